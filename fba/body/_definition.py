@@ -21,6 +21,8 @@ from fba.body.skeleton import MAX_JOINTS, Skeleton
 from fba.errors import ModelError
 from fba.source import Path, read_whole
 
+MAX_BYTES = 1 << 24
+"""Largest file of a definition: 4096 joints take less than 1 MB."""
 PROFILES = ("simple", "calibration", "predictable")
 
 
@@ -45,7 +47,8 @@ class BodyDefinition:
                 or not all(map(_finite, centre))
             ):
                 raise ModelError(
-                    f"BodyDefinition: the centre of {name!r} must be 3 finite numbers, not {centre!r}"
+                    f"BodyDefinition: the centre of {str(name)[:60]!r} must be 3 finite numbers, "
+                    f"not {_short(centre)}"
                 )
 
     @classmethod
@@ -57,8 +60,11 @@ class BodyDefinition:
         where its content is different.
         """
         file = os.fspath(path) if isinstance(path, str | os.PathLike) else "the file"
+        data = read_whole(path)
+        if len(data) > MAX_BYTES:
+            raise ModelError(f"{file}: is {len(data)} bytes long, more than the {MAX_BYTES} that are read")
         try:
-            document = json.loads(read_whole(path))
+            document = json.loads(data)
         except (ValueError, RecursionError) as error:
             raise ModelError(f"{file}: is no JSON: {error}") from None
         joints = document.get("joints") if isinstance(document, dict) else None
@@ -179,4 +185,18 @@ def _extent(positions: Float64) -> float:
 
 
 def _finite(value: object) -> bool:
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
+
+
+def _short(value: object) -> str:
+    """Return a value as the text of an error shows it."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python writes no number of more than 4300 digits
+        text = "a huge number"
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -15,6 +15,7 @@ from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import checked_weights
 from fba.errors import ModelError
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh.meshes import Material, Meshes, join_rows, mesh_arrays
 
 if TYPE_CHECKING:
@@ -132,15 +133,16 @@ class BodyModel(Meshes[BodyPart]):
         return default()
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> BodyModel:
+    def load(cls, path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LIMITS) -> BodyModel:
         """Return a body from a glTF 2.0 file as `save` writes it.
 
         Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
-        damaged, contradicts itself, or lacks the extension FBA_body.
+        damaged, contradicts itself, or lacks the extension FBA_body; LimitError where it takes more memory
+        than the limits allow.
         """
         from fba.body.storage import load
 
-        return load(path)
+        return load(path, limits)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the body as a skinned glTF 2.0 mesh (.glb): whole or not at all.

@@ -23,6 +23,7 @@ from fba.gltf.part_materials import PartWriter, read_material
 from fba.gltf.scene import Gltf, Primitive
 from fba.gltf.values import Value, locating_errors, optional_member
 from fba.gltf.writer import Builder
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
 NAME = "FBA_body"
@@ -111,15 +112,16 @@ def _quaternions(turns: Float64) -> Float64:
     return quaternions
 
 
-def load(path: Path) -> BodyModel:
+def load(path: Path, limits: Limits = DEFAULT_LIMITS) -> BodyModel:
     """Return the body model in a .glb (or .gltf) file as `save` writes it.
 
     Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
-    damaged, contradicts itself, or lacks the extension FBA_body.
+    damaged, contradicts itself, or lacks the extension FBA_body, LimitError where it takes more memory than
+    the limits allow.
     """
     from fba.gltf.document import open_document
 
-    return read_body(open_document(path))
+    return read_body(open_document(path, limits))
 
 
 def read_body(document: Document) -> BodyModel:

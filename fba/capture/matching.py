@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
+from itertools import islice
 
 from fba.body.skeleton import ROOT, Skeleton
 from fba.errors import ModelError, Remedy
@@ -21,6 +22,8 @@ REQUIRED = (ROOT,)
 """Joints that every source must have."""
 FEWEST = 5
 """Least number of names by which a family fits."""
+PREFIX_LENGTH, PREFIX_MARKS = 100, 8
+"""Most characters, and separators, of a shared prefix: "Scene|Bob_Rig|mixamorig:"."""
 PREFIX_NAMES = 8
 """How many of the first names are tried as beginning of the others: "Bip01", "Bip01 Pelvis"."""
 
@@ -83,7 +86,8 @@ def _shared_prefixes(names: Sequence[str]) -> list[str]:
     """Return the prefixes that at least half of the names share: up to a separator, or a full name."""
     counts: Counter[str] = Counter()
     for name in names:
-        counts.update({name[: mark.end()] for mark in re.finditer(r"[_ .|-]+", name)})
+        marks = re.finditer(r"[_ .|-]+", name[:PREFIX_LENGTH])
+        counts.update({name[: mark.end()] for mark in islice(marks, PREFIX_MARKS)})
     counts.update({name: sum(n.startswith(name) for n in names) for name in names[:PREFIX_NAMES]})
     many = [prefix for prefix, count in counts.items() if 2 * count >= len(names) > 1]
     return sorted(many, key=len)

@@ -86,7 +86,9 @@ class SkeletonMotion:
         rate = Fraction(rate)
         if rate <= 0:
             raise ValueError(f"resample: the frame rate must be positive, not {rate}")
-        if rate == self.rate or not len(self):
+        if rate == self.rate:
+            return self
+        if not len(self):
             return replace(self, rate=rate)
         ratio = self.rate / rate
         count = (len(self) - 1) * ratio.denominator // ratio.numerator + 1

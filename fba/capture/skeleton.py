@@ -17,12 +17,15 @@ from fba.capture import _standard_skeleton as standard_skeleton
 from fba.capture import matching, retarget
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FbaWarning, ModelError
+from fba.limits import DEFAULT_LIMITS, Limits
 
 ORIGINS = ("source", "start", "middle")
 GROUNDS = ("floor", "source", "none")
 SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spines.GROUPS}
 MOST_FRAMES = 500_000
-"""More than an hour at 120 frames/s; retargeting needs about 20 kB for each frame."""
+"""More than an hour at 120 frames/s."""
+FRAME_BYTES, JOINT_BYTES = 3000, 110
+"""Memory that retargeting takes for each frame, and for each joint of the source in it."""
 LIMBS = tuple(
     tuple(f"{side}_{joint}" for joint in chain)
     for side in "lr"
@@ -42,6 +45,7 @@ def from_skeleton(
     plant: bool = True,
     spine: str | int = "spread",
     solver: BapSolver | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the BAPs of a captured motion: a body track that sends the BAPs of the joints that were found.
 
@@ -70,8 +74,11 @@ def from_skeleton(
     joint for joint, wherever its feet are: ground has no effect, and spine only if it is "simple", "full" or
     a number.
 
+    limits: what a motion may need at another rate, see `fba.Limits`.
+
     Raises ModelError if no family of names fits, the root of the solver's skeleton is not HumanoidRoot, the
-    source has no size or there are more than 500,000 frames, ValueError for a bad option or joint name. Warns
+    source has no size or there are more than 500,000 frames, LimitError for more than the limits allow,
+    ValueError for a bad option or joint name. Warns
     (FbaWarning) of missing joints of a limb: they stay in the default posture.
     `fba.capture.retarget_report` measures how close the result comes.
     """
@@ -86,7 +93,10 @@ def from_skeleton(
             f"the motion has {frames} frames at {float(rate):g} frames/s, more than {MOST_FRAMES}; "
             "cut it into pieces, or give a lower rate"
         )
-    motion = motion.resample(rate)
+    if frames > len(motion):
+        own_bytes = motion.rotations.nbytes + motion.positions.nbytes
+        check_memory(limits, frames, len(motion.names), f"the motion at {float(rate):g} frames/s", own_bytes)
+    motion = motion.resample(rate, limits=limits)
     if origin not in ORIGINS:
         raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {origin!r}")
     if ground not in GROUNDS:
@@ -127,3 +137,12 @@ def from_skeleton(
 
     track = solve_track(solver, turned, len(root), matrices)
     return Animation(motion.rate, np.arange(len(root)), None, track, motion.name)
+
+
+def check_memory(limits: Limits, frames: int, joints: int, what: str, source: int) -> None:
+    """Raise LimitError if the retargeting of a motion would take more than the limits allow.
+
+    what: "the motion". source: bytes of the file, or the part of it, that the motion comes from.
+    """
+    limits.check_frames(frames, what)
+    limits.check_bytes(frames * (FRAME_BYTES + JOINT_BYTES * joints), what, source=source)

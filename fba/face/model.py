@@ -17,6 +17,7 @@ from fba.face.expressions import Definitions
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, row_of
 from fba.face.tables import HEAD, FaceDefTables
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh.meshes import Material, Meshes, mesh_arrays
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 
@@ -116,15 +117,16 @@ class FaceModel(Meshes[Part]):
         return default()
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> FaceModel:
+    def load(cls, path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LIMITS) -> FaceModel:
         """A face from a glTF 2.0 file (.glb or .gltf) with the FBA extension, as `save` writes it.
 
         Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
-        damaged, contradicts itself, or lacks the extension.
+        damaged, contradicts itself, or lacks the extension; LimitError where it takes more memory than the
+        limits allow.
         """
         from fba.face.gltf.storage import load
 
-        return load(path)
+        return load(path, limits)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the face as glTF 2.0 (.glb), atomically."""

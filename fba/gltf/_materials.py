@@ -72,6 +72,7 @@ class _Pictures:
             data = bytes(view)
         else:
             data = self.document.resource(uri)
+            self.document.budget.add_source(len(data))
             self.document.budget.charge(len(data), entry)
         if media_type(data) is None:
             self._warn(entry, "is neither PNG nor JPEG")

@@ -8,7 +8,7 @@ import json
 import os
 import re
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 from urllib.parse import unquote
@@ -16,13 +16,14 @@ from urllib.parse import unquote
 from fba.errors import FbaError, ModelError
 from fba.gltf import _glb as glb
 from fba.gltf.values import Budget, Value
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
 from fba.source import Path, open_source
 
 MAX_JSON = 64 << 20
 """Longest JSON text, in bytes; geometry belongs in buffers."""
-MAX_UNPACKED = 1 << 30
-"""Most bytes that the arrays and objects of one file may take together."""
+JSON_BYTES = {b"{": 240, b"[": 72, b",": 8, b'"': 30}
+"""Memory that the parsed JSON takes for each of these characters."""
 MAX_ITEMS = 1 << 18
 """Most entries of one list of a document."""
 
@@ -36,7 +37,7 @@ class Document:
     root: Value
     buffers: tuple[memoryview, ...]
     folder: str | None
-    budget: Budget = field(default_factory=lambda: Budget(MAX_UNPACKED))
+    budget: Budget
 
     def entries(self, key: str) -> list[Value]:
         """Return the entries of one of the document's lists, e.g. "meshes"."""
@@ -68,14 +69,21 @@ class Document:
         return _beside(uri, self.folder, most)
 
 
-def open_document(path: Path) -> Document:
-    """Open a .glb or .gltf file. Raises FormatError where it cannot be read, ModelError for its content."""
+def open_document(path: Path, limits: Limits = DEFAULT_LIMITS) -> Document:
+    """Open a .glb or .gltf file.
+
+    Raises FormatError where it cannot be read, ModelError for its content, LimitError where that takes more
+    memory than the limits allow; so does everything that is read from the document later.
+    """
     name = os.fspath(path)
     data = _content(name, glb.MAX_BYTES)
-    return parse_document(data, os.path.basename(name) or name, os.path.dirname(os.path.abspath(name)))
+    folder = os.path.dirname(os.path.abspath(name))
+    return parse_document(data, os.path.basename(name) or name, folder, limits)
 
 
-def parse_document(data: bytes, file: str, folder: str | None = None) -> Document:
+def parse_document(
+    data: bytes, file: str, folder: str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> Document:
     """Return a document from bytes. file: name for messages. folder: of the files that it names, or None."""
     binary: memoryview | None = None
     text = memoryview(data)
@@ -84,29 +92,34 @@ def parse_document(data: bytes, file: str, folder: str | None = None) -> Documen
     elif data[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
         kind = recognition_hint(data[:HEAD_BYTES])
         raise ModelError(f"{file}: is not glTF 2.0: neither a .glb container nor the JSON of a .gltf{kind}")
-    root = Value(parse_json(text, file), file)
+    root = Value(parse_json(text, file, limits), file)
     asset = root.member("asset")
     version = asset.member("version").text(100)
     if not re.fullmatch(r"2\.\d+", version):
         raise asset.member("version").error(f"is {version!r}; only glTF 2 is read")
-    opened = Document(root, (), folder)
+    opened = Document(root, (), folder, Budget(limits, len(data)))
     buffers: list[memoryview] = []
     for number, entry in enumerate(opened.entries("buffers")):
         buffers.append(_buffer(opened, entry, binary if number == 0 else None))
     return Document(root, tuple(buffers), folder, opened.budget)
 
 
-def parse_json(text: memoryview, file: str) -> Any:
-    """Return the JSON object in UTF-8 text; ModelError where it is none, too long or nested too deeply."""
+def parse_json(text: memoryview, file: str, limits: Limits = DEFAULT_LIMITS) -> Any:
+    """Return the JSON object in UTF-8 text.
+
+    Raises ModelError where it is none, too long or nested too deeply, LimitError where it takes more memory
+    than the limits allow: a list of empty lists takes many times its text.
+    """
     if len(text) > MAX_JSON:
         raise ModelError(
             f"{file}: {len(text)} bytes of JSON, more than the {MAX_JSON} that are read; "
             "keep geometry and pictures in a .glb or in files of their own"
         )
+    raw = bytes(text)
+    memory = sum(raw.count(mark) * size for mark, size in JSON_BYTES.items())
+    limits.check_bytes(memory, f"{file}: its JSON", source=len(text))
     try:
-        data = json.loads(
-            bytes(text).decode("utf-8-sig"), parse_constant=_refuse_constant, object_pairs_hook=_unique
-        )
+        data = json.loads(raw.decode("utf-8-sig"), parse_constant=_refuse_constant, object_pairs_hook=_unique)
     except RecursionError:
         raise ModelError(f"{file}: the JSON is nested too deeply; glTF never needs that") from None
     except UnicodeDecodeError as error:
@@ -141,6 +154,7 @@ def _buffer(document: Document, entry: Value, binary: memoryview | None) -> memo
         if not (isinstance(uri.data, str) and uri.data.startswith("data:")):
             document.budget.charge(length, entry)
         content = memoryview(document.resource(uri, length))
+        document.budget.add_source(len(content))
     if len(content) < length:
         raise entry.error(f"should have {length} bytes, but has only {len(content)}; was it fully copied?")
     return content[:length]

@@ -16,6 +16,7 @@ from fba.gltf._meshes import read_meshes
 from fba.gltf.document import Document, open_document
 from fba.gltf.nodes import read_nodes, read_roots, read_skins
 from fba.gltf.scene import Gltf
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
 PACKED = {
@@ -28,15 +29,15 @@ KNOWN = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual"
 """Extensions that a file may require: they are read, or do not change shapes."""
 
 
-def read_gltf(path: Path) -> Gltf:
+def read_gltf(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> Gltf:
     """Return the content of a .glb or .gltf file.
 
     Buffers and pictures may be in the file, in data URIs, or in files in the same folder or below it. Points,
     lines, and pictures that are neither PNG nor JPEG are left out with an FbaWarning. FormatError where the
     file cannot be opened; ModelError, which names the place in the document, where it is damaged, too large,
-    or requires an unknown extension.
+    or requires an unknown extension; LimitError where it takes more memory than the limits allow.
     """
-    return read_document(open_document(path))
+    return read_document(open_document(path, limits))
 
 
 def read_document(document: Document) -> Gltf:
@@ -58,6 +59,7 @@ def read_document(document: Document) -> Gltf:
         order=order,
         document=document.root,
         accessors=accessors,
+        budget=document.budget,
     )
 
 

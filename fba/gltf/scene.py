@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from fba.arrays import Float32, Float64, Int32
 from fba.gltf._accessors import Accessors
-from fba.gltf.values import Value
+from fba.gltf.values import Budget, Value
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,8 @@ class Gltf:
     """The content of a glTF file.
 
     roots: nodes at the top of the default scene. order: all nodes, parents first. document: the JSON,
-    accessors: the arrays, both for extensions and extras. Lengths are metres, +y is up, models face +z.
+    accessors: the arrays, both for extensions and extras. budget: of the memory. Lengths are metres, +y is
+    up, models face +z.
     """
 
     file: str
@@ -132,12 +133,14 @@ class Gltf:
     order: tuple[int, ...]
     document: Value
     accessors: Accessors
+    budget: Budget
 
     def shown(self) -> tuple[int, ...]:
         """Return the nodes of the default scene, parents first."""
         inside: set[int] = set()
+        roots = set(self.roots)
         for number in self.order:
             parent = self.nodes[number].parent
-            if number in self.roots or (parent is not None and parent in inside):
+            if number in roots or (parent is not None and parent in inside):
                 inside.add(number)
         return tuple(number for number in self.order if number in inside)

@@ -10,9 +10,11 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import FbaWarning
-from fba.gltf.document import MAX_UNPACKED
 from fba.gltf.scene import Gltf, Material, Node, Primitive
-from fba.gltf.values import Budget
+from fba.mesh.names import UniqueNames
+
+SURFACE_BYTES = 2500
+"""Memory of a surface, whatever its number of vertices."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +43,13 @@ class Surface:
 def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
     """Return every surface of the default scene, parents first.
 
-    Raises ModelError where they take more than 1 GiB together, as a mesh that is shown a million times does.
+    Raises LimitError where they take more memory than the limits of `gltf` allow, as a mesh that is shown
+    a million times does.
     """
-    budget = Budget(MAX_UNPACKED)
+    budget = gltf.budget.copy()
     result: list[Surface] = []
-    names: set[str] = set()
+    names = UniqueNames()
+    of_skins: dict[int, Float64] = {}
     for number in gltf.shown():
         node = gltf.nodes[number]
         if node.mesh is None:
@@ -55,27 +59,23 @@ def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
             moving = sum(morph is not None for morph in primitive.morphs)
             # float64 positions and normals; with a skin, a matrix for each vertex
             each = 200 + 12 * moving + (0 if node.skin is None else 600)
-            budget.charge(len(primitive.positions) * each, gltf.document)
-            name = _unique(node.name if not node.name.startswith("node ") else mesh.name, names)
+            budget.charge(SURFACE_BYTES + len(primitive.positions) * each, gltf.document)
+            name = names(node.name if not node.name.startswith("node ") else mesh.name)
             with np.errstate(all="ignore"):  # overflow is detected at the end
-                result.append(_surface(gltf, node, number, primitive, mesh.morph_names, name))
+                result.append(_surface(gltf, number, primitive, mesh.morph_names, name, of_skins))
     return tuple(result)
 
 
-def _unique(name: str, taken: set[str]) -> str:
-    """Return the name, with a number where it is taken, and add it to those taken."""
-    unique, count = name, 1
-    while unique in taken:
-        count += 1
-        unique = f"{name} {count}"
-    taken.add(unique)
-    return unique
-
-
 def _surface(
-    gltf: Gltf, node: Node, number: int, primitive: Primitive, names: tuple[str, ...], name: str
+    gltf: Gltf,
+    number: int,
+    primitive: Primitive,
+    names: tuple[str, ...],
+    name: str,
+    of_skins: dict[int, Float64],
 ) -> Surface:
-    matrices = _frames(gltf, node, primitive)
+    """Return the surface of a node's primitive. of_skins: see `_frames`."""
+    matrices = _frames(gltf, gltf.nodes[number], primitive, of_skins)
     linear = matrices[..., :3, :3]
     positions = _moved(linear, primitive.positions) + matrices[..., :3, 3]
     morphs = {
@@ -105,12 +105,18 @@ def _surface(
     )
 
 
-def _frames(gltf: Gltf, node: Node, primitive: Primitive) -> Float64:
-    """Return the node's matrix, float64 (4, 4), or one for each vertex of a skin, (V, 4, 4)."""
+def _frames(gltf: Gltf, node: Node, primitive: Primitive, of_skins: dict[int, Float64]) -> Float64:
+    """Return the node's matrix, float64 (4, 4), or one for each vertex of a skin, (V, 4, 4).
+
+    of_skins: matrices of the joints of each skin, computed once: many nodes may have the same.
+    """
     if node.skin is None or primitive.joints is None or primitive.weights is None:
         return node.world
-    skin = gltf.skins[node.skin]
-    joints = np.stack([gltf.nodes[joint].world for joint in skin.joints]) @ skin.inverse_bind
+    if node.skin not in of_skins:
+        skin = gltf.skins[node.skin]
+        worlds = np.stack([gltf.nodes[joint].world for joint in skin.joints])
+        of_skins[node.skin] = worlds @ skin.inverse_bind
+    joints = of_skins[node.skin]
     total = primitive.weights.sum(axis=1, dtype=np.float64)
     carried = total > 0
     matrices = np.zeros((len(primitive.positions), 4, 4))

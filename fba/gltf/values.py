@@ -8,25 +8,37 @@ from collections.abc import Iterator
 from typing import Any
 
 from fba.errors import ModelError
+from fba.limits import Limits
 
 MAX_TEXT = 1 << 16
 """Most characters of a text; names and notes are far shorter."""
 
 
 class Budget:
-    """The memory that reading one file may still use, so that a small file cannot exhaust it."""
+    """Counts the memory that the content of one file takes, so that a small file cannot exhaust it.
 
-    def __init__(self, left: int) -> None:
-        self._left = self._all = left
+    limits: how much that may be. source: bytes of the file, and of the files that it names.
+    """
+
+    def __init__(self, limits: Limits, source: int) -> None:
+        self._limits, self._source = limits, source
+        self._used = 0
 
     def charge(self, amount: int, where: Value) -> None:
-        """Take `amount` bytes, before they are allocated; ModelError where that is too much."""
-        self._left -= max(amount, 256)  # even an empty array or object takes this much
-        if self._left < 0:
-            raise where.error(
-                f"the file unpacks to more than {self._all >> 20} MiB, the most that is read; "
-                "is it damaged? If not, make it smaller"
-            )
+        """Count `amount` bytes, before they are allocated; LimitError where that is too much."""
+        self._used += max(amount, 256)  # even an empty array or object takes this much
+        place = f"{where.file}: {where.path}" if where.path else where.file
+        self._limits.check_bytes(self._used, f"{place}: what the file unpacks to", source=self._source)
+
+    def add_source(self, size: int) -> None:
+        """Count the bytes of another file that the file names."""
+        self._source += size
+
+    def copy(self) -> Budget:
+        """Return a budget with the same used, for one of several things that are made of the file."""
+        copied = Budget(self._limits, self._source)
+        copied._used = self._used
+        return copied
 
 
 class Value:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from pathlib import Path
 
 from fba.errors import FbaWarning, ModelError
 from fba.mesh.meshes import Material
@@ -15,14 +16,39 @@ PICTURES = (b"\x89PNG", b"\xff\xd8\xff")
 """How PNG and JPEG files begin."""
 
 
-def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
+class Pictures:
+    """Reads the pictures that .mtl files name, each once, however many materials name it."""
+
+    def __init__(self) -> None:
+        self._known: dict[Path, bytes] = {}
+
+    def read(self, file: os.PathLike[str], name: str, where: str) -> bytes:
+        """Return the PNG or JPEG of this name beside a file; b"" with an FbaWarning where it is neither.
+
+        where: the line that names it.
+        """
+        path = find_beside(file, name)
+        if path is None:
+            warnings.warn(f"{where}: the picture {name!r} does not lie beside it", FbaWarning, stacklevel=5)
+            return b""
+        if path not in self._known:
+            self._known[path] = _picture(path, where)
+        return self._known[path]
+
+
+def read_mtl(
+    path: str | os.PathLike[str], library: str, pictures: Pictures | None = None
+) -> dict[str, Material]:
     """Return materials by name of an .mtl file that lies beside an OBJ file; none where it is missing.
+
+    pictures: those that were read before.
 
     Kd is the colour (sRGB, as writers put it there), Ns the shine, map_Kd the picture: PNG or JPEG
     beside the file, others are left out with an FbaWarning. Raises ModelError naming the line.
     """
     file = find_beside(path, library)
     materials: dict[str, Material] = {}
+    pictures = Pictures() if pictures is None else pictures
     if file is None:
         warnings.warn(f"{path}: its materials {library!r} do not lie beside it", FbaWarning, stacklevel=4)
         return materials
@@ -45,22 +71,18 @@ def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
         elif tokens[0] == "Ns":
             rough = max(0.05, (2.0 / (max(parse_number(tokens[1], where, "Ns"), 0.0) + 2.0)) ** 0.25)
         elif tokens[0] == "map_Kd":
-            picture = _picture(file, tokens[-1], where)
+            picture = pictures.read(file, tokens[-1], where)
     finish()
     return materials
 
 
-def _picture(file: os.PathLike[str], name: str, where: str) -> bytes:
-    path = find_beside(file, name)
-    if path is None:
-        warnings.warn(f"{where}: the picture {name!r} does not lie beside it", FbaWarning, stacklevel=5)
-        return b""
+def _picture(path: Path, where: str) -> bytes:
     try:
         content = read_bytes(path, MAX_PICTURE)
     except ModelError as error:
         warnings.warn(f"{where}: {error}", FbaWarning, stacklevel=5)
         return b""
     if not content.startswith(PICTURES):
-        warnings.warn(f"{where}: {name!r} is neither PNG nor JPEG; left out", FbaWarning, stacklevel=5)
+        warnings.warn(f"{where}: {path.name!r} is neither PNG nor JPEG; left out", FbaWarning, stacklevel=5)
         return b""
     return content

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from array import array
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,6 +26,8 @@ MAX_BYTES = 1 << 30
 MAX_ASCII = 1 << 27
 """Largest file of ASCII numbers."""
 MAX_PROPERTIES = 200
+AT_ONCE = 65536
+"""Lists that are joined at once."""
 FACE_LISTS = ("vertex_indices", "vertex_index")
 NAMES_S, NAMES_T = ("s", "u", "texture_u"), ("t", "v", "texture_v")
 
@@ -93,6 +96,27 @@ def _read_property(tokens: list[str], where: str) -> tuple[str, str, str]:
             raise ModelError(f"{where}: the length of a list cannot be a fraction")
         return tokens[4], TYPES[tokens[3]], TYPES[tokens[2]]
     raise ModelError(f"{where}: {' '.join(tokens)[:60]!r} is no property that is known")
+
+
+class _Lists:
+    """Lists of numbers, joined now and then: an array takes far more memory than the few numbers in it."""
+
+    def __init__(self) -> None:
+        self._starts = array("q", [0])
+        self._blocks: list[Float64] = []
+        self._last: list[Float64] = []
+
+    def append(self, numbers: Float64) -> None:
+        """Add a list."""
+        self._starts.append(self._starts[-1] + len(numbers))
+        self._last.append(numbers)
+        if len(self._last) == AT_ONCE:
+            self._blocks.append(np.concatenate(self._last))
+            self._last = []
+
+    def joined(self) -> tuple[Int64, Float64]:
+        """Return where each list starts, int64 (lists + 1,), and all numbers."""
+        return np.array(self._starts), np.concatenate([np.zeros(0), *self._blocks, *self._last])
 
 
 @dataclass
@@ -175,7 +199,7 @@ class _Reader:
         even = self._even_lists(element) if self.order and element.count else None
         if even is not None:
             return {}, even
-        rows_of: dict[str, list[Float64]] = {n: [] for n, _, length in element.properties if length}
+        lists_of = {name: _Lists() for name, _, length in element.properties if length}
         total = 0
         for number in range(element.count):
             for name, kind, length in element.properties:
@@ -190,11 +214,10 @@ class _Reader:
                     )
                 count = int(given)
                 total += count
-                rows_of[name].append(self._take(kind, count, element, number))
+                lists_of[name].append(self._take(kind, count, element, number))
         lists = {}
-        for name, rows in rows_of.items():
-            starts = np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
-            values = np.concatenate(rows) if rows else np.zeros(0)
+        for name, rows in lists_of.items():
+            starts, values = rows.joined()
             if name in FACE_LISTS and not (np.abs(values) < 2**53).all():
                 raise ModelError(f"{self.path}: {element.name[:20]}: an index is not a whole number")
             lists[name] = (starts, np.nan_to_num(values).astype(np.int64))

@@ -11,8 +11,9 @@ from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
 from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_lines
 
-TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}]|[^\s,\[\]{}"]+')
-STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
+# Possessive (*+): a pattern that may take characters back remembers a place for each.
+TOKEN = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[\]{}]|[^\s,\[\]{}"]++')
+STRING = re.compile(r'"(?:[^"\\]|\\.)*+"')
 LISTS = ("point", "coordIndex", "texCoordIndex")
 
 

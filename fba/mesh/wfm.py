@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from array import array
 from collections.abc import Iterator
 
 import numpy as np
@@ -20,17 +21,18 @@ def read_wfm(path: str | os.PathLike[str]) -> Polygons:
     """
     name = os.fspath(path)
     rows = read_words(name)
-    vertices = _table(rows, name, "vertices", MAX_VERTICES)
-    faces = _table(rows, name, "faces", MAX_FACES)
-    positions = np.array(
-        [[parse_number(t, where, "a coordinate") for t in tokens] for where, tokens in vertices]
-    )
-    corners = np.array(
-        [[parse_integer(t, where, "a vertex") for t in tokens] for where, tokens in faces], dtype=np.int64
-    )
-    for (where, _), triangle in zip(faces, corners, strict=True):
-        if triangle.min() < 0 or triangle.max() >= len(positions):
-            raise ModelError(f"{where}: vertex {triangle.max()} does not exist; there are {len(positions)}")
+    numbers = array("d")
+    for where, tokens in _table(rows, name, "vertices", MAX_VERTICES):
+        numbers.extend(parse_number(token, where, "a coordinate") for token in tokens)
+    positions = np.array(numbers).reshape(-1, 3)
+    indices = array("q")
+    for where, tokens in _table(rows, name, "faces", MAX_FACES):
+        triangle = [parse_integer(token, where, "a vertex") for token in tokens]
+        wrong = next((vertex for vertex in triangle if not 0 <= vertex < len(positions)), None)
+        if wrong is not None:
+            raise ModelError(f"{where}: vertex {wrong} does not exist; there are {len(positions)}")
+        indices.extend(triangle)
+    corners = np.array(indices).reshape(-1, 3)
     return Polygons(
         positions,
         np.arange(len(corners) + 1, dtype=np.int32) * 3,
@@ -43,20 +45,18 @@ def read_wfm(path: str | os.PathLike[str]) -> Polygons:
 
 def _table(
     rows: Iterator[tuple[str, list[str]]], path: str, what: str, most: int
-) -> list[tuple[str, list[str]]]:
-    """Return a count, then as many rows of three."""
+) -> Iterator[tuple[str, list[str]]]:
+    """Read a count, then yield as many rows of three words, with their places."""
     where, tokens = next(rows, (path, []))
     if len(tokens) != 1:
         raise ModelError(f"{where}: the number of {what} is expected here, alone on its line")
     count = parse_integer(tokens[0], where, f"the number of {what}")
     if not 1 <= count <= most:
         raise ModelError(f"{where}: {count} {what}; a face has 1 to {most}")
-    table: list[tuple[str, list[str]]] = []
-    for _ in range(count):
+    for number in range(count):
         where, tokens = next(rows, (path, []))
         if not tokens:
-            raise ModelError(f"{path}: ends after {len(table)} of {count} {what}")
+            raise ModelError(f"{path}: ends after {number} of {count} {what}")
         if len(tokens) != 3:
             raise ModelError(f"{where}: three numbers are expected of each of the {what}, not {len(tokens)}")
-        table.append((where, tokens))
-    return table
+        yield where, tokens

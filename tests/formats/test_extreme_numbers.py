@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fba
-from fba.errors import FbaError, FormatError, ModelError
+from fba.errors import FbaError, FormatError, LimitError, ModelError
 from fba.face.importers.points.points_file import read_points
 from fba.formats.bvh.reader import read_motion
 from fba.mesh.ply import read_ply
@@ -108,11 +108,11 @@ def test_joints_without_channels_in_many_frames(tmp_path: Path) -> None:
     closing = "}\n" * 900
     frames = rest.replace("Frames: 1", "Frames: 20000").replace("\n0 0 0\n", "\n" + "0 0 0\n" * 20_000)
     path.write_text(f"{head}{joints}End Site{end[:-3]}{closing}}}\nMOTION{frames}")
-    with pytest.raises(FormatError, match=r"a\.bvh: 901 joints in 20000 frames, but only 3 channels"):
+    with pytest.raises(LimitError, match=r"a\.bvh: a motion of 901 joints, .* and 20000 frames takes"):
         read_motion(path)
 
 
-@pytest.mark.parametrize("rate", [1_000_001, 537_000_000])
+@pytest.mark.parametrize("rate", [1, 999, 1_000_001, 537_000_000])
 def test_a_sound_of_a_rate_that_no_device_has(tmp_path: Path, rate: int) -> None:
     pytest.importorskip("av")
     from fba_player.sound.audio_file import SoundFile
@@ -123,7 +123,7 @@ def test_a_sound_of_a_rate_that_no_device_has(tmp_path: Path, rate: int) -> None
         file.setsampwidth(1)
         file.setframerate(rate)
         file.writeframes(bytes(1000))
-    with pytest.raises(FormatError, match=f"says {rate} samples a second; 1 to 1000000 are read"):
+    with pytest.raises(FormatError, match=f"says {rate} samples a second; 1000 to 1000000 are read"):
         SoundFile(path)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fba.errors import ModelError
+from fba.errors import LimitError, ModelError
 from fba.gltf import read_gltf, surfaces
 from gltf_documents import Sheet
 
@@ -88,7 +88,7 @@ def test_a_mesh_shown_too_often_is_refused(tmp_path: Path) -> None:
     sheet.show({"attributes": {"POSITION": sheet.array(corners)}, "indices": sheet.array([0, 1, 2], "u2")})
     sheet.json["nodes"] *= 1000
     gltf = read_gltf(sheet.save(tmp_path / "a.glb"))
-    with pytest.raises(ModelError, match="unpacks to more than 1024 MiB"):
+    with pytest.raises(LimitError, match="what the file unpacks to takes"):
         surfaces(gltf)
 
 

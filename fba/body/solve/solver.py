@@ -206,7 +206,9 @@ def solve_track(
         previous = values[block][-1]
     sent = np.zeros(BAP_COUNT, dtype=bool)
     sent[[bap.number - 1 for bap in baps() if bap.joint in joints]] = True
-    return BodyTrack(wrapped(values), np.broadcast_to(sent, values.shape))
+    values = wrapped(values)
+    values.flags.writeable = False  # so that the track need not copy it
+    return BodyTrack(values, np.broadcast_to(sent, values.shape))
 
 
 def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> Int32:

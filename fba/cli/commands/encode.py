@@ -165,7 +165,7 @@ def command(
         settings["clamp"] = bool(captures)
     table = settings["bap_steps"]
     with Progress("encoding", None):
-        coded = _encode(animation, settings) if epf is None else _encode_as_epf(epf, animation, table)
+        coded = _encode(animation, settings) if epf is None else _encode_as_epf(epf, animation, table, limit)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
     if as_json:
@@ -197,13 +197,13 @@ def _encode(animation: Animation, settings: Mapping[str, Any]) -> _Encoded:
     )
 
 
-def _encode_as_epf(epf: Path, animation: Animation, bap_steps: str) -> _Encoded:
+def _encode_as_epf(epf: Path, animation: Animation, bap_steps: str, limits: Limits) -> _Encoded:
     """Return the stream of an animation, coded plane by plane as an EPF file says."""
     from fba.codec import encode_planes
     from fba.formats.epf.epf import read_epf
 
     with input_file(epf) as file:
-        planes = read_epf(file)
+        planes = read_epf(file, limits=limits)
     data = encode_planes(animation, planes, bap_steps=bap_steps)
     quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
     return _Encoded(data, len(planes), sum(plane.intra for plane in planes), 0, quant)

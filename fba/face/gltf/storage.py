@@ -16,17 +16,19 @@ from fba.face.tables import HEAD
 from fba.gltf.document import open_document
 from fba.gltf.part_materials import PartWriter
 from fba.gltf.writer import Builder
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import faps
 from fba.source import Path
 
 
-def load(path: Path) -> FaceModel:
+def load(path: Path, limits: Limits = DEFAULT_LIMITS) -> FaceModel:
     """Read a face model from a .glb (or .gltf) file, as `save` writes it.
 
     Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
-    damaged, contradicts itself, or lacks the extension FBA_face.
+    damaged, contradicts itself, or lacks the extension FBA_face, LimitError where it takes more memory than
+    the limits allow.
     """
-    return read_model(open_document(path))
+    return read_model(open_document(path, limits))
 
 
 def save(model: FaceModel, path: Path) -> None:

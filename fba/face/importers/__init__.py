@@ -9,6 +9,7 @@ from pathlib import Path
 from fba.errors import OptionError
 from fba.face.importers._sniffing import KINDS, sniff
 from fba.face.model import FaceModel
+from fba.limits import DEFAULT_LIMITS, Limits
 
 __all__ = ["KINDS", "import_model"]
 
@@ -22,6 +23,7 @@ def import_model(
     up: str = "y",
     kinds: Mapping[str, str] | None = None,
     name: str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> FaceModel:
     """A face model from a file that knows nothing of FAPs, with tables for all FAPs that it can serve.
 
@@ -31,7 +33,8 @@ def import_model(
     are read from a file of the mesh's name beside it (.points.csv, .points.json, .fdp), or located by the
     shapes of a glTF head. unit: metres per unit, by default judged by the distance of the pupils. up: the
     file's vertical axis, "y" or "z". kinds: kind of part ("none" to leave it out) by the name of a group,
-    object, mesh or material, where that name does not say. name: of the model.
+    object, mesh or material, where that name does not say. name: of the model. limits: of a glTF head, see
+    `fba.Limits`.
 
     Raises ModelError for a file that is damaged, unknown (it lists what is read) or lacks what a face
     needs; OptionError for options that do not fit. FAPs that cannot be served are in `lost`.
@@ -48,7 +51,7 @@ def import_model(
         return import_makehuman(path, name=name or "MakeHuman")
     from fba.face.importers.assembly.model import ImportOptions
 
-    options = ImportOptions(path, name or Path(path).stem or "face", unit, up, kinds)
+    options = ImportOptions(path, name or Path(path).stem or "face", unit, up, kinds, limits)
     if form == "fdp":
         from fba.face.importers._fdp import import_fdp
 

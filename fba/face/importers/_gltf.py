@@ -12,10 +12,11 @@ from fba.arrays import Float32
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
-from fba.face.importers.assembly.pieces import assemble, unused_name
+from fba.face.importers.assembly.pieces import assemble, part_names
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.points.points_file import given_points, points_beside
 from fba.face.model import FaceModel, Material, Part
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh.text_files import MAX_VERTICES
 
 EXTENSION = "FBA_face"
@@ -30,9 +31,9 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
     points that are not given are located by them. Raises ModelError as `import_model`.
     """
     path = options.path
-    pieces, has_extension = gltf_pieces(path)
+    pieces, has_extension = gltf_pieces(path, options.limits)
     if has_extension and points is None:
-        return FaceModel.load(path)
+        return FaceModel.load(path, limits=options.limits)
     given = given_points(points) if points is not None else points_beside(Path(path), POINT_FILES)
     if given is None:
         from fba.face.importers.assembly.landmarks import find_points
@@ -52,7 +53,7 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
     return finish_import(pieces, positions, given.vertices, options)
 
 
-def gltf_pieces(path: str | os.PathLike[str]) -> tuple[list[Piece], bool]:
+def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -> tuple[list[Piece], bool]:
     """(every surface of a glTF file as a piece, whether the file is a face model of this project).
 
     Origins of vertices are counted through the pieces.
@@ -60,14 +61,14 @@ def gltf_pieces(path: str | os.PathLike[str]) -> tuple[list[Piece], bool]:
     from fba.gltf import read_gltf, surfaces
 
     try:
-        gltf = read_gltf(path)
+        gltf = read_gltf(path, limits=limits)
     except FormatError as error:
         raise ModelError(str(error)) from error
     extensions = gltf.document.get("extensions")
     is_own = extensions is not None and extensions.get(EXTENSION) is not None
     pieces: list[Piece] = []
     start = 0
-    taken: set[str] = set()
+    names_of_parts = part_names()
     for surface in surfaces(gltf):
         count = len(surface.positions)
         if start + count > MAX_VERTICES:
@@ -76,7 +77,7 @@ def gltf_pieces(path: str | os.PathLike[str]) -> tuple[list[Piece], bool]:
         if (own := surface.material) is not None:
             texture = None if surface.texcoords is None else own.texture
             material = Material(own.name, own.colour[:3], own.roughness, texture)
-        name = unused_name(surface.name or "mesh", taken)
+        name = names_of_parts(surface.name or "mesh")
         part = Part(
             name,
             "other",

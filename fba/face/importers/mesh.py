@@ -14,12 +14,12 @@ from fba.arrays import Float64
 from fba.errors import FbaWarning, ModelError, Remedy
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly.model import ImportOptions, finish_import
-from fba.face.importers.assembly.pieces import unused_name
+from fba.face.importers.assembly.pieces import part_names
 from fba.face.importers.assembly.polygon_parts import Piece, make_piece
 from fba.face.importers.points.fdp_data import repair_sides
 from fba.face.importers.points.points_file import GivenPoints, given_points, points_beside
 from fba.face.model import FaceModel, Material
-from fba.mesh.mtl import read_mtl
+from fba.mesh.mtl import Pictures, read_mtl
 from fba.mesh.obj import read_obj
 from fba.mesh.ply import read_ply
 from fba.mesh.polygons import Polygons
@@ -31,6 +31,10 @@ READERS: Mapping[str, Callable[[str | os.PathLike[str]], Polygons]] = {
     "ply": read_ply,
     "wfm": read_wfm,
 }
+MAX_PIECES = 1000
+"""Most groups and materials with polygons; a model has as many parts at most."""
+MAX_LIBRARIES = 100
+"""Most files of materials that one mesh may name."""
 FEWEST_PAIRS = 8
 """Fewest points with both a position and a vertex that show the unit of a file of points."""
 POINT_FILES = (".points.csv", ".points.json", ".fdp", ".csv", ".json")
@@ -48,20 +52,30 @@ def import_mesh(options: ImportOptions, form: str, points: object = None) -> Fac
             f"{path.stem}.points.csv with lines 'name,x,y,z' or 'name,vertex' (vertices count from 0), for "
             "instance '9.3,297' for the tip of the nose"
         ).with_remedies(Remedy("points", "or name their file with {}", "FILE"))
-    pieces = polygon_pieces(polygons, _materials(path) if form == "obj" else {})
+    pieces = polygon_pieces(polygons, _materials(path) if form == "obj" else {}, path)
     positions, vertices = _point_positions(polygons, given, os.fspath(path))
     return finish_import(pieces, positions, vertices, options)
 
 
-def polygon_pieces(polygons: Polygons, materials: Mapping[str, Material]) -> list[Piece]:
-    """A piece for each group and material of a mesh file; those without triangles are left out."""
+def polygon_pieces(
+    polygons: Polygons, materials: Mapping[str, Material], path: str | os.PathLike[str] = "the mesh"
+) -> list[Piece]:
+    """A piece for each group and material of a mesh file; those without triangles are left out.
+
+    path: named in the ModelError for more than `MAX_PIECES`.
+    """
     pieces = []
-    taken: set[str] = set()
-    for index, (group, material) in enumerate(polygons.groups):
+    names_of_parts = part_names()
+    solid = np.bincount(polygons.group, np.diff(polygons.starts) >= 3, len(polygons.groups)) > 0
+    if np.count_nonzero(solid) > MAX_PIECES:
+        raise ModelError(
+            f"{path}: {np.count_nonzero(solid)} groups and materials have polygons; at most {MAX_PIECES} "
+            "are read: join some, or export the head alone"
+        )
+    for index in np.flatnonzero(solid).tolist():
+        group, material = polygons.groups[index]
         faces = polygons.group == index
-        if not (np.diff(polygons.starts)[faces] >= 3).any():
-            continue
-        name = unused_name(group or material or "mesh", taken)
+        name = names_of_parts(group or material or "mesh")
         own = materials.get(material, Material(material or "plain"))
         pieces.append(replace(make_piece(polygons, faces, name, material=own), material=material))
     return pieces
@@ -134,8 +148,14 @@ def _in_unit_of_mesh(given: Float64, positions: Float64, bound: list[str], path:
 
 def _materials(path: str | os.PathLike[str]) -> dict[str, Material]:
     """The materials of the .mtl files that an OBJ file names, by name."""
-    materials: dict[str, Material] = {}
+    libraries: dict[str, None] = {}
     for line, text in read_lines(path):
-        if text.startswith("mtllib") and line < 10000:
-            materials |= read_mtl(path, text[6:].strip())
+        if text.startswith("mtllib"):
+            libraries[text[6:].strip()] = None
+            if len(libraries) > MAX_LIBRARIES:
+                raise ModelError(f"{path}:{line}: names more than {MAX_LIBRARIES} files of materials")
+    materials: dict[str, Material] = {}
+    pictures = Pictures()
+    for library in libraries:
+        materials |= read_mtl(path, library, pictures)
     return materials

@@ -19,8 +19,9 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton
-from fba.capture.skeleton import MOST_FRAMES
+from fba.capture.skeleton import MOST_FRAMES, check_memory
 from fba.errors import FbaWarning, FormatError, ModelError
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
 from fba.source import read_whole
 
@@ -36,8 +37,8 @@ NOMINAL_RATES = tuple(
            | {Fraction(n) for n in (250, 300, 480, 500, 1000)})
 )  # fmt: skip
 """Frame rates, one of which a rounded frame time probably means."""
-SPARE_MEMORY, MEMORY_PER_CHARACTER = 200_000_000, 50
-"""Bytes that rotations may take, whatever the file, and for each of its characters: six are three angles."""
+MAX_LINE = 1 << 20
+"""Longest line, in characters: far more than 4096 joints have numbers."""
 STRETCH = 1e-3
 """Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
 
@@ -69,32 +70,40 @@ def read(
     plant: bool = True,
     spine: str | int = "spread",
     joints: Mapping[str, str] | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the motion of a BVH file as BAPs; see `fba.capture.from_skeleton` for the options.
 
-    Raises FormatError for anything that is not BVH or whose skeleton is not a body; warns (FbaWarning) of
+    Raises FormatError for anything that is not BVH or whose skeleton is not a body, LimitError for more than
+    the limits allow; warns (FbaWarning) of
     irregularities.
     """
-    motion = read_motion(path)
+    motion = read_motion(path, limits=limits)
     try:
         return from_skeleton(
-            motion, rate, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine
-        )
+            motion, rate, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine,
+            limits=limits,
+        )  # fmt: skip
     except ModelError as error:
         raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
 
 
-def read_motion(path: str | Path) -> SkeletonMotion:
-    """Return the skeleton and its motion as they are in the file. Raises FormatError, warns (FbaWarning)."""
+def read_motion(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> SkeletonMotion:
+    """Return the skeleton and its motion as they are in the file.
+
+    Raises FormatError, and LimitError for more than the limits allow; warns (FbaWarning).
+    """
     data = read_whole(path)
     kind = recognition_hint(data[:HEAD_BYTES])
     if kind and not re.match(rb"(?:\xef\xbb\xbf)?\s*HIERARCHY\b", data, re.IGNORECASE):
         raise FormatError(f"a BVH file begins with HIERARCHY{kind}", path=path)
     text = data.decode("utf-8-sig", errors="replace")
-    return parse(text, name=Path(path).stem, path=path)
+    return parse(text, name=Path(path).stem, path=path, limits=limits)
 
 
-def parse(text: str, *, name: str = "", path: str | Path | None = None) -> SkeletonMotion:
+def parse(
+    text: str, *, name: str = "", path: str | Path | None = None, limits: Limits = DEFAULT_LIMITS
+) -> SkeletonMotion:
     """Return the same as `read_motion`, from text. path: named in errors."""
     if max(text.count("\n"), text.count("\r")) > MAX_LINES:
         raise FormatError(f"more than {MAX_LINES} lines; cut the motion into pieces", path=path)
@@ -103,12 +112,9 @@ def parse(text: str, *, name: str = "", path: str | Path | None = None) -> Skele
     count, frame_time, first = _motion_header(lines, after, path)
     channels = sum(len(c) for c in tree.channels)
     numbers = _numbers(lines, first, channels, count, path)
-    if 32 * len(numbers) * len(tree.names) > SPARE_MEMORY + MEMORY_PER_CHARACTER * len(text):
-        raise FormatError(
-            f"{len(tree.names)} joints in {len(numbers)} frames, but only {channels} channels: this takes "
-            "far more memory than the file; remove joints without channels, or cut the motion into pieces",
-            path=path,
-        )
+    content = f"{len(tree.names)} joints, {channels} channels and {len(numbers)} frames"
+    what = f"{path or 'BVH'}: a motion of {content}"
+    check_memory(limits, len(numbers), len(tree.names), what, len(text))
     return _motion(tree, numbers, _rate(frame_time), name, path)
 
 
@@ -241,6 +247,12 @@ def _numbers(
     batch: list[str] = []
     total = 0
     for number in range(first, len(lines)):
+        if len(lines[number]) > MAX_LINE:
+            raise FormatError(
+                f"a line of more than {MAX_LINE} characters; are its line ends lost?",
+                path=path,
+                line=number + 1,
+            )
         words = lines[number].split()
         if not words:
             continue

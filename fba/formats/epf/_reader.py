@@ -28,11 +28,16 @@ from fba.errors import FbaWarning
 from fba.formats.epf._tags import BODY, FACE, PARTS, TAGS, Part
 from fba.formats.text.lines import Lines, content, decoded
 from fba.formats.text.values import FRAME_NUMBER_MAX
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import recognition_hint
 from fba.source import Path, open_source
 
 SKIP_MAX = 1_000_000
 """Most frames that a plane may skip: 11 hours at 25 frames/s. More is a mistake in the file."""
+
+
+PLANE_BYTES = 600
+"""Memory of a plane's settings."""
 
 
 @dataclass
@@ -63,6 +68,8 @@ class _Reader:
     gender: int = 0
     coding_type: int = 0
     planes: list[PlaneSettings] = field(default_factory=list)
+    frames: int = 0
+    """Planes, and the frames that they skip."""
 
     def add_plane(self, block: dict[str, _Tag]) -> None:
         """Append the plane that a block describes. FormatError where the block contradicts itself."""
@@ -105,6 +112,7 @@ class _Reader:
                 skip=self.skip(block),
             )
         )
+        self.frames += 1 + self.planes[-1].skip
 
     def part(self, part: Part, block: dict[str, _Tag], opened: int) -> PartSettings:
         """Return the settings of a part in this plane. opened: line on which its block begins."""
@@ -314,12 +322,13 @@ class _Reader:
         return values
 
 
-def read_epf(path: Path) -> list[PlaneSettings]:
+def read_epf(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> list[PlaneSettings]:
     """Return the planes that an EPF file describes, in order.
 
     `face` and `body` of a P plane are the objects of the I plane in force. Raises FormatError with line
     and token for unknown tags, values that the syntax cannot carry, and contradictions; warns (FbaWarning)
-    of a mask or quantiser that changes in the block of a P plane.
+    of a mask or quantiser that changes in the block of a P plane. Planes and the frames that they skip are
+    limited: LimitError.
     """
     file, size = open_source(path)
     with file:
@@ -339,6 +348,7 @@ def read_epf(path: Path) -> list[PlaneSettings]:
             if tag == "FBM":
                 if block:
                     reader.add_plane(block)
+                    _check_limits(reader, size, limits)
                 block = {}
             elif not block:
                 raise lines.error("comes before FBM, which opens the block of each plane", token=tag)
@@ -348,4 +358,12 @@ def read_epf(path: Path) -> list[PlaneSettings]:
         if not block:
             raise lines.error("holds no planes, only blank lines and comments")
         reader.add_plane(block)
+        _check_limits(reader, size, limits)
     return reader.planes
+
+
+def _check_limits(reader: _Reader, size: int, limits: Limits) -> None:
+    """Raise LimitError for more planes, or more frames skipped, than allowed. size: bytes of the file."""
+    where = f"{reader.lines.path}:{reader.lines.number}"
+    limits.check_frames(reader.frames, f"{where}: what is to be coded, with the frames skipped,")
+    limits.check_bytes(len(reader.planes) * PLANE_BYTES, f"{where}: {len(reader.planes)} planes", source=size)

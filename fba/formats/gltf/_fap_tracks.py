@@ -131,9 +131,11 @@ def _add_targets(
             raise entry.error("expected a FAP and its value at weight 1")
         wanted[name] = _fap(pair[0]), pair[1].number(-LARGEST, LARGEST)
     channels = {channel.node: channel for channel in clip.channels if channel.path == "weights"}
+    seen: set[int] = set()
     for number, node in enumerate(gltf.nodes):
-        if node.mesh is None:
+        if node.mesh is None or node.mesh in seen:
             continue
+        seen.add(node.mesh)  # its names were taken by the first node that shows it
         mesh = gltf.meshes[node.mesh]
         columns = [column for column, name in enumerate(mesh.morph_names) if name in wanted]
         if not columns:

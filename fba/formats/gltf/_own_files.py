@@ -58,7 +58,8 @@ def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
     channels: Sequence[Channel] = clip.channels
     if note.get("root") is not None:
         nodes = _find_joints(gltf, note.member("root").index(len(gltf.nodes), "node"), Skeleton.default())
-        channels = [channel for channel in clip.channels if channel.node in set(nodes.values())]
+        inside = set(nodes.values())
+        channels = [channel for channel in clip.channels if channel.node in inside]
     times = _times(channels, note)
     steps = np.rint(times * float(rate))
     if not (steps[-1] < MOST_INDEX and (len(steps) < 2 or (np.diff(steps) > 0).all())):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations, product
 
 import numpy as np
@@ -50,9 +50,10 @@ def find_bind_pose(gltf: Gltf, nodes: Sequence[int], parents: Sequence[int]) -> 
     root.
     """
     inverse: dict[int, Float64] = {}
+    inside = set(nodes)
     for skin in gltf.skins:
         for joint, matrix in zip(skin.joints, skin.inverse_bind, strict=True):
-            if joint in set(nodes):
+            if joint in inside:
                 inverse.setdefault(joint, np.asarray(matrix, dtype=np.float64))
     bound = {joint: _invert(gltf, joint, matrix) for joint, matrix in inverse.items()}
     if bound and np.ptp([matrix[:3, 3] for matrix in bound.values()], axis=0).max() <= 0:
@@ -81,7 +82,10 @@ class Sampler:
 
     def __init__(self, gltf: Gltf, channels: Sequence[Channel], times: Float64) -> None:
         self._gltf, self._times = gltf, times
-        self._channels = {(channel.node, channel.path): channel for channel in channels}
+        self._channels = {(channel.node, channel.path): _cut(channel, times) for channel in channels}
+
+    def __len__(self) -> int:
+        return len(self._times)
 
     def translation(self, node: int) -> Float64:
         """Return a node's translations, float64 (T, 3)."""
@@ -108,6 +112,16 @@ class Sampler:
         sizes = lengths if scale is None else sample(scale, self._times)[:, None, :]
         result: Float64 = matrices * sizes
         return result
+
+
+def _cut(channel: Channel, times: Float64) -> Channel:
+    """Return a channel with only the keys that matter at times (T,), and one or two more on each side."""
+    if not len(times):
+        return channel
+    # as float32, since NumPy would convert all keys otherwise
+    low, high = np.searchsorted(channel.times, np.array([times[0], times[-1]], dtype=np.float32)).tolist()
+    rows = slice(max(low - 2, 0), high + 3)
+    return replace(channel, times=channel.times[rows], values=channel.values[rows])
 
 
 def key_times(channels: Sequence[Channel]) -> Float64:

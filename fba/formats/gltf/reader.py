@@ -8,22 +8,27 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 
 from fba import rotations
 from fba.animation import Animation
-from fba.arrays import Float64
+from fba.arrays import Bool, Float64
 from fba.capture import SkeletonMotion, from_skeleton, matching
-from fba.capture.skeleton import MOST_FRAMES
+from fba.capture.skeleton import MOST_FRAMES, check_memory
 from fba.errors import FbaWarning, FormatError, ModelError, Remedy
 from fba.formats.gltf._own_files import find_note, read_note
-from fba.formats.gltf._pose import Sampler, find_bind_pose, key_times
+from fba.formats.gltf._pose import BindPose, Sampler, find_bind_pose, key_times
 from fba.gltf import Animation as Clip
 from fba.gltf import Gltf, read_gltf
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
+MAX_JOINTS = 4096
+CHUNK = 200_000
+"""Joints times frames that are sampled at once."""
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 DEFAULT_RATE = Fraction(30)
 STRETCH = 0.01
@@ -48,6 +53,7 @@ def read(
     spine: str | int = "spread",
     joints: Mapping[str, str] | None = None,
     clip: str | int | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Read the animation of a glTF skeleton as BAPs.
 
@@ -55,11 +61,11 @@ def read(
     this project are read as they are, with their own frames, unless an option other than clip and rate asks
     for retargeting.
 
-    Raises FormatError for anything that is not glTF, or whose skeleton is not a body; warns (FbaWarning)
-    of what is left out.
+    Raises FormatError for anything that is not glTF, or whose skeleton is not a body, LimitError for more
+    than the limits allow; warns (FbaWarning) of what is left out.
     """
     try:
-        gltf = read_gltf(path)
+        gltf = read_gltf(path, limits=limits)
         plain = (joints, scale, origin, ground, plant, spine) == (
             None, None, "source", "floor", True, "spread",
         )  # fmt: skip
@@ -70,11 +76,12 @@ def read(
             note = find_note(gltf, own)
             if note is not None:
                 animation = read_note(gltf, own, note)
-                return animation if rate is None else animation.resample(Fraction(rate))
-        motion = sample_motion(gltf, clip=clip, rate=rate)
+                return animation if rate is None else animation.resample(Fraction(rate), limits=limits)
+        motion = sample_motion(gltf, clip=clip, rate=rate, limits=limits)
         return from_skeleton(
-            motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine
-        )
+            motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine,
+            limits=limits,
+        )  # fmt: skip
     except ModelError as error:
         raise FormatError(error.finding.removeprefix(f"{path}: "), path=path).with_remedies(
             *error.remedies
@@ -82,19 +89,28 @@ def read(
 
 
 def read_motion(
-    path: Path, *, clip: str | int | None = None, rate: Fraction | int | str | None = None
+    path: Path,
+    *,
+    clip: str | int | None = None,
+    rate: Fraction | int | str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> SkeletonMotion:
     """Return the joints of a glTF file and one of its animations, sampled.
 
     clip: name or number (from 0) of the animation; None for the first that moves the skeleton. rate: frames
-    per second; None for that of the keys if they are regular, else 30. Raises FormatError, ModelError; warns
-    (FbaWarning) if there are several animations or skeletons to choose from.
+    per second; None for that of the keys if they are regular, else 30. Raises FormatError, ModelError, and
+    LimitError for more than the limits allow; warns (FbaWarning) if there are several animations or skeletons
+    to choose from.
     """
-    return sample_motion(read_gltf(path), clip=clip, rate=rate)
+    return sample_motion(read_gltf(path, limits=limits), clip=clip, rate=rate, limits=limits)
 
 
 def sample_motion(
-    gltf: Gltf, *, clip: str | int | None = None, rate: Fraction | int | str | None = None
+    gltf: Gltf,
+    *,
+    clip: str | int | None = None,
+    rate: Fraction | int | str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> SkeletonMotion:
     """Do the same as `read_motion` for a file that has been read."""
     try:
@@ -106,27 +122,68 @@ def sample_motion(
 
 def _sample_motion(gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None) -> SkeletonMotion:
     nodes = _skeleton(gltf)
-    chosen = _choose_clip(gltf, clip, set(nodes))
-    channels = [channel for channel in chosen.channels if channel.node in set(nodes)]
+    if len(nodes) > MAX_JOINTS:
+        raise ModelError(f"{gltf.file}: the skeleton has {len(nodes)} joints, more than {MAX_JOINTS}")
+    place = {node: number for number, node in enumerate(nodes)}
+    chosen = _choose_clip(gltf, clip, set(place))
+    channels = [channel for channel in chosen.channels if channel.node in place]
     times = key_times(channels)
     frames = Fraction(rate) if rate is not None else _rate(times)
     if frames <= 0:
         raise ValueError(f"rate must be positive, not {rate}")
     first, last = float(times[0]), float(times[-1])
     count = int((last - first) * float(frames) + 1e-6) + 1
+    what = f"{gltf.file}: animation {chosen.name!r}, {last - first:.0f} s at {float(frames):g} frames/s,"
+    limits.check_seconds(last - first, what)
     if count > MOST_FRAMES:
         raise ModelError(
-            f"animation {chosen.name!r}: {last - first:.0f} s at {float(frames):g} frames/s are "
-            f"{count} frames, more than {MOST_FRAMES}; give a lower rate, or cut it into pieces"
+            f"{what} has {count} frames, more than {MOST_FRAMES}; give a lower rate, or cut it into pieces"
         )
-    sample_times = first + np.arange(count) / float(frames)
-    parents = [nodes.index(p) if (p := gltf.nodes[node].parent) in nodes else -1 for node in nodes]
+    keys = sum(channel.times.nbytes + channel.values.nbytes for channel in channels)
+    check_memory(limits, count, len(nodes), what, keys)
+    parents = [-1 if (p := gltf.nodes[node].parent) is None else place.get(p, -1) for node in nodes]
     bind = find_bind_pose(gltf, nodes, parents)
-    sampler = Sampler(gltf, channels, sample_times)
+    used = _descendants(parents, _find_root([gltf.nodes[node].name for node in nodes]))
+    row_of = {number: row for row, number in enumerate(used)}
+    motion = SkeletonMotion(
+        names=tuple(gltf.nodes[nodes[number]].name for number in used),
+        parents=np.array([row_of[parents[n]] if row else -1 for row, n in enumerate(used)]),
+        offsets=bind.offsets()[used],
+        rotations=np.zeros((0, len(used), 4)),
+        positions=np.zeros((0, 3)),
+        rate=frames,
+        name=chosen.name,
+    )
+    turns, root = np.empty((count, len(used), 4)), np.empty((count, 3))
+    stretched = np.zeros(len(used), dtype=np.bool_)
+    at_once = min(max(CHUNK // len(nodes), 1), count)
+    for start in range(0, count, at_once):
+        rows = np.arange(start, min(start + at_once, count))
+        sampler = Sampler(gltf, channels, first + rows / float(frames))
+        turned, positions = _world(gltf, sampler, nodes, parents, bind)
+        local = turned[:, used]
+        for row, number in enumerate(used[1:], 1):
+            inverse = turned[:, parents[number]] * [1, -1, -1, -1]
+            local[:, row] = rotations.multiply(inverse, turned[:, number])
+        turns[rows] = local / np.linalg.norm(local, axis=-1, keepdims=True)
+        root[rows] = positions[:, used[0]]
+        stretched |= _stretched(
+            replace(motion, rotations=turns[rows], positions=root[rows]), positions[:, used]
+        )
+    if stretched.any():
+        _warn_of_stretching(chosen.name, [motion.names[row] for row in np.flatnonzero(stretched)])
+    return replace(motion, rotations=turns, positions=root)
 
-    # the transforms of all nodes of the skeleton in the scene's frame
-    turned = np.zeros((count, len(nodes), 4))
-    positions = np.zeros((count, len(nodes), 3))
+
+def _world(
+    gltf: Gltf, sampler: Sampler, nodes: list[int], parents: list[int], bind: BindPose
+) -> tuple[Float64, Float64]:
+    """Return rotations (T, J, 4) of nodes from the bind pose, and positions (T, J, 3), in the scene's frame.
+
+    nodes: parents first. parents: position of each one's parent in nodes, -1 for the root.
+    """
+    turned = np.zeros((len(sampler), len(nodes), 4))
+    positions = np.zeros((len(sampler), len(nodes), 3))
     linear: list[Float64] = []
     for number, node in enumerate(nodes):
         local = sampler.linear(node)
@@ -141,22 +198,7 @@ def _sample_motion(gltf: Gltf, clip: str | int | None, rate: Fraction | int | st
             linear.append(linear[parent] @ local)
             positions[:, number] = positions[:, parent] + (linear[parent] @ shift[:, :, None])[:, :, 0]
         turned[:, number] = bind.turned(number, linear[number])
-    used = _descendants(parents, _find_root([gltf.nodes[node].name for node in nodes]))
-    local_turns = turned[:, used]
-    for row, number in enumerate(used[1:], 1):
-        inverse = turned[:, parents[number]] * [1, -1, -1, -1]
-        local_turns[:, row] = rotations.multiply(inverse, turned[:, number])
-    motion = SkeletonMotion(
-        names=tuple(gltf.nodes[nodes[number]].name for number in used),
-        parents=np.array([used.index(parents[n]) if row else -1 for row, n in enumerate(used)]),
-        offsets=bind.offsets()[used],
-        rotations=local_turns / np.linalg.norm(local_turns, axis=-1, keepdims=True),
-        positions=positions[:, used[0]],
-        rate=frames,
-        name=chosen.name,
-    )
-    _warn_of_stretching(motion, positions[:, used])
-    return motion
+    return turned, positions
 
 
 def _skeleton(gltf: Gltf) -> list[int]:
@@ -266,19 +308,18 @@ def _rate(times: Float64) -> Fraction:
     return DEFAULT_RATE
 
 
-def _warn_of_stretching(motion: SkeletonMotion, positions: Float64) -> None:
-    """Warn of joints that move relative to their parents: `motion` keeps them as in the bind pose.
-
-    positions: (T, J, 3), where the file has the joints.
-    """
+def _stretched(motion: SkeletonMotion, positions: Float64) -> Bool:
+    """Return bool (J,): joints that move relative to their parents. positions: (T, J, 3), as in the file."""
     size = float(np.ptp(motion.rest(), axis=0).max()) or 1.0
-    rigid = motion.world()[1]
-    moved = np.abs(rigid - positions).max(axis=(0, 2)) > STRETCH * size
-    if moved.any():
-        names = [motion.names[number] for number in np.flatnonzero(moved)]
-        warnings.warn(
-            f"{motion.name}: joints that move against their parents, or stand elsewhere than in the bind "
-            f"pose, are held as they are there: {', '.join(names[:5])}{', ...' if len(names) > 5 else ''}",
-            FbaWarning,
-            stacklevel=5,
-        )
+    moved: Bool = np.abs(motion.world()[1] - positions).max(axis=(0, 2)) > STRETCH * size
+    return moved
+
+
+def _warn_of_stretching(name: str, joints: list[str]) -> None:
+    """Warn of joints that move relative to their parents, but are held as in the bind pose."""
+    warnings.warn(
+        f"{name}: joints that move against their parents, or stand elsewhere than in the bind "
+        f"pose, are held as they are there: {', '.join(joints[:5])}{', ...' if len(joints) > 5 else ''}",
+        FbaWarning,
+        stacklevel=5,
+    )

@@ -5,20 +5,29 @@ Decoding a picture takes a tenth of a second, so the reduced sizes that screens 
 
 from __future__ import annotations
 
+import contextlib
 import io
+import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, UInt8
 from fba.cache import load_or_make, make_key
+from fba.limits import DEFAULT_LIMITS, Limits
 
 LARGEST = 4096
 """Wider or higher pictures are scaled down to this many pixels."""
+PIXEL_BYTES, SCALED_BYTES, COEFFICIENT_BYTES = 4, 8, 6
+"""Memory of a pixel while it is decoded, and scaled down; of a progressive JPEG, that of its coefficients."""
+BAND = 256
+"""Rows that are converted at once."""
 LARGE = 100_000
 """Files of at least this many bytes are cached on disk when reduced."""
-MAKING = 1
+MAKING = 2
 """Cache version of pictures; increment when `FacePicture` gives other pixels or measures."""
 
 RELIEF_SIZE = 256
@@ -60,11 +69,13 @@ class FacePicture:
         return pixels
 
 
-def load_picture(data: bytes) -> FacePicture:
+def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture:
     """The picture in the bytes of a PNG or JPEG file.
 
-    Raises OSError, ValueError or SyntaxError if it cannot be read.
+    Raises OSError, ValueError or SyntaxError if it cannot be read, LimitError if it has more pixels, or takes
+    more memory for its bytes, than the limits allow.
     """
+    _check_size(data, limits)
 
     def measure() -> list[Int32]:
         """Width, height, and 1 if it is opaque."""
@@ -82,18 +93,54 @@ def load_picture(data: bytes) -> FacePicture:
     return FacePicture(data, (int(measures[0]), int(measures[1])), bool(measures[2]))
 
 
-def _decode(data: bytes) -> UInt8:
-    """uint8 (H, W, 4): the pixels of a file, at most `LARGEST` wide and high."""
+def _check_size(data: bytes, limits: Limits) -> None:
+    """Raise LimitError for a picture that is too large to be decoded."""
+    with _opened(data) as image:
+        width, height = image.size
+        what = f"the picture of a texture, {width} x {height} pixels,"
+        limits.check_pixels(width, height, "the picture of a texture")
+        if image.info.get("progressive"):  # reduced only after all of it was decoded
+            needed = width * height * COEFFICIENT_BYTES
+        else:
+            _prepare(image)
+            scaled = max(image.size) > LARGEST
+            needed = image.width * image.height * (SCALED_BYTES if scaled else PIXEL_BYTES)
+        limits.check_bytes(needed, what, source=len(data))
+
+
+@contextlib.contextmanager
+def _opened(data: bytes) -> Iterator[Any]:
+    """The `PIL.Image` in the bytes of a file, not decoded yet. `Limits` say how large it may be, not PIL."""
     from PIL import Image
 
     try:
-        with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as image:
-            if max(image.size) > LARGEST:
-                image.draft("RGB", (LARGEST, LARGEST))
-                image.thumbnail((LARGEST, LARGEST))
-            return np.asarray(image.convert("RGBA"))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
     except Image.DecompressionBombError as error:
         raise ValueError(str(error)) from error
+    with image:
+        yield image
+
+
+def _prepare(image: Any) -> None:
+    """Let a large JPEG be decoded at half its size or less."""
+    if max(image.size) > LARGEST:
+        least = LARGEST * 9 // 10  # so that one of 8000 pixels becomes one of 4000
+        image.draft("RGB", (least, least))
+
+
+def _decode(data: bytes) -> UInt8:
+    """uint8 (H, W, 4): the pixels of a file, at most `LARGEST` wide and high."""
+    with _opened(data) as image:
+        _prepare(image)
+        if max(image.size) > LARGEST:
+            image.thumbnail((LARGEST, LARGEST))
+        pixels = np.empty((image.height, image.width, 4), dtype=np.uint8)
+        for top in range(0, image.height, BAND):  # a whole copy in RGBA would double the memory
+            rows = image.crop((0, top, image.width, min(top + BAND, image.height)))
+            pixels[top : top + BAND] = np.asarray(rows.convert("RGBA"))
+        return pixels
 
 
 def _reduced(pixels: UInt8, factor: int) -> UInt8:

@@ -18,7 +18,8 @@ CHANNELS = 2
 RATES = (8000, 192_000)
 """Samples per second, least and most; other rates are resampled to `USUAL_RATE`."""
 USUAL_RATE = 48_000
-HIGHEST_RATE = 1_000_000
+LOWEST_RATE, HIGHEST_RATE = 1000, 1_000_000
+"""Samples per second that are read: resampling takes time and memory in proportion to the change."""
 RUN_UP = 0.5
 """Seconds decoded before the first sample that is read: MP3 and AAC frames need the ones before them."""
 GAP = 0.02
@@ -125,8 +126,10 @@ class SoundFile:
         self._container, self._stream = open_sound(self._av, self.path)
 
     def _rate(self, rate: int) -> int:
-        if not 1 <= rate <= HIGHEST_RATE:  # a resampler takes memory in proportion to the rate
-            raise FormatError(f"says {rate} samples a second; 1 to {HIGHEST_RATE} are read", path=self.path)
+        if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+            raise FormatError(
+                f"says {rate} samples a second; {LOWEST_RATE} to {HIGHEST_RATE} are read", path=self.path
+            )
         fits = rate in self._rates if self._rates else RATES[0] <= rate <= RATES[1]
         return rate if fits else USUAL_RATE
 

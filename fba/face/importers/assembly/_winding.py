@@ -74,16 +74,22 @@ def _opposing(triangles: Int32) -> Bool:
     if not clash.any():
         return np.zeros(count, dtype=np.bool_)
     graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count)).tocsr()
+    _, label = connected_components(graph, directed=False)
+    sizes = np.bincount(label)
+    doubtful = np.zeros(len(sizes), dtype=np.bool_)
+    doubtful[label[a[clash]]] = True
+    # one more triangle, a neighbour of the first of each doubtful piece, so that one walk reaches them all
+    starts = np.unique(label, return_index=True)[1][doubtful]
+    a_all, b_all = np.append(a, np.full(len(starts), count)), np.append(b, starts)
+    size = count + 1
+    graph = coo_array((np.ones(len(a_all), dtype=np.int8), (a_all, b_all)), shape=(size, size)).tocsr()
+    walk, before = breadth_first_order(graph, count, directed=False)
     clashes = {(int(x), int(y)) for x, y in zip(a[clash], b[clash], strict=True)}
-    total, label = connected_components(graph, directed=False)
     wrong = np.zeros(count, dtype=np.bool_)
-    for piece in np.unique(label[np.concatenate([a[clash], b[clash]])]) if total else ():
-        start = int(np.flatnonzero(label == piece)[0])
-        walk, before = breadth_first_order(graph, start, directed=False)
-        for here in walk[1:]:
-            there = int(before[here])
-            against = (there, int(here)) in clashes or (int(here), there) in clashes
-            wrong[here] = wrong[there] ^ against
-        if wrong[walk].sum() > len(walk) / 2:
-            wrong[walk] = ~wrong[walk]
+    for here in walk[1:].tolist():
+        there = int(before[here])
+        if there < count:
+            wrong[here] = wrong[there] ^ ((there, here) in clashes or (here, there) in clashes)
+    most = doubtful & (np.bincount(label, wrong, len(sizes)) > sizes / 2)
+    wrong ^= most[label]
     return wrong

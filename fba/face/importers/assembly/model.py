@@ -17,6 +17,7 @@ from fba.face.importers.assembly.default_materials import apply_default_material
 from fba.face.importers.assembly.pieces import FREE, assemble, shift_piece
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.model import FaceModel
+from fba.limits import DEFAULT_LIMITS, Limits
 
 PUPILS = 0.062
 """Metres between the pupils of an adult."""
@@ -37,6 +38,7 @@ class ImportOptions:
     unit: float | None = None
     up: str = "y"
     kinds: Mapping[str, str] | None = None
+    limits: Limits = DEFAULT_LIMITS
 
 
 def turn_upright(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piece], Float64]:

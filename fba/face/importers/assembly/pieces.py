@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -16,6 +16,7 @@ from fba.arrays import Bool, Float32, Float64
 from fba.errors import ModelError, OptionError
 from fba.face.importers.assembly.polygon_parts import Piece, vertex_components
 from fba.face.model import PART_KINDS, Part
+from fba.mesh.names import UniqueNames
 
 DROPPED = "none"
 """Kind of parts that are left out: transparent shells in front of the eye, which would hide it."""
@@ -123,35 +124,38 @@ def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[P
         ("brow", "left brow", "right brow"),
         ("lash", "left lashes", "right lashes"),
     ):
-        add(kind, left, _side(of_kind(kind), lambda centre: centre[0] > middle))
-        add(kind, right, _side(of_kind(kind), lambda centre: centre[0] <= middle))
+        add(kind, left, _side(of_kind(kind), lambda centres: centres[:, 0] > middle))
+        add(kind, right, _side(of_kind(kind), lambda centres: centres[:, 0] <= middle))
     teeth = of_kind("teeth")
     if teeth:
         levels = np.concatenate([piece.part.vertices[:, 1] for piece in teeth])
         between = float(levels.min() + levels.max()) / 2
-        add("teeth", "upper teeth", _side(teeth, lambda centre: centre[1] > between))
-        add("teeth", "lower teeth", _side(teeth, lambda centre: centre[1] <= between))
+        add("teeth", "upper teeth", _side(teeth, lambda centres: centres[:, 1] > between))
+        add("teeth", "lower teeth", _side(teeth, lambda centres: centres[:, 1] <= between))
     for kind in ("tongue", "mouth"):
         add(kind, kind, of_kind(kind))
-    taken = {piece.part.name for piece in result}
+    unused = part_names(piece.part.name for piece in result)
     for piece, kind in pieces:
         if kind in ("hair", "other"):
-            name = unused_name(piece.part.name, taken)
+            name = unused(piece.part.name)
             result.append(replace(piece, part=replace(piece.part, name=name, kind=kind)))
     return tuple(result)
 
 
-def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], bool]) -> list[Piece]:
-    """The components of each piece whose centre lies on the wanted side."""
+def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], Bool]) -> list[Piece]:
+    """The components of each piece whose centre lies on the wanted side.
+
+    wanted: takes centres (N, 3), returns bool (N,).
+    """
     result = []
     for piece in pieces:
         vertices = piece.part.vertices
         label = vertex_components(piece.part.triangles, len(vertices), vertices)
-        mask = np.zeros(len(vertices), dtype=np.bool_)
-        for shell in range(int(label.max()) + 1):
-            inside = label == shell
-            box = vertices[inside].astype(np.float64)
-            mask[inside] = wanted((box.min(axis=0) + box.max(axis=0)) / 2)
+        order = np.argsort(label, kind="stable")
+        starts = np.flatnonzero(np.diff(label[order], prepend=-1))
+        ordered = vertices[order].astype(np.float64)
+        centres = (np.minimum.reduceat(ordered, starts) + np.maximum.reduceat(ordered, starts)) / 2
+        mask = wanted(centres)[label]
         if mask.any():
             result.append(piece if mask.all() else _cut(piece, mask, piece.part.name))
     return result
@@ -224,14 +228,9 @@ def _colours(part: Part) -> Float32:
     return own
 
 
-def unused_name(name: str, taken: set[str]) -> str:
-    """The name, numbered where it is taken or reserved ("head" stands for all parts); taken from now on."""
-    result, count = name, 1
-    while result in taken or result == "head":
-        count += 1
-        result = f"{name} {count}"
-    taken.add(result)
-    return result
+def part_names(taken: Iterable[str] = ()) -> UniqueNames:
+    """Names for the parts of a face; "head" is reserved: it stands for all parts."""
+    return UniqueNames(("head", *taken))
 
 
 @cache

@@ -74,13 +74,12 @@ def make_piece(
     return Piece(part, origin=origin)
 
 
-def polygon_components(polygons: Polygons) -> list[Bool]:
-    """Masks, bool (F,), of the polygons of each connected component, ordered by lowest vertex number."""
+def polygon_components(polygons: Polygons) -> tuple[Intp, Intp]:
+    """The connected component of each vertex, (V,), and of each polygon, (F,), by lowest vertex number."""
     sizes = np.diff(polygons.starts)
     first = np.repeat(polygons.corners[polygons.starts[:-1]], sizes)
     label = _connected(first, polygons.corners, len(polygons.vertices))
-    of_face = label[polygons.corners[polygons.starts[:-1]]]
-    return [of_face == shell for shell in np.unique(of_face)]
+    return label, label[polygons.corners[polygons.starts[:-1]]]
 
 
 def vertex_components(triangles: Int32, count: int, vertices: Float32) -> Intp:

@@ -194,14 +194,19 @@ def eye_pieces(clothes: Path, base: Float64) -> list[Piece]:
 
 def _eyeball(eyes: Polygons, side: float) -> Bool:
     """The faces of one eyeball, without the transparent cornea in front of it, which is a mesh of its own."""
-    best = None
-    for faces in polygon_components(eyes):
-        vertices = eyes.vertices[eyes.used(faces)]
-        if vertices[:, 0].mean() * side > 0 and (best is None or vertices[:, 2].max() < best[0]):
-            best = (float(vertices[:, 2].max()), faces)
-    if best is None:
+    of_vertex, of_face = polygon_components(eyes)
+    used = np.unique(eyes.corners)
+    component, vertices = of_vertex[used], eyes.vertices[used]
+    count = int(of_vertex.max(initial=0)) + 1
+    across = np.bincount(component, vertices[:, 0] * side, count)
+    front = np.full(count, -np.inf)
+    np.maximum.at(front, component, vertices[:, 2])
+    front[~(across > 0)] = np.inf
+    best = int(front.argmin())
+    if not np.isfinite(front[best]):
         raise ModelError(f"{EYES}: there is no {'left' if side > 0 else 'right'} eye in it")
-    return best[1]
+    mask: Bool = of_face == best
+    return mask
 
 
 def _feature_points(base: Polygons, pieces: list[Piece]) -> tuple[Float64, Int32]:

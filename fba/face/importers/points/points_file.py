@@ -19,6 +19,9 @@ from fba.face.importers.points.fdp import load_fdp
 from fba.face.importers.points.xface import xface_points
 from fba.mesh.text_files import parse_integer, parse_number, read_bytes, read_lines
 
+MAX_JSON = 1 << 24
+"""Largest JSON file of 84 points, in bytes."""
+
 
 @dataclass(frozen=True, eq=False)
 class GivenPoints:
@@ -79,7 +82,7 @@ def read_points(path: str | os.PathLike[str]) -> GivenPoints:
     suffix = os.path.splitext(name)[1].lower()
     if suffix == ".json":
         try:
-            content = json.loads(read_bytes(name))
+            content = json.loads(read_bytes(name, MAX_JSON))
         except (ValueError, RecursionError) as error:
             raise ModelError(f"{name}: is not JSON: {error}") from error
         if isinstance(content, dict) and isinstance(content.get("points"), dict):
@@ -138,10 +141,19 @@ def _from_mapping(content: Mapping[Any, Any], where: str) -> GivenPoints:
             position = np.array([np.nan])
         if position.shape != (3,) or not np.isfinite(position).all():
             raise ModelError(
-                f"{where}: feature point {name} must be [x, y, z] or a vertex, not {str(value)[:60]}"
+                f"{where}: feature point {name} must be [x, y, z] or a vertex, not {_short(value)}"
             )
         points[row_of()[name]] = position
     return _check_given(GivenPoints(points, vertices), where)
+
+
+def _short(value: object) -> str:
+    """A value as the text of an error shows it."""
+    try:
+        text = str(value)
+    except ValueError:  # Python writes no number of more than 4300 digits
+        return "a huge number"
+    return text[:60]
 
 
 def _from_fdp(path: str) -> GivenPoints:

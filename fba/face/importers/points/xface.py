@@ -51,11 +51,11 @@ def load_xface(path: str) -> Fdp:
         if name not in row_of():
             raise ModelError(f"{where}: there is no feature point {name[:40]!r}")
         index = parse_integer(element.get("index", ""), where, "index, the vertex of the point,")
-        inside = [
+        inside = tuple(  # one for all influences
             parse_integer(token, where, "an index of a vertex")
             for block in element.findall("indices")
             for token in (block.text or "").split()
-        ]
+        )
         if min([index, *inside]) < 0:
             raise ModelError(f"{where}: vertex {min([index, *inside])} is negative")
         # the first one is the point itself; others attach other meshes to it (teeth to the chin)
@@ -67,7 +67,7 @@ def load_xface(path: str) -> Fdp:
                 raise ModelError(f"{where}: fap {fap - 1} of <influence> does not exist (counted from 0)")
             weight = parse_number(influence.get("weight", ""), where, "weight of <influence>")
             shape = influence.get("type", "")
-            influences.append(Influence(fap, shape, weight, mesh_name, index, tuple(inside)))
+            influences.append(Influence(fap, shape, weight, mesh_name, index, inside))
     if not vertices:
         raise ModelError(f"{path}: there is no <fdp> in it")
     points = np.full((len(names()), 3), np.nan)

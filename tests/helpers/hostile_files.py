@@ -1,0 +1,574 @@
+"""Files that try a reader's patience: each grows with a size, and doing so must cost no more than that.
+
+`hostile_files` returns them by name. Each is as long as asked, within a small factor, and repeats one thing
+that a reader might search again and again, or unpack: tokens, names, nodes, brackets, quotes, skipped frames.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from format_files import mask
+from gltf_documents import Sheet
+
+JOINTS = {
+    "Spine": ("Hips", (0, 1, 0)),
+    "Neck": ("Spine", (0, 3, 0)),
+    "Head": ("Neck", (0, 1, 0)),
+    "LeftUpLeg": ("Hips", (1, 0, 0)),
+    "LeftLeg": ("LeftUpLeg", (0, -4, 0)),
+    "LeftFoot": ("LeftLeg", (0, -4, 0)),
+    "RightUpLeg": ("Hips", (-1, 0, 0)),
+    "RightLeg": ("RightUpLeg", (0, -4, 0)),
+    "RightFoot": ("RightLeg", (0, -4, 0)),
+}
+"""Parents and offsets of a skeleton that can be retargeted."""
+
+
+def joint_lines(parent: str = "Hips") -> str:
+    """Return the joints below one as BVH, without channels."""
+    return "".join(
+        f"JOINT {name} {{ OFFSET {x} {y} {z} CHANNELS 0 {joint_lines(name)}}}\n"
+        for name, (above, (x, y, z)) in JOINTS.items()
+        if above == parent
+    )
+
+
+@dataclass(frozen=True)
+class HostileFile:
+    """A file of a size. read: takes its path. name: of the file. make: returns its bytes for a size in bytes.
+
+    beside: other files, by name, of the same size.
+    """
+
+    read: Callable[[Path], object]
+    name: str
+    make: Callable[[int], bytes]
+    beside: dict[str, Callable[[int], bytes]] = field(default_factory=dict)
+
+    def write(self, folder: Path, size: int) -> tuple[Path, int]:
+        """Write the file, and those beside it; return its path, and the bytes of all."""
+        folder.mkdir(parents=True, exist_ok=True)
+        total = 0
+        for name, make in {**self.beside, self.name: self.make}.items():
+            content = make(size)
+            total += len(content)
+            (folder / name).write_bytes(content)
+        return folder / self.name, total
+
+
+def repeat(head: str, part: str, tail: str = "", *, most: int = 1 << 30) -> Callable[[int], bytes]:
+    """Return a maker of files with one part repeated, at most `most` times; "%d" in it is its number."""
+
+    def make(size: int) -> bytes:
+        if "%d" not in part:
+            return (head + part * min(size // len(part), most) + tail).encode()
+        count = min(size // (len(part) + 3), most)
+        return (head + "".join(part % number for number in range(count)) + tail).encode()
+
+    return make
+
+
+def pairs(head: str, first: str, middle: str, last: str, tail: str = "") -> Callable[[int], bytes]:
+    """Return a maker of files with two parts, each repeated as often."""
+
+    def make(size: int) -> bytes:
+        count = size // (len(first) + len(last))
+        return (head + first * count + middle + last * count + tail).encode()
+
+    return make
+
+
+def counted(head: str, part: str) -> Callable[[int], bytes]:
+    """Return a maker of files with one part repeated, whose number stands for "%d" in the head."""
+
+    def make(size: int) -> bytes:
+        return (head % (size // len(part)) + part * (size // len(part))).encode()
+
+    return make
+
+
+def bvh(*, joints: str = "", channels: int = 3, motion: str = "", ends: str = "") -> str:
+    """Return a BVH file of known joints, or of those given."""
+    nested = joint_lines() + joints
+    names = " ".join(("Zrotation", "Xrotation", "Yrotation")[:channels])
+    root = f"HIERARCHY\nROOT Hips\n{{\nOFFSET 0 0 0\nCHANNELS {channels} {names}\n"
+    return f"{root}{nested}{ends}}}\nMOTION\n{motion}"
+
+
+def nested_joints(size: int) -> bytes:
+    """Joints, each in the one before."""
+    count = min(size // 60, 4000)
+    opened = "".join(f"JOINT j{n}\n{{\nOFFSET 0 1 0\nCHANNELS 1 Zrotation\n" for n in range(count))
+    text = bvh(joints=opened + "}\n" * count, motion="Frames: 1\nFrame Time: 0.04\n")
+    return (text + " ".join(["1"] * (count + 3)) + "\n").encode()
+
+
+FRAMES = "Frames: 1\nFrame Time: 0.04\n"
+FAP_HEAD = "2.1 a 25 1\n"
+
+
+def deflated_picture(size: int) -> bytes:
+    """A PNG of zeros: its pixels are a thousand times its bytes."""
+    side = int((size * 1000 / 3) ** 0.5)
+    return png(side, side)
+
+
+def png(width: int, height: int) -> bytes:
+    """A PNG of black pixels in RGB."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    packer = zlib.compressobj(9)
+    row = bytes(1 + 3 * width)
+    packed = b"".join(packer.compress(row) for _ in range(height)) + packer.flush()
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+    return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", packed) + chunk(b"IEND", b"")
+
+
+def skeleton(
+    *,
+    nodes: int = 0,
+    nested: bool = False,
+    name: str = "j%d",
+    last: float = 1.0,
+    channels: int = 1,
+    clips: int = 1,
+    skin: bool = False,
+    roots: int = 0,
+) -> bytes:
+    """Return a .glb with a known skeleton whose root turns, and more nodes below its last joint."""
+    sheet = Sheet()
+    count = len(JOINTS) + 1
+    numbers = {known: n for n, known in enumerate(["Hips", *JOINTS])}
+    body: list[dict[str, Any]] = [{"name": "Hips"}]
+    body += [{"name": known, "translation": offset} for known, (_, offset) in JOINTS.items()]
+    for known, (above, _) in JOINTS.items():
+        body[numbers[above]].setdefault("children", []).append(numbers[known])
+    extra = [{"name": name % n if "%d" in name else name, "translation": [0, 1, 0]} for n in range(nodes)]
+    if nodes:
+        body[0]["children"] = body[0]["children"] + ([count] if nested else list(range(count, count + nodes)))
+    if nested:
+        for n in range(nodes - 1):
+            extra[n]["children"] = [count + n + 1]
+    body += extra
+    first = len(body)
+    body += [{"name": f"root{n}"} for n in range(roots)]
+    times = sheet.array([[0.0], [last]])
+    turns = sheet.array([[0, 0, 0, 1], [0.6, 0, 0, 0.8]])
+    sampler = {"input": times, "output": turns}
+    clip = {
+        "samplers": [sampler],
+        "channels": [
+            {"sampler": 0, "target": {"node": n % first, "path": "rotation"}} for n in range(channels)
+        ],
+    }
+    sheet.json |= {
+        "nodes": body,
+        "scenes": [{"nodes": [0, *range(first, first + roots)]}],
+        "animations": [clip] * clips,
+    }
+    if skin:
+        sheet.json["skins"] = [{"joints": list(range(first))}]
+    return sheet.glb()
+
+
+def surface(*, meshes: int = 1, name: str = "", targets: int = 0, picture: bytes = b"") -> bytes:
+    """Return a .glb with as many nodes that show one triangle."""
+    sheet = Sheet()
+    primitive = sheet.triangle()
+    if targets:
+        moved = sheet.array([[0, 0, 1]] * 3)
+        primitive["targets"] = [{"POSITION": moved}] * targets
+    if picture:
+        sheet.json |= {
+            "images": [{"bufferView": sheet.bytes(picture), "mimeType": "image/png"}],
+            "textures": [{"source": 0}],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        }
+        primitive["material"] = 0
+        primitive["attributes"]["TEXCOORD_0"] = sheet.array([[0, 0], [1, 0], [0, 1]])
+    sheet.json |= {
+        "meshes": [{"primitives": [primitive]}],
+        "nodes": [{"mesh": 0} | ({"name": name} if name else {}) for _ in range(meshes)],
+    }
+    return sheet.glb()
+
+
+PLY_HEAD = (
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face %d\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+)
+OBJ_HEAD = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+VRML_HEAD = "#VRML V2.0 utf8\n"
+VRML_SET = (
+    "Shape { geometry IndexedFaceSet {"
+    " coord Coordinate { point [0 0 0, 1 0 0, 0 1 0] } coordIndex [0 1 2 -1] } }\n"
+)
+XFACE, XFACE_END = "<xfdp><head/><source/>", "</xfdp>"
+XFACE_POINT = '<fdp name="2.1" affects="a.wrl_0" index="0">'
+EPF_PLANE = f"FBM 1\nFFR 0\nISI 1\nFMT {'0 ' * 10}\nFQU 1\n"
+GLTF = '{"asset": {"version": "2.0"}, '
+
+
+def wav(rate: int = 8000, channels: int = 1) -> Callable[[int], bytes]:
+    """Return a maker of sounds."""
+
+    def make(size: int) -> bytes:
+        form = struct.pack("<HHIIHH", 1, channels, rate, rate * channels * 2, channels * 2, 16)
+        chunks = b"fmt " + struct.pack("<I", 16) + form + b"data" + struct.pack("<I", size) + bytes(size)
+        return b"RIFF" + struct.pack("<I", 4 + len(chunks)) + b"WAVE" + chunks
+
+    return make
+
+
+def even_vertices(size: int) -> bytes:
+    """A binary PLY of faces with lists of different lengths."""
+    count = size // 5
+    head = PLY_HEAD.replace("ascii", "binary_little_endian") % count
+    head = head.partition("end_header\n")[0].replace("list int", "list uchar") + "end_header\n"
+    rows = np.zeros((count, 5), dtype=np.uint8)
+    rows[::2, 0] = 1
+    lists = b"".join(row[: 1 + 4 * row[0]].tobytes() for row in rows)
+    return head.encode() + bytes(36) + lists
+
+
+def read_any(path: Path) -> object:
+    """Read an animation."""
+    import fba
+
+    return fba.read(path)
+
+
+def read_motion(path: Path) -> object:
+    """Read a capture, and find its joints by their names."""
+    from fba.capture import matching
+    from fba.formats import format_of
+
+    read = format_of(path).read_motion
+    assert read is not None
+    motion = read(path)
+    return matching.match(motion.names)
+
+
+def read_epf(path: Path) -> object:
+    """Read an EPF file."""
+    from fba.formats.epf.epf import read_epf as read
+
+    return read(path)
+
+
+def encode_with_epf(path: Path) -> object:
+    """Encode an animation as an EPF file says."""
+    import fba
+    from fba.codec import encode_planes
+    from fba.formats.epf.epf import read_epf as read
+
+    return encode_planes(fba.read(path.with_suffix(".fap")), read(path))
+
+
+def read_obj(path: Path) -> object:
+    """Read an OBJ mesh."""
+    from fba.mesh.obj import read_obj as read
+
+    return read(path)
+
+
+def read_pieces(path: Path) -> object:
+    """Read an OBJ mesh with its materials, as an import does."""
+    from fba.face.importers.mesh import _materials, polygon_pieces
+    from fba.mesh.obj import read_obj as read
+
+    return polygon_pieces(read(path), _materials(path))
+
+
+def read_ply(path: Path) -> object:
+    """Read a PLY mesh."""
+    from fba.mesh.ply import read_ply as read
+
+    return read(path)
+
+
+def read_vrml(path: Path) -> object:
+    """Read a VRML mesh."""
+    from fba.mesh.vrml import read_vrml as read
+
+    return read(path)
+
+
+def read_wfm(path: Path) -> object:
+    """Read a wire frame."""
+    from fba.mesh.wfm import read_wfm as read
+
+    return read(path)
+
+
+def read_points(path: Path) -> object:
+    """Read feature points."""
+    from fba.face.importers.points.points_file import read_points as read
+
+    return read(path)
+
+
+def read_head(path: Path) -> object:
+    """Read the pieces of a glTF head."""
+    from fba.face.importers._gltf import gltf_pieces
+
+    return gltf_pieces(path)
+
+
+def read_picture(path: Path) -> object:
+    """Decode the picture of a glTF head."""
+    from fba.face.importers._gltf import gltf_pieces
+    from fba_player.mesh.textures import load_picture
+
+    (piece,), _ = gltf_pieces(path)
+    assert piece.part.material.texture is not None
+    return load_picture(piece.part.material.texture).reduced(4)
+
+
+def load_face(path: Path) -> object:
+    """Load a face model."""
+    from fba.face import FaceModel
+
+    return FaceModel.load(path)
+
+
+def load_body(path: Path) -> object:
+    """Load a body model."""
+    from fba.body.model import BodyModel
+
+    return BodyModel.load(path)
+
+
+def load_definition(path: Path) -> object:
+    """Load a body definition."""
+    from fba.body import BodyDefinition
+
+    return BodyDefinition.load(path)
+
+
+def read_sound(path: Path) -> object:
+    """Read a sound, a second at a time."""
+    from fba_player.sound.audio_file import SoundFile
+
+    with SoundFile(path) as sound:
+        at = 0
+        while len(part := sound.read(at, sound.rate)):
+            at += len(part)
+    return at
+
+
+def table(text: str, faces: int) -> Callable[[int], bytes]:
+    """Return a maker of wire frames: as many vertices as fit."""
+
+    def make(size: int) -> bytes:
+        count = size // len(text)
+        return (f"{count}\n" + text * count + f"{faces}\n" + "0 1 2\n" * faces).encode()
+
+    return make
+
+
+def prefixes(size: int) -> bytes:
+    """A capture with many names, each of many words, that begin alike."""
+    count = int(size**0.5)
+    many = "".join(f"JOINT {'a_' * count}{n} {{ OFFSET 0 1 0 CHANNELS 0 }}\n" for n in range(count // 2))
+    return bvh(joints=many, motion=FRAMES + "1 2 3\n").encode()
+
+
+def planes(size: int) -> bytes:
+    """An I plane and P planes that skip a million frames each."""
+    return (EPF_PLANE + "SKN 1000000\n" + "FBM 1\nFFR 0\nISI 0\nSKN 1000000\n" * (size // 32)).encode()
+
+
+FAP = FAP_HEAD + mask(3) + "\n0 1\n"
+
+
+def hostile_files() -> dict[str, HostileFile]:
+    """Return all hostile files, by name."""
+    return {**_texts(), **_captures(), **_gltf(), **_meshes(), **_points(), **_sounds()}
+
+
+def _texts() -> dict[str, HostileFile]:
+    return {
+        "fap words": HostileFile(read_any, "a.fap", repeat(FAP_HEAD + mask(3) + "\n0 ", "1 ")),
+        "fap masks": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, mask(3) + "\n%d 1\n")),
+        "fap blanks": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, "\n")),
+        "fap comments": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, "#\n")),
+        "fap returns": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, "\r")),
+        "fap backwards": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, mask() + "\n0\n")),
+        "fap name": HostileFile(read_any, "a.fap", repeat("2.1 ", "a ", "25 1\n", most=30_000)),
+        "fap empty masks": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, mask() + "\n%d\n")),
+        "bap masks": HostileFile(read_any, "a.bap", repeat("3.1 a 25 1\n", mask(width=186) + "\n%d\n")),
+        "epf planes": HostileFile(read_epf, "a.epf", repeat(EPF_PLANE, "FBM 1\nFFR 1\n")),
+        "epf I planes": HostileFile(read_epf, "a.epf", repeat("", EPF_PLANE)),
+        "epf words": HostileFile(read_epf, "a.epf", repeat("FBM 1\nFIX ", "1 ")),
+        "epf skips": HostileFile(encode_with_epf, "a.epf", planes, {"a.fap": lambda size: FAP.encode()}),
+    }
+
+
+def _captures() -> dict[str, HostileFile]:
+    joint = " { OFFSET 0 1 0 CHANNELS 0 }\n"
+    start = "HIERARCHY\nROOT Hips\n"
+    motion = FRAMES + "1 2 3\n"
+    ends = bvh(ends="|", motion=motion).split("|")
+    names = bvh(joints="JOINT |" + joint, motion=motion).split("|")
+    return {
+        "bvh nested": HostileFile(read_motion, "a.bvh", nested_joints),
+        "bvh spaces": HostileFile(read_motion, "a.bvh", repeat(bvh() + "Frames", " ", "x\n")),
+        "bvh short lines": HostileFile(read_motion, "a.bvh", repeat(bvh(channels=1) + FRAMES, "11\n")),
+        "bvh frames": HostileFile(read_any, "a.bvh", repeat(bvh(channels=1) + FRAMES, "1\n", most=20_000)),
+        "bvh one line": HostileFile(read_motion, "a.bvh", repeat(bvh() + FRAMES, "1 ")),
+        "bvh blank lines": HostileFile(read_motion, "a.bvh", repeat(bvh() + motion, "\n")),
+        "bvh braces": HostileFile(read_motion, "a.bvh", repeat(start, "{")),
+        "bvh name": HostileFile(read_motion, "a.bvh", repeat("HIERARCHY\nROOT ", "a ", "{ OFFSET 0 0 0 }\n")),
+        "bvh prefixes of a name": HostileFile(read_motion, "a.bvh", repeat(names[0], "a_", names[1])),
+        "bvh shared prefixes": HostileFile(read_motion, "a.bvh", prefixes),
+        "bvh ends": HostileFile(
+            read_motion, "a.bvh", repeat(ends[0], "End Site { OFFSET 0 1 0 }\n", ends[1])
+        ),
+        "bvh end words": HostileFile(read_motion, "a.bvh", repeat(start + "{\n", "END ")),
+        "bvh joint words": HostileFile(read_motion, "a.bvh", repeat(start + "{\n", "JOINT ")),
+        "gltf nodes": HostileFile(read_motion, "a.glb", lambda size: skeleton(nodes=size // 44)),
+        "gltf nested": HostileFile(
+            read_motion, "a.glb", lambda size: skeleton(nodes=size // 60, nested=True)
+        ),
+        "gltf one name": HostileFile(
+            read_motion, "a.glb", lambda size: skeleton(nodes=size // 44, name="Hips")
+        ),
+        "gltf skin": HostileFile(read_motion, "a.glb", lambda size: skeleton(nodes=size // 52, skin=True)),
+        "gltf channels": HostileFile(read_motion, "a.glb", lambda size: skeleton(channels=size // 64)),
+        "gltf clips": HostileFile(read_motion, "a.glb", lambda size: skeleton(clips=size // 120)),
+        "gltf roots": HostileFile(read_motion, "a.glb", lambda size: skeleton(roots=size // 24)),
+        "gltf hours": HostileFile(read_any, "a.glb", lambda size: skeleton(last=16_000.0)),
+    }
+
+
+def _gltf() -> dict[str, HostileFile]:
+    return {
+        "gltf surfaces": HostileFile(read_head, "a.glb", lambda size: surface(meshes=size // 12)),
+        "gltf heads": HostileFile(read_head, "a.glb", lambda size: surface(meshes=size // 22, name="head")),
+        "gltf targets": HostileFile(read_head, "a.glb", lambda size: surface(targets=min(size // 16, 4096))),
+        "gltf lists": HostileFile(read_head, "a.gltf", repeat(GLTF + '"extras": [', "[],", "0]}")),
+        "gltf objects": HostileFile(read_head, "a.gltf", repeat(GLTF + '"extras": [', "{},", "0]}")),
+        "gltf meshes": HostileFile(
+            read_head, "a.gltf", repeat(GLTF + '"meshes": [', '{"primitives":[]},', '{"primitives":[]}]}')
+        ),
+        "gltf materials": HostileFile(read_head, "a.gltf", repeat(GLTF + '"materials": [', "{},", "{}]}")),
+        "gltf deep": HostileFile(read_head, "a.gltf", pairs(GLTF + '"extras": ', "[", "", "]", "}")),
+        "gltf members": HostileFile(read_head, "a.gltf", repeat(GLTF, '"a%d":0,', '"b":0}')),
+        "gltf digits": HostileFile(read_head, "a.gltf", repeat(GLTF + '"scene": ', "1", "}")),
+        "gltf picture": HostileFile(
+            read_picture, "a.glb", lambda size: surface(picture=deflated_picture(size // 5))
+        ),
+        "face of nothing": HostileFile(load_face, "a.glb", lambda size: surface(meshes=size // 12)),
+        "body of nothing": HostileFile(load_body, "a.glb", lambda size: skeleton(nodes=size // 44)),
+    }
+
+
+def _meshes() -> dict[str, HostileFile]:
+    faces = "f 1 2 3\n"
+    return {
+        "obj faces": HostileFile(read_obj, "a.obj", repeat(OBJ_HEAD, faces)),
+        "obj corners": HostileFile(read_obj, "a.obj", repeat(OBJ_HEAD + "f ", "1 ", "\n", most=500_000)),
+        "obj continued": HostileFile(read_obj, "a.obj", repeat(OBJ_HEAD + "f 1 2 3 ", "\\\n", "\n")),
+        "obj vertices": HostileFile(read_obj, "a.obj", repeat("", "v 0 0 0\n", faces)),
+        "obj groups": HostileFile(read_pieces, "a.obj", repeat(OBJ_HEAD, "g a%d\n" + faces)),
+        "obj materials": HostileFile(read_pieces, "a.obj", repeat(OBJ_HEAD, "g a\nusemtl m%d\n" + faces)),
+        "obj libraries": HostileFile(
+            read_pieces,
+            "a.obj",
+            repeat(OBJ_HEAD + faces, "mtllib a.mtl\n"),
+            {"a.mtl": repeat("", "newmtl a%d\n")},
+        ),
+        "obj pictures": HostileFile(
+            read_pieces,
+            "a.obj",
+            repeat(OBJ_HEAD + "mtllib a.mtl\n", "usemtl a%d\n" + faces, most=1000),
+            {
+                "a.mtl": repeat("", "newmtl a%d\nmap_Kd a.png\n"),
+                "a.png": lambda size: b"\x89PNG" + bytes(size),
+            },
+        ),
+        "obj comments": HostileFile(read_obj, "a.obj", repeat(OBJ_HEAD + faces, "#" * 1000 + "\n")),
+        "ply ascii": HostileFile(read_ply, "a.ply", counted(PLY_HEAD, "3 0 1 2\n")),
+        "ply empty lists": HostileFile(read_ply, "a.ply", counted(PLY_HEAD, "0\n")),
+        "ply binary lists": HostileFile(read_ply, "a.ply", even_vertices),
+        "ply words": HostileFile(read_ply, "a.ply", repeat(PLY_HEAD % 1 + "3 0 1 2 ", "1 ")),
+        "ply header": HostileFile(read_ply, "a.ply", repeat("ply\n", "comment a\n", "end_header\n")),
+        "vrml quotes": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD + '"', '\\"')),
+        "vrml strings": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD, '"\n')),
+        "vrml sets": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD, VRML_SET)),
+        "vrml brackets": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD, "{")),
+        "vrml numbers": HostileFile(
+            read_vrml, "a.wrl", repeat(VRML_HEAD + "IndexedFaceSet { coordIndex [", "0 -1 0 -1\n", "] }")
+        ),
+        "vrml words": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD, "a\n")),
+        "wfm rows": HostileFile(read_wfm, "a.wfm", table("0 0 0\n", 1)),
+        "wfm comments": HostileFile(read_wfm, "a.wfm", repeat("", "#\n")),
+    }
+
+
+def _points() -> dict[str, HostileFile]:
+    shape = {"a.wrl": lambda size: (VRML_HEAD + VRML_SET).encode()}
+    return {
+        "points rows": HostileFile(read_points, "a.csv", repeat("name\n", "#\n")),
+        "points commas": HostileFile(read_points, "a.csv", repeat("2.1", ",", most=1_000_000)),
+        "points blanks": HostileFile(read_points, "a.csv", repeat("2.1", " ", "x", most=1_000_000)),
+        "points lists": HostileFile(read_points, "a.json", repeat('{"2.1": [', "[],", "0]}")),
+        "points objects": HostileFile(read_points, "a.json", repeat('{"2.1": [', "{},", "0]}")),
+        "points digits": HostileFile(read_points, "a.json", repeat('{"2.1": [', "1", ",0,0]}")),
+        "points deep": HostileFile(read_points, "a.json", pairs('{"2.1": ', "[", "", "]", "}")),
+        "fdp rows": HostileFile(read_points, "a.fdp", repeat("1.0 a\n", "99.99 0 0 0\n")),
+        "xface elements": HostileFile(read_points, "a.fdp", repeat(XFACE, "<a/>", XFACE_END)),
+        "xface deep": HostileFile(read_points, "a.fdp", pairs(XFACE, "<a>", "", "</a>", XFACE_END)),
+        "xface indices": HostileFile(
+            read_points,
+            "a.fdp",
+            repeat(XFACE + XFACE_POINT + "<indices>", "1 ", "</indices></fdp>" + XFACE_END),
+        ),
+        "xface influences": HostileFile(
+            read_points,
+            "a.fdp",
+            pairs(
+                XFACE + XFACE_POINT + "<indices>",
+                "1 2 3 4 5 6 7 8 ",
+                "</indices>",
+                '<influence fap="3" weight="1"/>',
+                "</fdp>" + XFACE_END,
+            ),
+        ),
+        "xface submeshes": HostileFile(
+            read_points,
+            "a.fdp",
+            repeat(XFACE, '<fdp name="2.1" affects="a.wrl_%d" index="0"/>', XFACE_END),
+            shape,
+        ),
+        "xface attributes": HostileFile(read_points, "a.fdp", repeat("<xfdp ", 'a%d="" ', "/>")),
+        "body joints": HostileFile(
+            load_definition, "a.json", repeat('{"joints": {', '"j%d": {"centre": [0, 0, 0]},', '"j": 0}}')
+        ),
+        "body lists": HostileFile(load_definition, "a.json", repeat('{"joints": [', "[],", "0]}")),
+        "body digits": HostileFile(
+            load_definition, "a.json", repeat('{"joints": {"a": {"centre": [', "1", ",0,0]}}}")
+        ),
+        "body name": HostileFile(
+            load_definition, "a.json", repeat('{"joints": {"', "a", '": {"centre": 0}}}')
+        ),
+    }
+
+
+def _sounds() -> dict[str, HostileFile]:
+    return {
+        "wav": HostileFile(read_sound, "a.wav", wav()),
+        "wav of one sample a second": HostileFile(read_sound, "a.wav", wav(rate=1)),
+        "wav of 64 channels": HostileFile(read_sound, "a.wav", wav(channels=64)),
+    }
