@@ -425,7 +425,7 @@ def _captures() -> dict[str, HostileFile]:
         "bvh nested": HostileFile(read_motion, "a.bvh", nested_joints),
         "bvh spaces": HostileFile(read_motion, "a.bvh", repeat(bvh() + "Frames", " ", "x\n")),
         "bvh short lines": HostileFile(read_motion, "a.bvh", repeat(bvh(channels=1) + FRAMES, "11\n")),
-        "bvh frames": HostileFile(read_any, "a.bvh", repeat(bvh(channels=1) + FRAMES, "1\n", most=20_000)),
+        "bvh frames": HostileFile(read_any, "a.bvh", repeat(bvh(channels=1) + FRAMES, "1\n", most=10_000)),
         "bvh one line": HostileFile(read_motion, "a.bvh", repeat(bvh() + FRAMES, "1 ")),
         "bvh blank lines": HostileFile(read_motion, "a.bvh", repeat(bvh() + motion, "\n")),
         "bvh braces": HostileFile(read_motion, "a.bvh", repeat(start, "{")),

@@ -114,13 +114,15 @@ def sample_motion(
 ) -> SkeletonMotion:
     """Do the same as `read_motion` for a file that has been read."""
     try:
-        return _sample_motion(gltf, clip, rate)
+        return _sample_motion(gltf, clip, rate, limits)
     except ModelError as error:
         found = error.finding.removeprefix(f"{gltf.file}: ")
         raise ModelError(f"{gltf.file}: {found}").with_remedies(*error.remedies) from error
 
 
-def _sample_motion(gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None) -> SkeletonMotion:
+def _sample_motion(
+    gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None, limits: Limits
+) -> SkeletonMotion:
     nodes = _skeleton(gltf)
     if len(nodes) > MAX_JOINTS:
         raise ModelError(f"{gltf.file}: the skeleton has {len(nodes)} joints, more than {MAX_JOINTS}")

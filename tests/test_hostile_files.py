@@ -1,0 +1,121 @@
+"""Files that grow: reading takes time in proportion to their length, and 20 times their length and 200 MB of
+memory at most, whatever they repeat. What is refused, is refused with an error of ours.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fba
+from fba.errors import LimitError, ModelError
+from hostile_files import bvh, hostile_files, png, skeleton, surface
+
+SMALL, LARGE = (200_000, 800_000) if os.environ.get("FBA_FUZZ") == "long" else (15_000, 60_000)
+HELPERS = Path(__file__).parent / "helpers"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is measured through /proc")
+def test_time_and_memory_grow_no_faster_than_files(tmp_path: Path) -> None:
+    pytest.importorskip("av")
+    from measured_reading import SLOWER, SPARE_SECONDS
+
+    done = subprocess.run(
+        [sys.executable, str(HELPERS / "measured_reading.py"), str(tmp_path), str(SMALL), str(LARGE)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "FBA_CACHE": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    results = json.loads(done.stdout)
+    assert len(results) == len(hostile_files())
+    findings = []
+    for result in results:
+        small, large = result["small"], result["large"]
+        if large["seconds"] > SLOWER * small["seconds"] + SPARE_SECONDS:
+            findings.append(f"{result['name']}: {small['seconds']:.2f} s, then {large['seconds']:.2f} s")
+        if large["memory"] > 20 * large["bytes"] + 200e6:
+            findings.append(f"{result['name']}: {large['bytes']} bytes take {large['memory'] / 1e6:.0f} MB")
+        findings += [f"{result['name']}: {one['outcome']}" for one in (small, large) if one["outcome"]]
+    assert not findings, "\n".join(findings)
+
+
+def test_two_keys_hours_apart(tmp_path: Path) -> None:
+    path = tmp_path / "a.glb"
+    path.write_bytes(skeleton(last=16_000.0))
+    with pytest.raises(
+        LimitError, match=r"a\.glb: animation 'animation 0', 16000 s at .* raise it with limits"
+    ):
+        fba.read(path)
+    path.write_bytes(skeleton(last=1e6))
+    with pytest.raises(LimitError, match="lasts 1000000 s, more than the 604800"):
+        fba.read(path)
+
+
+def test_a_limit_can_be_raised(tmp_path: Path) -> None:
+    path = tmp_path / "a.bvh"
+    path.write_text(bvh(channels=1, motion="Frames: 300\nFrame Time: 0.04\n" + "1\n" * 300))
+    with pytest.raises(LimitError, match="`bytes`"):
+        fba.read(path, limits=fba.Limits(bytes=100_000))
+    with pytest.raises(LimitError, match="`frames`"):
+        fba.read(path, limits=fba.Limits(frames=299))
+    assert len(fba.read(path, limits=fba.Limits(frames=300))) == 300
+
+
+def test_a_picture_of_169_million_pixels() -> None:
+    pytest.importorskip("PIL")
+    from fba_player.mesh.textures import load_picture
+
+    with pytest.raises(
+        LimitError, match="13000 x 13000 pixels, more than the 67108864 that the limit `pixels`"
+    ):
+        load_picture(_wide(png(8, 8), 13_000))
+    with pytest.raises(LimitError, match=r"6000 x 6000 pixels, takes 288000000 bytes of memory"):
+        load_picture(_wide(png(8, 8), 6_000))
+    assert load_picture(png(4096, 16)).size == (4096, 16)
+
+
+def _wide(picture: bytes, side: int) -> bytes:
+    """Return a PNG that claims other measures: what they are is checked before anything is decoded."""
+    import struct
+    import zlib
+
+    header = struct.pack(">4sII", b"IHDR", side, side) + picture[24:29]
+    return picture[:12] + header + struct.pack(">I", zlib.crc32(header)) + picture[33:]
+
+
+def test_a_thousand_planes_that_skip_a_million_frames(tmp_path: Path) -> None:
+    file = hostile_files()["epf skips"]
+    path, size = file.write(tmp_path, 24_000)
+    assert size < 25_000
+    with pytest.raises(LimitError, match=r"a\.epf:\d+: what is to be coded, with the frames skipped, has"):
+        file.read(path)
+
+
+def test_more_parts_than_a_face_has(tmp_path: Path) -> None:
+    file = hostile_files()["obj groups"]
+    path, _ = file.write(tmp_path, 40_000)
+    with pytest.raises(ModelError, match="groups and materials have polygons; at most 1000 are read"):
+        file.read(path)
+
+
+def test_a_skeleton_of_more_joints_than_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.glb"
+    path.write_bytes(skeleton(nodes=4100))
+    with pytest.raises(fba.FormatError, match=r"the skeleton has \d+ joints, more than 4096"):
+        fba.read(path)
+
+
+def test_many_surfaces_of_one_name_have_different_names(tmp_path: Path) -> None:
+    from fba.gltf import read_gltf, surfaces
+
+    path = tmp_path / "a.glb"
+    path.write_bytes(surface(meshes=3, name="head"))
+    assert [one.name for one in surfaces(read_gltf(path))] == ["head", "head 2", "head 3"]
