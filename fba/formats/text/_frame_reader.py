@@ -18,6 +18,7 @@ from fba.formats.text._layout import Layout
 from fba.formats.text.frame_rates import parse_rate
 from fba.formats.text.lines import GIVE_RATE, Header, Lines, content, is_header, is_mask, parse_header
 from fba.formats.text.values import Row, ValueParser
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, open_source
 
 BATCH_LINES = 2048
@@ -46,6 +47,7 @@ def read_frames(
     name: str | None = None,
     salvage: bool = False,
     angle_scale: Fraction | float = 1,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Frames:
     """Return the header and all frames of a file.
 
@@ -75,6 +77,7 @@ def read_frames(
                 FbaWarning,
                 stacklevel=3,
             )
+    limits.check_frames(reader.count, f"{path}: the file")
     return reader.frames(header)
 
 

@@ -10,6 +10,7 @@ from fba.formats.text._frame_reader import read_frames
 from fba.formats.text._frame_writer import write_frames
 from fba.formats.text._layout import bap_layout
 from fba.formats.text.lines import sniff_layout
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
 
@@ -25,6 +26,7 @@ def read_bap(
     name: str | None = None,
     salvage: bool = False,
     angle_scale: Fraction | float = 1,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Read a BAP file; its frame numbers become the animation's index.
 
@@ -33,7 +35,9 @@ def read_bap(
     translations), for the old files whose unit is not 1e-5 rad. Raises FormatError with line and
     token; FbaWarning as `fba.formats.text.fap.read_fap`.
     """
-    frames = read_frames(path, bap_layout(), fps=fps, name=name, salvage=salvage, angle_scale=angle_scale)
+    frames = read_frames(
+        path, bap_layout(), fps=fps, name=name, salvage=salvage, angle_scale=angle_scale, limits=limits
+    )
     body = BodyTrack(frames.slots, frames.mask)
     return Animation(frames.header.rate, frames.index, None, body, frames.header.name)
 

@@ -13,6 +13,7 @@ from fba.formats.text._frame_reader import read_frames
 from fba.formats.text._frame_writer import write_frames
 from fba.formats.text._layout import fap_layout
 from fba.formats.text.lines import sniff_layout
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 from fba.source import Path
 
@@ -32,16 +33,20 @@ def read_fap(
     name: str | None = None,
     salvage: bool = False,
     angle_scale: Fraction | float = 1,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Read a FAP file; its frame numbers become the animation's index.
 
     fps, name: replace those of the header, or a missing header. salvage: keep the frames before damage
     or a cut instead of raising. angle_scale: factor on the eight FAPs in angle units, for files whose
-    unit is not 1e-5 rad (50 for one that took it as 5e-4). Raises FormatError with line and token;
+    unit is not 1e-5 rad (50 for one that took it as 5e-4). Raises FormatError with line and token, LimitError for
+    more frames than `limits` allow;
     FbaWarning for values that had to be rounded, a wrong frame count, frame numbers that do not
     increase, an unknown version.
     """
-    frames = read_frames(path, fap_layout(), fps=fps, name=name, salvage=salvage, angle_scale=angle_scale)
+    frames = read_frames(
+        path, fap_layout(), fps=fps, name=name, salvage=salvage, angle_scale=angle_scale, limits=limits
+    )
     values = np.zeros((len(frames.index), FAP_COUNT), dtype=np.int32)
     values[:, 2:] = frames.slots[:, _FIELDS:]
     face = FaceTrack(
