@@ -94,7 +94,7 @@ def test_a_mesh_shown_too_often_is_refused(tmp_path: Path) -> None:
 
 def test_transforms_that_overflow_are_refused(tmp_path: Path) -> None:
     sheet = Sheet()
-    sheet.show(sheet.triangle(), scale=[1e200, 1, 1])
+    sheet.show(sheet.triangle(), scale=[1e90, 1, 1])
     with pytest.raises(ModelError, match=r"nodes\[0\]: positions overflow"):
         surfaces(read_gltf(sheet.save(tmp_path / "a.glb")))
     sheet.json["nodes"] = [{"mesh": 0, "scale": [1e200, 1, 1]}, {"children": [0], "scale": [1e200, 1, 1]}]

@@ -39,10 +39,9 @@ def read_fap(
 
     fps, name: replace those of the header, or a missing header. salvage: keep the frames before damage
     or a cut instead of raising. angle_scale: factor on the eight FAPs in angle units, for files whose
-    unit is not 1e-5 rad (50 for one that took it as 5e-4). Raises FormatError with line and token, LimitError for
-    more frames than `limits` allow;
-    FbaWarning for values that had to be rounded, a wrong frame count, frame numbers that do not
-    increase, an unknown version.
+    unit is not 1e-5 rad (50 for one that took it as 5e-4). Raises FormatError with line and token,
+    LimitError for more frames than `limits` allow; FbaWarning for values that had to be rounded, a wrong
+    frame count, frame numbers that do not increase, an unknown version.
     """
     frames = read_frames(
         path, fap_layout(), fps=fps, name=name, salvage=salvage, angle_scale=angle_scale, limits=limits
