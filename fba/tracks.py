@@ -103,8 +103,8 @@ class FaceTrack:
         parts: each a track and its number of frames; None for a track that sends nothing.
         """
         parts = list(parts)
-        if all(track is None for track, _ in parts):
-            return None
+        if len(parts) == 1 or all(track is None for track, _ in parts):
+            return parts[0][0] if parts else None
         tracks = [track if track is not None else cls.empty(count) for track, count in parts]
         return cls(
             _stack([t.values for t in tracks]),
@@ -174,8 +174,8 @@ class BodyTrack:
         parts: each a track and its number of frames; None for a track that sends nothing.
         """
         parts = list(parts)
-        if all(track is None for track, _ in parts):
-            return None
+        if len(parts) == 1 or all(track is None for track, _ in parts):
+            return parts[0][0] if parts else None
         tracks = [track if track is not None else cls.empty(count) for track, count in parts]
         return cls(_stack([t.values for t in tracks]), _stack([t.mask for t in tracks]))
 

@@ -134,6 +134,8 @@ class Encoder:
         options.clamp.
         """
         amounts = rows[:, slots.AMOUNTS]
+        if amounts.min() >= 0 and amounts.max() <= INTENSITY_MAX:
+            return
         wrong = np.argwhere((amounts < 0) | (amounts > quantiser.ROUNDED_AMOUNT_MAX)).tolist()
         if wrong and not self.options.clamp:
             frame, column = wrong[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -52,7 +52,7 @@ class Block:
         return CodedFrames(
             slots.FACE_BIT,
             self.rows,
-            self._places,
+            _places(self.columns.tobytes()),
             self._masks(slots.FACE_BIT, settings.mask),
             None if interpolated is None else self._masks(slots.FACE_BIT, interpolated),
         ).face()
@@ -64,19 +64,12 @@ class Block:
         if settings is None:
             return None
         mask = self._masks(slots.BODY_BIT, settings.mask)
-        return CodedFrames(slots.BODY_BIT, self.rows, self._places, mask).body()
+        return CodedFrames(slots.BODY_BIT, self.rows, _places(self.columns.tobytes()), mask).body()
 
     @cached_property
     def same_parts(self) -> bool:
         """Whether all planes carry the same parts."""
         return len(self.parts) == 1 or bool((self.parts == self.parts[0]).all())
-
-    @cached_property
-    def _places(self) -> Int64:
-        """int64 (slots,): the column of each slot, -1 where there is none."""
-        places = np.full(slots.SLOTS, -1, dtype=np.int64)
-        places[self.columns] = np.arange(len(self.columns))
-        return places
 
     def _masks(self, part: int, mask: Bool) -> Masks:
         """Return the masks of all frames, empty where a plane lacks the part."""
@@ -111,3 +104,12 @@ class Block:
                 body[frame] if body is not None else None,
                 PlaneInfo(self.number + position, bit, after - bit, settings, self.doubtful),
             )
+
+
+@lru_cache(maxsize=64)
+def _places(columns: bytes) -> Int64:
+    """Return int64 (slots,): the place of each slot among columns, the bytes of int64; -1 if it has none."""
+    numbers = np.frombuffer(columns, dtype=np.int64)
+    places = np.full(slots.SLOTS, -1, dtype=np.int64)
+    places[numbers] = np.arange(len(numbers))
+    return places
