@@ -71,6 +71,10 @@ GAIT_DETECTION = "fba/body/gait/_detection.py"
 GAIT_MEASURE = "fba/body/gait/_measure.py"
 DAMAGE = "fba/codec/_damage.py"
 RESTARTS = "fba/codec/_restart_points.py"
+VALUES = "conformance/fba_conformance/values.py"
+JUDGEMENT = "conformance/fba_conformance/suite/judgement.py"
+TESTED = "conformance/fba_conformance/suite/programs.py"
+PROGRAMS_TEST = "tests/conformance/test_programs.py"
 
 LOSS_TEST = "tests/codec/test_loss.py"
 TIMES_TEST = "tests/codec/test_codec_rules.py"
@@ -261,6 +265,14 @@ MUTANTS = (
     Mutant(GAIT_DETECTION, "UNEVEN = 2.2", "UNEVEN = 3.1", GAIT_TEST),
     Mutant(GAIT_MEASURE, "ON_GROUND = 0.002", "ON_GROUND = 0.0018", GAIT_TEST),
     Mutant(GAIT_MEASURE, "ON_GROUND = 0.002", "ON_GROUND = 0.0022", GAIT_TEST),
+    Mutant(VALUES, "TIME_TOLERANCE = Fraction(1, 1000)", "TIME_TOLERANCE = Fraction(1, 50)", PROGRAMS_TEST),
+    Mutant(VALUES, "if found.time is None:", "if False:", PROGRAMS_TEST),
+    Mutant(JUDGEMENT, "if not failed:", "if False:", PROGRAMS_TEST),
+    Mutant(JUDGEMENT, "given = given[:-1]", "pass", PROGRAMS_TEST),
+    Mutant(
+        JUDGEMENT, "if not found.ended:\n            return", "if False:\n            return", PROGRAMS_TEST
+    ),
+    Mutant(TESTED, "if run.crash or (run.failure and", "if (run.failure and", PROGRAMS_TEST),
     Mutant(DAMAGE, "DOUBTFUL = 8", "DOUBTFUL = 0", "tests/codec/test_damage.py"),
     Mutant(CLOCK, "_BELIEVED_JUMP = 60", "_BELIEVED_JUMP = 10**6", LOSS_TEST),
     Mutant(CLOCK, "or index > self._coded_index", "or index < 0", LOSS_TEST),

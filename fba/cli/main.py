@@ -29,7 +29,7 @@ _COMMANDS = {
     "render": "Render a file to a picture or a video, without a window.",
     "verify": "Check FBA streams for damage, and compute digests of their values.",
     "stats": "Show where the bits of FBA streams go.",
-    "conformance": "Check this codec against test vectors.",
+    "conformance": "Check this codec, or another program, against test vectors.",
     "bench": "Measure the speed of this codec on a stream.",
     "gait": "Generate a walk by stride and character, or find the steps in one.",
     "model": "Inspect face models, check them, import them, fit them to a person.",

@@ -151,6 +151,28 @@ def test_the_independent_decoder_and_ours_pass_as_programs(
     assert [result.line() for result in results if not result.exact] == []
 
 
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
+@pytest.mark.parametrize(
+    ("mistake", "found", "passed"),
+    [
+        ("steps-always-iso", "body_visage", "body"),
+        ("closing-bits-unchecked", "closing_bits_body", "dct_body"),
+    ],
+)
+def test_a_decoder_with_a_mistake_fails_as_a_program(
+    monkeypatch: pytest.MonkeyPatch, mistake: str, found: str, passed: str
+) -> None:
+    def run(self: Program, values: dict[str, str], output: Path) -> programs.Run:
+        arguments = ["decode", values["in"], values["out"], "--bap-steps", values["bap_steps"]]
+        monkeypatch.setattr(sys, "argv", ["program", *arguments, "--mistake", mistake])
+        example_program.main()
+        return programs.Run(0)
+
+    monkeypatch.setattr(Program, "run", run)
+    tested = parse_program("decode {in} {out} {bap_steps}")
+    assert [check_decoder(tested, VECTORS[name]).decoded for name in (found, passed)] == [False, True]
+
+
 def encoded_by_us(monkeypatch: pytest.MonkeyPatch, vector: Vector) -> programs.Result:
     def run(self: Program, values: dict[str, str], output: Path) -> programs.Run:
         arguments = ["encode", values["in"], values["out"], "--rate", values["rate"]]
