@@ -36,6 +36,8 @@ from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELD
 HEADER = "fba-values 1"
 TIME_TOLERANCE = Fraction(1, 1000)
 """Seconds by which a time may differ: some decoders count in milliseconds."""
+LONGEST_DENOMINATOR = 10**6
+"""Times with a larger one are written as decimal numbers."""
 
 _FIELDS = {"viseme": len(VISEME_FIELDS), "expression": len(EXPRESSION_FIELDS)}
 _COUNTS = {"fap": FAP_COUNT, "bap": BAP_COUNT}
@@ -67,7 +69,7 @@ class PlaneValues:
         """Yield the lines of the plane, in the one order that we write."""
         yield "plane"
         if self.time is not None:
-            yield f"time {self.time}"
+            yield f"time {_time_text(self.time)}"
         for name, fields in (("viseme", self.viseme), ("expression", self.expression)):
             if fields is not None:
                 yield f"{name} {' '.join(map(str, fields))}"
@@ -113,6 +115,14 @@ class Listing:
         if len(self.planes) != len(other.planes):
             return f"{len(other.planes)} planes, expected {len(self.planes)}"
         return ""
+
+
+def _time_text(time: Fraction) -> str:
+    """Return a time as a fraction, or with nine decimals where rates that changed make the fraction long."""
+    if time.denominator <= LONGEST_DENOMINATOR:
+        return str(time)
+    seconds, billionths = divmod(round(time * 10**9), 10**9)
+    return f"{seconds}.{billionths:09}"
 
 
 def _plane_difference(expected: PlaneValues, found: PlaneValues, *, timed: bool) -> str:

@@ -16,6 +16,7 @@ from fba_conformance.suite.archive import write_archive
 from fba_conformance.suite.generate import Made, made_vectors, write_vectors
 from fba_conformance.suite.index import OWN, Vector, read_vectors
 from fba_conformance.suite.runner import check, expected_listing
+from fba_conformance.values import read_values
 
 VECTORS = read_vectors()
 LONG = {"valid/counts_halved.fba", "valid/bap_int32.fba", "valid/high_level_zeros.fba"}
@@ -112,4 +113,5 @@ def test_the_zip_has_everything_and_always_the_same_bytes(made: list[Made]) -> N
     for entry in json.loads(held["index.json"]):
         text = held[entry["stream"].replace(".fba", ".txt")]
         assert sha256(text).hexdigest() == entry["values"]  # sha256sum checks it, without Python
+        assert read_values(text.decode()).digest() == entry["values"]
         assert entry["tests"] in held["README.txt"].decode()

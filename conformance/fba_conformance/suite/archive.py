@@ -27,8 +27,8 @@ Part of fba, under the MIT licence.
   valid/NAME.fba     a stream that every decoder must decode
   valid/NAME.txt     the values that it must find
   damaged/NAME.fba   a stream with damage
-  damaged/NAME.txt   the values before the damage, a line "error", and the values behind it that can be
-  salvaged index.json         the tables below, for programs
+  damaged/NAME.txt   the values before the damage, a line "error", and those that can be salvaged behind it
+  index.json         the tables below, for programs
   coverage.txt       which vectors reach which element of the syntax, and which branch of a decoder
   SHA256SUMS         checksums of all other files: sha256sum -c SHA256SUMS
 
