@@ -18,6 +18,7 @@ from fba.errors import FbaError, OptionError
 from fba_conformance.fuzz import __main__ as program
 from fba_conformance.fuzz import _campaign as campaign
 from fba_conformance.fuzz import _engine as engine
+from fba_conformance.fuzz import _guided as guided
 from fba_conformance.fuzz import _stream_contract as contract
 from fba_conformance.fuzz._minimise import minimise
 from fba_conformance.fuzz._mutation import mutate
@@ -162,6 +163,25 @@ def test_unknown_targets_are_refused_with_a_list() -> None:
         find_target("bhv")
     with pytest.raises(SystemExit):
         program.main(["--target", "bhv"])
+
+
+def test_guided_fuzzing_says_what_it_needs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(guided, "find_spec", lambda name: None)
+    with pytest.raises(SystemExit, match="2"):
+        program.main(["--guided", "--target", "fap"])
+    assert "--guided needs atheris" in capsys.readouterr().err
+
+
+def test_guided_fuzzing_counts_its_inputs(
+    own: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("atheris")
+    monkeypatch.setattr(campaign, "MINIMISED_SECONDS", 0.0)
+    arguments = ["--guided", "--target", f"{OWN}:raises", "--corpus", str(own / "corpus"), "--jobs", "1"]
+    assert program.main([*arguments, "--minutes", "0.01"]) == 1
+    assert "four times e" in capsys.readouterr().out
 
 
 def test_a_corpus_without_files_is_refused(tmp_path: Path) -> None:

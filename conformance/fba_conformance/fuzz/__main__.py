@@ -60,7 +60,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.corpus,
         options.findings,
     )  # fmt: skip
-    reports = (run_guided if options.guided else run_campaign)(campaign, _say)
+    try:
+        reports = (run_guided if options.guided else run_campaign)(campaign, _say)
+    except FbaError as error:
+        parser.error(str(error))
     found = sum(len(report.findings) for report in reports)
     planes = sum(report.planes for report in reports)
     _say(f"{sum(report.count for report in reports)} inputs, {planes} mutated planes; {found} findings")

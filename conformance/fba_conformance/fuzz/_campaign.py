@@ -167,6 +167,12 @@ def _death(campaign: Campaign, target: Target, number: int, kind: str, words: st
     """Return the finding of an input that made the process crash or hang, minimised in new processes."""
     corpus = read_corpus(target, campaign.corpus)
     data, _ = mutated(target, corpus, campaign.seed, number)
+    smaller = minimise_in_processes(target, data, holding=(0, 1))
+    return Finding(target.name, campaign.seed, number, kind, words, data, smaller)
+
+
+def minimise_in_processes(target: Target, data: bytes, holding: tuple[int, ...] = (0,)) -> bytes:
+    """Return a smaller input with which a worker hangs or ends with a status that is not in `holding`."""
     with tempfile.TemporaryDirectory(prefix="fba-fuzz-") as name:
         path = Path(name) / "input"
 
@@ -180,10 +186,9 @@ def _death(campaign: Campaign, target: Target, number: int, kind: str, words: st
                 )  # fmt: skip
             except subprocess.TimeoutExpired:
                 return True
-            return done.returncode not in (0, 1)
+            return done.returncode not in holding
 
-        smaller = minimise(data, fails, MINIMISED_SECONDS)
-    return Finding(target.name, campaign.seed, number, kind, words, data, smaller)
+        return minimise(data, fails, MINIMISED_SECONDS)
 
 
 def worker_command(target: Target, *arguments: str) -> list[str]:

@@ -188,10 +188,14 @@ def _common(one: bytes, other: bytes) -> int:
 
 
 class Check:
-    """Checks one input within limits of time and, after `limit`, of memory. seconds: that the last took."""
+    """Checks one input within limits of time and, after `limit`, of memory. seconds: that the last took.
 
-    def __init__(self, target: Target, folder: Path) -> None:
+    most_seconds: processor time that any input may take, whatever its size.
+    """
+
+    def __init__(self, target: Target, folder: Path, most_seconds: float = MOST_SECONDS) -> None:
         self.seconds = 0.0
+        self._most_seconds = most_seconds
         self._check, self._folder = target.load(), folder
         self._limited = False
 
@@ -208,9 +212,10 @@ class Check:
         """Check an input; raise for a finding."""
         most_before, before = _peak_memory(), _memory()
         outcome = self._timed(data)
-        if self.seconds > MOST_SECONDS + MOST_SECONDS_PER_BYTE * len(data):
+        most_seconds = self._most_seconds + MOST_SECONDS_PER_BYTE * len(data)
+        if self.seconds > most_seconds:
             self._timed(data)  # whatever happens once, as compiling does, is no fault of the input
-            if self.seconds > MOST_SECONDS + MOST_SECONDS_PER_BYTE * len(data):
+            if self.seconds > most_seconds:
                 raise ContractError(f"{len(data)} bytes took {self.seconds:.1f} s of processor time")
         most = _peak_memory()
         if self._limited and most > most_before:

@@ -8,17 +8,17 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from importlib.util import find_spec
 from pathlib import Path
 from re import findall
 
 from fba.errors import OptionError
-from fba_conformance.fuzz._campaign import Campaign, environment, save
-from fba_conformance.fuzz._engine import Check, Finding, Report
+from fba_conformance.fuzz._campaign import Campaign, environment, minimise_in_processes, save
+from fba_conformance.fuzz._engine import Finding, Report
 from fba_conformance.fuzz.corpus import read_corpus
-from fba_conformance.fuzz.targets import Target, find_target
+from fba_conformance.fuzz.targets import Target
 
 MOST_BYTES = 20_000
 
@@ -58,7 +58,7 @@ def _run_target(campaign: Campaign, target: Target, seconds: float) -> Report:
         ]
         limits += ["-timeout=60", "-rss_limit_mb=4096", f"-artifact_prefix={found}/", "-print_final_stats=1"]
         done = subprocess.run(
-            [sys.executable, "-m", __name__, target.name, str(corpus), *limits],
+            [sys.executable, "-m", "fba_conformance.fuzz._guided_worker", target.name, str(corpus), *limits],
             env={**environment(target), "NUMBA_DISABLE_JIT": "1"}, capture_output=True, check=False,
         )  # fmt: skip
         words = done.stderr.decode("utf-8", "replace") + done.stdout.decode("utf-8", "replace")
@@ -68,28 +68,10 @@ def _run_target(campaign: Campaign, target: Target, seconds: float) -> Report:
         for number, path in enumerate(sorted(found.iterdir())):
             data = path.read_bytes()
             kind = path.name.partition("-")[0]
+            smaller = minimise_in_processes(target, data)
             report.findings.append(
-                Finding(target.name, campaign.seed, number, kind, words[-4000:], data, data)
+                Finding(target.name, campaign.seed, number, kind, words[-4000:], data, smaller)
             )
         if done.returncode and not report.findings:
             raise RuntimeError(f"atheris ended with status {done.returncode}:\n{words[-4000:]}")
         return report
-
-
-def main(arguments: Sequence[str]) -> None:
-    """Fuzz a target in this process: its name, then libFuzzer's arguments."""
-    import atheris
-
-    with atheris.instrument_imports(include=["fba"]):
-        target = find_target(arguments[0])
-        check = Check(target, Path(tempfile.mkdtemp(prefix="fba-fuzz-")))
-
-    def feed(data: bytes) -> None:
-        check(data)
-
-    atheris.Setup(["fuzz", *arguments[1:]], feed)
-    atheris.Fuzz()
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
