@@ -54,6 +54,8 @@ def check_stream(data: bytes, _folder: Path | None = None) -> Outcome:
             decoder.damage
         ):  # strictly, an unknown start code ends the object, and the next one is read as well
             ours = [frame for frame in ours if frame.end < 8 * decoder.damage[0].start + 8]
+            rest = _without_times(rest, decoder.damage[0].doubtful)  # it may not trust a time code there
+            ours = _without_times(ours, decoder.damage[0].doubtful)
         if rest[: len(ours)] != ours and not earlier:
             raise ContractError(
                 f"{len(rest)} frames salvaged that do not begin with the {len(ours)} good ones"
@@ -152,11 +154,17 @@ def _decode(
 
 
 class _DecodedFrame(NamedTuple):
-    """A decoded frame: its first bit in the stream, the bit behind it, and a digest of everything else."""
+    """A decoded frame: its first bit in the stream, the bit behind it, its time, and a digest of the rest."""
 
     bit: int
     end: int
+    shown: int
     content: int
+
+
+def _without_times(frames: list[_DecodedFrame], numbers: range) -> list[_DecodedFrame]:
+    """Return the frames, those of these numbers without their times."""
+    return [frame._replace(shown=0) if number in numbers else frame for number, frame in enumerate(frames)]
 
 
 def _frames(blocks: list[Block]) -> list[_DecodedFrame]:
@@ -177,6 +185,6 @@ def _frames(blocks: list[Block]) -> list[_DecodedFrame]:
         for position, index in enumerate(block.index.tolist()):
             carried = parts[position]
             values = tuple((part, track[position].tobytes()) for part, track in tracks if carried & part)
-            content = hash((index, block.rate, carried, values))
-            frames.append(_DecodedFrame(borders[position], borders[position + 1], content))
+            content = hash((block.rate, carried, values))
+            frames.append(_DecodedFrame(borders[position], borders[position + 1], index, content))
     return frames
