@@ -18,6 +18,8 @@ from typing import Any, Protocol
 
 from fba.cli.startup import INTERRUPTED, leave
 
+CHECK_AFTER = 1.0
+"""Seconds after which it is checked whether an interruption was swallowed by somebody's `except:`."""
 RETRY_AFTER = 0.05
 """Seconds until a delayed interruption comes again."""
 FRAGILE = (
@@ -53,6 +55,7 @@ class Interruptions:
     def __init__(self) -> None:
         self.exit_code = INTERRUPTED
         self._lost = False
+        self._raised = self._checking = self._over = False
         self._handlers: dict[int, Any] = {}
 
     def __enter__(self) -> Interruptions:
@@ -67,18 +70,14 @@ class Interruptions:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._over = True
         sys.unraisablehook = self._hook
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
 
     def caused(self, error: BaseException) -> bool:
         """Whether Ctrl-C caused an error: by the error's own causes, or because an interruption was lost."""
-        cause: BaseException | None = error
-        while cause is not None:
-            if isinstance(cause, KeyboardInterrupt):
-                return True
-            cause = cause.__cause__ or cause.__context__
-        return self._lost
+        return _is_interruption(error) or self._lost
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         self.exit_code = 128 + number
@@ -87,7 +86,23 @@ class Interruptions:
                 _thread.start_new_thread(_interrupt_later, (number,))
                 return
             frame = frame.f_back
+        if self._checking:
+            self._checking = False
+            if _is_interruption(sys.exception()):
+                return  # the program is cleaning up
+        if not self._raised:
+            self._raised = True
+            _thread.start_new_thread(self._check, (number,))
         raise KeyboardInterrupt
+
+    def _check(self, number: int) -> None:
+        """Interrupt again, now and then, until the program ends: a library may have swallowed the first."""
+        while True:
+            time.sleep(CHECK_AFTER)
+            if self._over:
+                return
+            self._checking = True
+            _thread.interrupt_main(signal.Signals(number))
 
     def _unraisable(self, unraisable: _Unraisable) -> None:
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):
@@ -95,6 +110,15 @@ class Interruptions:
             return
         self._lost = True
         _thread.start_new_thread(_interrupt_later, (self.exit_code - 128,))
+
+
+def _is_interruption(error: BaseException | None) -> bool:
+    """Whether an error is, or was caused by, a KeyboardInterrupt."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _interrupt_later(number: int) -> None:

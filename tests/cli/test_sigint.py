@@ -70,6 +70,30 @@ finally:
 """
 
 
+SWALLOWED = """
+import signal, sys, time
+from fba.cli import _sigint
+from fba.cli.main import group, main
+_sigint.CHECK_AFTER = 0.1
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+@group.command("long")
+def long():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except:
+        pass
+    try:
+        time.sleep(30)
+    finally:
+        time.sleep(0.5)
+        print("cleaned up")
+
+group.get_command = lambda context, name: long
+main(["long"])
+"""
+
+
 def ran(code: str) -> tuple[int, str, str]:
     command = [sys.executable, "-c", code]
     result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
@@ -120,3 +144,7 @@ def test_ctrl_c_inside_a_callback_of_c_code_is_not_lost(afterwards: str) -> None
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
     )
     assert (result.returncode, result.stdout, result.stderr.strip()) == (130, "", "fba: interrupted")
+
+
+def test_ctrl_c_that_a_library_swallows_comes_again_and_disturbs_no_cleaning_up() -> None:
+    assert ran(SWALLOWED) == (130, "cleaned up\n", "\nfba: interrupted\n")
