@@ -32,6 +32,8 @@ class StreamClock:
         self.rate: Fraction | None = None
         self.jump: int | None = None
         """Frames by which the last I plane's time code goes beyond the count of planes; None without one."""
+        self.refused = ""
+        """Which rate or time code of the last I plane was not believed."""
         self.agreements = 0
         """Time codes that named the frame that the count of planes had come to."""
         self._anchor = Fraction(0)  # time of the plane that had index `_anchor_index`
@@ -62,12 +64,13 @@ class StreamClock:
         confirms it, as does a frame rate that changes in a stream that repeats its rate.
         """
         problems = []
+        self.refused = ""
         rate = frame_rate.fraction if frame_rate is not None else self.rate
         if rate is None:
             rate = DEFAULT_RATE
             problems.append(f"the first I plane says no frame rate; {rate} frames/s assumed")
         if repair and frame_rate is not None and self._doubts_rate(rate):
-            problems.append(f"the frame rate {rate} in place of {self.rate} was not used")
+            self.refused = f"the frame rate {rate} in place of {self.rate} was not used"
             rate = self.rate or rate
         now = self.time
         if rate != self.rate:
@@ -87,7 +90,7 @@ class StreamClock:
             elif time_code.total_seconds < now and not (repair and self._can_go_back(nearest)):
                 problems.append(f"time code {time_code} lies before the previous plane; it was not used")
             elif repair and self._goes_too_far(nearest, rate):
-                problems.append(f"time code {time_code} is far ahead of the count of planes; it was not used")
+                self.refused = f"time code {time_code} is far ahead of the count of planes; it was not used"
             else:
                 if time_code.total_seconds >= now:
                     nearest = max(nearest, self.index)

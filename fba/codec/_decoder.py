@@ -352,8 +352,12 @@ class Decoder:
             self._catching_up = not self._may_step_back
         if log.resuming:
             log.resume(*((max(jump, 0), 0) if clock.jump is not None else lost or (None, None)))
-        elif self._salvage and agreed and jump:
+        elif self._salvage and (jump < 0 or (agreed and jump)):
             self._report_jump(settings, bit, jump)
+        if clock.refused:
+            bit = self._absolute(bit)
+            error = BitstreamError(clock.refused, plane=self.planes, bit=bit)
+            self.damage.append(Damage(error, bit >> 3, bit >> 3))
 
     def _begin_object(self) -> None:
         """Reset the reader for a new object."""
