@@ -173,3 +173,11 @@ def test_straight_leg_is_not_broken_for_a_millimetre() -> None:
     assert turned.max() < 2.0
     assert np.degrees(Rotation.from_matrix(thigh).magnitude()).max() < 1.0
     assert leg_ik.pliancy(leg).max() < 0.05
+
+
+def test_heights_of_no_person_have_a_level_ground() -> None:
+    """Least squares have no solution where one frame is 1e29 m away: found by fuzzing."""
+    lowest = np.array([[7.2e28, -0.97, -0.98], [7.2e28, -0.966, -0.97]])
+    across = np.array([[1.2e27, 0.09, 0.09], [1.2e27, -0.15, -0.09]])
+    points = np.stack([across, lowest, np.full((2, 3), 0.0225)], axis=-1)
+    assert ground.find(lowest, points).slope == (0.0, 0.0)

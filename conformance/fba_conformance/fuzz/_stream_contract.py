@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 from random import Random
 from typing import NamedTuple
@@ -54,9 +55,7 @@ def check_stream(data: bytes, _folder: Path | None = None) -> Outcome:
             decoder.damage
         ):  # strictly, an unknown start code ends the object, and the next one is read as well
             ours = [frame for frame in ours if frame.end < 8 * decoder.damage[0].start + 8]
-            rest = _without_times(rest, decoder.damage[0].doubtful)  # it may not trust a time code there
-            ours = _without_times(ours, decoder.damage[0].doubtful)
-        if rest[: len(ours)] != ours and not earlier:
+        if _without_times(rest[: len(ours)]) != _without_times(ours) and not earlier:
             raise ContractError(
                 f"{len(rest)} frames salvaged that do not begin with the {len(ours)} good ones"
             )
@@ -158,13 +157,13 @@ class _DecodedFrame(NamedTuple):
 
     bit: int
     end: int
-    shown: int
+    shown: tuple[int, Fraction]
     content: int
 
 
-def _without_times(frames: list[_DecodedFrame], numbers: range) -> list[_DecodedFrame]:
-    """Return the frames, those of these numbers without their times."""
-    return [frame._replace(shown=0) if number in numbers else frame for number, frame in enumerate(frames)]
+def _without_times(frames: list[_DecodedFrame]) -> list[tuple[int, int, int]]:
+    """Return the frames without their times: salvaging, it may not believe time codes and rates."""
+    return [(frame.bit, frame.end, frame.content) for frame in frames]
 
 
 def _frames(blocks: list[Block]) -> list[_DecodedFrame]:
@@ -185,6 +184,8 @@ def _frames(blocks: list[Block]) -> list[_DecodedFrame]:
         for position, index in enumerate(block.index.tolist()):
             carried = parts[position]
             values = tuple((part, track[position].tobytes()) for part, track in tracks if carried & part)
-            content = hash((block.rate, carried, values))
-            frames.append(_DecodedFrame(borders[position], borders[position + 1], index, content))
+            content = hash((carried, values))
+            frames.append(
+                _DecodedFrame(borders[position], borders[position + 1], (index, block.rate), content)
+            )
     return frames

@@ -75,5 +75,8 @@ def _plane(heights: Float64, across: Float64) -> Float64:
         over = heights - columns @ plane
         weights = np.where(over > 0, UPPER, 1.0) / np.maximum(1.0, np.abs(over) / NEAR)
         matrix = (columns * weights[:, None]).T @ columns + hold
-        plane = np.linalg.solve(matrix, columns.T @ (weights * heights))
+        try:
+            plane = np.linalg.solve(matrix, columns.T @ (weights * heights))
+        except np.linalg.LinAlgError:  # heights so large that the weights vanish: no ground of any person
+            break
     return plane
