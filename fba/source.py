@@ -60,7 +60,7 @@ def read_whole(path: Path) -> bytes:
     with file:
         if size > MAX_WHOLE_FILE:
             raise FormatError(
-                f"is {size} bytes long, more than the {MAX_WHOLE_FILE} that are read in one piece; "
+                f"is {size} bytes long, more than the {MAX_WHOLE_FILE} that can be read in one piece; "
                 "feed it to fba.Decoder chunk by chunk",
                 path=path,
             )

@@ -66,7 +66,7 @@ class BodyDefinition:
         try:
             document = json.loads(data)
         except (ValueError, RecursionError) as error:
-            raise ModelError(f"{file}: is no JSON: {error}") from None
+            raise ModelError(f"{file}: is not JSON: {error}") from None
         joints = document.get("joints") if isinstance(document, dict) else None
         if not isinstance(joints, dict) or not all(
             isinstance(j, dict) and "centre" in j for j in joints.values()

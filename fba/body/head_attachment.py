@@ -141,13 +141,15 @@ def skull_of(body: BodyModel) -> int:
 def placement(body: BodyModel, eyes: npt.ArrayLike) -> Float64:
     """Return float64 (4, 4), from a face's frame to the body's as modelled. eyes: (2, 3), its pupils."""
     if body.eyes is None:
-        raise ModelError(f"the body {body.name!r} has no pupils, so there is no place for a face on it")
+        raise ModelError(f"the body {body.name!r} has no pupils, so no face can be attached to it")
     given = np.array(eyes, dtype=np.float64)
     if given.shape != (2, 3) or not np.isfinite(given).all():
-        raise ModelError(f"a face on a body needs its two pupils (points 3.5 and 3.6), not {given.tolist()}")
+        raise ModelError(
+            f"a face on a body needs the positions of both pupils (points 3.5 and 3.6), not {given.tolist()}"
+        )
     apart = float(np.linalg.norm(given[1] - given[0]))
     if not apart > 1e-9:
-        raise ModelError("both pupils of the face are in the same place")
+        raise ModelError("both pupils of the face have the same position")
     size = float(np.linalg.norm(body.eyes[1] - body.eyes[0])) / apart
     if abs(size - 1) < SAME_SIZE:
         size = 1.0

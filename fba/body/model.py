@@ -113,7 +113,8 @@ class BodyModel(Meshes[BodyPart]):
         for number, matrix in enumerate(bind):
             if not is_rigid(matrix):
                 raise ModelError(
-                    f"the bind matrix of {self.skeleton.names[number]!r} is no rotation with a place: "
+                    f"the bind matrix of {self.skeleton.names[number]!r} must be a rotation and a "
+                    "position, not "
                     f"{np.round(matrix, 4).tolist()}"
                 )
         bind.flags.writeable = False
@@ -121,7 +122,7 @@ class BodyModel(Meshes[BodyPart]):
         if self.eyes is not None:
             eyes = np.array(self.eyes, dtype=np.float64)
             if eyes.shape != (2, 3) or not np.isfinite(eyes).all() or np.allclose(eyes[0], eyes[1]):
-                raise ModelError(f"the pupils must be two places (2, 3), not {eyes.tolist()}")
+                raise ModelError(f"the pupils must be two finite positions, (2, 3), not {eyes.tolist()}")
             eyes.flags.writeable = False
             object.__setattr__(self, "eyes", eyes)
 

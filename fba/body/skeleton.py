@@ -95,7 +95,7 @@ class Skeleton:
         children: dict[str | None, list[str]] = {}
         for name, parent in parents.items():
             if parent is not None and parent not in parents:
-                raise ModelError(f"Skeleton: joint {name!r} hangs on {parent!r}, which is not there")
+                raise ModelError(f"Skeleton: joint {name!r} has the parent {parent!r}, which does not exist")
             children.setdefault(parent, []).append(name)
         waiting = list(reversed(children.get(None, [])))
         while waiting:
@@ -104,7 +104,7 @@ class Skeleton:
             waiting.extend(reversed(children.get(name, [])))
         if len(order) != len(parents):
             loose = next(name for name in parents if name not in set(order))
-            raise ModelError(f"Skeleton: joint {loose!r} is part of a cycle and hangs on no root")
+            raise ModelError(f"Skeleton: joint {loose!r} is part of a cycle and not connected to the root")
         numbers = {name: number for number, name in enumerate(order)}
         return cls(
             tuple(order),

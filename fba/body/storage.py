@@ -133,12 +133,12 @@ def read_body(document: Document) -> BodyModel:
         raise document.root.error(f"has no extension {NAME}, so it is not a body model of fba")
     version = content.member("version").integer(0, 1 << 30)
     if version != VERSION:
-        raise content.error(f"is version {version}; version {VERSION} is read here")
+        raise content.error(f"has version {version}, but this fba reads version {VERSION} only")
     gltf = read_document(document)
     where = content.member("skin")
     skin = gltf.skins[where.index(len(gltf.skins), "skin")]
     if len(skin.joints) > MAX_JOINTS:
-        raise where.error(f"{len(skin.joints)} joints, more than the {MAX_JOINTS} that are read")
+        raise where.error(f"{len(skin.joints)} joints, but at most {MAX_JOINTS} can be read")
     with locating_errors(where), np.errstate(all="ignore"):
         skeleton, bind, order = _skeleton(gltf, skin.joints)
         _check_bind(skin.inverse_bind[order], bind, skeleton.names)
@@ -175,7 +175,7 @@ def _skeleton(gltf: Gltf, joints: tuple[int, ...]) -> tuple[Skeleton, Float64, I
             )
         if own.parent is not None and own.parent not in row:
             raise ModelError(
-                f"joint {own.name!r} (node {node}) hangs on node {own.parent}, which is no joint"
+                f"joint {own.name!r} (node {node}) has the parent node {own.parent}, which is not a joint"
             )
         parent = -1 if own.parent is None else row[own.parent]
         parents.append(parent)
@@ -197,7 +197,7 @@ def _check_bind(inverse: Float64, bind: Float64, names: tuple[str, ...]) -> None
     if not (off < BIND_TOLERANCE).all():
         worst = int(np.argmax(~(off < BIND_TOLERANCE)))
         raise ModelError(
-            f"the inverse bind matrix of joint {names[worst]!r} contradicts where its node stands"
+            f"the inverse bind matrix of joint {names[worst]!r} contradicts the position of its node"
         )
 
 
@@ -207,7 +207,7 @@ def _part(entry: Value, gltf: Gltf, skin: Value, row: Int32, document: Document)
     if node.mesh is None or len(gltf.meshes[node.mesh].primitives) != 1:
         raise where.error("must have a mesh of one primitive")
     if node.skin != skin.data:
-        raise where.error(f"must be carried by skin {skin.data}")
+        raise where.error(f"must use skin {skin.data}")
     primitive = gltf.meshes[node.mesh].primitives[0]
     document.budget.charge(len(primitive.positions) * 200 + len(primitive.triangles) * 36, entry)
     with locating_errors(entry):
@@ -230,7 +230,9 @@ def _carried(primitive: Primitive, row: Int32) -> tuple[Int32, Float32]:
     if primitive.joints is None or primitive.weights is None:
         raise ModelError("its vertices have no joints")
     if primitive.joints.shape[1] != INFLUENCES:
-        raise ModelError(f"{primitive.joints.shape[1]} joints a vertex, but {INFLUENCES} are read")
+        raise ModelError(
+            f"{primitive.joints.shape[1]} joints for each vertex, but at most {INFLUENCES} can be read"
+        )
     if (np.abs(primitive.positions) > LARGEST).any():
         raise ModelError(f"a vertex is more than {LARGEST:g} m away")
     return row[primitive.joints], primitive.weights

@@ -104,7 +104,9 @@ class FaceModel(Meshes[Part]):
         self._check_tables()
         for number in self.lost:
             if not FIRST_LOW_LEVEL_FAP <= number <= FAP_COUNT:
-                raise ModelError(f"FAP {number} cannot be lost: there are {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}")
+                raise ModelError(
+                    f"`lost` names FAP {number}, but only {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT} exist"
+                )
         object.__setattr__(self, "lost", dict(self.lost))
         object.__setattr__(self, "notes", dict(self.notes))
         self.fapu  # noqa: B018 - raises ModelError for a face without units
@@ -199,7 +201,9 @@ class FaceModel(Meshes[Part]):
         for table in self.tables:
             where = f"FaceDefTables of FAP {table.fap} {faps()[table.fap - 1].name}"
             if table.fap in seen:
-                raise ModelError(f"{where}: there are two")
+                raise ModelError(
+                    f"{where}: this FAP has two of them; put all its meshes and transforms into one"
+                )
             seen.add(table.fap)
             for mesh in table.meshes:
                 if mesh.part not in sizes:

@@ -108,7 +108,7 @@ def formats() -> tuple[Format, ...]:
             written="ASCII body animation parameters, version 3.2",
         ),
         Format(
-            "epf", (".epf",), "encoder parameter file: how to code an animation; holds none itself",
+            "epf", (".epf",), "encoder parameter file: how to encode an animation; contains none itself",
             lazy("epf.epf", "sniff_epf"), lazy("epf.epf", "read_animation"), None, (),
         ),
         Format(

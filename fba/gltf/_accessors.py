@@ -87,7 +87,7 @@ class Accessors:
         width = WIDTHS[shape]
         given = entry.member("count")
         if isinstance(given.data, int) and given.data > MAX_ELEMENTS:
-            raise given.error(f"more than the {MAX_ELEMENTS} elements that are read; simplify the model")
+            raise given.error(f"more than the {MAX_ELEMENTS} elements that can be read; simplify the model")
         count = given.integer(1, MAX_ELEMENTS)
         # charged for the raw numbers and the float32 array
         self._document.budget.charge(count * width * (kind.itemsize + 4), entry)

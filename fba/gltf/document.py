@@ -112,7 +112,7 @@ def parse_json(text: memoryview, file: str, limits: Limits = DEFAULT_LIMITS) -> 
     """
     if len(text) > MAX_JSON:
         raise ModelError(
-            f"{file}: {len(text)} bytes of JSON, more than the {MAX_JSON} that are read; "
+            f"{file}: {len(text)} bytes of JSON, more than the {MAX_JSON} that can be read; "
             "keep geometry and pictures in a .glb or in files of their own"
         )
     raw = bytes(text)
@@ -196,7 +196,7 @@ def _content(path: str, most: int, *, start: bool = False) -> bytes:
     file, size = open_source(path)
     with file:
         if size > most and not start:
-            raise ModelError(f"{path}: is {size} bytes long, more than the {most} that are read")
+            raise ModelError(f"{path}: is {size} bytes long, more than the {most} that can be read")
         try:
             return file.read(min(size, most))
         except OSError as error:

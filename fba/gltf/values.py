@@ -83,7 +83,7 @@ class Value:
             return []
         entries = list(content.members())
         if len(entries) > most:
-            raise content.error(f"more than the {most} entries that are read")
+            raise content.error(f"more than the {most} entries that can be read")
         for name, _ in entries:
             Value(name, content.file, content.path).text()  # names must be Unicode too
         return entries
@@ -96,7 +96,7 @@ class Value:
         if not isinstance(self.data, list):
             raise self._unexpected("a list")
         if len(self.data) > most:
-            raise self.error(f"{len(self.data)} elements, more than the {most} that are read")
+            raise self.error(f"{len(self.data)} elements, more than the {most} that can be read")
         return [Value(data, self.file, f"{self.path}[{n}]") for n, data in enumerate(self.data)]
 
     def integer(self, low: int, high: int) -> int:
@@ -141,7 +141,7 @@ class Value:
         if not isinstance(self.data, str):
             raise self._unexpected("text")
         if len(self.data) > most:
-            raise self.error(f"a text of {len(self.data)} characters, more than the {most} that are read")
+            raise self.error(f"a text of {len(self.data)} characters, more than the {most} that can be read")
         try:
             self.data.encode()
         except UnicodeEncodeError:

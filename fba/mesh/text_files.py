@@ -75,7 +75,7 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> bytes:
     file, size = _opened(name)
     with file:
         if size > limit:
-            raise ModelError(f"{name}: is {size} bytes long, more than the {limit} that are read")
+            raise ModelError(f"{name}: is {size} bytes long, more than the {limit} that can be read")
         try:
             return file.read(size)
         except OSError as error:

@@ -175,9 +175,9 @@ def test_where_a_face_cannot_be_put() -> None:
     with pytest.raises(ModelError, match="has no pupils"):
         placement(replace(body, eyes=None), np.eye(3)[:2])
     for bad in (np.full((2, 3), np.nan), np.zeros((1, 3))):
-        with pytest.raises(ModelError, match="needs its two pupils"):
+        with pytest.raises(ModelError, match="needs the positions of both pupils"):
             placement(body, bad)
-    with pytest.raises(ModelError, match="in the same place"):
+    with pytest.raises(ModelError, match="the same position"):
         placement(body, np.zeros((2, 3)))
 
 

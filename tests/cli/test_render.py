@@ -264,7 +264,7 @@ def test_numbered_pictures_and_gifs(run: Run, clip: Path, tmp_path: Path) -> Non
         assert picture.mode == "RGBA"
         assert picture.getextrema()[3] == (0, 255)
     code, _, err = run(*arguments)
-    assert (code, "00000.png to 00005.png (6 pictures) are there already" in err) == (1, True)
+    assert (code, "00000.png to 00005.png (6 pictures) are in this folder already" in err) == (1, True)
     assert run(*arguments, "--replace").code == 0
     gif = tmp_path / "a.gif"
     assert run("render", clip, "-o", gif, "--end", "0.08", *SMALL) == (0, f"{gif}: 96x72\n", "")

@@ -123,7 +123,7 @@ def test_a_sound_of_a_rate_that_no_device_has(tmp_path: Path, rate: int) -> None
         file.setsampwidth(1)
         file.setframerate(rate)
         file.writeframes(bytes(1000))
-    with pytest.raises(FormatError, match=f"says {rate} samples a second; 1000 to 1000000 are read"):
+    with pytest.raises(FormatError, match=f"claims {rate} samples a second; 1000 to 1000000 can be read"):
         SoundFile(path)
 
 

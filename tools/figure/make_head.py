@@ -151,7 +151,7 @@ def _chart(surface: Refined, marks: sculpt.Marks) -> paint.Chart:
     outside = surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0
     values = np.stack([marks.mouth, marks.eye, marks.lip], axis=1)
     uvs = surface.uvs[surface.corners[outside]]
-    return paint.chart(surface.vertices, values, surface.triangles[outside], uvs)
+    return paint.make_chart(surface.vertices, values, surface.triangles[outside], uvs)
 
 
 def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:

@@ -1,6 +1,6 @@
 """The skin's texture: complexion, lips, brows and cropped hair, painted by position on the head.
 
-`scalp` and `brow` are the density of hair.
+`scalp` and `brow` return the density of hair at each point.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ NECK = np.array([206, 158, 131.0])
 HAIR = np.array([52, 38, 30.0])
 SCALP = np.array([112, 86, 73.0])
 AXIS = -0.085
-"""z of the vertical axis about which the hairline is given."""
+"""z of the vertical axis around which the angles of the hairline are measured."""
 CROWN = np.array([0.004, 0.104, -0.118])
 THICKNESS = 0.0035
 BROW = np.array([
-    # along the left brow: x, y, how far it reaches down and up (mm)
+    # along the left brow: x, y, extent downwards and upwards (mm)
     (12.5, 14.5, 3.4, 3.2), (18, 17.6, 4.0, 3.6), (26, 20.8, 3.9, 3.4), (35, 23.0, 3.2, 3.0),
     (44, 22.6, 2.4, 2.4), (52, 19.0, 1.6, 1.7), (59, 13.6, 0.7, 0.8),
 ]) / 1000  # fmt: skip
@@ -46,18 +46,20 @@ BROW = np.array([
 class Chart:
     """The surface at every texel.
 
-    place: (S, S, 3) position, metres. value: (S, S, K). known: (S, S) mask of covered texels.
+    positions_at: (S, S, 3) positions, metres. values_at: (S, S, K). known: (S, S) mask of covered texels.
     """
 
-    place: Float64
-    value: Float64
+    positions_at: Float64
+    values_at: Float64
     known: Bool
 
 
-def chart(vertices: Float64, values: Float64, triangles: Integer, uvs: Float64, size: int = SIZE) -> Chart:
+def make_chart(
+    vertices: Float64, values: Float64, triangles: Integer, uvs: Float64, size: int = SIZE
+) -> Chart:
     """Return the chart of triangles (F, 3) with uvs (F, 3, 2) at their corners, origin at the bottom left."""
     data = np.concatenate([vertices, values], axis=1)
-    out = np.zeros((size, size, data.shape[1]))
+    sampled = np.zeros((size, size, data.shape[1]))
     known = np.zeros((size, size), dtype=bool)
     corners = np.stack([uvs[..., 0] * size - 0.5, (1 - uvs[..., 1]) * size - 0.5], axis=-1)
     for triangle, corner in zip(triangles, corners, strict=True):
@@ -73,18 +75,18 @@ def chart(vertices: Float64, values: Float64, triangles: Integer, uvs: Float64, 
         wb = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / area
         wc = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / area
         wa = 1 - wb - wc
-        grown = -0.6 / max(np.sqrt(abs(area)), 1e-6)  # half a texel beyond the edge, to hide seams
-        inside = (wa >= grown) & (wb >= grown) & (wc >= grown)
+        tolerance = -0.6 / max(np.sqrt(abs(area)), 1e-6)  # half a texel beyond the edge, to hide seams
+        inside = (wa >= tolerance) & (wb >= tolerance) & (wc >= tolerance)
         weights = np.stack([wa, wb, wc], axis=-1)[inside]
-        out[y[inside], x[inside]] = weights @ data[triangle]
+        sampled[y[inside], x[inside]] = weights @ data[triangle]
         known[y[inside], x[inside]] = True
-    return Chart(out[..., :3], out[..., 3:], known)
+    return Chart(sampled[..., :3], sampled[..., 3:], known)
 
 
-def scalp(positions: Float64, soft: float = 0.004) -> Float64:
+def scalp(positions: Float64, edge_width: float = 0.004) -> Float64:
     """Return (N,) density of hair at points (N, 3): 0 on the face, 1 on the scalp.
 
-    soft: width of the edge, metres.
+    edge_width: metres over which the hair thins out at its edge.
     """
     with (Path(__file__).parent / "hairline.csv").open(encoding="utf-8") as file:
         line = np.array([[float(row["degrees"]), float(row["y"]) / 1000] for row in csv.DictReader(file)])
@@ -94,11 +96,11 @@ def scalp(positions: Float64, soft: float = 0.004) -> Float64:
     above = (positions[:, 1] - height(around)) / np.sqrt(1 + slope**2)
     ear = (np.abs(positions[:, 0]) > 0.0765) & (positions[:, 1] < 0.006)
     ear &= (positions[:, 2] > -0.122) & (positions[:, 2] < -0.100)
-    return np.where(ear, 0.0, smoothstep(above / soft + 0.5))
+    return np.where(ear, 0.0, smoothstep(above / edge_width + 0.5))
 
 
 def brow(positions: Float64) -> tuple[Float64, Float64]:
-    """Return position along the brow (N,), 0 inner end to 1 outer end, and density of its hair (N,), 0..1."""
+    """Return (N,) positions along the brow, 0 (inner end) to 1 (outer end), and (N,) density of hair."""
     x = np.abs(positions[:, 0])
     middle, low, high = (np.interp(x, BROW[:, 0], BROW[:, column]) for column in (1, 2, 3))
     offset = positions[:, 1] - middle
@@ -118,28 +120,28 @@ def noise(positions: Float64, scale: float, seed: int) -> Float64:
     return map_coordinates(lattice, (positions / scale).T, order=1, mode="grid-wrap")
 
 
-def paint(lay: Chart) -> Image.Image:
-    """Return the texture of a chart. Its values: rings about mouth and eyes, upper lip or not."""
-    p = lay.place[lay.known]
-    ring_mouth, ring_eye, lip_side = (lay.value[lay.known][:, k] for k in range(3))
+def paint(chart: Chart) -> Image.Image:
+    """Return the texture of a chart. Its values: rings around mouth and eyes, and the sign of the lip."""
+    p = chart.positions_at[chart.known]
+    ring_mouth, ring_eye, lip_side = (chart.values_at[chart.known][:, k] for k in range(3))
     colour = _complexion(p)
     colour = _eyes(colour, p, ring_eye)
     colour = _mouth(colour, p, ring_mouth, lip_side)
     hair = scalp(p, 0.011)
     speckle = 0.5 + 0.5 * noise(p, 0.0009, 31)
     cover = smoothstep(hair * 1.25 - 0.55 * speckle * (1 - hair))
-    # Hairs end at the seam of the texture, at the back of the head: a darker ground hides it.
+    # Strokes of hair end at the seam of the texture, at the back of the head; a darker scalp hides it.
     seam = np.exp(-((p[:, 0] / 0.003) ** 2)) * (p[:, 2] < -0.12)
     colour = _blend(colour, HAIR, hair * seam * 0.25)
-    ground = 0.72 * (cover * (1 - 0.3 * seam))[:, None]
-    colour = colour * (1 - ground) + SCALP * ground
-    hairs = 0.30 * brow(p)[1][:, None]
-    colour = colour * (1 - hairs) + HAIR * hairs
-    image = np.zeros((*lay.known.shape, 3))
-    image[lay.known] = colour
-    image = _fill_unknown(image, lay.known)
+    scalp_share = 0.72 * (cover * (1 - 0.3 * seam))[:, None]
+    colour = colour * (1 - scalp_share) + SCALP * scalp_share
+    brow_share = 0.30 * brow(p)[1][:, None]
+    colour = colour * (1 - brow_share) + HAIR * brow_share
+    image = np.zeros((*chart.known.shape, 3))
+    image[chart.known] = colour
+    image = _fill_unknown(image, chart.known)
     picture = Image.fromarray(np.clip(image, 0, 255).astype(np.uint8))
-    _strokes(picture, lay)
+    _strokes(picture, chart)
     return picture
 
 
@@ -155,7 +157,7 @@ def _blend(colour: Float64, other: Float64, share: Float64) -> Float64:
 
 
 def _spot(p: Float64, centre: tuple[float, float, float], radius: float) -> Float64:
-    """Return (N,) 1 in the middle of a spot on both sides of the face, 0 at its edge; centre, radius: mm."""
+    """Return (N,) weights of a spot on each side of the face, 1 in its middle, 0 at its edge; in mm."""
     folded = np.stack([np.abs(p[:, 0]), p[:, 1], p[:, 2]], axis=1) * 1000
     return 1 - smoothstep(np.linalg.norm(folded - centre, axis=1) / radius)
 
@@ -189,7 +191,7 @@ def _eyes(colour: Float64, p: Float64, ring: Float64) -> Float64:
     colour = _blend(colour, SOCKET, upper * 0.42 + lower * 0.30 + inner * 0.25)
     lid = near & (ring < 5.0)
     colour = _blend(colour, WATERLINE, np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.75, 0))
-    # The root of the lashes draws a line along the margin's outer edge.
+    # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.78, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.26, line)
     line *= smoothstep((x - 19.0) / 5.0)
@@ -201,7 +203,7 @@ def _eyes(colour: Float64, p: Float64, ring: Float64) -> Float64:
 def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64) -> Float64:
     near = ring < 90
     corner = smoothstep((np.abs(p[:, 0]) - 0.015) / 0.012)
-    border = np.where(side > 0, 5.0, 5.1) - 1.9 * corner  # vermilion ends nearer in the corners
+    border = np.where(side > 0, 5.0, 5.1) - 1.9 * corner  # the red of the lips is narrower in the corners
     red = np.where(near, smoothstep((border + 0.55 - ring) / 1.0), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
     lip = LIP + lines[:, None] * np.array([9, 9, 8.0]) + (side > 0)[:, None] * np.array([-8, -7, -6.0])
@@ -223,22 +225,22 @@ def _fill_unknown(image: Float64, known: Bool) -> Float64:
     return image[row, column]
 
 
-def _strokes(picture: Image.Image, lay: Chart) -> None:
+def _strokes(picture: Image.Image, chart: Chart) -> None:
     """Draw single hairs onto the picture: cropped ones on the scalp, longer ones in the brows."""
     random = np.random.default_rng(17)
-    step_x = np.gradient(lay.place, axis=1)
-    step_y = np.gradient(lay.place, axis=0)
+    step_x = np.gradient(chart.positions_at, axis=1)
+    step_y = np.gradient(chart.positions_at, axis=0)
     area = np.linalg.norm(np.cross(step_x, step_y), axis=2)
-    solid = lay.known & (area < 1e-6) & (area > 1e-12)
+    solid = chart.known & (area < 1e-6) & (area > 1e-12)
     rows, columns = np.nonzero(solid)
-    p = lay.place[rows, columns]
+    p = chart.positions_at[rows, columns]
     layers = []
     hair = scalp(p, 0.012)
     weight = area[rows, columns] * np.clip(hair * 1.15 - 0.1, 0, 1)
     chosen = random.choice(len(p), 130000, p=weight / weight.sum())
     away = p[chosen] - CROWN
-    swirl = np.cross(away, (0.0, 1.0, 0.0)) * 0.35
-    direction = _unit(away + swirl + random.normal(0, 0.018, away.shape)) * random.uniform(
+    whorl = np.cross(away, (0.0, 1.0, 0.0)) * 0.35
+    direction = _unit(away + whorl + random.normal(0, 0.018, away.shape)) * random.uniform(
         0.002, 0.0045, (len(chosen), 1)
     )
     layers.append((chosen, direction, 0.66))
@@ -256,22 +258,22 @@ def _strokes(picture: Image.Image, lay: Chart) -> None:
         good = np.abs(move).max(axis=1) < 60
         for (x0, y0), (dx, dy) in zip(roots[good] * 2, move[good] * 2, strict=True):
             draw.line((x0 - dx / 2, y0 - dy / 2, x0 + dx / 2, y0 + dy / 2), fill=255, width=2)
-        soft = mask.resize((SIZE, SIZE), Image.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.5))
-        soft = soft.point(lambda value, s=strength: int(value * s))
-        picture.paste(Image.new("RGB", picture.size, tuple(int(c) for c in HAIR)), (0, 0), soft)
+        blurred = mask.resize((SIZE, SIZE), Image.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.5))
+        faded = blurred.point(lambda value, s=strength: int(value * s))
+        picture.paste(Image.new("RGB", picture.size, tuple(int(c) for c in HAIR)), (0, 0), faded)
 
 
 def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Float64:
-    """Return (N, 3) hairs of the brow, metres: up at its inner end, outwards along it, down at its tail."""
-    lean = np.interp(along, [0.0, 0.2, 0.6, 1.0], [78.0, 42.0, 12.0, -24.0]) + random.normal(0, 9, len(p))
+    """Return (N, 3) hairs of the brow, metres: upwards at its inner end, then outwards, last downwards."""
+    angle = np.interp(along, [0.0, 0.2, 0.6, 1.0], [78.0, 42.0, 12.0, -24.0]) + random.normal(0, 9, len(p))
     middle = np.interp(np.abs(p[:, 0]), [0.012, 0.035, 0.06], [0.0148, 0.0232, 0.0135])
-    lean = np.radians(lean - np.clip((p[:, 1] - middle) / 0.003, -1, 1) * 22)
-    out = np.stack([np.cos(lean) * np.sign(p[:, 0]), np.sin(lean), np.zeros(len(p))], axis=1)
-    return out * random.uniform(0.0035, 0.0062, (len(p), 1))
+    angle = np.radians(angle - np.clip((p[:, 1] - middle) / 0.003, -1, 1) * 22)
+    sampled = np.stack([np.cos(angle) * np.sign(p[:, 0]), np.sin(angle), np.zeros(len(p))], axis=1)
+    return sampled * random.uniform(0.0035, 0.0062, (len(p), 1))
 
 
 def _in_texels(step_x: Float64, step_y: Float64, direction: Float64) -> Float64:
-    """Return (N, 2) texels of directions (N, 3) on the surface."""
+    """Return (N, 2) directions in texels of directions (N, 3) on the surface."""
     xx, yy, xy = ((a * b).sum(axis=1) for a, b in ((step_x, step_x), (step_y, step_y), (step_x, step_y)))
     dx, dy = ((step * direction).sum(axis=1) for step in (step_x, step_y))
     det = np.maximum(xx * yy - xy**2, 1e-24)

@@ -1,7 +1,7 @@
 """Reshapes the base head into the standard's neutral face, with an adult's proportions.
 
-The base has small eyes that look a little down and a narrow mouth. Published norms of adults have
-eyes some 29 mm wide and 34 mm apart and a mouth of 51 mm; the standard asks for lids that touch the rim
+The base has small eyes that look a little down, and a narrow mouth. Published norms of adults:
+eyes some 29 mm wide and 34 mm apart, and a mouth 51 mm wide; the standard asks for lids that touch the rim
 of the iris above and below, and lips that touch along a level line.
 """
 
@@ -35,11 +35,11 @@ CONTACT_RING = 1
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """Regions of the head's vertices, by rings of edges.
+    """Regions of the vertices of the head, by their distance in edges from eye sockets and mouth.
 
-    eye: (V,) rings about the border of the left or right eye socket, positive on the outside, negative
-    within, 99 far away. mouth: the same about the border of the inside of the mouth. lip: (V,) 1 on the
-    upper lip and above it, -1 on the lower lip and below, 0 elsewhere and between both.
+    eye: (V,) number of the ring around the border of the left or right eye socket, positive outside,
+    negative inside, `FAR` if far away. mouth: the same around the border of the inside of the mouth.
+    lip: (V,) 1 on the upper lip and above it, -1 on the lower lip and below it, 0 elsewhere.
     """
 
     eye: Int64 | Float64
@@ -80,9 +80,9 @@ def _signed_rings(head: Surface, border: Bool, inside: Bool) -> Int64:
 
 
 def sculpt_head(head: Surface, marks: Marks) -> Surface:
-    """Return the base head with its eyes, mouth and nose in proportion; symmetric as the base is."""
+    """Return the base head with eyes, mouth and nose in proportion; as symmetric as the base is."""
     vertices = _wider_eyes(head.vertices, marks)
-    for _ in range(4):  # laying the lids on the eyeballs moves them a little each time
+    for _ in range(4):  # laying the lids on the eyeballs changes their height a little each time
         vertices = _open_lids(vertices, marks)
     vertices = _mouth(vertices, marks)
     vertices = _fuller_lips(vertices, marks)
@@ -101,10 +101,10 @@ def _wider_eyes(vertices: Float64, marks: Marks) -> Float64:
     left, sign = _both_sides(vertices)
     near = (marks.eye != FAR) & (left[:, 2] > 0.045)
     offset = left - EYE_CENTRE
-    away = np.hypot(offset[:, 0] / 1.3, offset[:, 1])
-    weight = np.where(near, 1 - smoothstep((away - 0.010) / 0.014), 0.0)
+    distance = np.hypot(offset[:, 0] / 1.3, offset[:, 1])
+    weight = np.where(near, 1 - smoothstep((distance - 0.010) / 0.014), 0.0)
     stretch = np.where(offset[:, 0] < 0, 0.25, 0.10)
-    ball = marks.eye < 0  # the socket stays about the eyeball
+    ball = marks.eye < 0  # the socket stays around the eyeball
     # The nose bridge between the eyes must not be crossed.
     left[:, 0] += offset[:, 0] * stretch * weight * np.where(ball, 0.5, 1.0)
     left[:, 0] = np.where(np.abs(vertices[:, 0]) < 1e-6, 0.0, left[:, 0])
@@ -141,19 +141,19 @@ def _open_lids(vertices: Float64, marks: Marks) -> Float64:
     region = (ring != FAR) & (left[:, 2] > 0.045)
     upper = upper_side(left[:, 0], left[:, 1])
     margin = region & (ring == MARGIN_RING)
-    wanted = {True: EYE_CENTRE[1] + IRIS / 2, False: EYE_CENTRE[1] - IRIS / 2}
+    target_y = {True: EYE_CENTRE[1] + IRIS / 2, False: EYE_CENTRE[1] - IRIS / 2}
     for side in (True, False):
-        mine = region & (upper == side)
+        on_side = region & (upper == side)
         edge = margin & (upper == side)
-        # One vertex of each margin stands over the middle of the pupil.
+        # One vertex of each margin is moved to the middle of the pupil.
         nearest = left[edge, 0][np.abs(left[edge, 0] - EYE_CENTRE[0]).argmin()]
         bump = np.exp(-(((left[:, 0] - nearest) / 0.005) ** 2)) * (1 - smoothstep((np.abs(ring) - 3) / 5.0))
-        left[:, 0] += (EYE_CENTRE[0] - nearest) * bump * mine
+        left[:, 0] += (EYE_CENTRE[0] - nearest) * bump * on_side
         order = np.argsort(left[edge, 0])
         x, y = left[edge, 0][order], left[edge, 1][order]
-        move = wanted[side] - np.interp(EYE_CENTRE[0], x, y)
+        move = target_y[side] - np.interp(EYE_CENTRE[0], x, y)
         fade = np.where(ring >= 0, 1 - smoothstep((ring - 4) / 8.0), 1 - smoothstep(-ring / 3.0))
-        shift = move * opening_profile(left[:, 0]) * fade * mine
+        shift = move * opening_profile(left[:, 0]) * fade * on_side
         left[:, 1] += shift
     left = _onto_eyeball(left, ring, region)
     left[:, 0] *= sign
@@ -161,39 +161,39 @@ def _open_lids(vertices: Float64, marks: Marks) -> Float64:
 
 
 def _onto_eyeball(left: Float64, ring: Int64, region: Bool) -> Float64:
-    """Return vertices with the lids and the skin about them on the eyeball, and the socket clear of it."""
+    """Return vertices with lids and skin around them laid on the eyeball, and the socket outside of it."""
     offset = left - EYE_CENTRE
-    away = np.linalg.norm(offset, axis=1)
+    distance = np.linalg.norm(offset, axis=1)
     edge = region & (ring == MARGIN_RING)
-    # The margin's displacement, looked up by direction for the rings outside it.
+    # The rings outside the margin move like the margin in the same direction from the eyeball.
     angle = np.arctan2(offset[:, 1], offset[:, 0])
     order = np.argsort(angle[edge])
-    towards = (EYE_RADIUS + LID_GAP - away[edge])[order]
+    correction = (EYE_RADIUS + LID_GAP - distance[edge])[order]
     caruncle = left[edge, 0][order] < EYE_CENTRE[0] - EYE_RADIUS * 0.86
-    towards = np.where(caruncle, np.clip(towards, -0.001, None), towards)
+    correction = np.where(caruncle, np.clip(correction, -0.001, None), correction)
     sorted_angles = angle[edge][order]
-    pull = np.interp(angle, sorted_angles, towards, period=2 * np.pi)
+    pull = np.interp(angle, sorted_angles, correction, period=2 * np.pi)
     fade = 1 - smoothstep((ring - 3) / 6.0)
     outside = region & (ring >= 1)
-    moved = left + offset / away[:, None] * (pull * fade * outside)[:, None]
+    moved = left + offset / distance[:, None] * (pull * fade * outside)[:, None]
     within = region & (ring <= 1)
-    least = EYE_RADIUS + np.where(ring >= 0, LID_GAP + 0.0001, 0.0009)
+    min_distance = EYE_RADIUS + np.where(ring >= 0, LID_GAP + 0.0001, 0.0009)
     offset = moved - EYE_CENTRE
-    away = np.linalg.norm(offset, axis=1)
-    keep_out = np.where(within, np.maximum(away, least), away)
-    return EYE_CENTRE + offset / away[:, None] * keep_out[:, None]
+    distance = np.linalg.norm(offset, axis=1)
+    new_distance = np.where(within, np.maximum(distance, min_distance), distance)
+    return EYE_CENTRE + offset / distance[:, None] * new_distance[:, None]
 
 
 def lay_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
-    """Return vertices of the refined head with lid margins and sockets clear of the eyeballs again."""
+    """Return vertices of the refined head with lid margins and sockets moved out of the eyeballs again."""
     left, sign = _both_sides(vertices)
     offset = left - EYE_CENTRE
-    away = np.linalg.norm(offset, axis=1)
+    distance = np.linalg.norm(offset, axis=1)
     region = (ring != FAR) & (left[:, 2] > 0.045)
-    least = np.where(ring > 1.0, EYE_RADIUS + LID_GAP, EYE_RADIUS + LID_GAP + 0.0001)
-    least = np.where(ring < 0, EYE_RADIUS + 0.0009, least)
-    out = np.where(region & (ring <= 8), np.maximum(away, least), away)
-    moved = EYE_CENTRE + offset / away[:, None] * out[:, None]
+    min_distance = np.where(ring > 1.0, EYE_RADIUS + LID_GAP, EYE_RADIUS + LID_GAP + 0.0001)
+    min_distance = np.where(ring < 0, EYE_RADIUS + 0.0009, min_distance)
+    new_distances = np.where(region & (ring <= 8), np.maximum(distance, min_distance), distance)
+    moved = EYE_CENTRE + offset / distance[:, None] * new_distances[:, None]
     moved[:, 0] *= sign
     return moved
 
@@ -201,15 +201,15 @@ def lay_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
 def _mouth(vertices: Float64, marks: Marks) -> Float64:
     """Return vertices with a wider mouth, whose lips touch along a level line."""
     ring, lip = marks.mouth, marks.lip
-    away = np.hypot(vertices[:, 0] / 1.25, vertices[:, 1] - MOUTH[1])
-    weight = np.where(vertices[:, 2] > 0.02, 1 - smoothstep((away - 0.016) / 0.022), 0.0)
+    distance = np.hypot(vertices[:, 0] / 1.25, vertices[:, 1] - MOUTH[1])
+    weight = np.where(vertices[:, 2] > 0.02, 1 - smoothstep((distance - 0.016) / 0.022), 0.0)
     vertices = vertices.copy()
     vertices[:, 0] *= 1 + 0.11 * weight
     contact = ring == CONTACT_RING
     lines = {}
     for side in (1, -1):
-        mine = np.flatnonzero(contact & (lip == side))
-        lines[side] = vertices[mine[np.argsort(vertices[mine, 0])]]
+        on_side = np.flatnonzero(contact & (lip == side))
+        lines[side] = vertices[on_side[np.argsort(vertices[on_side, 0])]]
     x = vertices[:, 0]
     corner = vertices[contact][np.abs(vertices[contact, 0]).argmax()]
     ends = sorted([corner, corner * (-1.0, 1.0, 1.0)], key=lambda end: float(end[0]))
@@ -218,19 +218,19 @@ def _mouth(vertices: Float64, marks: Marks) -> Float64:
     y = {side: np.interp(x, line[:, 0], line[:, 1]) for side, line in lines.items()}
     z = {side: np.interp(x, line[:, 0], line[:, 2]) for side, line in lines.items()}
     fade = np.where(ring == FAR, 0.0, 1 - smoothstep((np.abs(ring - CONTACT_RING) - 1) / 9.0))
-    # Between both lips, in the corners, either line serves: they meet there.
+    # In the corners, between both lips, the two lines meet, so either can be used.
     label = np.where((lip == 0) & (ring != FAR), 1, lip)
     for side in (1, -1):
-        mine = label == side
-        vertices[mine, 1] += ((MOUTH[1] - y[side]) * fade)[mine]
-        vertices[mine, 2] += (((z[1] + z[-1]) / 2 - z[side]) * fade)[mine]
+        on_side = label == side
+        vertices[on_side, 1] += ((MOUTH[1] - y[side]) * fade)[on_side]
+        vertices[on_side, 2] += (((z[1] + z[-1]) / 2 - z[side]) * fade)[on_side]
     return vertices
 
 
 def _fuller_lips(vertices: Float64, marks: Marks) -> Float64:
     """Return vertices with the red of the lips a little higher and rounder; the line of contact stays."""
-    out = np.where(marks.mouth == FAR, 0, np.maximum(marks.mouth - CONTACT_RING, 0)).astype(np.float64)
-    fade = np.where(out > 0, np.exp(-(((out - 3.0) / 2.2) ** 2)), 0.0)
+    rings = np.where(marks.mouth == FAR, 0, np.maximum(marks.mouth - CONTACT_RING, 0)).astype(np.float64)
+    fade = np.where(rings > 0, np.exp(-(((rings - 3.0) / 2.2) ** 2)), 0.0)
     middle = 1 - smoothstep((np.abs(vertices[:, 0]) - 0.006) / 0.018)
     vertices = vertices.copy()
     lift = np.where(marks.lip > 0, 0.0011, -0.0013)
@@ -242,15 +242,15 @@ def _fuller_lips(vertices: Float64, marks: Marks) -> Float64:
 def _nose(vertices: Float64) -> Float64:
     """Return vertices with the tip of the nose a little lower, so that the nostrils face down, not ahead."""
     tip = np.array([0.0, -0.0385, 0.106])
-    away = np.linalg.norm((vertices - tip) * (0.75, 1.0, 0.8), axis=1)
-    weight = 1 - smoothstep((away - 0.004) / 0.020)
+    distance = np.linalg.norm((vertices - tip) * (0.75, 1.0, 0.8), axis=1)
+    weight = 1 - smoothstep((distance - 0.004) / 0.020)
     vertices = vertices.copy()
     vertices[:, 1] -= 0.0024 * weight
     return vertices
 
 
 def _lips(head: Surface, ring: Int64) -> Int64:
-    """Return (V,) 1 on the upper lip and above, -1 on the lower, 0 elsewhere, by halves of the texture."""
+    """Return (V,) 1 on and above the upper lip, -1 on and below the lower, 0 elsewhere; from the texture."""
     inside = head.tile == 1
     heights = head.uvs[head.corners][:, :, 1].mean(axis=1)
     faces = inside & (head.vertices[head.quads][:, :, 1] < -0.03).all(axis=1)

@@ -1,7 +1,7 @@
-"""Catmull-Clark subdivision of some faces of a surface, the others left as they are.
+"""Catmull-Clark subdivision of chosen faces of a surface; the others stay as they are.
 
-The cage is first adjusted so that the smooth surface passes through its vertices: a sculpted form keeps
-its size. Faces beside finer ones are cut into triangles to the midpoints of the shared edges.
+The control cage is first adjusted so that the smooth surface passes through the original vertices; otherwise
+the form would shrink. Faces beside subdivided ones are cut into triangles to the midpoints of shared edges.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ class Refined:
     """A refined surface and its relation to the coarse one.
 
     vertices: (V, 3). triangles: (F, 3). corners: (F, 3), rows of uvs. uvs: (U, 2). quads: (F,), the quad
-    of the coarse surface that each triangle lies in. blend: sparse (V, coarse vertices), averages that
-    interpolate any value of the coarse vertices to the fine ones.
+    of the coarse surface that each triangle lies in. blend: sparse (V, coarse vertices), weights that
+    interpolate values of the coarse vertices to the fine ones.
     """
 
     vertices: Float64
@@ -33,9 +33,10 @@ class Refined:
 
 
 def refine(surface: Surface, chosen: Bool, fit: int = 4) -> Refined:
-    """Return the surface with the chosen quads (mask (F,)) subdivided once.
+    """Return the surface with the chosen quads subdivided once.
 
-    fit: rounds of adjusting the cage so that the result passes through the surface's vertices.
+    chosen: bool (F,). fit: rounds in which the cage is adjusted so that the result passes through the
+    vertices of the surface.
     """
     from scipy.sparse import csr_matrix, eye, vstack
 
@@ -59,13 +60,13 @@ def refine(surface: Surface, chosen: Bool, fit: int = 4) -> Refined:
         rows = np.repeat(np.arange(number), size)
         averages.append(csr_matrix((np.full(len(rows), 1 / size), (rows, corners.ravel())), (number, count)))
     blend = vstack(averages, format="csr")
-    triangles, corners, uvs, owner = _cut(surface, scheme, chosen, edge_row, face_row, vertices)
-    return Refined(vertices, triangles, corners, uvs, owner, blend)
+    triangles, corners, uvs, source_quads = _cut(surface, scheme, chosen, edge_row, face_row, vertices)
+    return Refined(vertices, triangles, corners, uvs, source_quads, blend)
 
 
 @dataclass(frozen=True, eq=False)
 class _Scheme:
-    """The masks of Catmull and Clark, with creases along open borders; made by `_make_scheme`.
+    """Catmull-Clark averages, with creases along open borders; made by `_make_scheme`.
 
     quads: (F, 4). edges: (E, 2). face_edges: (F, 4), edges of each quad. uses: (E,) quads at each edge.
     """
@@ -88,16 +89,16 @@ class _Scheme:
         count = len(cage)
         faces, valence = _sum_at(self.quads, self.face_points(cage), count)
         middles = cage[self.edges].mean(axis=1)
-        around, edges = _sum_at(self.edges, middles, count)
+        edge_sums, edges = _sum_at(self.edges, middles, count)
         n = np.maximum(valence, 1)
-        inner = (faces / n + 2 * around / np.maximum(edges, 1) + (n - 3) * cage) / n
+        inner = (faces / n + 2 * edge_sums / np.maximum(edges, 1) + (n - 3) * cage) / n
         is_open = self.uses == 1
         rim, rims = _sum_at(self.edges[is_open], middles[is_open], count)
         return np.where(rims > 0, rim / np.maximum(rims, 1) / 2 + cage / 2, inner)
 
 
 def _sum_at(rows: Int64, values: Float64, count: int) -> tuple[Float64, Float64]:
-    """Return sums (count, 3) of values (N, 3) over their rows (N, K), and how many each sums (count, 1)."""
+    """Return sums (count, 3) of values (N, 3), added to their rows (N, K), and the numbers of summands."""
     total, number = np.zeros((count, 3)), np.zeros((count, 1))
     for k in range(rows.shape[1]):
         np.add.at(total, rows[:, k], values)
@@ -124,55 +125,57 @@ def _cut(
     """Return triangles of all faces, their texture corners, uvs, and the quad that each came from."""
     triangles: list[list[int]] = []
     corners: list[list[int]] = []
-    owner: list[int] = []
+    source_quads: list[int] = []
     uvs = surface.uvs.tolist()
-    between: dict[tuple[int, int], int] = {}
+    midpoint_rows: dict[tuple[int, int], int] = {}
 
-    def uv_between(*rows: int) -> int:
+    def uv_midpoint(*rows: int) -> int:
         key = tuple(sorted(rows))
-        if key not in between:
-            between[key] = len(uvs)  # type: ignore[index]
+        if key not in midpoint_rows:
+            midpoint_rows[key] = len(uvs)  # type: ignore[index]
             uvs.append(np.mean([uvs[row] for row in rows], axis=0).tolist())
-        return between[key]  # type: ignore[index]
+        return midpoint_rows[key]  # type: ignore[index]
 
     for face, (quad, uv, edges) in enumerate(
         zip(surface.quads.tolist(), surface.corners.tolist(), scheme.face_edges.tolist(), strict=True)
     ):
         middles = [int(edge_row[edge]) for edge in edges]
-        mid_uvs = [uv_between(uv[k], uv[(k + 1) % 4]) if middles[k] >= 0 else -1 for k in range(4)]
+        uv_middles = [uv_midpoint(uv[k], uv[(k + 1) % 4]) if middles[k] >= 0 else -1 for k in range(4)]
         # polygons of pairs (vertex, uv)
-        own, middle = list(zip(quad, uv, strict=True)), list(zip(middles, mid_uvs, strict=True))
+        own, middle = list(zip(quad, uv, strict=True)), list(zip(middles, uv_middles, strict=True))
         if chosen[face]:
-            centre = (int(face_row[face]), uv_between(*uv))
+            centre = (int(face_row[face]), uv_midpoint(*uv))
             polygons = [[own[k], middle[k], centre, middle[k - 1]] for k in range(4)]
         else:
             pairs = (pair for k in range(4) for pair in (own[k], middle[k]))
             polygons = [[pair for pair in pairs if pair[0] >= 0]]
         for polygon in polygons:
             ring = [vertex for vertex, _ in polygon]
-            straight = [not chosen[face] and vertex in middles for vertex in ring]
-            for triangle in _triangulate(ring, vertices, straight):
+            is_midpoint = [not chosen[face] and vertex in middles for vertex in ring]
+            for triangle in _triangulate(ring, vertices, is_midpoint):
                 triangles.append([polygon[k][0] for k in triangle])
                 corners.append([polygon[k][1] for k in triangle])
-                owner.append(face)
-    return np.array(triangles), np.array(corners), np.array(uvs), np.array(owner)
+                source_quads.append(face)
+    return np.array(triangles), np.array(corners), np.array(uvs), np.array(source_quads)
 
 
-def _triangulate(ring: list[int], vertices: Float64, straight: list[bool]) -> list[tuple[int, int, int]]:
+def _triangulate(ring: list[int], vertices: Float64, is_midpoint: list[bool]) -> list[tuple[int, int, int]]:
     """Return triangles of a polygon, cut along its shortest diagonals; ties are broken symmetrically.
 
-    straight: corners in the middle of a side; cutting these off would leave slivers.
+    is_midpoint: mask of corners in the middle of a side; cutting these off would leave slivers.
     """
-    left = list(range(len(ring)))
+    remaining = list(range(len(ring)))
     triangles = []
 
     def diagonal(k: int) -> float:
-        ends = vertices[ring[left[k - 1]]], vertices[ring[left[(k + 1) % len(left)]]]
+        ends = vertices[ring[remaining[k - 1]]], vertices[ring[remaining[(k + 1) % len(remaining)]]]
         return round(float(np.linalg.norm(ends[0] - ends[1])), 9)
 
-    while len(left) > 3:
-        candidates = [k for k in range(len(left)) if not straight[left[k]]] or range(len(left))
+    while len(remaining) > 3:
+        candidates = [k for k in range(len(remaining)) if not is_midpoint[remaining[k]]] or range(
+            len(remaining)
+        )
         best = min(candidates, key=diagonal)
-        triangles.append((left[best - 1], left[best], left[(best + 1) % len(left)]))
-        left.pop(best)
-    return [*triangles, (left[0], left[1], left[2])]
+        triangles.append((remaining[best - 1], remaining[best], remaining[(best + 1) % len(remaining)]))
+        remaining.pop(best)
+    return [*triangles, (remaining[0], remaining[1], remaining[2])]

@@ -87,7 +87,7 @@ def reduce(animation: Animation, gait: Gait | None = None, skeleton: Skeleton | 
     gait = detect(animation, skeleton) if gait is None else gait
     keys = gait.keys
     if not keys:
-        raise ValueError("gait: no steps to reduce this motion to")
+        raise ValueError("gait: this motion cannot be reduced, because no steps were found in it")
     span = np.zeros(len(animation), dtype=bool)
     span[keys[0] : keys[-1] + 1] = True
     keep = span & ~gait.walking

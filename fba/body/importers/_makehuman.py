@@ -146,7 +146,7 @@ def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _RigPosi
         parent = entry.get("parent")
         bones[name] = None if parent is None or parent.data is None else parent.text(200)
         if len(bones) > MAX_ITEMS:
-            raise rig.error("more bones than are read")
+            raise rig.error(f"more than {MAX_ITEMS} bones")
     return bones, _RigPositions(dict(rig.member("joints").members()), vertices)
 
 

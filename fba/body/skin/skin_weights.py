@@ -29,7 +29,7 @@ def checked_weights(
     if share.shape != which.shape:
         raise ModelError(f"{where}: weights must have shape {which.shape}, not {share.shape}")
     if which.size and int(which.min()) < 0:
-        raise ModelError(f"{where}: a joint has a negative number")
+        raise ModelError(f"{where}: joint numbers must not be negative")
     total = share.sum(axis=1, dtype=np.float64)
     # written so that NaN fails too
     wrong = ~((share >= 0).all(axis=1) & (np.abs(total - 1) <= WEIGHT_TOLERANCE))

@@ -176,7 +176,7 @@ class BapSolver:
             tables.limits, previous is None, VALUE_LIMIT, values,
         )  # fmt: skip
         if not fits:
-            raise ModelError("BapSolver.solve: the pose lies beyond what 32 bits of mm or 1e-5 rad can say")
+            raise ModelError("BapSolver.solve: the pose does not fit BAPs of 32 bits, in mm and 1e-5 rad")
         return values if array.ndim == 4 else values[0]
 
     def _angles(self, baps: npt.ArrayLike | None) -> Float64:

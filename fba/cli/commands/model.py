@@ -36,7 +36,7 @@ POINT_FILES = "FDP, CSV or JSON file"
     ),
 )
 def command() -> None:
-    """Face models: look at one, check it, import one, fit one to a person."""
+    """Inspect face models, check them, import them, fit them to a person."""
 
 
 _output_option = click.option(
@@ -66,16 +66,16 @@ def _read(file: Path | None) -> FaceModel:
 
 
 @command.command(
-    short_help="What a face model holds.",
+    short_help="Show what a face model contains.",
     epilog=examples("fba model info --default", "fba model info --json head.glb"),
 )
 @click.argument("file", metavar="[FILE]", required=False, type=SOURCE)
-@click.option("--default", is_flag=True, help="The built-in head.")
+@click.option("--default", is_flag=True, help="Use the built-in head instead of FILE.")
 @options.json_option
 def info(file: Path | None, default: bool, as_json: bool) -> None:
-    """Show what a face model holds: parts, units, feature points and FAPs.
+    """Show what a face model contains: parts, units, feature points and FAPs.
 
-    FILE: a .glb of this project, or anything that `fba model import` reads.
+    FILE is a face model (.glb), or any file that `fba model import` reads.
     """
     from fba.cli import model_text
 
@@ -91,7 +91,7 @@ def info(file: Path | None, default: bool, as_json: bool) -> None:
     epilog=examples("fba model validate head.glb", "fba model validate --json --default"),
 )
 @click.argument("file", metavar="[FILE]", required=False, type=SOURCE)
-@click.option("--default", is_flag=True, help="The built-in head.")
+@click.option("--default", is_flag=True, help="Use the built-in head instead of FILE.")
 @click.option(
     "--only", type=click.Choice(["neutral", "faps"]), help="Check only the rest position, or only the FAPs."
 )
@@ -99,8 +99,8 @@ def info(file: Path | None, default: bool, as_json: bool) -> None:
 def validate(file: Path | None, default: bool, only: str | None, as_json: bool) -> None:
     """Check a face model against the standard: its neutral face, and the effect of every FAP.
 
-    Every finding gives the measured and the expected value. The exit code is 1 if streams would play
-    wrongly (errors); warnings concern looks, or what could not be checked.
+    Every finding gives the measured and the expected value. Errors are faults with which streams play
+    wrongly, and the exit code is then 1; warnings concern the looks, or what could not be checked.
     """
     from fba.cli import model_text
     from fba.face import checks
@@ -122,7 +122,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
 
 @command.command(
     "import",
-    short_help="Make a face model of a mesh.",
+    short_help="Make a face model from a mesh.",
     epilog=examples(
         "fba model import makehuman/base.obj -o head.glb",
         "fba model import scan.ply --points scan.points.csv --unit 0.001 -o scan.glb",
@@ -136,14 +136,14 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     "--points",
     metavar="FILE",
     type=SOURCE,
-    help=f"Where the feature points are: {POINT_FILES}. Default: one of the mesh's name beside it.",
+    help=f"{POINT_FILES} with the feature points. Default: a file beside IN with the same name.",
 )
-@click.option("--kind", type=click.Choice(KINDS), help="Kind of IN; default: recognised from its content.")
+@click.option("--kind", type=click.Choice(KINDS), help="Kind of IN. Default: recognised from its content.")
 @click.option(
     "--unit",
     type=float,
     metavar="METRES",
-    help="Metres per unit of IN. Default: estimated from the distance of the pupils.",
+    help="Metres per unit of IN. Default: estimated from the distance between the pupils.",
 )
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis.")
 @click.option(
@@ -151,9 +151,10 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     "kinds",
     multiple=True,
     metavar="NAME=KIND",
-    help="Kind of a group, object, mesh or material: skin, eye, teeth, tongue, ..., or none; repeatable.",
+    help="Kind of a group, object, mesh or material: skin, eye, teeth, tongue, ..., or none to leave it out; "
+    "repeatable.",
 )
-@click.option("--name", help="Name of the model. Default: that of the file.")
+@click.option("--name", help="Name of the model. Default: the name of the file.")
 def import_(
     source: Path,
     output: Path,
@@ -168,8 +169,8 @@ def import_(
     """Turn a mesh into a face model that plays FAPs, and write it as glTF.
 
     Reads MakeHuman's base mesh (its folder, or base.obj), glTF heads with ARKit's shapes, OBJ, PLY and
-    Candide meshes with feature points, FDP files with their mesh. Every FAP that the mesh can show gets
-    tables; unsupported FAPs are listed with reasons.
+    Candide meshes with feature points, and FDP files with their mesh. FAPs that the mesh
+    cannot show are listed with the reasons.
     """
     from fba.face.importers import import_model
 
@@ -191,7 +192,7 @@ def import_(
 @_output_option
 @options.no_clobber_option
 @click.option(
-    "--model", "base", metavar="FILE", type=SOURCE, help="The face to fit. Default: the built-in head."
+    "--model", "base", metavar="FILE", type=SOURCE, help="Face model to fit. Default: the built-in head."
 )
 @click.option(
     "--unit",
@@ -200,11 +201,11 @@ def import_(
 )
 @options.choice_option(
     "--tables",
-    "How FAP tables are made: carried over with the surface, authored anew, "
+    "How the motions of FAPs are adapted: carried over with the surface, computed again from the mesh, "
     "or whichever meets the standard better.",
     "auto", "carry", "author",
 )  # fmt: skip
-@click.option("--name", help="Name of the fitted model. Default: that of the file.")
+@click.option("--name", help="Name of the fitted model. Default: the name of the file.")
 def fit(
     points: Path,
     output: Path,
@@ -216,8 +217,8 @@ def fit(
 ) -> None:
     """Fit a face to a person's feature points, and write it as glTF.
 
-    POINTS is an FDP, CSV or JSON file in any unit and pose; points that it lacks are mirrored from the
-    other side, or follow their surroundings. For an Xface file without its mesh, the distances are used.
+    POINTS is an FDP, CSV or JSON file in any unit and pose. Missing points are mirrored from the other side,
+    or follow the points around them. Of an Xface file without its mesh, the distances are used.
     """
     from fba.face.calibration import fit as fitted
 
@@ -249,8 +250,8 @@ def _read_points(path: Path, model: FaceModel) -> Float64:
     from fba.face.calibration import points_of_distances
 
     warnings.warn(
-        f"{path}: {', '.join(absent)}, whose vertices the file names, is not beside it: "
-        f"only the distances {', '.join(fdp.distances)} are used",
+        f"{path}: the mesh {', '.join(absent)} is not in the same folder, so positions of feature points are "
+        f"unknown; only the distances {', '.join(fdp.distances)} are used",
         FbaWarning,
         stacklevel=2,
     )

@@ -121,8 +121,8 @@ def _check_size(parts: tuple[Part, ...]) -> None:
     total = sum(len(part.vertices) for part in parts)
     if total > MOST_VERTICES:
         raise ModelError(
-            f"the mesh has {total} vertices, but at most {MOST_VERTICES} can be authored: "
-            "cut it down to the head, or decimate it"
+            f"the mesh has {total} vertices, but at most {MOST_VERTICES} are possible: "
+            "reduce it to the head, or decimate it"
         )
 
 

@@ -41,7 +41,7 @@ def read_model(document: Document) -> FaceModel:
         )
     version = content.member("version").integer(0, 1 << 30)
     if version != VERSION:
-        raise content.error(f"is version {version}; version {VERSION} is read here")
+        raise content.error(f"has version {version}, but this fba reads version {VERSION} only")
     gltf = read_document(document)
     parts = _parts(content.member("parts"), gltf, document.budget)
     points, bound = _points(content.member("featurePoints"), parts)

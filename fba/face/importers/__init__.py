@@ -69,4 +69,4 @@ def import_model(
 def _refuse_options(what: str, **options: object) -> None:
     for option, value in options.items():
         if value is not None:
-            raise OptionError(f"{option} does not apply to {what}, which brings its own")
+            raise OptionError(f"{option} does not apply to {what}, which has its own")

@@ -45,7 +45,7 @@ def import_fdp(options: ImportOptions) -> FaceModel:
             given = GivenPoints(fdp.points, {point: vertex for point, (_, vertex) in fdp.vertices.items()})
             return import_mesh(replace(options, path=mesh), form, given)
     raise ModelError(
-        f"{path}: an FDP file says where feature points are, but brings no mesh; put {path.stem}.wfm, .obj "
+        f"{path}: an FDP file says where feature points are, but contains no mesh; put {path.stem}.wfm, .obj "
         "or .ply beside it, or fit an existing head to its points: fba model fit"
     )
 

@@ -92,7 +92,7 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
         pieces.append(Piece(part, material.name, origin, dict(surface.morphs)))
         start += count
     if not pieces:
-        raise ModelError(f"{path}: its scene shows no triangles")
+        raise ModelError(f"{path}: the scene contains no triangles; export the head as a mesh")
     return pieces, is_own
 
 

@@ -38,7 +38,7 @@ def sniff(path: str | os.PathLike[str]) -> str:
     if kind is None:
         reads = "; ".join(KINDS.values())
         hint = recognition_hint(head)
-        raise ModelError(f"{path}: no face can be read from this file{hint}. Read are: {reads}")
+        raise ModelError(f"{path}: no face can be read from this file{hint}. Files that can be read: {reads}")
     return kind
 
 

@@ -144,7 +144,7 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
                 if word == "JOINT" and (not stack or stack[-1] < 0):
                     raise fail("a JOINT must stand inside a ROOT or JOINT")
                 if len(tree.names) >= MAX_JOINTS:
-                    raise fail(f"more than {MAX_JOINTS} joints")
+                    raise fail(f"more than {MAX_JOINTS} joints; remove those that are not needed")
                 pending = len(tree.names)
                 end = next((i for i in range(position + 1, len(words)) if words[i] == "{"), len(words))
                 tree.names.append(" ".join(words[position + 1 : end]) or f"joint{pending}")
@@ -184,14 +184,14 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
                 position = _channels(tree, stack, words, position, path, number)
             elif word == "MOTION":
                 if stack or pending is not None:
-                    raise fail(f"MOTION begins, but {len(stack)} braces are still open")
+                    raise fail(f"MOTION begins, but {len(stack)} braces are still open; close them first")
                 if not tree.names:
                     raise fail("there is no ROOT joint before MOTION")
                 return tree, number
             else:
                 raise fail("expected ROOT, JOINT, End Site, OFFSET, CHANNELS, a brace or MOTION")
     raise FormatError(
-        "the file ends before MOTION; it is cut short, or no BVH file", path=path, line=len(lines)
+        "the file ends before MOTION; it is cut short, or not a BVH file", path=path, line=len(lines)
     )
 
 
@@ -201,16 +201,25 @@ def _channels(
     """Read CHANNELS of a joint; return the position of the next word. line: 0-based."""
     text = words[position + 1] if position + 1 < len(words) else ""
     if not stack or stack[-1] < 0 or not re.fullmatch(r"[0-9]{1,2}", text):
-        raise FormatError("CHANNELS needs a count, inside a joint", path=path, line=line + 1, token=text)
+        raise FormatError(
+            "expected CHANNELS inside a joint, followed by the number of channels",
+            path=path,
+            line=line + 1,
+            token=text,
+        )
     names = [w.lower() for w in words[position + 2 : position + 2 + int(text)]]
     for channel in names:
         if not re.fullmatch(r"[xyz](rotation|position)", channel):
             raise FormatError(
-                "channels are Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation",
+                "expected a channel: Xposition, Yposition, Zposition, Xrotation, Yrotation or Zrotation",
                 path=path, line=line + 1, token=channel,
             )  # fmt: skip
     if len(names) != int(text) or tree.channels[stack[-1]]:
-        raise FormatError(f"expected {text} channels, once for this joint", path=path, line=line + 1)
+        raise FormatError(
+            f"CHANNELS must stand once in each joint, with {text} names behind its number",
+            path=path,
+            line=line + 1,
+        )
     tree.channels[stack[-1]] = names
     return position + 2 + int(text)
 
@@ -299,7 +308,7 @@ def _numbers(
         ends = np.cumsum(counts)
         row = int(np.searchsorted(ends, wrong[0], side="right"))
         raise FormatError(
-            "motion must be finite, plausible numbers",
+            f"the values of channels must be finite numbers of at most {LARGEST:g}",
             path=path,
             line=row_lines[row] + 1,
             token=lines[row_lines[row]].split()[int(wrong[0] - ends[row])],

@@ -64,7 +64,7 @@ def write(
     if joints not in ("all", "moving"):
         raise OptionError(f'joints must be "all" or "moving", not {joints!r}')
     if not (np.isfinite(unit) and 1e-6 <= unit <= 1e6):
-        raise OptionError(f"unit must be lengths in the file for one metre, 1e-6 to 1e6, not {unit}")
+        raise OptionError(f"unit must be the number of file units in a metre, 1e-6 to 1e6, not {unit}")
     if not RATES[0] <= animation.rate <= RATES[1]:
         raise FormatError(
             f"{float(animation.rate):g} frames/s cannot be written as BVH, which takes 1/3600 to 10000",
@@ -92,12 +92,12 @@ def _shown_baps(animation: Animation, path: Path) -> Int32:
             "BVH holds a body, and this animation has only a face; write .fap, .fba or .glb", path=path
         )
     if not len(animation):
-        raise FormatError("BVH needs a frame at least, and this animation has none", path=path)
+        raise FormatError("a BVH file needs at least one frame, and this animation has none", path=path)
     count = int(animation.index[-1]) - int(animation.index[0]) + 1
     if count > MOST_FRAMES:
         raise FormatError(
             f"{count} frames from the first to the last are more than the {MOST_FRAMES} that BVH files "
-            "are read with; write pieces of it, or resample",
+            "are read with; write shorter pieces, or resample",
             path=path,
         )
     body = animation.resample(animation.rate).body

@@ -78,7 +78,9 @@ class _Reader:
         if "ISI" in block:
             self.intra = bool(self.number(block, "ISI", 0, 1))
         if self.intra is None:
-            raise self.lines.error("the first block needs ISI: 1 for an I plane", line=opened)
+            raise self.lines.error(
+                "the first block must contain 'ISI 1', because a stream begins with an I plane", line=opened
+            )
         self.gender = self.number(block, "GDR", 0, 1) if "GDR" in block else self.gender
         self.coding_type = self.number(block, "CDM", 0, 1) if "CDM" in block else self.coding_type
         frames: dict[int, int] = {}
@@ -207,7 +209,9 @@ class _Reader:
                 mask[member - 1] = bit
         if used != len(tag.values):
             raise self.lines.error(
-                f"{part.mask} goes on behind its {len(types)} groups", token=tag.values[used], line=tag.line
+                f"{part.mask} has more values than its {len(types)} groups need",
+                token=tag.values[used],
+                line=tag.line,
             )
         mask.flags.writeable = False
         return tuple(types), mask
@@ -353,7 +357,9 @@ def read_epf(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> list[PlaneSettin
             elif not block:
                 raise lines.error("comes before FBM, which opens the block of each plane", token=tag)
             elif tag in block:
-                raise lines.error("stands twice in one block; FBM opens the next", token=tag)
+                raise lines.error(
+                    "stands twice in one block; the block of the next plane begins with FBM", token=tag
+                )
             block[tag] = _Tag(values, lines.number)
         if not block:
             raise lines.error("holds no planes, only blank lines and comments")

@@ -97,7 +97,8 @@ class _Writer:
             if len(values) > 1:
                 what = "suggested_gender" if tag == "GDR" else "object_coding_type"
                 raise UnsupportedError(
-                    f"{self.path}: {where}face and body differ in {what}, for which an EPF file has one tag",
+                    f"{self.path}: {where}face and body differ in {what}, but an EPF file has only one tag "
+                    "for both",
                     what=f"EPF with two values of {what}",
                 )
             value = values.pop()
@@ -117,7 +118,11 @@ class _Writer:
         for number, (kind, group) in enumerate(zip(settings.mask_types, groups, strict=True), start=1):
             bits = [int(settings.mask[member - 1]) for member in group]
             if not 0 <= kind <= 3 or (kind == 2 and part.bit == BODY):
-                raise FormatError(f"{where}{part.word} group {number} has mask type {kind}", path=self.path)
+                raise FormatError(
+                    f"{where}{part.word} group {number} has mask type {kind}; expected "
+                    f"{'0, 1 or 3' if part.bit == BODY else '0 to 3'}",
+                    path=self.path,
+                )
             if (kind == 0 and any(bits)) or (kind == 3 and not all(bits)):
                 raise FormatError(
                     f"{where}mask type {kind} of {part.word} group {number} contradicts its mask",

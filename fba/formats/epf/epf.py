@@ -31,7 +31,7 @@ def read_animation(path: Path) -> Animation:
     if not sniff_epf(read_head(path), ""):
         read_epf(path)  # raises an error that says what is wrong
     raise UnsupportedError(
-        f"{path}: is an encoder parameter file (EPF): it says how to code an animation and holds none; "
+        f"{path}: is an encoder parameter file (EPF): it says how to encode an animation, but contains none; "
         "use it with `fba encode IN.fap -o OUT.fba --epf FILE`, or fba.formats.epf.epf.read_epf",
         what="EPF as an animation",
     )

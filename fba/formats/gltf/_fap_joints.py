@@ -1,4 +1,4 @@
-"""Joints that FAPs turn and shift, such as eyes and head, and the way back from their motion to FAPs."""
+"""Joints that FAPs turn and shift, such as eyes and head; FAPs are computed back from their motion."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ LARGEST = 1e6
 
 @dataclass(frozen=True, eq=False)
 class FapJoint:
-    """A node and the FAPs that move it, in its parent's frame.
+    """A node and the FAPs that move it, in the frame of its parent.
 
-    position (3,), rest (3, 3): where it is and how it is turned when all FAPs are 0. turns: FAP, and its axis
-    (3,) times radians per step, the outermost first; axes are perpendicular. shifts: FAP, and metres per step
-    (3,), linearly independent. read_faps: the FAPs that are to be read from this joint's motion.
+    position (3,), rest (3, 3): position and rotation when all FAPs are 0. turns: each FAP with its axis (3,)
+    times radians per step, the outermost first; axes are perpendicular. shifts: each FAP with its metres per
+    step (3,), linearly independent. read_faps: the FAPs that a reader takes from the motion of this joint.
     """
 
     node: int
@@ -45,30 +45,30 @@ class FapJoint:
     ) -> FapJoint | None:
         """Return the joint of a part or of `HEAD`; None if its motion does not determine the FAPs.
 
-        frame: (4, 4), from the face's frame to that of the node's parent, scaled uniformly. rest: (4, 4), the
-        node when all FAPs are 0.
+        frame: (4, 4), from the face's frame to that of the node's parent, scaled uniformly. rest: (4, 4),
+        matrix of the node when all FAPs are 0.
         """
         flat = flatten_transforms(model)
         number = [*(part.name for part in model.parts), HEAD].index(part)
         turns, shifts = [], []
-        centred = True
-        turn = frame[:3, :3] / np.cbrt(np.linalg.det(frame[:3, :3]))
+        turns_in_place = True
+        rotation = frame[:3, :3] / np.cbrt(np.linalg.det(frame[:3, :3]))
         for row in range(int(flat.start[number]), int(flat.start[number + 1])):
             kind, fap = KIND_ORDER[flat.kind[row]], int(flat.column[row]) + 1
             if kind == "translation":
                 shifts.append((fap, frame[:3, :3] @ flat.amount[row]))
                 continue
             centre = frame[:3, :3] @ flat.centre[row] + frame[:3, 3]
-            centred = centred and np.allclose(centre, rest[:3, 3], atol=1e-9)
+            turns_in_place = turns_in_place and np.allclose(centre, rest[:3, 3], atol=1e-9)
             if kind == "rotation":
-                turns.append((fap, turn @ flat.amount[row]))
-        if not centred:  # turning shifts it too
+                turns.append((fap, rotation @ flat.amount[row]))
+        if not turns_in_place:  # turning also shifts the node
             shifts = []
         joint = cls(node, rest[:3, 3], rest[:3, :3], tuple(turns), tuple(shifts))
         return joint if (turns or shifts) and joint._is_invertible() else None
 
     def _is_invertible(self) -> bool:
-        """Whether the motion determines every FAP."""
+        """Return whether the motion determines every FAP."""
         faps = [fap for fap, _ in (*self.turns, *self.shifts)]
         if len(self.turns) > 3 or len(self.shifts) > 3 or len(set(faps)) != len(faps):
             return False
@@ -79,38 +79,40 @@ class FapJoint:
         axes = axes / lengths[:, None]
         if np.abs(axes @ axes.T - np.eye(len(axes))).max(initial=0) > SQUARE:
             return False
-        ways = np.array([way for _, way in self.shifts]).reshape(-1, 3)
-        return bool(not len(ways) or np.linalg.matrix_rank(ways) == len(ways))
+        offsets = np.array([offset for _, offset in self.shifts]).reshape(-1, 3)
+        return bool(not len(offsets) or np.linalg.matrix_rank(offsets) == len(offsets))
 
-    def values(self, turned: Float64, positions: Float64) -> dict[int, Float64]:
+    def values(self, rotations: Float64, positions: Float64) -> dict[int, Float64]:
         """Return FAPs (T,) by number, from rotations (T, 3, 3) and positions (T, 3) of the node."""
         values: dict[int, Float64] = {}
         if self.turns:
             axes = np.array([axis for _, axis in self.turns])
             lengths = np.linalg.norm(axes, axis=1)
-            angles = _angles(turned @ self.rest.T, axes / lengths[:, None])
+            angles = _angles(rotations @ self.rest.T, axes / lengths[:, None])
             for column, (fap, _) in enumerate(self.turns):
                 values[fap] = angles[column] / lengths[column]
         if self.shifts:
-            steps = (positions - self.position) @ np.linalg.pinv(np.array([way for _, way in self.shifts]))
+            steps = (positions - self.position) @ np.linalg.pinv(
+                np.array([offset for _, offset in self.shifts])
+            )
             for column, (fap, _) in enumerate(self.shifts):
                 values[fap] = steps[:, column]
         return values
 
     def to_note(self, faps: Set[int]) -> dict[str, Any]:
-        """Return the joint as JSON. faps: those that are to be read from its motion."""
+        """Return the joint as JSON. faps: those that a reader takes from its motion."""
         return {
             "node": self.node,
             "place": self.position.tolist(),
             "rest": self.rest.ravel().tolist(),
             "turns": [[fap, axis.tolist()] for fap, axis in self.turns],
-            "shifts": [[fap, way.tolist()] for fap, way in self.shifts],
+            "shifts": [[fap, offset.tolist()] for fap, offset in self.shifts],
             "told": sorted(faps),
         }
 
     @classmethod
     def from_note(cls, note: Value, nodes: int) -> FapJoint:
-        """Return the joint that a note describes; ModelError for a wrong one. nodes: how many there are."""
+        """Return the joint that a note describes; ModelError if it is invalid. nodes: number of nodes."""
         joint = cls(
             note.member("node").index(nodes, "node"),
             np.array(note.member("place").numbers(3, -LARGEST, LARGEST)),
@@ -122,9 +124,12 @@ class FapJoint:
                 for entry in note.member("told").elements(FAP_COUNT)
             ),
         )
-        named = {fap for fap, _ in (*joint.turns, *joint.shifts)}
-        if not (joint._is_invertible() and joint.read_faps <= named):
-            raise note.error("this joint's motion does not determine its FAPs")
+        moving_faps = {fap for fap, _ in (*joint.turns, *joint.shifts)}
+        if not (joint._is_invertible() and joint.read_faps <= moving_faps):
+            raise note.error(
+                "the motion of this joint does not determine its FAPs: up to three perpendicular axes "
+                "and three independent shifts are expected, each of another FAP"
+            )
         return joint
 
 
@@ -140,7 +145,7 @@ def _read_steps(note: Value) -> Steps:
     return tuple(steps)
 
 
-def _angles(turned: Float64, axes: Float64) -> Float64:
+def _angles(rotations: Float64, axes: Float64) -> Float64:
     """Return angles (3, T), in radians, about up to three perpendicular axes.
 
     Outermost first; with fewer axes, the last angles are 0. In the frame of
@@ -148,7 +153,7 @@ def _angles(turned: Float64, axes: Float64) -> Float64:
     """
     base = np.eye(3)
     base[: len(axes)] = axes
-    if len(axes) == 1:  # any perpendicular: the coordinate axis that it has least of is never parallel to it
+    if len(axes) == 1:  # the coordinate axis in which it is smallest is never parallel to it
         across = np.eye(3)[int(np.abs(axes[0]).argmin())]
         base[1] = np.cross(axes[0], across)
         base[1] /= np.linalg.norm(base[1])
@@ -156,8 +161,8 @@ def _angles(turned: Float64, axes: Float64) -> Float64:
         base[2] = np.cross(base[0], base[1])
     mirrored = float(np.sign(np.linalg.det(base)))
     base[2] *= mirrored
-    r = base @ turned @ base.T
-    middle = np.arctan2(r[:, 0, 2], np.hypot(r[:, 0, 0], r[:, 0, 1]))
-    outer = np.arctan2(-r[:, 1, 2], r[:, 2, 2])
-    inner = np.arctan2(-r[:, 0, 1], r[:, 0, 0])
-    return np.stack([outer, middle, inner * mirrored])
+    r = base @ rotations @ base.T
+    second = np.arctan2(r[:, 0, 2], np.hypot(r[:, 0, 0], r[:, 0, 1]))
+    first = np.arctan2(-r[:, 1, 2], r[:, 2, 2])
+    third = np.arctan2(-r[:, 0, 1], r[:, 0, 0])
+    return np.stack([first, second, third * mirrored])

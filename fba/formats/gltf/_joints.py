@@ -46,8 +46,8 @@ def start_clip(builder: Builder, times: Float64, path: Path) -> Clip:
     keys = times.astype(np.float32)
     if len(keys) > 1 and not (np.diff(keys) > np.diff(times).min() / 2).all():
         raise FormatError(
-            f"the animation is {times[-1]:.0f} s long; glTF's times, 32-bit floats, do not tell its "
-            "frames apart; write pieces of it",
+            f"the animation is {times[-1]:.0f} s long; glTF stores times as 32-bit floats, which "
+            "cannot tell its frames apart; write shorter pieces",
             path=path,
         )
     return Clip(builder, builder.data(keys, bounds=True))

@@ -47,7 +47,9 @@ def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
     Raises ModelError if the note is wrong; warns (FbaWarning) of morph targets that are missing.
     """
     if note.member("version").integer(0, 1 << 30) != VERSION:
-        raise note.error(f"is version {note.member('version').data}; version {VERSION} is read here")
+        raise note.error(
+            f"has version {note.member('version').data}, but this fba reads version {VERSION} only"
+        )
     text = note.member("rate")
     try:
         rate: Fraction = parse_rate(text.text(100))
@@ -63,7 +65,7 @@ def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
     times = _times(channels, note)
     steps = np.rint(times * float(rate))
     if not (steps[-1] < MOST_INDEX and (len(steps) < 2 or (np.diff(steps) > 0).all())):
-        raise text.error("the keys of the animation are closer than its frames")
+        raise text.error("some keys of the animation are less than a frame apart at this rate")
     body = _body(gltf, channels, note, nodes, times) if nodes else None
     face = read_face(gltf, clip, face_note, times) if (face_note := note.get("face")) is not None else None
     return Animation(rate, first + steps.astype(np.int64), face, body, clip.name)
@@ -73,7 +75,7 @@ def _times(channels: Sequence[Channel], note: Value) -> Float64:
     """Return the times of all keys (T,), seconds; ModelError if there are too many."""
     times = key_times(channels)
     if len(times) > MOST_FRAMES:
-        raise note.error(f"its animation has {len(times)} keys, more than the {MOST_FRAMES} that are read")
+        raise note.error(f"its animation has {len(times)} keys, more than the {MOST_FRAMES} that can be read")
     return times
 
 

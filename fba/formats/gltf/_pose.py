@@ -164,7 +164,7 @@ def nearest_rotation(matrices: Float64) -> Float64:
     """Return the rotations (..., 3, 3) closest to matrices that also scale; ModelError for singular ones."""
     u, s, v = np.linalg.svd(matrices)
     if (s[..., -1] <= 1e-9 * np.maximum(s[..., 0], 1e-300)).any():
-        raise ModelError("a joint is scaled to nothing; its rotation is unknown")
+        raise ModelError("a joint has a scale of 0, so its rotation is unknown")
     sign = np.sign(np.linalg.det(u @ v))
     u[..., :, -1] *= sign[..., None]
     result: Float64 = u @ v
@@ -175,7 +175,7 @@ def _normalize(values: Float64) -> Float64:
     """Return unit quaternions; ModelError for one of length 0."""
     length = np.linalg.norm(values, axis=-1, keepdims=True)
     if (length < 1e-6).any():
-        raise ModelError("an animation has a rotation that is no rotation: a quaternion of length 0")
+        raise ModelError("an animation has a rotation quaternion of length 0; expected length 1")
     result: Float64 = values / length
     return result
 

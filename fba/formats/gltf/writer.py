@@ -54,13 +54,14 @@ def write(
     An animation with a body is written as a whole person, one with only a face as a head. Reading the file
     returns the same BAPs and FAPs at the same times (docs/formats.md says what is lost). Raises FormatError
     for no frame, more than 100,000, or a skeleton without a body track; ModelError if glTF cannot hold a
-    model. Warns (FbaWarning) if a body has no place for a face.
+    model. Warns (FbaWarning) if a body has no position for a face.
     """
     if os.fspath(path).lower().endswith(".gltf"):
         raise FormatError("glTF is written in one file; name it .glb", path=path)
     if not 1 <= len(animation) <= MOST_FRAMES:
         raise FormatError(
-            f"{len(animation)} frames; 1 to {MOST_FRAMES} can be written as glTF: take pieces, or resample",
+            f"{len(animation)} frames; 1 to {MOST_FRAMES} can be written as glTF; write shorter "
+            "pieces, or resample",
             path=path,
         )
     if animation.body is None and not mesh:
@@ -168,7 +169,7 @@ def _make_head(
     if person.eyes is None:
         if animation.face is not None or model is not None:
             warnings.warn(
-                f"the body {person.name!r} has no place for a face; none is shown",
+                f"the body {person.name!r} has no position for a face; none is shown",
                 FbaWarning,
                 stacklevel=5,
             )

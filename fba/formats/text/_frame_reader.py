@@ -177,7 +177,9 @@ class _Reader:
         layout, path = self.layout, self.lines.path
         if not self._blocks:
             if header.frames:
-                raise FormatError(f"has a header that promises {header.frames} frames, but none", path=path)
+                raise FormatError(
+                    f"the header promises {header.frames} frames, but the file has none", path=path
+                )
             empty = np.zeros((0, layout.columns), dtype=bool)
             return Frames(header, np.zeros(0, np.int64), empty, np.zeros((0, layout.slots), dtype=np.int32))
         index, slots, masks, numbers = (

@@ -44,7 +44,9 @@ def write_frames(
     try:
         parse_rate(rate)
     except FormatError as error:
-        raise FormatError("the frame rate is too long a fraction; resample", path=path, token=rate) from error
+        raise FormatError(
+            "the frame rate is a fraction with too many digits; resample the animation", path=path, token=rate
+        ) from error
     name = _header_name(animation.name) or _header_name(os.path.basename(os.fspath(path))) or "animation"
     mask_texts: dict[bytes, bytes] = {}
     with atomic(path) as file:

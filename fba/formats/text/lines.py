@@ -107,7 +107,7 @@ class Lines:
         if len(line) > MAX_LINE_BYTES + 1:
             raise self.error(
                 f"a line of more than {MAX_LINE_BYTES} bytes: not a text file of this kind, "
-                "or its line ends are lost",
+                "or its line breaks are missing",
                 line=self.number + ahead,
             )
 

@@ -105,7 +105,7 @@ class Numbered:
         except FileNotFoundError:
             return []
         except OSError as error:
-            raise write_error(self.folder, error, "cannot be looked into") from error
+            raise write_error(self.folder, error, "the folder cannot be read") from error
         pattern = re.compile(f"{re.escape(self._before)}(\\d+){re.escape(self._after)}")
         numbers = [int(match[1]) for name in names if (match := pattern.fullmatch(name))]
         return sorted(number for number in numbers if self.path(number).exists())
@@ -139,7 +139,8 @@ class Sequence:
         existing = names.existing()
         if existing and not replace:
             raise FormatError(
-                f"{_range_text(names, existing)} there already; choose another folder", path=names.folder
+                f"{_range_text(names, existing)} in this folder already; choose another folder",
+                path=names.folder,
             ).with_remedies(Remedy("replace", "or have them replaced with {}", "True"))
         if beyond := [number for number in existing if number >= count]:
             raise FormatError(

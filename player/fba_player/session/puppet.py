@@ -125,13 +125,19 @@ class Puppet:
     def move_fap(self, number: int, value: float) -> None:
         """Set a FAP, 3 to 68, in its unit. ValueError for another number or a value that is not finite."""
         if not FIRST_LOW_LEVEL_FAP <= number <= FAP_COUNT or not np.isfinite(value):
-            raise ValueError(f"there is no FAP {number} with the value {value}")
+            raise ValueError(
+                f"FAP {number} cannot be set to {value}: expected a FAP from {FIRST_LOW_LEVEL_FAP} to "
+                f"{FAP_COUNT} and a finite value"
+            )
         self._fap_values[number - 1], self.fap_moved[number - 1] = value, True
 
     def move_bap(self, number: int, value: float) -> None:
         """Set a BAP, 1 to 296, in 1e-5 rad or mm. ValueError as for `move_fap`."""
         if not 1 <= number <= BAP_COUNT or not np.isfinite(value):
-            raise ValueError(f"there is no BAP {number} with the value {value}")
+            raise ValueError(
+                f"BAP {number} cannot be set to {value}: expected a BAP from 1 to {BAP_COUNT} and a "
+                "finite value"
+            )
         self._bap_values[number - 1], self.bap_moved[number - 1] = value, True
 
     def release(self, faps: tuple[int, ...] = (), baps: tuple[int, ...] = ()) -> None:

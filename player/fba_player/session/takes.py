@@ -121,7 +121,7 @@ class Takes:
         """The path for a name: in the folder, with the suffix .fba. Raises FormatError for an empty name."""
         name = name.strip()
         if not name or name.endswith(("/", os.sep)) or name in (".", ".."):
-            raise FormatError("is no name for a file; write one, such as take.fba", path=name or "take")
+            raise FormatError("is not a file name; give one, such as take.fba", path=name or "take")
         path = self.folder / name
         return path if path.suffix.lower() == ".fba" else path.with_name(path.name + ".fba")
 

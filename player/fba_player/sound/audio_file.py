@@ -46,7 +46,7 @@ def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
     stream = container.streams.audio[0]
     if stream.codec_context is None:
         container.close()
-        raise FormatError("holds sound in a coding that is not known here", path=path)
+        raise FormatError("contains sound in an unknown coding; convert it to WAV, FLAC or MP3", path=path)
     return container, stream
 
 
@@ -128,7 +128,7 @@ class SoundFile:
     def _rate(self, rate: int) -> int:
         if not LOWEST_RATE <= rate <= HIGHEST_RATE:
             raise FormatError(
-                f"says {rate} samples a second; {LOWEST_RATE} to {HIGHEST_RATE} are read", path=self.path
+                f"claims {rate} samples a second; {LOWEST_RATE} to {HIGHEST_RATE} can be read", path=self.path
             )
         fits = rate in self._rates if self._rates else RATES[0] <= rate <= RATES[1]
         return rate if fits else USUAL_RATE

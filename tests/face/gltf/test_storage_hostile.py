@@ -53,7 +53,7 @@ LOOP = {"source": ["raise_nose"], "destination": {"raise_nose": {}}}
 CASES: list[tuple[str, Any, str]] = [
     ("extensions", REMOVED, "has no extension FBA_face, .* fba model import"),
     (FACE, [], "extensions.FBA_face: expected an object, found a list"),
-    (FACE + "/version", 2, "extensions.FBA_face: is version 2; version 1 is read"),
+    (FACE + "/version", 2, "extensions.FBA_face: has version 2, but this fba reads version 1 only"),
     (FACE + "/version", REMOVED, "extensions.FBA_face: 'version' is missing"),
     (FACE + "/name", 1, "FBA_face.name: expected text"),
     (FACE + "/notes", {"a": []}, "FBA_face.notes.a: expected text, found a list of 0"),
@@ -79,7 +79,7 @@ CASES: list[tuple[str, Any, str]] = [
     (FACE + "/featurePoints/3.1/part", REMOVED, r"\['3.1'\]: 'part' is missing"),
     (FACE + "/featurePoints/3.5/position/0", -0.5, "FBA_face: .*3.5"),
     (FACE + "/tables/0/fap", "viseme", r"tables\[0\].fap: 'viseme' is not the name of a low-level FAP"),
-    (FACE + "/tables/1/fap", "open_jaw", "FBA_face: FaceDefTables of FAP 3 open_jaw: there are two"),
+    (FACE + "/tables/1/fap", "open_jaw", "FBA_face: FaceDefTables of FAP 3 open_jaw: this FAP has two"),
     (FACE + "/tables/0/meshes", [{}] * 5, r"tables\[0\].meshes: 5 elements, more than the 4"),
     (FACE + "/tables/2/transforms/0/kind", "twist", r"tables\[2\].transforms\[0\].kind: 'twist' is none"),
     (FACE + "/tables/2/transforms/0/amount", [0, 1], r"transforms\[0\].amount: expected a list of 3"),

@@ -114,7 +114,7 @@ def test_the_file_itself_and_a_folder_without_fitted_eyes(folder: Path, tmp_path
     assert len(np.unique(eye.vertices, axis=0)) == 72  # vertices 14598 to 14669 of the base mesh
     assert head.bound[row_of()["3.5"]] >= 0
     assert np.isfinite(head.points).all()
-    with pytest.raises(OptionError, match="brings its own"):
+    with pytest.raises(OptionError, match="has its own"):
         import_model(tmp_path, points={"9.3": 1})
 
 
@@ -136,8 +136,12 @@ def test_broken_fitted_eyes_are_named(folder: Path, tmp_path: Path) -> None:
         ("14598 14599 14662", "14598 14599 99999", "vertex 99999 of the base mesh does not exist"),
         ("0.64546", "many", "a weight must be a finite number"),
         ("1.6482", "0", "must be positive"),
-        ("obj_file high-poly.obj", "obj_file ../../none.obj", "does not lie beside it"),
-        ("14598 14599 14662 0.64546 0.02023 0.33431 -0.00208 -0.00037 0.00667\n", "", "places 1063 vertices"),
+        ("obj_file high-poly.obj", "obj_file ../../none.obj", "is not in its folder"),
+        (
+            "14598 14599 14662 0.64546 0.02023 0.33431 -0.00208 -0.00037 0.00667\n",
+            "",
+            "gives positions for 1063 vertices",
+        ),
     ):
         assert old in text
         (tmp_path / "high-poly.mhclo").write_text(text.replace(old, new, 1))

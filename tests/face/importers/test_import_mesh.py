@@ -232,7 +232,7 @@ def test_units_by_the_distance_of_the_pupils(apart: float, size: float) -> None:
 )
 def test_unknown_files_are_told_what_is_read(tmp_path: Path, name: str, content: bytes) -> None:
     (tmp_path / name).write_bytes(content)
-    with pytest.raises(ModelError, match=r"Read are: MakeHuman.*glTF.*OBJ.*PLY.*Candide.*FDP"):
+    with pytest.raises(ModelError, match=r"Files that can be read: MakeHuman.*glTF.*OBJ.*PLY.*Candide.*FDP"):
         import_model(tmp_path / name)
 
 

@@ -48,16 +48,16 @@ def test_csv(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("9.3,1,2\n", ":1: 'name,x,y,z'"),
-        ("9.3,1\n9.3,2\n", ":2: feature point 9.3 comes twice"),
+        ("9.3,1\n9.3,2\n", ":2: feature point 9.3 is listed twice"),
         ("9.99,1\n", ":1: there is no feature point '9.99'"),
         ("name,x\nnose,1\n", ":2: there is no feature point 'nose'"),
         ("9.3,a,b,c\n", ":1: a coordinate must be a finite number"),
         ("9.3,0,0,nan\n", "finite number"),
         ("9.3,1.5\n", ":1: a vertex must be a whole number"),
         ("9.3,-1\n", "vertices count from 0"),
-        ('"\n', "no feature point in it"),
+        ('"\n', "contains no feature points"),
         ('9.3,1\n"" "\n', ":2: there is no feature point ''"),
-        ("# nothing\n", "no feature point in it"),
+        ("# nothing\n", "contains no feature points"),
     ],
 )
 def test_bad_csv(tmp_path: Path, text: str, words: str) -> None:
@@ -129,8 +129,8 @@ def test_wrong_sides_are_put_right_with_a_warning(tmp_path: Path) -> None:
         ("1.0 a\n2.1 0 0\n", ":2: a feature point is"),
         ("1.0 a\n2.1 0 0 x 0.1\n", ":2: a coordinate"),
         ("1.0 a\n2.1 0 0 0 0.x\n", ":2: the vertex in MESH.VERTEX"),
-        ("1.0 a\n2.1 0 0 0\n2.1 0 0 0\n", ":3: feature point 2.1 comes twice"),
-        ("1.0 a\n", "no feature point in it"),
+        ("1.0 a\n2.1 0 0 0\n2.1 0 0 0\n", ":3: feature point 2.1 is listed twice"),
+        ("1.0 a\n", "contains no feature points"),
     ],
 )
 def test_bad_text_fdp(tmp_path: Path, text: str, words: str) -> None:

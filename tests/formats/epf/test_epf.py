@@ -91,7 +91,7 @@ def test_body_masks_follow_the_listed_order_of_the_groups(tmp_path: Path) -> Non
         (["FFR 1"], 1, "comes before FBM"),
         (["FBM 4"], 1, r"integer in 1\.\.3.*'4'"),
         (["FBM"], 1, "one number, found 0"),
-        (["FBM 1", "FFR 0"], 1, "needs ISI"),
+        (["FBM 1", "FFR 0"], 1, "the first block must contain .ISI 1."),
         (["FBM 1", "ISI 1", FMT, "FQU 1"], 1, "needs FFR"),
         (["FBM 1", "FFR 0", "ISI 0"], 1, "P plane.*before any I plane"),
         (["FBM 1", "FFR 0", "ISI 1", "FQU 1"], 1, "needs FMT"),
@@ -101,7 +101,7 @@ def test_body_masks_follow_the_listed_order_of_the_groups(tmp_path: Path) -> Non
         ([*FIRST, "BQU 5"], 6, "body tag in a block without a body"),
         ([*FIRST[:4], "FQU 32"], 5, r"integer in 0\.\.31"),
         ([*FIRST[:4], "FQU x"], 5, "'x'"),
-        (["FBM 1", "FFR 0", "ISI 1", FMT + " 0", "FQU 1"], 4, "goes on behind its 10 groups"),
+        (["FBM 1", "FFR 0", "ISI 1", FMT + " 0", "FQU 1"], 4, "has more values than its 10 groups need"),
         (["FBM 1", "FFR 0", "ISI 1", "FMT 0 3 0 1 1", "FQU 1"], 4, "ends within group 4"),
         (["FBM 1", "FFR 0", "ISI 1", "FMT 1 2 0", "FQU 1"], 4, "mask bits of group 1"),
         (["FBM 1", "FFR 0", "ISI 1", "FMT 4", "FQU 1"], 4, r"integer in 0\.\.3"),
@@ -161,11 +161,11 @@ def part(**changes: Any) -> PartSettings:
         ([PlaneSettings(True, face_frame=0, face=part(mask_types=(3,)))], "10 mask types"),
         (
             [PlaneSettings(True, face_frame=0, face=part(mask_types=(4, *[0] * 9)))],
-            "group 1 has mask type 4",
+            "group 1 has mask type 4; expected 0 to 3",
         ),
         (
             [PlaneSettings(True, body_frame=0, body=PartSettings((2, *[0] * 23), np.zeros(296, bool)))],
-            "group 1 has mask type 2",
+            "group 1 has mask type 2; expected 0, 1 or 3",
         ),
         (
             [

@@ -84,7 +84,7 @@ def test_a_skeleton_carries_the_faps_as_numbers(tmp_path: Path) -> None:
     fba.write(tmp_path / "a.glb", written, mesh=False)
     assert fba.read(tmp_path / "a.glb").face == written.face
     body = replace(BodyModel.default(), eyes=None)
-    with pytest.warns(FbaWarning, match="has no place for a face; none is shown"):
+    with pytest.warns(FbaWarning, match="has no position for a face; none is shown"):
         fba.write(tmp_path / "b.glb", written, body=body)
     assert fba.read(tmp_path / "b.glb").face == written.face
 

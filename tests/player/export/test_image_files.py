@@ -63,7 +63,7 @@ def test_an_older_sequence_is_not_mixed_with(tmp_path: Path) -> None:
     for name in ("000.png", "002.png", "x.png", "0000000.jpg"):
         (tmp_path / name).write_bytes(b"old")
     with pytest.raises(
-        FormatError, match=r"000.png to 002.png \(2 pictures\) are there already.*replace=True"
+        FormatError, match=r"000.png to 002.png \(2 pictures\) are in this folder already.*replace=True"
     ):
         Sequence(numbered, 3)
     Sequence(numbered, 3, replace=True)

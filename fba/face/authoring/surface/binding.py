@@ -50,7 +50,8 @@ def face_size(points: Float64) -> float:
     known = points[np.isfinite(points).all(axis=1)]
     if len(known) < 2:
         raise ModelError(
-            f"only {len(known)} of the {len(points)} feature points are known: nothing to make tables from"
+            f"only {len(known)} of the {len(points)} feature points are known; at least two are "
+            "needed, and for FAPU ten"
         )
     return float(np.linalg.norm(known.max(axis=0) - known.min(axis=0))) / 2
 

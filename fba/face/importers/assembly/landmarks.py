@@ -41,7 +41,7 @@ def find_points(pieces: Sequence[Piece], path: str) -> Float64:
     eyes = _eyes(pieces, path)
     skin = [piece for piece in pieces if piece.part.kind == "skin"]
     if not skin:
-        raise ModelError(f"{path}: no part is skin; name the kinds of the parts").with_remedies(POINTS)
+        raise ModelError(f"{path}: no part is skin; give the kinds of the parts").with_remedies(POINTS)
     by_fap = {fap: morph for name, morph in skin[0].morphs.items() if (fap := fap_of(name)) is not None}
     vertices = skin[0].part.vertices.astype(np.float64)
     if len(by_fap) >= FEWEST_FAPS:

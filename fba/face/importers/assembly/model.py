@@ -71,7 +71,7 @@ def finish_import(
     metres, with its origin between the pupils. Pieces with shapes get tables measured from them.
     """
     if not pieces:
-        raise ModelError(f"{os.fspath(options.path)}: there are no triangles in it")
+        raise ModelError(f"{os.fspath(options.path)}: contains no triangles; export the head as a mesh")
     pieces, points = turn_upright(pieces, points, options.up)
     size, how = metres_per_unit(points, options.unit)
     pupils = points[[row_of()["3.5"], row_of()["3.6"]]]

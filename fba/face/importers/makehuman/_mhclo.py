@@ -42,10 +42,12 @@ def fit_clothes(path: Path, base: Float64) -> Polygons:
         else:
             reading = False
     if mesh is None:
-        raise ModelError(f"{path}: the mesh that its line 'obj_file' names does not lie beside it")
+        raise ModelError(f"{path}: the mesh that its line 'obj_file' names is not in its folder")
     polygons = read_obj(mesh)
     if len(rows) != len(polygons.vertices):
-        raise ModelError(f"{path}: places {len(rows)} vertices, but {mesh.name} has {len(polygons.vertices)}")
+        raise ModelError(
+            f"{path}: gives positions for {len(rows)} vertices, but {mesh.name} has {len(polygons.vertices)}"
+        )
     return replace(polygons, vertices=np.array(rows, dtype=np.float64))
 
 

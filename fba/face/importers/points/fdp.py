@@ -63,7 +63,7 @@ def _load_text(path: str) -> Fdp:
         else:
             point = tokens[0]
             if np.isfinite(points[row_of()[point]]).any():
-                raise ModelError(f"{where}: feature point {point} comes twice")
+                raise ModelError(f"{where}: feature point {point} is listed twice")
             points[row_of()[point]] = [parse_number(token, where, "a coordinate") for token in tokens[1:4]]
             if len(tokens) == 5:
                 mesh, _, vertex = tokens[4].partition(".")
@@ -71,7 +71,7 @@ def _load_text(path: str) -> Fdp:
                 if index >= 0:
                     vertices[point] = (mesh, index)
     if not np.isfinite(points).any():
-        raise ModelError(f"{path}: there is no feature point in it")
+        raise ModelError(f"{path}: contains no feature points")
     if unknown:
         warnings.warn(
             f"{path}: left out {', '.join(unknown[:5])}: the standard has no such feature point",

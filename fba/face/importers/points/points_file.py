@@ -114,7 +114,7 @@ def _from_csv(path: str) -> GivenPoints:
                 continue  # titles
             raise ModelError(f"{where}: there is no feature point {name[:40]!r}; they are named 2.1 to 11.6")
         if name in vertices or np.isfinite(points[row_of()[name]]).any():
-            raise ModelError(f"{where}: feature point {name} comes twice")
+            raise ModelError(f"{where}: feature point {name} is listed twice")
         if len(tokens) == 2:
             vertices[name] = parse_integer(tokens[1], where, "a vertex")
         elif len(tokens) == 4:
@@ -166,7 +166,7 @@ def _from_fdp(path: str) -> GivenPoints:
 def _check_given(given: GivenPoints, where: str) -> GivenPoints:
     """The points, if there are any; ModelError otherwise, and for a negative vertex."""
     if not given:
-        raise ModelError(f"{where}: there is no feature point in it")
+        raise ModelError(f"{where}: contains no feature points")
     for name, vertex in given.vertices.items():
         if vertex < 0:
             raise ModelError(f"{where}: feature point {name} is vertex {vertex}; vertices count from 0")
