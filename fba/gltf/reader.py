@@ -72,6 +72,6 @@ def _check_extensions(document: Document) -> None:
             )
         if name not in KNOWN and not name.startswith("KHR_materials_"):
             if "texture" in name:  # another kind of picture: shapes can be read without it
-                warnings.warn(f"{entry.file}: {name} is not read", FbaWarning, stacklevel=3)
+                warnings.warn(f"{entry.file}: {name} cannot be read; left out", FbaWarning, stacklevel=3)
                 continue
             raise entry.error(f"the file needs the extension {name}, which fba does not support")

@@ -29,7 +29,11 @@ class Pictures:
         """
         path = find_beside(file, name)
         if path is None:
-            warnings.warn(f"{where}: the picture {name!r} does not lie beside it", FbaWarning, stacklevel=5)
+            warnings.warn(
+                f"{where}: the picture {name!r} is not in the folder of the file; left out",
+                FbaWarning,
+                stacklevel=5,
+            )
             return b""
         if path not in self._known:
             self._known[path] = _picture(path, where)
@@ -50,7 +54,11 @@ def read_mtl(
     materials: dict[str, Material] = {}
     pictures = Pictures() if pictures is None else pictures
     if file is None:
-        warnings.warn(f"{path}: its materials {library!r} do not lie beside it", FbaWarning, stacklevel=4)
+        warnings.warn(
+            f"{path}: the file of its materials, {library!r}, is not in its folder; left out",
+            FbaWarning,
+            stacklevel=4,
+        )
         return materials
     name: str | None = None
     colour, rough, picture = (0.8, 0.8, 0.8), 0.6, b""

@@ -142,7 +142,7 @@ def split(whole: dict[str, Any]) -> None:
     ("change", "message"),
     [
         (lose_arms, "no joints for l_shoulder, r_shoulder; they stay as they are"),
-        (split, "has several skeletons; 'HumanoidRoot' is read, left out: vl5"),
+        (split, "has several skeletons; 'HumanoidRoot' is read, the others are left out: vl5"),
     ],
 )
 def test_what_is_there_is_played_and_the_rest_is_told(

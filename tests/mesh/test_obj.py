@@ -105,10 +105,10 @@ def test_damage_is_named(tmp_path: Path, text: str | bytes, place: str, words: s
 
 def test_names_of_files_that_no_system_takes(tmp_path: Path) -> None:
     long = "m" * 5000
-    with pytest.warns(FbaWarning, match="do not lie beside it"):
+    with pytest.warns(FbaWarning, match="is not in its folder; left out"):
         assert read_mtl(tmp_path / "mesh.obj", long) == {}
     (tmp_path / "a.mtl").write_text(f"newmtl a\nmap_Kd {long}.png\n")
-    with pytest.warns(FbaWarning, match="does not lie beside it"):
+    with pytest.warns(FbaWarning, match="is not in the folder of the file; left out"):
         assert read_mtl(tmp_path / "mesh.obj", "a.mtl")["a"].texture is None
 
 

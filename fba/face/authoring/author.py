@@ -181,7 +181,7 @@ class _Authoring:
         self._add_head()
         for fap in range(FIRST_LOW_LEVEL_FAP, len(faps()) + 1):
             if fap not in self.moves and fap not in self.turns and fap not in self.lost:
-                self.lost[fap] = "nothing of this mesh moves with it"
+                self.lost[fap] = "no part of this mesh moves with this FAP"
 
     def _add_to_surface(self, fap: int, motion: Motion) -> None:
         """Add a motion of the surface, and of the parts attached to it, to a FAP."""
@@ -255,7 +255,7 @@ class _Authoring:
             if pupils:
                 self.moves[PUPIL_FAP[side]] = pupils
             else:
-                self.lost[PUPIL_FAP[side]] = f"the {side} eyeball has no vertices about its pupil"
+                self.lost[PUPIL_FAP[side]] = f"the {side} eyeball has no vertices within its pupil"
 
     def _add_tongue(self) -> None:
         tongues = [part for part in self.parts if part.kind == "tongue" and len(part.vertices)]

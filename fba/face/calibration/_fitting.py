@@ -151,7 +151,7 @@ def _swap_to_own_sides(points: Float64) -> Float64:
     changes = [f"{a} and {b} have changed places" for a, b in swaps]
     changes += [f"{name} is on the other side" for name in wrong]
     if changes:
-        warnings.warn(f"put right: {'; '.join(changes)}", FbaWarning, stacklevel=3)
+        warnings.warn(f"corrected: {'; '.join(changes)}", FbaWarning, stacklevel=3)
     return repaired
 
 

@@ -136,8 +136,8 @@ def _in_unit_of_mesh(given: Float64, positions: Float64, bound: list[str], path:
     wrong = [names()[row] for row, bad in zip(rows, away, strict=True) if bad]
     if wrong:
         warnings.warn(
-            f"{path}: {len(wrong)} of {len(rows)} feature points do not lie where their vertices are "
-            f"({', '.join(wrong[:8])}{', ...' if len(wrong) > 8 else ''}); the vertices are taken",
+            f"{path}: {len(wrong)} of {len(rows)} feature points are not where their vertices are "
+            f"({', '.join(wrong[:8])}{', ...' if len(wrong) > 8 else ''}); the vertices are used",
             FbaWarning,
             stacklevel=5,
         )

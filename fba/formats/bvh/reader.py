@@ -298,7 +298,7 @@ def _numbers(
             )
     if stated is not None and stated != frames:
         warnings.warn(
-            f"{path or 'BVH'}: the header says {stated} frames, the file has {frames}; those are used",
+            f"{path or 'BVH'}: the header says {stated} frames, but the file has {frames}; these are read",
             FbaWarning,
             stacklevel=4,
         )
@@ -391,7 +391,7 @@ def _motion(
             offsets[joint] = np.median(translation, axis=0)
     if stretched:
         warnings.warn(
-            f"{path or 'BVH'}: joints that move against their parents are held at their median place: "
+            f"{path or 'BVH'}: joints whose offset from the parent varies keep the median of it: "
             f"{', '.join(stretched[:5])}{', ...' if len(stretched) > 5 else ''}",
             FbaWarning,
             stacklevel=4,

@@ -145,7 +145,7 @@ class _Reader:
             for tag in changed:
                 warnings.warn(
                     f"{self.lines.path}:{block[tag].line}: {tag} in the block of a P plane (ISI 0) "
-                    "counts from the next I plane on",
+                    "takes effect at the next I plane",
                     FbaWarning,
                     stacklevel=5,
                 )

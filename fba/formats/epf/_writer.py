@@ -30,7 +30,7 @@ def write_epf(path: Path, planes: Iterable[PlaneSettings]) -> None:
     if writer.start_codes:
         warnings.warn(
             f"{path}: {writer.start_codes} planes have a start code before them, which an EPF file "
-            "cannot say; ask the encoder for it",
+            "cannot store; with the option start_codes, the encoder writes new ones",
             FbaWarning,
             stacklevel=2,
         )

@@ -102,7 +102,7 @@ def read_face(gltf: Gltf, clip: Clip, note: Value, times: Float64) -> FaceTrack:
         values[:, _fap(pair[0]) - 1] = gltf.accessors.floats(pair[1], "SCALAR", count=len(times))[:, 0]
     if missing:
         warnings.warn(
-            f"{gltf.file}: morph targets of FAPs are missing, and count as 0: "
+            f"{gltf.file}: morph targets of FAPs are missing, and taken as 0: "
             f"{', '.join(missing[:5])}{', ...' if len(missing) > 5 else ''}",
             FbaWarning,
             stacklevel=6,

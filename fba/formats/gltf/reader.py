@@ -234,7 +234,7 @@ def _skeleton(gltf: Gltf) -> list[int]:
     if others:
         warnings.warn(
             f"{gltf.file}: has several skeletons; {gltf.nodes[best[0]].name!r} is read, "
-            f"left out: {', '.join(others[:5])}{', ...' if len(others) > 5 else ''}",
+            f"the others are left out: {', '.join(others[:5])}{', ...' if len(others) > 5 else ''}",
             FbaWarning,
             stacklevel=5,
         )
@@ -320,8 +320,8 @@ def _stretched(motion: SkeletonMotion, positions: Float64) -> Bool:
 def _warn_of_stretching(name: str, joints: list[str]) -> None:
     """Warn of joints that move relative to their parents, but are held as in the bind pose."""
     warnings.warn(
-        f"{name}: joints that move against their parents, or stand elsewhere than in the bind "
-        f"pose, are held as they are there: {', '.join(joints[:5])}{', ...' if len(joints) > 5 else ''}",
+        f"{name}: joints whose offset from the parent varies, or differs from the bind pose, "
+        f"keep that of the bind pose: {', '.join(joints[:5])}{', ...' if len(joints) > 5 else ''}",
         FbaWarning,
         stacklevel=5,
     )

@@ -188,14 +188,14 @@ class _Reader:
         self._blocks.clear()
         if self.values.rounded:
             warnings.warn(
-                f"{path}: {self.values.rounded} values are no integers, the first on line "
+                f"{path}: {self.values.rounded} values are not integers, the first on line "
                 f"{self.values.rounded_line}; rounded half away from zero",
                 FbaWarning,
                 stacklevel=4,
             )
         if header.frames is not None and header.frames != len(index):
             warnings.warn(
-                f"{path}: the header says {header.frames} frames, the file holds {len(index)}; took those",
+                f"{path}: the header says {header.frames} frames, the file has {len(index)}; all are read",
                 FbaWarning,
                 stacklevel=4,
             )
@@ -287,7 +287,7 @@ def _renumber(index: Int64, lines: Int64, path: Path) -> Int64:
     first = int(np.argmax(repeated)) + 1
     warnings.warn(
         f"{path}:{int(lines[first])}: frame number {int(index[first])} comes after {int(index[first - 1])}; "
-        f"{int(repeated.sum())} frames whose number does not increase follow the frame before them",
+        f"{int(repeated.sum())} frames whose number does not increase are read as the next ones in time",
         FbaWarning,
         stacklevel=5,
     )

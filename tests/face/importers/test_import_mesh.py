@@ -294,7 +294,7 @@ def test_candide_with_its_feature_points(shared: Path) -> None:
         model = import_model(
             shared / "data/candide/candide3-ClosedMouth.wfm", points=shared / "data/candide/candide3.fdp"
         )
-    assert any("(7.1, 11.1, 11.2, 11.3); the vertices are taken" in str(w.message) for w in seen)
+    assert any("(7.1, 11.1, 11.2, 11.3); the vertices are used" in str(w.message) for w in seen)
     assert len(model.table_of) >= 45
     for fap, words in (("yaw_l_eyeball", "eyeball"), ("raise_tongue", "tongue"), ("pull_l_ear", "10.3")):
         assert words in model.lost[fap_numbers()[fap]]

@@ -97,7 +97,7 @@ def test_rates(written: str, rate: Fraction) -> None:
 
 
 def test_wrong_frame_count_is_a_warning() -> None:
-    with pytest.warns(FbaWarning, match="header says 3 frames, the file has 2"):
+    with pytest.warns(FbaWarning, match="header says 3 frames, but the file has 2; these"):
         assert len(reader.parse(text(frames="3"))) == 2
 
 

@@ -196,7 +196,7 @@ def test_targets_that_are_gone(tmp_path: Path) -> None:
             mesh.get("extras", {}).pop("targetNames", None)
 
     edit(tmp_path / "a.glb", change)
-    with pytest.warns(FbaWarning, match=r"morph targets of FAPs are missing, and count as 0: open_jaw"):
+    with pytest.warns(FbaWarning, match=r"morph targets of FAPs are missing, and taken as 0: open_jaw"):
         face = fba.read(tmp_path / "a.glb").face
     assert face is not None
     assert not face.values[:, 2].any()

@@ -304,7 +304,9 @@ def test_two_skeletons_in_one_file(tmp_path: Path) -> None:
         document["scenes"][0]["nodes"].append(number)
         document["skins"][0].pop("inverseBindMatrices")
 
-    with pytest.warns(FbaWarning, match="several skeletons; 'Armature' is read, left out: Prop"):
+    with pytest.warns(
+        FbaWarning, match="several skeletons; 'Armature' is read, the others are left out: Prop"
+    ):
         fba.read(changed(tmp_path, another))
 
 
