@@ -62,7 +62,7 @@ class BodyDefinition:
         file = os.fspath(path) if isinstance(path, str | os.PathLike) else "the file"
         data = read_whole(path)
         if len(data) > MAX_BYTES:
-            raise ModelError(f"{file}: is {len(data)} bytes long, more than the {MAX_BYTES} that are read")
+            raise ModelError(f"{file}: is {len(data)} bytes long, more than the {MAX_BYTES} that can be read")
         try:
             document = json.loads(data)
         except (ValueError, RecursionError) as error:

@@ -212,7 +212,7 @@ def test_joints_that_stand_off_their_bind_pose_by_a_hundredth(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         read_motion(path)
-    assert any("held as they are there: LeftHand" in str(w.message) for w in caught) == warned
+    assert any("keep that of the bind pose: LeftHand" in str(w.message) for w in caught) == warned
 
 
 @pytest.mark.parametrize(
