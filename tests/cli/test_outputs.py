@@ -68,7 +68,9 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
             if isinstance(param.type, OutputType) or param.name == "output":
                 writing.add(name)
                 assert "--no-clobber" in options, f"fba {name}"
-    assert writing == {"encode", "decode", "convert", "render", "gait", "model import", "model fit"}
+    assert writing == {
+        "encode", "decode", "convert", "render", "gait", "model import", "model fit", "conformance"
+    }  # fmt: skip
 
 
 OVERWRITING = [

@@ -11,7 +11,8 @@ import click
 from fba.atomic import atomic
 from fba.cli import options
 from fba.cli.command import Command, examples
-from fba.cli.printing import Progress, print_json
+from fba.cli.outputs import Output, Outputs, OutputType, display_name
+from fba.cli.printing import Progress
 
 if TYPE_CHECKING:
     from fba_conformance.suite.index import Vector
@@ -51,17 +52,16 @@ if TYPE_CHECKING:
 @click.option(
     "--only", multiple=True, metavar="NAME", help="Only vectors or groups of this name; may be repeated."
 )
-@click.option(
-    "--junit", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Write JUnit XML, too."
-)
+@click.option("--junit", type=OutputType(), metavar="FILE", help="Write JUnit XML, too.")
 @click.option(
     "--zip",
     "archive",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=OutputType(),
     metavar="FILE",
     help="Write the vectors that come with fba as a zip, with all values as text, and test nothing.",
 )
 @click.option("--verbose", "-v", is_flag=True, help="Print a line for every vector, not only for failures.")
+@options.no_clobber_option
 @options.json_option
 def command(
     folder: Path | None,
@@ -72,6 +72,7 @@ def command(
     junit: Path | None,
     archive: Path | None,
     verbose: bool,
+    no_clobber: bool,
     as_json: bool,
 ) -> None:
     """Check this codec, or the programs of --decoder and --encoder, against test vectors.
@@ -80,8 +81,10 @@ def command(
     vector fails.
     """
     if archive is not None:
-        _write_archive(archive, folder)
+        _write_archive(archive, folder, no_clobber=no_clobber)
         return
+    written = [] if junit is None else [Output("--junit", junit, text=True)]
+    outputs = Outputs(written, no_clobber=no_clobber)
     from fba_conformance.suite import result as results_module
     from fba_conformance.suite.index import read_vectors
 
@@ -94,17 +97,16 @@ def command(
                 results.append(check(vector))
                 step.advance()
     if junit is not None:
-        with atomic(junit) as file:
-            file.write(results_module.junit(results, decoder or encoder or "fba"))
+        outputs.write(junit, results_module.junit(results, decoder or encoder or "fba"))
     failed = [result for result in results if not result.passed]
     if as_json:
-        print_json([result.to_dict() for result in results])
+        outputs.print_json([result.to_dict() for result in results])
     else:
         for result in results if verbose else [one for one in results if not one.exact]:
-            click.echo(result.line())
+            outputs.say(result.line())
         for line in results_module.table(results):
-            click.echo(line)
-        click.echo(results_module.summary(results))
+            outputs.say(line)
+        outputs.say(results_module.summary(results))
     if failed:
         raise click.exceptions.Exit(1)
 
@@ -153,7 +155,7 @@ def _chosen(vectors: Sequence[Vector], names: Sequence[str]) -> Sequence[Vector]
     return chosen
 
 
-def _write_archive(path: Path, folder: Path | None) -> None:
+def _write_archive(path: Path, folder: Path | None, *, no_clobber: bool) -> None:
     """Write the suite as a zip."""
     from fba_conformance.suite.archive import write_archive
     from fba_conformance.suite.coverage import report
@@ -161,6 +163,7 @@ def _write_archive(path: Path, folder: Path | None) -> None:
 
     if folder is not None:
         raise click.UsageError("--zip writes the vectors that come with fba; leave the folder out")
-    with atomic(path) as file:
+    outputs = Outputs([Output("--zip", path)], no_clobber=no_clobber)
+    with outputs.file(path) as name, atomic(name) as file:
         count = write_archive(file, made_vectors(), report())
-    click.echo(f"{path}: {count} vectors")
+    outputs.say(f"{display_name(path)}: {count} vectors")
