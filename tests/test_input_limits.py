@@ -44,11 +44,16 @@ def test_the_last_that_is_allowed_and_the_first_that_is_not() -> None:
 
 
 def test_the_limit_that_the_error_asks_for_is_enough() -> None:
-    far = face(0, 31 * 3600, rate=1)
+    far = face(0, 1000, rate=1)
     with pytest.raises(LimitError, match=r"raise it with limits=fba.Limits\(bytes=\d+\)") as caught:
-        far.resample(25)
+        far.resample(25, limits=Limits(bytes=1_000_000))
     argument = caught.value.remedies[0].value
-    assert far.resample(25, limits=eval(argument)).index[-1] == 25 * 31 * 3600
+    assert far.resample(25, limits=eval(argument)).index[-1] == 25 * 1000
+
+
+def test_two_frames_a_day_apart_are_not_filled_up_by_default() -> None:
+    with pytest.raises(LimitError, match="of memory"):
+        face(0, 31 * 3600, rate=1).resample(25)
 
 
 def test_time_codes_far_apart(tmp_path: Path) -> None:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from bitstring import BitArray
+
 from fba.parameters import Bap, Fap, baps, faps
 from fba_conformance._part import LISTS, MARKER_EVERY, RANGE_UNIT, HighLevel, Part, Slot
 from fba_conformance._textbook import FrequencyTable, encode_segment
@@ -66,18 +68,21 @@ class Plane:
 
 
 class StreamWriter:
-    """Writes start codes and planes. length: number of bits written so far."""
+    """Writes start codes and planes."""
 
     def __init__(self, bap_steps: str = "iso") -> None:
-        self.length = 0
-        self._pieces: list[str] = []
+        self._bits = BitArray()
         self._fap, self._bap = Part("fap"), Part("bap", bap_steps)
         self._viseme, self._expression = HighLevel("viseme"), HighLevel("expression")
 
+    @property
+    def length(self) -> int:
+        """Number of bits written so far."""
+        return len(self._bits)
+
     def write(self, bits: str) -> None:
         """Write bits, a string of 0 and 1."""
-        self._pieces.append(bits)
-        self.length += len(bits)
+        self._bits.append(BitArray(bin=bits))
 
     def write_start_code(self, code: int, *, stuffing: bool = True) -> None:
         """Write stuffing and a start code. stuffing: a whole byte of it at a byte boundary."""
@@ -115,7 +120,7 @@ class StreamWriter:
         """Return the bytes written. ValueError within a byte."""
         if self.length % 8:
             raise ValueError("the stream does not end at a byte boundary; write stuffing")
-        return int("1" + "".join(self._pieces), 2).to_bytes(self.length // 8 + 1, "big")[1:]
+        return self._bits.tobytes()
 
     def _write_faps(self, plane: Plane, values: Values) -> None:
         """Write the FAP half of a plane."""

@@ -36,7 +36,7 @@ def performance(face: bool = True, body: bool = True, rate: int = 25, first: int
 def test_the_table() -> None:
     assert [entry.name for entry in formats()] == ["fba", "fap", "bap", "epf", "bvh", "gltf"]
     by_name = {entry.name: entry for entry in formats()}
-    assert by_name["fap"].read_options == ("fps", "name", "salvage", "angle_scale")
+    assert by_name["fap"].read_options == ("fps", "name", "salvage", "angle_scale", "limits")
     assert by_name["fap"].write_options == by_name["epf"].write_options == ()
     assert "bap_steps" in by_name["fba"].read_options
     assert "fap_quant" in by_name["fba"].write_options

@@ -8,7 +8,6 @@ import tempfile
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from random import Random
@@ -23,8 +22,6 @@ MOST_SECONDS, MOST_SECONDS_PER_BYTE = 3.0, 0.002
 """Processor time that one input may take, and more for each of its bytes: generous, as machines differ."""
 MOST_MEMORY, MOST_MEMORY_PER_BYTE = 200_000_000, 20
 """Memory that one input may take beyond what the process had before it, in bytes."""
-ADDRESS_SPACE = 6_000_000_000
-"""Bytes of addresses that the process may have: asking for more is a MemoryError, which is a finding."""
 MINIMISED_SECONDS = 15.0
 
 
@@ -202,11 +199,6 @@ class Check:
     def limit(self) -> None:
         """From now on, limit memory: what was compiled up to now does not count."""
         self._limited = True
-        with suppress(ImportError, ValueError, OSError):  # no such module on Windows; or a lower limit is set
-            import resource
-
-            if sys.platform == "linux" and "atheris" not in sys.modules:
-                resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, resource.RLIM_INFINITY))
 
     def __call__(self, data: bytes) -> Outcome:
         """Check an input; raise for a finding."""

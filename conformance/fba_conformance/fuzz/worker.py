@@ -13,6 +13,7 @@ import mmap
 import struct
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from fba_conformance.fuzz._engine import Report, run, run_files
@@ -20,6 +21,8 @@ from fba_conformance.fuzz.corpus import read_corpus
 from fba_conformance.fuzz.targets import find_target
 
 NUMBER = struct.Struct("<q")
+ADDRESS_SPACE = 6_000_000_000
+"""Bytes of addresses that the process may have: asking for more is a MemoryError, which is a finding."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("files", nargs="*", type=Path)
     options = parser.parse_args(arguments)
     faulthandler.enable()
+    _limit_addresses()
     target = find_target(options.target)
     if options.files:
         report = run_files(target, [path.read_bytes() for path in options.files])
@@ -53,6 +57,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _save(report, options.findings)
     sys.stdout.write(json.dumps(report.to_dict()) + "\n")
     return 1 if report.findings else 0
+
+
+def _limit_addresses() -> None:
+    """Limit the addresses of this process, on Linux."""
+    with suppress(ImportError, ValueError, OSError):  # no such module on Windows; or a lower limit is set
+        import resource
+
+        if sys.platform == "linux":
+            resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, resource.RLIM_INFINITY))
 
 
 def _progress(path: Path | None) -> Callable[[int], None]:
