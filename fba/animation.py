@@ -24,8 +24,10 @@ __all__ = ["Animation", "BodyTrack", "FaceTrack", "Frame"]
 _INDEX_MAX = 1 << 62
 """Bound of frame indices, so that sums of two fit 64 bits."""
 
-_RESAMPLED_BYTES = 5
-"""Memory of a resampled parameter in a frame: an int32 and a bool."""
+_RESAMPLED_BYTES = 10
+"""Memory of a resampled parameter in a frame: an int32, masks, and its share of all that comes in between."""
+_CHUNK = 1 << 14
+"""Frames that are interpolated at once, which limits the memory for numbers of 64 bits."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -267,9 +269,13 @@ def _between(
 
     both: bool (S, columns), True where both frames sent the value; elsewhere that of before holds.
     """
-    start = values[before]
-    change = np.where(both, values[after].astype(np.float64) - start, 0.0)
-    return np.rint(start + change * weight[:, None]).astype(values.dtype)
+    result = np.empty((len(before), values.shape[1]), dtype=values.dtype)
+    for begin in range(0, len(before), _CHUNK):
+        chunk = slice(begin, begin + _CHUNK)
+        start = values[before[chunk]]
+        change = np.where(both[chunk], values[after[chunk]].astype(np.float64) - start, 0.0)
+        result[chunk] = np.rint(start + change * weight[chunk, None])
+    return result
 
 
 def _resample_face(
