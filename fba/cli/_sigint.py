@@ -12,6 +12,7 @@ import _thread
 import contextlib
 import signal
 import sys
+import threading
 import time
 from types import FrameType, TracebackType
 from typing import Any, Protocol
@@ -102,7 +103,7 @@ class Interruptions:
             if self._over:
                 return
             self._checking = True
-            _thread.interrupt_main(signal.Signals(number))
+            _interrupt_main(number)
 
     def _unraisable(self, unraisable: _Unraisable) -> None:
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):
@@ -123,4 +124,12 @@ def _is_interruption(error: BaseException | None) -> bool:
 
 def _interrupt_later(number: int) -> None:
     time.sleep(RETRY_AFTER)
-    _thread.interrupt_main(signal.Signals(number))
+    _interrupt_main(number)
+
+
+def _interrupt_main(number: int) -> None:
+    """Interrupt the main thread, where the system can do so also while it waits."""
+    if sys.platform == "win32":
+        _thread.interrupt_main(signal.Signals(number))
+    else:
+        signal.pthread_kill(threading.main_thread().ident or 0, number)

@@ -84,9 +84,9 @@ def long():
     except:
         pass
     try:
-        time.sleep(30)
+        time.sleep(100)
     finally:
-        time.sleep(0.5)
+        time.sleep(0.3)
         print("cleaned up")
 
 group.get_command = lambda context, name: long
@@ -96,7 +96,7 @@ main(["long"])
 
 def ran(code: str) -> tuple[int, str, str]:
     command = [sys.executable, "-c", code]
-    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
     return result.returncode, result.stdout, result.stderr
 
 
