@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,15 @@ FAMILIES = (
 )
 
 pytestmark = pytest.mark.slow
+
+
+@cache
+def traced(path: Path, bap_steps: str) -> tuple[list[dict[str, Any]], list[type[Warning]]]:
+    """Planes of a stream, and the categories of the warnings that it gives."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        planes = decode_values(path.read_bytes(), bap_steps=bap_steps)
+    return planes, [warning.category for warning in caught]
 
 
 def text_frames(path: Path) -> list[tuple[list[bool], list[int]]]:
@@ -62,13 +72,9 @@ def test_values_of_every_plane(shared: Path, family: str) -> None:
     assert records
     wrong = []
     for record in records:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            planes = decode_values((folder / record["stream"]).read_bytes(), bap_steps=record["bap_steps"])
+        planes, warned = traced(folder / record["stream"], record["bap_steps"])
         # One vector repeats a time code with its marker bit 0: read, with a warning.
-        assert [w.category for w in caught] == [FbaWarning] * 2 * record["stream"].endswith(
-            "synth_face_tc.fba"
-        )
+        assert warned == [FbaWarning] * 2 * record["stream"].endswith("synth_face_tc.fba")
         for kind in ("fap", "bap"):
             name = record.get(f"decoded_{kind}")
             if name is None:
@@ -89,7 +95,7 @@ def test_bits_time_and_header_of_real_streams(shared: Path) -> None:
     paths = sorted((shared / "vectors" / "real").glob("*.trace"))
     assert len(paths) == 41
     for path in paths:
-        planes = decode_values(path.with_suffix(".fba").read_bytes(), bap_steps="visage")
+        planes, _ = traced(path.with_suffix(".fba"), "visage")
         lines = path.read_text().splitlines()
         assert len(lines) == len(planes)
         for line, plane in zip(lines, planes, strict=True):

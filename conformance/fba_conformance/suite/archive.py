@@ -29,7 +29,6 @@ Part of fba, under the MIT licence.
   damaged/NAME.fba   a stream with damage
   damaged/NAME.txt   the values before the damage, a line "error", and those that can be salvaged behind it
   index.json         the tables below, for programs
-  coverage.txt       which vectors reach which element of the syntax, and which branch of a decoder
   SHA256SUMS         checksums of all other files: sha256sum -c SHA256SUMS
 
 THE VALUES
@@ -61,10 +60,9 @@ With Python, `fba conformance FOLDER --decoder 'yours {in} {out}'` does all that
 """
 
 
-def write_archive(file: BinaryIO, vectors: Iterable[Made], coverage: str) -> int:
-    """Write the zip; return the number of vectors. vectors, coverage: as made anew, and the report."""
+def write_archive(file: BinaryIO, vectors: Iterable[Made]) -> int:
+    """Write the zip; return the number of vectors. vectors: as made anew."""
     contents = dict(_files(vectors))
-    contents["coverage.txt"] = coverage.encode()
     sums = "".join(f"{sha256(data).hexdigest()}  {name}\n" for name, data in sorted(contents.items()))
     contents["SHA256SUMS"] = sums.encode()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:

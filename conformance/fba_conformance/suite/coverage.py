@@ -61,11 +61,6 @@ def _reached_by(vector: Vector) -> set[str]:
     return branches() | points(elements, data, vector.bap_steps, damaged=damaged)
 
 
-def report() -> str:
-    """Return the report as text."""
-    return "\n".join(report_lines(reached(read_vectors()))) + "\n"
-
-
 def report_lines(found: Mapping[str, list[str]]) -> list[str]:
     """Return the lines of the report: what is reached, by how many vectors, and by which."""
     sections: dict[str, list[str]] = defaultdict(list)
