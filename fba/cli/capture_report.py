@@ -34,16 +34,21 @@ def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str
     return animation, {"limits": rows, "limits_clamped": limits == "clamp"}
 
 
-def compare(captures: Sequence[Path], animation: Animation, format: str | None = None) -> dict[str, Any]:
-    """Return a report of the angles between the bones of captures and of the body, before coding."""
+def compare(
+    captures: Sequence[Path], animation: Animation, format: str | None = None, clip: str | None = None
+) -> dict[str, Any]:
+    """Return a report of the angles between the bones of captures and of the body, before coding.
+
+    clip: the animation that was read of a file with several, by name or number.
+    """
     from fba.capture import retarget_report
     from fba.formats import format_of
 
     reports = []
     for path in captures:
-        read_motion = format_of(path, format).read_motion
-        assert read_motion is not None  # the caller names captures only
-        motion = read_motion(path)
+        reader = format_of(path, format)
+        assert reader.read_motion is not None  # the caller names captures only
+        motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": clip}))
         report = asdict(retarget_report(motion, animation))
         reports.append({"input": str(path), **report})
     return {"captures": reports}

@@ -24,6 +24,7 @@ OPTIONS = {
     "kind": "kind",
     "replace": "replace",
     "limits": "limit",
+    "clip": "clip",
 }
 """Arguments of the library, and the parameters of commands that do the same."""
 OTHER_COMMANDS = (("encode",), ("convert",), ("model", "import"))

@@ -6,7 +6,7 @@ import os
 import sys
 import tempfile
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from fba.body.model import BodyModel
     from fba.codec.stream_info import StreamInfo
     from fba.face.model import FaceModel
+    from fba.formats.gltf.clips import ClipInfo
     from fba.formats.registry import Format
 
 NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
@@ -102,6 +103,7 @@ def read_input(
     capture: Mapping[str, object] | None = None,
     doubts: list[str] | None = None,
     format: str | None = None,
+    clip: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the animation of a file of any format, or of the one that `format` names.
@@ -110,12 +112,14 @@ def read_input(
 
     fps resamples the animation, and motion capture before it is retargeted. It, or header_fps, and name
     replace a header that a file lacks. capture: options for the readers of motion capture. doubts: that
-    warning is appended to it.
+    warning is appended to it. clip: of several animations in the file, the one to read, by name or number;
+    without effect where the format holds one.
     """
     from fba.formats import read
 
     options: dict[str, object] = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name}
-    options |= {"salvage": salvage or None, "rate": fps, "limits": limits, **(capture or {})}
+    options |= {"salvage": salvage or None, "rate": fps, "limits": limits, "clip": clip}
+    options |= capture or {}
     with input_file(path) as file:
         reader = _find_format(file, format)
         animation = read(file, format=reader.name, **_taken(reader, options))
@@ -133,14 +137,36 @@ def probe_input(
     fps: Fraction | None,
     format: str | None,
     salvage: bool,
+    clip: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> StreamInfo:
-    """Return what a file of any format holds. fps: the rate of a file that has none."""
+    """Return what a file of any format holds.
+
+    fps: the rate of a file that has none. clip: see `read_input`.
+    """
     from fba.formats import probe
 
     reader = _find_format(path, format)
-    options = {} if reader.name == "fba" else _taken(reader, {"fps": fps, "salvage": salvage or None})
+    options = (
+        {} if reader.name == "fba" else _taken(reader, {"fps": fps, "salvage": salvage or None, "clip": clip})
+    )
     return probe(path, bap_steps=bap_steps, format=reader.name, limits=limits, **options)
+
+
+def list_clips(path: Path, format: str | None, limits: Limits) -> tuple[ClipInfo, ...]:
+    """Return the animations of a file in a format that holds several; none for other formats."""
+    reader = _find_format(path, format)
+    return () if reader.list_clips is None else reader.list_clips(path, limits=limits)
+
+
+def check_clip(clip: str | None, files: Iterable[Path], format: str | None) -> None:
+    """Raise click.UsageError for `--clip` without a file whose format holds several animations."""
+    if clip is None:
+        return
+    formats = {_find_format(file, format) for file in files if str(file) != "-"}
+    if formats and all(entry.list_clips is None for entry in formats):
+        names = " and ".join(sorted(entry.name.upper() for entry in formats))
+        raise click.UsageError(f"--clip is for glTF, which may hold several animations, not for {names}")
 
 
 def _taken(reader: Format, options: Mapping[str, object]) -> dict[str, Any]:

@@ -121,6 +121,12 @@ salvage_option = click.option(
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
 
+clip_option = click.option(
+    "--clip",
+    metavar="NAME",
+    help="Which animation of a glTF file with several, by name or number; `fba info` lists them.",
+)
+
 limit_option = click.option(
     "--limit",
     "limit",

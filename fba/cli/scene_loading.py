@@ -51,6 +51,7 @@ def open_file(file: Path, how: SceneOptions, doubts: list[str] | None = None) ->
             salvage=salvage,
             doubts=doubts,
             format=how.format,
+            clip=how.clip,
             limits=how.limit,
         )
         return animation, False
@@ -166,6 +167,6 @@ def _read_other(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> 
     with inputs.spooled(source, name, head) as path:
         animation = inputs.read_input(
             path, bap_steps=how.bap_steps, header_fps=how.fps, name=name, salvage=how.salvage,
-            format=how.format, limits=how.limit,
+            format=how.format, clip=how.clip, limits=how.limit,
         )  # fmt: skip
     return replace(animation, name=name) if animation.name == path.name else animation

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from fba.cli import options
+from fba.cli import inputs, options
 from fba.cli.command import Decorated
 from fba.cli.inputs import EXISTING
 from fba.limits import Limits
@@ -29,6 +29,7 @@ class SceneOptions:
     arrange: str | None
     fps: Fraction | None
     format: str | None
+    clip: str | None
     camera: str | None
     view: str
     shows: tuple[tuple[str, object], ...]
@@ -87,6 +88,7 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]
         click.option("--arrange", type=click.Choice(["side", "over"]), help=arrange),
         options.fps_option(fps),
         options.from_option,
+        options.clip_option,
         click.option(
             "--camera",
             type=click.Choice(["front", "three-quarter", "profile", "body"]),
@@ -147,6 +149,7 @@ def check_files(files: tuple[Path, ...], how: SceneOptions, sound: SoundOptions,
         raise click.UsageError("--audio and --no-audio contradict each other")
     if sound.audio_offset and sound.no_audio:
         raise click.UsageError("--audio-offset and --no-audio contradict each other")
+    inputs.check_clip(how.clip, files, how.format)
     if len(files) > MOST:
         raise click.UsageError(f"{len(files)} files are too many for one {what}; at most {MOST}")
     if len(files) < 2 and how.arrange is not None:

@@ -24,6 +24,7 @@ from fba.source import Path, read_head
 if TYPE_CHECKING:
     from fba.capture.motion import SkeletonMotion
     from fba.codec import StreamInfo
+    from fba.formats.gltf.clips import ClipInfo
 
 
 UNKNOWN = Remedy("format", "if it is one of them, name it with {}", "'bvh'")
@@ -58,8 +59,9 @@ class Format:
     name: as in `format=`. suffixes: lower case, with the dot; the first is the usual one. sniff: whether a
     file with this beginning (up to 64 KiB) and this lower-case suffix has this format. read, write: file to
     Animation and back; write is None if there is no writer. carries: the parts that a file can hold.
-    read_motion: reads the motion of a skeleton, for formats of motion capture; `read` retargets it. written:
-    description of a written file, if `description` says more than the writer can do.
+    read_motion: reads the motion of a skeleton, for formats of motion capture; `read` retargets it.
+    list_clips: describes the animations of a file, for formats that hold several; `read` takes one as `clip`.
+    written: description of a written file, if `description` says more than the writer can do.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Format:
     write: Callable[..., None] | None
     carries: tuple[str, ...] = ("face", "body")
     read_motion: Callable[..., SkeletonMotion] | None = None
+    list_clips: Callable[..., tuple[ClipInfo, ...]] | None = None
     written: str = ""
 
     @property
@@ -119,7 +122,8 @@ def formats() -> tuple[Format, ...]:
         Format(
             "gltf", (".glb", ".gltf"), "glTF 2.0: read, an animated skeleton; written, a skinned person",
             lazy("gltf.reader", "sniff"), lazy("gltf.reader", "read"), lazy("gltf.writer", "write"),
-            read_motion=lazy("gltf.reader", "read_motion"), written="glTF 2.0, a skinned person",
+            read_motion=lazy("gltf.reader", "read_motion"), list_clips=lazy("gltf.clips", "list_clips"),
+            written="glTF 2.0, a skinned person",
         ),
     )  # fmt: skip
 

@@ -10,7 +10,7 @@ import click
 
 from fba.cli import options, step_tables, writer_options
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, read_input
+from fba.cli.inputs import EXISTING, check_clip, read_input
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
@@ -37,6 +37,7 @@ from fba.limits import Limits
 @click.argument("target", metavar="OUT", type=OutputType())
 @options.fps_option("Resample to this frame rate; default: the input's own.")
 @options.from_option
+@options.clip_option
 @options.to_option
 @options.no_clobber_option
 @writer_options.writer_options
@@ -48,6 +49,7 @@ def command(
     target: Path,
     fps: Fraction | None,
     format: str | None,
+    clip: str | None,
     to: str | None,
     no_clobber: bool,
     bap_steps: str,
@@ -71,7 +73,10 @@ def command(
     extra = writer_options.settings(target, writing, given)
     if writing.name == "fba":
         extra["bap_steps"] = bap_steps
-    animation = read_input(source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format)
+    check_clip(clip, [source], format)
+    animation = read_input(
+        source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format, clip=clip
+    )
     if writing.name == "fba":
         step_tables.warn_of_coarse_steps(animation, bap_steps)
     with outputs.file(target) as file:

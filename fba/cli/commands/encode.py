@@ -12,7 +12,7 @@ import click
 from fba.animation import Animation
 from fba.cli import capture_report, options, step_tables
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, input_file, read_input
+from fba.cli.inputs import EXISTING, check_clip, input_file, read_input
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, rate_text, seconds_text
 from fba.errors import FormatError
@@ -44,6 +44,7 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 @options.no_clobber_option
 @options.fps_option("Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own.")
 @options.from_option
+@options.clip_option
 @click.option("--name", help="Name of the sequence, for input without a header.")
 @click.option(
     "--quant",
@@ -132,6 +133,7 @@ def command(
     no_clobber: bool,
     fps: Fraction | None,
     format: str | None,
+    clip: str | None,
     name: str | None,
     epf: Path | None,
     limits: str,
@@ -148,19 +150,20 @@ def command(
     """
     if epf is not None:
         _refuse_beside_epf()
+    check_clip(clip, inputs, format)
     outputs = Outputs([Output("--output", output)], [*inputs, epf], no_clobber=no_clobber)
     capture = {option: settings.pop(option) for option in CAPTURE}
     with Progress("reading", len(inputs)) as step:
         animation = _read_all(
             inputs, fps=fps, name=name, bap_steps=settings["bap_steps"], salvage=salvage, step=step,
-            capture=capture, format=format, limits=limit,
+            capture=capture, format=format, clip=clip, limits=limit,
         )  # fmt: skip
     captures = [path for path in inputs if _is_capture(path, format)]
     animation, report_values = capture_report.apply_limits(animation, limits)
     if report:
         if animation.body is None:
             raise click.UsageError("--report compares bones of motion capture, and there is no body")
-        report_values = capture_report.compare(captures, animation, format) | report_values
+        report_values = capture_report.compare(captures, animation, format, clip) | report_values
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
     table = settings["bap_steps"]
@@ -273,6 +276,7 @@ def _read_all(
     step: Progress,
     capture: Mapping[str, object],
     format: str | None,
+    clip: str | None,
     limits: Limits,
 ) -> Animation:
     """Return face and body of all inputs as one animation."""
@@ -282,7 +286,7 @@ def _read_all(
     for path in inputs:
         animation = read_input(
             path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture, format=format,
-            limits=limits,
+            clip=clip, limits=limits,
         )  # fmt: skip
         step.advance()
         if not len(animation):

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import EXISTING, input_file, probe_input
+from fba.cli.inputs import EXISTING, check_clip, input_file, list_clips, probe_input
 from fba.cli.printing import print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
 from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.formats.gltf.clips import ClipInfo
 
 
 @click.command(
@@ -31,6 +36,7 @@ from fba.limits import Limits
 )
 @options.fps_option("Frame rate of a file without a header.")
 @options.from_option
+@options.clip_option
 @options.salvage_option
 @options.limit_option
 @click.option("--values", is_flag=True, help="With --trace: the decoded symbols of every segment as well.")
@@ -42,6 +48,7 @@ def command(
     values: bool,
     fps: Fraction | None,
     format: str | None,
+    clip: str | None,
     salvage: bool,
     limit: Limits,
 ) -> None:
@@ -49,6 +56,7 @@ def command(
 
     --trace reads the stream a second time, bit by bit, with an independent decoder. It is slow.
     """
+    check_clip(clip, files, format)
     each = EachFile(files)
     if trace:
         for path in files:
@@ -60,13 +68,15 @@ def command(
     for path in files:
         with each.file(path), input_file(path) as file:
             info = probe_input(
-                file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage, limits=limit
+                file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage, clip=clip, limits=limit
             )
+            clips = list_clips(file, info.format, limit)
             if info.format == "fba" and info.body is not None:
                 step_tables.warn_of_doubtful_stream(path, file.read_bytes(), bap_steps)
-            reports.append({"file": str(path), **info.to_dict()})
+            report = {"file": str(path), **info.to_dict()}
+            reports.append(report | ({"clips": [asdict(clip) for clip in clips]} if clips else {}))
             if not as_json:
-                _print(path, info)
+                _print(path, info, clips)
     if as_json:
         print_json(reports if len(files) > 1 else reports[0])
     each.finish()
@@ -88,7 +98,7 @@ def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:
         click.echo(line)
 
 
-def _print(path: Path, info: StreamInfo) -> None:
+def _print(path: Path, info: StreamInfo, clips: tuple[ClipInfo, ...]) -> None:
     click.echo(f"{path}: {info.format.upper()}, {info.size} bytes")
     skipped = f", {info.skipped} skipped" if info.skipped else ""
     start = f", starts at {seconds_text(info.start)}" if info.start else ""
@@ -105,6 +115,9 @@ def _print(path: Path, info: StreamInfo) -> None:
     for name, part in (("face", info.face), ("body", info.body)):
         if part is not None:
             click.echo(f"  {name}     {_part_text(part, 'FAP' if name == 'face' else 'BAP', info.frames)}")
+    if len(clips) > 1:
+        for number, clip in enumerate(clips):
+            click.echo(f"  {'clips' if not number else '':8} {clip.name!r}, {seconds_text(clip.seconds)}")
     for damage in info.damage:
         click.echo(f"  damage   {damage}")
 

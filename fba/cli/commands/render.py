@@ -185,6 +185,7 @@ def command(
                 header_fps=how.fps,
                 salvage=how.salvage,
                 format=how.format,
+                clip=how.clip,
                 limits=how.limit,
             )
             for file in files

@@ -18,10 +18,10 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.capture import SkeletonMotion, from_skeleton, matching
 from fba.capture.skeleton import MOST_FRAMES, check_memory
-from fba.errors import FbaWarning, FormatError, ModelError, Remedy
+from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, find_bind_pose, key_times
-from fba.gltf import Animation as Clip
+from fba.formats.gltf.clips import choose_clip
 from fba.gltf import Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
@@ -70,9 +70,7 @@ def read(
             None, None, "source", "floor", True, "spread",
         )  # fmt: skip
         if plain and gltf.animations:
-            own = (
-                gltf.animations[0] if clip is None else _choose_clip(gltf, clip, set(range(len(gltf.nodes))))
-            )
+            own = gltf.animations[0] if clip is None else choose_clip(gltf, clip, range(len(gltf.nodes)))
             note = find_note(gltf, own)
             if note is not None:
                 animation = read_note(gltf, own, note)
@@ -127,7 +125,7 @@ def _sample_motion(
     if len(nodes) > MAX_JOINTS:
         raise ModelError(f"{gltf.file}: the skeleton has {len(nodes)} joints, more than {MAX_JOINTS}")
     place = {node: number for number, node in enumerate(nodes)}
-    chosen = _choose_clip(gltf, clip, set(place))
+    chosen = choose_clip(gltf, clip, place)
     channels = [channel for channel in chosen.channels if channel.node in place]
     times = key_times(channels)
     frames = Fraction(rate) if rate is not None else _rate(times)
@@ -264,36 +262,6 @@ def _fit(gltf: Gltf, tree: list[int]) -> int:
         return len(matching.match([gltf.nodes[number].name for number in tree])[1])
     except ModelError:
         return 0
-
-
-def _choose_clip(gltf: Gltf, clip: str | int | None, nodes: set[int]) -> Clip:
-    """Return the animation with this name or number, or the first that turns one of the nodes.
-
-    ModelError if there is none; warns (FbaWarning) if there are several and clip is None.
-    """
-    moving = [a for a in gltf.animations if any(c.node in nodes and c.path == "rotation" for c in a.channels)]
-    names = ", ".join(repr(a.name) for a in gltf.animations[:8])
-    if clip is None:
-        if not moving:
-            raise ModelError(
-                f"{gltf.file}: no animation turns the joints of the skeleton; there is no motion"
-            )
-        if len(moving) > 1:
-            text = f"{gltf.file}: has {len(moving)} animations, {names}; {moving[0].name!r} is read"
-            warnings.warn(
-                FbaWarning(text).with_remedies(Remedy("clip", "choose with {}", repr(moving[1].name))),
-                stacklevel=5,
-            )
-        return moving[0]
-    if isinstance(clip, int):
-        match = gltf.animations[clip] if 0 <= clip < len(gltf.animations) else None
-    else:
-        match = next((a for a in gltf.animations if a.name == clip), None)
-    if match is None or not any(channel.node in nodes for channel in match.channels):
-        raise ModelError(
-            f"{gltf.file}: no animation {clip!r} moves the skeleton; there are {names or 'none'}"
-        )
-    return match
 
 
 def _rate(times: Float64) -> Fraction:

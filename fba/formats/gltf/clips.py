@@ -1,0 +1,110 @@
+"""The clips (animations) of a glTF file: which there are, and which is read."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from fba.errors import FbaWarning, ModelError, Remedy, did_you_mean
+from fba.gltf import Animation as Clip
+from fba.gltf import Gltf, read_gltf
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import Path
+
+NAMED = 8
+"""Most clips that a message names."""
+
+
+@dataclass(frozen=True)
+class ClipInfo:
+    """A clip of a file.
+
+    name: as in the file; "animation 2" where it has none there. seconds: from the first key to the last.
+    channels: how many properties of nodes it animates.
+    """
+
+    name: str
+    seconds: float
+    channels: int
+
+
+def list_clips(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[ClipInfo, ...]:
+    """Return the clips of a glTF file, in its order.
+
+    Raises FormatError, ModelError, and LimitError for more than the limits allow.
+    """
+    return tuple(_describe(clip) for clip in read_gltf(path, limits=limits).animations)
+
+
+def choose_clip(gltf: Gltf, clip: str | int | None, nodes: Collection[int]) -> Clip:
+    """Return the clip with this name or number (from 0), or the first that turns one of the nodes.
+
+    A name counts whatever its capitals, if only one clip has it; a text that is no clip's name counts as
+    a number. ModelError if there is none; warns (FbaWarning) if there are several and clip is None.
+    """
+    inside = set(nodes)
+    if clip is None:
+        moving = [
+            a for a in gltf.animations if any(c.node in inside and c.path == "rotation" for c in a.channels)
+        ]
+        if not moving:
+            raise ModelError(
+                f"{gltf.file}: no animation turns the joints of the skeleton; there is no motion"
+            )
+        if len(moving) > 1:
+            text = (
+                f"{gltf.file}: has {len(moving)} animations, {_list_names(gltf)}; {moving[0].name!r} is read"
+            )
+            warnings.warn(
+                FbaWarning(text).with_remedies(Remedy("clip", "choose with {}", repr(moving[1].name))),
+                stacklevel=5,
+            )
+        return moving[0]
+    match = _find_clip(gltf, clip)
+    if match is None:
+        hint = did_you_mean(str(clip), [a.name for a in gltf.animations])
+        there = _list_names(gltf)
+        raise ModelError(
+            f"{gltf.file}: there is no animation {clip!r}{hint}; "
+            f"{f'there are {there}' if there else 'the file has none'}"
+        )
+    if not any(channel.node in inside for channel in match.channels):
+        raise ModelError(
+            f"{gltf.file}: the animation {match.name!r} does not move the skeleton; "
+            f"there are {_list_names(gltf)}"
+        )
+    return match
+
+
+def _find_clip(gltf: Gltf, clip: str | int) -> Clip | None:
+    """Return the clip with this name, or else this number; None if there is none."""
+    clips = gltf.animations
+    if isinstance(clip, str):
+        for same in (
+            [a for a in clips if a.name == clip],
+            [a for a in clips if a.name.lower() == clip.lower()],
+        ):
+            if len(same) == 1:
+                return same[0]
+            if same:
+                numbers = ", ".join(str(n) for n, a in enumerate(clips) if a in same)
+                raise ModelError(
+                    f"{gltf.file}: {len(same)} animations are called {clip!r}; give a number: {numbers}"
+                ).with_remedies(Remedy("clip", "choose with {}", str(clips.index(same[0]))))
+        if not clip.isdecimal():
+            return None
+        clip = int(clip[:9])
+    return clips[clip] if 0 <= clip < len(clips) else None
+
+
+def _list_names(gltf: Gltf) -> str:
+    names = [repr(a.name) for a in gltf.animations]
+    more = f", and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
+
+
+def _describe(clip: Clip) -> ClipInfo:
+    ends = [(float(c.times[0]), float(c.times[-1])) for c in clip.channels if len(c.times)]
+    seconds = max((end for _, end in ends), default=0.0) - min((start for start, _ in ends), default=0.0)
+    return ClipInfo(clip.name, seconds, len(clip.channels))

@@ -1,0 +1,73 @@
+"""`--clip`: the animation that commands read of a glTF file with several."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import fba
+from small_people import write_person
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+def raised(degrees: float, frames: int) -> dict[str, list[Rotation]]:
+    """The left arm turns up from the T pose, evenly."""
+    angles = np.linspace(0, degrees, frames)
+    return {"leftUpperArm": [Rotation.from_euler("z", angle, degrees=True) for angle in angles]}
+
+
+@pytest.fixture
+def people(tmp_path: Path) -> Path:
+    clips = {"Idle": raised(5, 4), "Wave": raised(60, 7), "wave": raised(20, 10)}
+    return write_person(tmp_path / "people.glb", clips=clips)
+
+
+def test_info_lists_the_clips(run: Run, people: Path) -> None:
+    code, out, err = run("info", people)
+    assert code == 0
+    assert out.splitlines()[-3].startswith("  clips ")
+    assert [line.split()[-3:] for line in out.splitlines()[-3:]] == [
+        ["'Idle',", "0.10", "s"],
+        ["'Wave',", "0.20", "s"],
+        ["'wave',", "0.30", "s"],
+    ]
+    assert "'Idle' is read; choose with --clip Wave" in err
+    listed = json.loads(run("info", people, "--json").out)["clips"]  # type: ignore[attr-defined]
+    assert [clip["name"] for clip in listed] == ["Idle", "Wave", "wave"]
+    np.testing.assert_allclose([clip["seconds"] for clip in listed], [0.1, 0.2, 0.3], atol=1e-6)
+
+
+def test_each_command_reads_the_clip_that_it_is_given(run: Run, people: Path, tmp_path: Path) -> None:
+    for word, frames in (("Wave", 7), ("wave", 10), ("idle", 4), ("2", 10)):
+        target = tmp_path / "out.bap"
+        assert run("convert", people, target, "--clip", word)[0] == 0
+        assert len(fba.read(target)) == frames
+    code, out, _ = run("info", people, "--clip", "Wave")
+    assert (code, "7 frames" in out) == (0, True)
+    stream = tmp_path / "out.fba"
+    code, out, err = run(
+        "encode", people, "-o", stream, "--clip", "wave", "--bap-steps", "visage", "--report"
+    )
+    assert code == 0
+    assert "animations" not in err
+    assert "(10 frames)" in out
+
+
+def test_a_clip_that_is_not_there(run: Run, people: Path, bvh: Path, tmp_path: Path) -> None:
+    code, _, err = run("convert", people, tmp_path / "out.bap", "--clip", "Wafe")
+    assert code == 1
+    assert "no animation 'Wafe'" in err
+    assert "did you mean" in err
+    assert "'Idle', 'Wave', 'wave'" in err
+    code, _, err = run("convert", people, tmp_path / "out.bap", "--clip", "WAVE")
+    assert code == 1
+    assert "2 animations are called 'WAVE'; give a number: 1, 2; choose with --clip 1" in err
+    code, _, err = run("encode", bvh, "-o", tmp_path / "out.fba", "--clip", "Wave")
+    assert code == 2
+    assert "--clip is for glTF, which may hold several animations, not for BVH" in err
