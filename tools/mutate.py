@@ -77,6 +77,7 @@ TESTED = "conformance/fba_conformance/suite/programs.py"
 PROGRAMS_TEST = "tests/conformance/test_programs.py"
 
 LOSS_TEST = "tests/codec/test_loss.py"
+DAMAGE_TEST = "tests/codec/test_damage.py"
 TIMES_TEST = "tests/codec/test_codec_rules.py"
 RANGES_TEST = "tests/codec/test_codec_rules.py tests/codec/test_limits.py"
 BVH_TEST = "tests/formats/bvh/test_bvh_rates.py"
@@ -273,7 +274,14 @@ MUTANTS = (
         JUDGEMENT, "if not found.ended:\n            return", "if False:\n            return", PROGRAMS_TEST
     ),
     Mutant(TESTED, "if run.crash or (run.failure and", "if (run.failure and", PROGRAMS_TEST),
-    Mutant(DAMAGE, "DOUBTFUL = 8", "DOUBTFUL = 0", "tests/codec/test_damage.py"),
+    Mutant(DAMAGE, "DOUBTFUL = 8", "DOUBTFUL = 0", DAMAGE_TEST),
+    Mutant("fba/codec/_plane/syntax.py", "LAYER_CODES = (0xB0, 0xB5)", "LAYER_CODES = (0xB0,)", DAMAGE_TEST),
+    Mutant(
+        "fba/codec/_decoder.py",
+        "                if self._objects or not self._salvage:\n",
+        "                if not self._salvage:\n",
+        DAMAGE_TEST,
+    ),
     Mutant(CLOCK, "_BELIEVED_JUMP = 60", "_BELIEVED_JUMP = 10**6", LOSS_TEST),
     Mutant(CLOCK, "or index > self._coded_index", "or index < 0", LOSS_TEST),
     Mutant(CLOCK, "and nearest == self.index:", "and False:", LOSS_TEST),

@@ -77,6 +77,12 @@ def decode_values(data: bytes, *, bap_steps: str = "iso") -> list[dict[str, Any]
     return list(planes(data, bap_steps=bap_steps))
 
 
+def _find_code(data: bytes, code: int, start: int) -> int:
+    """Return the byte at which a start code begins, from byte `start` on; the length of data without one."""
+    position = data.find(code.to_bytes(4, "big"), start)
+    return position if position >= 0 else len(data)
+
+
 class Walker:
     """Reads one object, one plane at each step. `record` describes the last plane (see `planes`).
 
@@ -128,9 +134,8 @@ class Walker:
     def _read_object_start(self) -> None:
         """Read the object's start code; visual object sequence and visual object headers may precede."""
         reader = self.reader
-        positions = [reader.data.find(code.to_bytes(4, "big")) for code in OBJECT_START_CODES]
-        start = min((position for position in positions if position >= 0), default=-1)
-        if start < 0 or not reader.data.startswith(b"\0\0\1"):
+        start = min(_find_code(reader.data, code, 0) for code in OBJECT_START_CODES)
+        if start == len(reader.data) or not reader.data.startswith(b"\0\0\1"):
             raise reader.error(
                 f"an FBA object starts with {' or '.join(f'{c:08x}' for c in OBJECT_START_CODES)}, "
                 f"found {reader.data[:4].hex() or 'nothing'}"
@@ -144,8 +149,13 @@ class Walker:
         reader.start_code(0)
 
     def _read_rest(self) -> None:
-        """Record all data after the object as one element."""
+        """Record all data after the object as one element. A plane that belongs to no object is an error."""
         reader = self.reader
+        objects = [_find_code(reader.data, code, reader.bit // 8) for code in OBJECT_START_CODES]
+        stray = [_find_code(reader.data, code, reader.bit // 8) for code in PLANE_START_CODES]
+        if min(stray) < min(objects):
+            reader.plane = self.count
+            raise reader.error("a plane start code behind the end of the object", bit=8 * min(stray))
         left = reader.size - reader.bit
         if left:
             bit = reader.bit

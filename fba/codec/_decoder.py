@@ -81,6 +81,7 @@ class Decoder:
         self._finished = False
         self._objects = 0
         self._object_end = 0  # byte of the stream at which the last object ended
+        self._closing_code: int | None = None  # last byte of the start code that ended it
         self._kind = ""  # what data without an object start code seems to be
         self._start_error: BitstreamError | None = None  # why the stream does not begin with an object
         self._clock = StreamClock()
@@ -177,7 +178,9 @@ class Decoder:
                     raise self._start_error
         while (start_code := buffer.find_start_code(self._scanned)) is not None:
             position, code = start_code
-            if self._salvage and self._objects == 0 and code in syntax.PLANE_CODES:
+            if code in syntax.PLANE_CODES:
+                if self._objects or not self._salvage:
+                    raise self._outside(position, code)
                 if position + 4 >= buffer.length and not final:
                     break  # the first bit of the plane is not here yet
                 if position + 4 < buffer.length and buffer.data[position + 4] & 0x80:
@@ -365,18 +368,23 @@ class Decoder:
         self._objects += 1
         self._clock.begin_object()
         self.ended = False
+        self._closing_code = None
         self._code_bit = None
 
     def _end_object(self, code: int) -> None:
-        """End the object at a start code of no plane; when salvaging, BitstreamError for an unknown one."""
-        if self._salvage and code != syntax.END_CODE:
-            raise BitstreamError(
+        """End the object at a start code of no plane. An unknown one is a warning, or damage."""
+        if code != syntax.END_CODE and code not in syntax.LAYER_CODES:
+            error = BitstreamError(
                 f"start code 00 00 01 {code:02x} where a plane, the end code 00 00 01 b1 or a new object "
                 "was expected",
                 plane=self.planes,
                 bit=self._absolute(self._bit - 32),
             )
+            if self._salvage:
+                raise error
+            self._warn(f"{error}; the object ends there")
         self.ended = code == syntax.END_CODE
+        self._closing_code = code
         self._scanned = self._bit >> 3
         self._object_end = self._buffer.offset + self._scanned
         self._step = self._find_object
@@ -409,8 +417,20 @@ class Decoder:
         if doubtful is not None:
             self._scanned = (doubtful >> 3) - self._buffer.offset
         else:
-            self._scanned = (self._lost_from >> 3) + 1 if self._objects else self._bit >> 3
+            self._scanned = max((self._lost_from >> 3) + 1, 0) if self._objects else self._bit >> 3
         self._step = self._resynchronise
+
+    def _outside(self, position: int, code: int) -> BitstreamError:
+        """Return the error for a plane start code, at a byte of the buffer, outside of an object."""
+        bit = 8 * (self._buffer.offset + position)
+        before = "no object has begun"
+        if self._objects:
+            end = self._object_end - 4
+            before = f"the object ended with start code 00 00 01 {self._closing_code:02x} at byte {end}"
+            self._lost_from = 8 * (self._object_end - self._buffer.offset)
+        return BitstreamError(
+            f"plane start code 00 00 01 {code:02x} outside of an object: {before}", plane=self.planes, bit=bit
+        )
 
     def _report_missing_end(self) -> None:
         """List as damage that the data ends without an end code."""
@@ -466,7 +486,7 @@ def decode(
             frames.add(block)
     for block in decoder.finish_blocks():
         frames.add(block)
-    if on_error == "raise" and decoder.planes and not decoder.ended:
+    if on_error == "raise" and decoder.planes and decoder._closing_code is None:
         warnings.warn(f"plane {decoder.planes - 1}: {_NO_END}", FbaWarning, stacklevel=2)
     for damage in decoder.damage:
         warnings.warn(str(damage), FbaWarning, stacklevel=2)

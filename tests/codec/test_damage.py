@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from codec_streams import OBJECT, content, decoded
+from codec_streams import END, OBJECT, content, decoded
 from fba import (
     Animation,
     BitstreamError,
@@ -228,6 +228,59 @@ def test_junk_before_the_object() -> None:
     assert [content(f) for f in got] == [content(f) for f in frames]
     assert [(d.start, d.stop) for d in decoder.damage] == [(0, 4)]
     assert "begins with 6a 75 6e 6b" in str(decoder.damage[0].error)
+
+
+LAYERS = b"\0\0\1\xb0\x61" + b"\0\0\1\xb5\x41\xff"
+"""Headers of a visual object sequence and of a visual object."""
+
+
+@pytest.mark.parametrize("chunk", [None, 1, 7])
+@pytest.mark.parametrize("code", [0x00, 0xB2, 0xE0, 0xB1, 0xB0, 0xB5])
+def test_planes_behind_a_start_code_that_ends_the_object(code: int, chunk: int | None) -> None:
+    """Whatever ended it, its planes are not left out without an error; salvaging goes on with them."""
+    data, frames = stream("both in sections"), truth("both in sections")
+    first, second = start_codes(data)[1:3]
+    bad = data[: first + 3] + bytes([code]) + data[first + 4 :]
+    got, error, _ = decoded(bad, chunk=chunk)
+    assert [content(f) for f in got] == [content(f) for f in frames[:3]]
+    assert isinstance(error, BitstreamError)
+    assert (error.plane, error.bit) == (3, 8 * second)
+    assert f"the object ended with start code 00 00 01 {code:02x} at byte {first}" in str(error)
+    got, error, decoder = decoded(bad, chunk=chunk, mode="salvage")
+    assert error is None
+    assert [content(f) for f in got] == [content(f) for f in frames[:3] + frames[6:]]
+    (damage,) = decoder.damage
+    assert damage.stop == second
+    assert damage.start in range(first - 1, first + 5)
+    assert not damage.doubtful
+
+
+@pytest.mark.parametrize(
+    ("between", "warned"),
+    [(END, ""), (LAYERS, ""), (END + LAYERS, ""), (LAYERS[5:], ""), (b"", ""), (b"\0\0\1\xb2fba", "b2")],
+)
+def test_what_ends_an_object_before_another(between: bytes, warned: str) -> None:
+    """Headers of the next object do so in order; another start code is told."""
+    data, frames = stream("body"), truth("body")
+    assert data.endswith(END)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        animation = decode(data[:-4] + between + data)
+    assert len(animation) == 2 * len(frames)
+    assert [f"start code 00 00 01 {warned} where" in str(one.message) for one in told] == [True] * bool(
+        warned
+    )
+    with warnings.catch_warnings(record=True) as lost:
+        warnings.simplefilter("always")
+        assert decode(data[:-4] + between + data, on_error="salvage") == animation
+    assert len(lost) == len(told)
+
+
+def test_a_plane_before_the_first_object() -> None:
+    data = stream("body")
+    with pytest.raises(BitstreamError, match="outside of an object: no object has begun") as caught:
+        decode(LAYERS + data[start_codes(data)[1] :] + data)
+    assert (caught.value.plane, caught.value.bit) == (0, 8 * len(LAYERS))
 
 
 def sections(count: int) -> Iterator[bytes]:

@@ -278,6 +278,7 @@ def _cuts() -> Iterator[Fault]:
 
 def _resumptions() -> Iterator[Fault]:
     """Yield streams in which it matters where decoding goes on."""
+    last = partial(_from_plane, 2 * _PERIOD)
     yield Fault("zeros", "20 bytes of 0 from a P plane on", _zeros, 2, partial(_from_plane, 10), times=True)
     yield Fault(
         "two_damages",
@@ -295,6 +296,11 @@ def _resumptions() -> Iterator[Fault]:
         partial(_from_plane, _PERIOD),
         times=True,
     )
+    for name, tests, code in (
+        ("foreign_code", "an unknown start code (00 00 01 00) in place of a plane's; planes follow", 0x00),
+        ("end_code_within", "an end code in place of a plane's start code; planes follow", 0xB1),
+    ):
+        yield Fault(name, tests, partial(_other_code, code), _PERIOD, last, times=True)
     yield Fault(
         "last_plane",
         "damage in the last plane: nothing behind it",
@@ -349,6 +355,13 @@ def _select(values: Mapping[int, tuple[int, ...]]) -> bytes:
         for number, one in values.items()
     }
     return write_stream(script([rest, rest, {**rest, **half}, {**rest, **values}, rest]))
+
+
+def _other_code(code: int) -> bytes:
+    """Return the stream with another last byte in its first plane start code."""
+    data = bytearray(_stream())
+    data[_code_position(bytes(data)) + 3] = code
+    return bytes(data)
 
 
 def _cut_skip() -> bytes:
