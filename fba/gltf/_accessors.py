@@ -28,6 +28,7 @@ class Accessors:
         self._entries = document.entries("accessors")
         self._floats: dict[int, Float32] = {}
         self._integers: dict[int, Array] = {}
+        self._filled: dict[int, Array] = {}
 
     def floats(self, reference: Value, *types: str, count: int | None = None) -> Float32:
         """Return float32 (N, width), finite, read-only; integers scaled as the document says.
@@ -37,7 +38,7 @@ class Accessors:
         """
         index, entry = self._entry(reference)
         if index not in self._floats:
-            raw = self._read(entry)
+            raw = self._read(index, entry)
             scaled = _scaled(raw, _flag(entry, "normalized"))
             if not np.isfinite(scaled).all():
                 row = int(np.argwhere(~np.isfinite(scaled))[0, 0])
@@ -55,12 +56,32 @@ class Accessors:
                 f"{entry.path} must hold unsigned integers (component type 5121, 5123, 5125)"
             )
         if index not in self._integers:
-            raw = self._read(entry)
+            raw = self._read(index, entry)
             raw = raw.astype(raw.dtype.newbyteorder("="), copy=False)
             raw.flags.writeable = False
             self._integers[index] = raw
         self._check(reference, entry, self._integers[index], types, count)
         return self._integers[index]
+
+    def charge(self, reference: Value) -> None:
+        """Count the memory of an accessor that `fill` is going to be called for."""
+        _, entry = self._entry(reference)
+        kind, width, count = self._layout(entry)
+        self._document.budget.charge(count * width * (kind.itemsize + 8), entry)
+
+    def fill(self, reference: Value, rows: Array) -> None:
+        """Give an accessor without bytes of its own its elements (N, width), as an extension unpacked them.
+
+        Raises ModelError where they are not of the accessor's size and type.
+        """
+        index, entry = self._entry(reference)
+        kind, width, count = self._layout(entry)
+        if rows.shape != (count, width):
+            raise entry.error(f"{count} elements of {width} numbers are announced, but {rows.shape} unpacked")
+        low, high = (rows.min(), rows.max()) if rows.size else (0, 0)
+        if kind.kind != "f" and (rows.dtype.kind == "f" or not _fits(low, high, kind)):
+            raise entry.error(f"the unpacked numbers, {low} to {high}, are not of component type {kind}")
+        self._filled[index] = rows.astype(kind)
 
     def _entry(self, reference: Value) -> tuple[int, Value]:
         index = reference.index(len(self._entries), "accessor")
@@ -76,7 +97,8 @@ class Accessors:
         if count is not None and len(array) != count:
             raise reference.error(f"{entry.path} has {len(array)} elements, but {count} are needed")
 
-    def _read(self, entry: Value) -> Array:
+    def _layout(self, entry: Value) -> tuple[np.dtype[Any], int, int]:
+        """Return the type of the numbers, how many an element has, and how many elements there are."""
         code = entry.member("componentType").integer(0, 1 << 16)
         if code not in COMPONENTS:
             raise entry.error(f"componentType {code} is none of {', '.join(map(str, COMPONENTS))}")
@@ -89,6 +111,12 @@ class Accessors:
         if isinstance(given.data, int) and given.data > MAX_ELEMENTS:
             raise given.error(f"more than the {MAX_ELEMENTS} elements that can be read; simplify the model")
         count = given.integer(1, MAX_ELEMENTS)
+        return kind, width, count
+
+    def _read(self, index: int, entry: Value) -> Array:
+        if index in self._filled:
+            return self._filled[index]
+        kind, width, count = self._layout(entry)
         # charged for the raw numbers and the float32 array
         self._document.budget.charge(count * width * (kind.itemsize + 4), entry)
         if entry.get("bufferView") is None:
@@ -134,6 +162,11 @@ class Accessors:
             )
         window: Array = np.ndarray((count, width), kind, data, offset, (stride, kind.itemsize))
         return window.copy()
+
+
+def _fits(low: Any, high: Any, kind: np.dtype[Any]) -> bool:
+    limits = np.iinfo(kind)
+    return int(limits.min) <= int(low) and int(high) <= int(limits.max)
 
 
 def _offset(entry: Value) -> int:

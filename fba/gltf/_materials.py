@@ -21,7 +21,9 @@ def media_type(data: bytes) -> str | None:
 def read_materials(document: Document) -> tuple[Material, ...]:
     """Return all materials, in order."""
     pictures = _Pictures(document)
-    return tuple(_material(entry, n, pictures) for n, entry in enumerate(document.entries("materials")))
+    materials = tuple(_material(entry, n, pictures) for n, entry in enumerate(document.entries("materials")))
+    pictures.warn()
+    return materials
 
 
 def _material(entry: Value, number: int, pictures: _Pictures) -> Material:
@@ -52,12 +54,13 @@ class _Pictures:
         self._textures = document.entries("textures")
         self._images = document.entries("images")
         self._known: dict[int, bytes | None] = {}
+        self._left_out: list[tuple[Value, str]] = []
 
     def texture(self, info: Value) -> bytes | None:
         index = info.member("index").index(len(self._textures), "texture")
         source = self._textures[index].get("source")
         if source is None:  # only an extension names its picture
-            self._warn(self._textures[index], "has no PNG or JPEG picture")
+            self._left_out.append((self._textures[index], "has no PNG or JPEG picture"))
             return None
         number = source.index(len(self._images), "image")
         if number not in self._known:
@@ -75,9 +78,14 @@ class _Pictures:
             self.document.budget.add_source(len(data))
             self.document.budget.charge(len(data), entry)
         if media_type(data) is None:
-            self._warn(entry, "is neither PNG nor JPEG")
+            self._left_out.append((entry, "is neither PNG nor JPEG"))
             return None
         return data
 
-    def _warn(self, entry: Value, text: str) -> None:
-        warnings.warn(f"{entry.file}: {entry.path}: {text}; left out", FbaWarning, stacklevel=3)
+    def warn(self) -> None:
+        """Warn of the pictures that were left out, once for all of them."""
+        if self._left_out:
+            entry, text = self._left_out[0]
+            more = len({each.path for each, _ in self._left_out}) - 1
+            rest = f" (and so {more} more)" if more else ""
+            warnings.warn(f"{entry.file}: {entry.path}: {text}; left out{rest}", FbaWarning, stacklevel=5)

@@ -10,6 +10,7 @@ import numpy as np
 from fba.arrays import Float32, Int32
 from fba.errors import FbaWarning
 from fba.gltf._accessors import Accessors
+from fba.gltf._draco import unpack_primitive
 from fba.gltf.document import MAX_ITEMS, Document
 from fba.gltf.scene import Mesh, Primitive
 from fba.gltf.values import Value
@@ -94,6 +95,7 @@ class _Reader:
 
     def primitive(self) -> Primitive:
         """Return the primitive; ModelError where it is damaged."""
+        unpack_primitive(self._document, self._accessors, self._entry)
         positions = self._accessors.floats(self._attributes.member("POSITION"), "VEC3")
         count = len(positions)
         normals = self._attributes.get("NORMAL")

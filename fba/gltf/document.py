@@ -15,6 +15,7 @@ from urllib.parse import unquote
 
 from fba.errors import FbaError, ModelError
 from fba.gltf import _glb as glb
+from fba.gltf._meshopt import unpack_view
 from fba.gltf.values import Budget, Value
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
@@ -26,6 +27,7 @@ JSON_BYTES = {b"{": 240, b"[": 72, b",": 8, b'"': 30}
 """Memory that the parsed JSON takes for each of these characters."""
 MAX_ITEMS = 1 << 18
 """Most entries of one list of a document."""
+MESHOPT = "EXT_meshopt_compression"
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 
@@ -47,9 +49,28 @@ class Document:
     def _views(self) -> list[Value]:
         return self.entries("bufferViews")
 
+    @cached_property
+    def _unpacked(self) -> dict[int, memoryview]:
+        """Bytes of the packed buffer views that were read, by index."""
+        return {}
+
     def view(self, reference: Value) -> tuple[memoryview, Value]:
         """Return the bytes of the buffer view that `reference` names by its index, and its entry."""
-        entry = self._views[reference.index(len(self._views), "buffer view")]
+        index = reference.index(len(self._views), "buffer view")
+        entry = self._views[index]
+        packing = find_extension(entry, MESHOPT)
+        if packing is None:
+            return self._stored(entry), entry
+        if index not in self._unpacked:
+            data = unpack_view(self._stored(packing), packing, self.budget)
+            length = entry.member("byteLength").integer(1, glb.MAX_BYTES)
+            if length > len(data):
+                raise entry.error(f"should have {length} bytes, but unpacks to {len(data)}")
+            self._unpacked[index] = data[:length]
+        return self._unpacked[index], entry
+
+    def _stored(self, entry: Value) -> memoryview:
+        """The bytes of a buffer that a buffer view, or the extension that packs it, names."""
         buffer = self.buffers[entry.member("buffer").index(len(self.buffers), "buffer")]
         given = entry.get("byteOffset")
         offset = 0 if given is None else given.integer(0, glb.MAX_BYTES)
@@ -58,7 +79,7 @@ class Document:
             raise entry.error(
                 f"reaches from byte {offset} to {offset + length}, but its buffer has {len(buffer)} bytes"
             )
-        return buffer[offset : offset + length], entry
+        return buffer[offset : offset + length]
 
     def resource(self, uri: Value, most: int = glb.MAX_BYTES) -> bytes:
         """Return the content of a data URI or a file beside the document; ModelError beyond `most` bytes."""
@@ -143,9 +164,17 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return members
 
 
+def find_extension(entry: Value, name: str) -> Value | None:
+    """The object of an extension in an entry of the document, or None."""
+    extensions = entry.get("extensions")
+    return None if extensions is None else extensions.get(name)
+
+
 def _buffer(document: Document, entry: Value, binary: memoryview | None) -> memoryview:
     length = entry.member("byteLength").integer(1, glb.MAX_BYTES)
     uri = entry.get("uri")
+    if uri is None and find_extension(entry, MESHOPT) is not None:
+        return memoryview(b"")  # a place for unpacked bytes
     if uri is None:
         if binary is None:
             raise entry.error("has no uri, and there is no binary chunk in its place")

@@ -20,12 +20,17 @@ from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
 PACKED = {
-    "KHR_draco_mesh_compression": "Draco-compressed meshes",
-    "EXT_meshopt_compression": "meshopt-compressed buffers",
     "KHR_meshopt_compression": "meshopt-compressed buffers",
 }
 """Extensions by which the geometry itself is compressed."""
-KNOWN = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "FBA_face"}
+KNOWN = {
+    "KHR_draco_mesh_compression",
+    "EXT_meshopt_compression",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "KHR_lights_punctual",
+    "FBA_face",
+}
 """Extensions that a file may require: they are read, or do not change shapes."""
 
 
@@ -68,7 +73,8 @@ def _check_extensions(document: Document) -> None:
         name = entry.text(200)
         if name in PACKED:
             raise entry.error(
-                f"{name}: {PACKED[name]} are not read; export or convert the file without compression"
+                f"{name}: {PACKED[name]} are not read; convert the file without compression: "
+                "npx @gltf-transform/cli copy in.glb out.glb"
             )
         if name not in KNOWN and not name.startswith("KHR_materials_"):
             if "texture" in name:  # another kind of picture: shapes can be read without it
