@@ -97,6 +97,7 @@ def retarget_report(
     """
     solver = solver if solver is not None else BapSolver()
     skeleton = solver.skeleton
+    joints = joints if joints is not None else motion.declared or None
     family, mapped = matching.map_joints(motion.names, joints, skeleton)
     if animation.body is None:
         raise ModelError("retarget_report: the animation has no body")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -22,7 +23,8 @@ class SkeletonMotion:
     rotations: float64 (T, J, 4), unit quaternions (w, x, y, z) relative to the parent.
     positions: float64 (T, 3), of the root. rate: frames per second.
     end_parents: int64 (E,), end_offsets: float64 (E, 3): ends of the last bones, where known.
-    name: of the performance.
+    name: of the performance. declared: joint name -> joint of the standard, where the file itself says which
+        bone is which; empty where names must tell.
 
     Raises ModelError if the parts contradict each other or are not finite.
     """
@@ -36,8 +38,10 @@ class SkeletonMotion:
     end_parents: Int64 = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     end_offsets: Float64 = field(default_factory=lambda: np.zeros((0, 3)))
     name: str = ""
+    declared: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "declared", dict(self.declared))
         count = len(self.names)
         for what, kind in (
             ("parents", np.int64),

@@ -50,9 +50,9 @@ def from_skeleton(
     """Return the BAPs of a captured motion: a body track that sends the BAPs of the joints that were found.
 
     rate: frames per second; None for the motion's own, else it is resampled. joints: source joint name ->
-    joint of the standard, replaces the built-in families of names. scale: metres of the body for one unit
-    of the source's root translation; None for the ratio of leg lengths, so that the source's unit does not
-    matter and feet do not slide.
+    joint of the standard, in place of what the motion declares and of the built-in families of names. scale:
+    metres of the body for one unit of the source's root translation; None for the ratio of leg lengths, so
+    that the source's unit does not matter and feet do not slide.
 
     origin: what is at the body's default position: "source", the source's own origin; "start", the first
     frame; "middle", the middle of the path, which keeps long walks within the ranges of a stream. ground: how
@@ -83,6 +83,7 @@ def from_skeleton(
     `fba.capture.retarget_report` measures how close the result comes.
     """
     solver = solver if solver is not None else BapSolver()
+    joints = joints if joints is not None else motion.declared or None
     _, mapped = matching.map_joints(motion.names, joints, solver.skeleton)
     rate = motion.rate if rate is None else Fraction(rate)
     if not len(motion):

@@ -43,15 +43,17 @@ class BindPose:
         return rotations.quaternions(nearest_rotation(linear) @ self.rotations[number].T)
 
 
-def find_bind_pose(gltf: Gltf, nodes: Sequence[int], parents: Sequence[int]) -> BindPose:
+def find_bind_pose(
+    gltf: Gltf, nodes: Sequence[int], parents: Sequence[int], *, skins: bool = True
+) -> BindPose:
     """Return the bind pose of joints. A joint of no skin has its node's transform relative to its parent.
 
     nodes: those of the joints, parents first. parents: position of each joint's parent in nodes, -1 for a
-    root.
+    root. skins: False for the pose of the nodes themselves.
     """
     inverse: dict[int, Float64] = {}
     inside = set(nodes)
-    for skin in gltf.skins:
+    for skin in gltf.skins if skins else ():
         for joint, matrix in zip(skin.joints, skin.inverse_bind, strict=True):
             if joint in inside:
                 inverse.setdefault(joint, np.asarray(matrix, dtype=np.float64))

@@ -16,14 +16,17 @@ import numpy as np
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
+from fba.body.skeleton import ROOT
 from fba.capture import SkeletonMotion, from_skeleton, matching
 from fba.capture.skeleton import MOST_FRAMES, check_memory
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, find_bind_pose, key_times
 from fba.formats.gltf.clips import choose_clip
+from fba.formats.gltf.humanoid import find_humanoid
 from fba.gltf import Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.mesh.names import UniqueNames
 from fba.source import Path
 
 MAX_JOINTS = 4096
@@ -31,6 +34,10 @@ CHUNK = 200_000
 """Joints times frames that are sampled at once."""
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 DEFAULT_RATE = Fraction(30)
+HALF_TURN = (-1, 1, -1)
+"""What half a turn about +y multiplies vectors by, and the last three numbers of quaternions."""
+MOST_APART = 1.5
+"""Frames at the lowest usual rate between keys that were sampled, not set by hand."""
 STRETCH = 0.01
 """Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
 
@@ -121,7 +128,9 @@ def sample_motion(
 def _sample_motion(
     gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None, limits: Limits
 ) -> SkeletonMotion:
-    nodes = _skeleton(gltf)
+    humanoid = find_humanoid(gltf)
+    declared = {} if humanoid is None else humanoid.joints
+    nodes = _declared_skeleton(gltf, declared) if declared else _skeleton(gltf)
     if len(nodes) > MAX_JOINTS:
         raise ModelError(f"{gltf.file}: the skeleton has {len(nodes)} joints, more than {MAX_JOINTS}")
     place = {node: number for number, node in enumerate(nodes)}
@@ -142,17 +151,25 @@ def _sample_motion(
     keys = sum(channel.times.nbytes + channel.values.nbytes for channel in channels)
     check_memory(limits, count, len(nodes), what, keys)
     parents = [-1 if (p := gltf.nodes[node].parent) is None else place.get(p, -1) for node in nodes]
-    bind = find_bind_pose(gltf, nodes, parents)
-    used = _descendants(parents, _find_root([gltf.nodes[node].name for node in nodes]))
+    bind = find_bind_pose(gltf, nodes, parents, skins=not declared)  # a declared person rests in a T pose
+    hips = [number for number, node in enumerate(nodes) if declared.get(node) == ROOT]
+    used = _descendants(parents, hips[0] if hips else _find_root([gltf.nodes[node].name for node in nodes]))
     row_of = {number: row for row, number in enumerate(used)}
+    unique = UniqueNames()
+    names = tuple(unique(gltf.nodes[nodes[number]].name) for number in used)
     motion = SkeletonMotion(
-        names=tuple(gltf.nodes[nodes[number]].name for number in used),
+        names=names,
         parents=np.array([row_of[parents[n]] if row else -1 for row, n in enumerate(used)]),
         offsets=bind.offsets()[used],
         rotations=np.zeros((0, len(used), 4)),
         positions=np.zeros((0, 3)),
         rate=frames,
         name=chosen.name,
+        declared={
+            name: declared[nodes[number]]
+            for name, number in zip(names, used, strict=True)
+            if nodes[number] in declared
+        },
     )
     turns, root = np.empty((count, len(used), 4)), np.empty((count, 3))
     stretched = np.zeros(len(used), dtype=np.bool_)
@@ -172,7 +189,18 @@ def _sample_motion(
         )
     if stretched.any():
         _warn_of_stretching(chosen.name, [motion.names[row] for row in np.flatnonzero(stretched)])
-    return replace(motion, rotations=turns, positions=root)
+    motion = replace(motion, rotations=turns, positions=root)
+    return _turn_round(motion) if humanoid is not None and humanoid.kind == "VRM 0" else motion
+
+
+def _turn_round(motion: SkeletonMotion) -> SkeletonMotion:
+    """Return a motion half a turn about +y further: people of VRM 0 face -z."""
+    return replace(
+        motion,
+        offsets=motion.offsets * HALF_TURN,
+        rotations=motion.rotations * [1, *HALF_TURN],
+        positions=motion.positions * HALF_TURN,
+    )
 
 
 def _world(
@@ -239,6 +267,26 @@ def _skeleton(gltf: Gltf) -> list[int]:
     return best
 
 
+def _declared_skeleton(gltf: Gltf, declared: Mapping[int, str]) -> list[int]:
+    """Return the nodes of the bones that a file declares, and all above them, parents first.
+
+    ModelError if they are not all connected.
+    """
+    inside = set(declared)
+    for number in reversed(gltf.order):
+        parent = gltf.nodes[number].parent
+        if number in inside and parent is not None:
+            inside.add(parent)
+    nodes = [number for number in gltf.order if number in inside]
+    roots = [gltf.nodes[number].name for number in nodes if gltf.nodes[number].parent is None]
+    if len(roots) > 1:
+        raise ModelError(
+            f"{gltf.file}: the bones of the person hang on several nodes, {', '.join(roots[:5])}; "
+            "expected one tree with the hips at its top"
+        )
+    return nodes
+
+
 def _find_root(names: list[str]) -> int:
     """Return the position of the hips, or 0. Nodes above them (an armature, a game's root) only move all."""
     try:
@@ -265,13 +313,17 @@ def _fit(gltf: Gltf, tree: list[int]) -> int:
 
 
 def _rate(times: Float64) -> Fraction:
-    """Return frames per second of regular keys: the usual rate that fits most of their intervals, else 30."""
+    """Return frames per second of regular keys: the usual rate that fits most of their intervals, else 30.
+
+    Keys that are set by hand, far apart, fit several rates; 30 is tried first for them.
+    """
     steps = np.diff(times)
     steps = steps[steps > 1e-4]
     if not len(steps):
         return DEFAULT_RATE
     shortest = float(np.percentile(steps, 25))
-    for rate in USUAL_RATES:
+    by_hand = shortest > MOST_APART / USUAL_RATES[0]
+    for rate in (int(DEFAULT_RATE), *USUAL_RATES) if by_hand else USUAL_RATES:
         frames = steps * rate
         if rate * shortest > 0.9 and (np.abs(frames - np.rint(frames)) < 0.02).mean() > 0.95:
             return Fraction(rate)
