@@ -97,7 +97,8 @@ def quaternions(matrices: Float64) -> Float64:
 
 def cross(a: Float64, b: Float64) -> Float64:
     """Return a x b for vectors (..., 3); three times as fast as NumPy's for some hundreds."""
-    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     result = np.empty(np.broadcast_shapes(a.shape, b.shape))
     result[..., 0] = ay * bz - az * by
     result[..., 1] = az * bx - ax * bz

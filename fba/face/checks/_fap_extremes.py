@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fba.arrays import Float64, Integer
+from fba.arrays import Bool, Float64, Integer
 from fba.face.checks._findings import Finding
 from fba.face.checks.posing import Poser
 from fba.face.model import Part
@@ -78,16 +78,21 @@ def _checked_triangles(poser: Poser, part: Part, fap: int) -> Integer:
     wide = np.linalg.norm(corners[0] - corners[1]), np.linalg.norm(corners[2] - corners[3])
     away = np.linalg.norm(part.vertices[:, None] - corners, axis=2)
     within = (np.nan_to_num(away, nan=np.inf) < CORNER * np.nan_to_num(np.repeat(wide, 2))).any(axis=1)
-    counted: Integer = part.triangles[~within[part.triangles].any(axis=1)]
+    counted: Integer = part.triangles[~_touching(within, part.triangles)]
     return counted
+
+
+def _touching(mask: Bool, triangles: Integer) -> Bool:
+    """(F,) mask of the triangles (F, 3) with a vertex in a mask (V,)."""
+    touching: Bool = mask[triangles[:, 0]] | mask[triangles[:, 1]] | mask[triangles[:, 2]]
+    return touching
 
 
 def count_damage(
     before: Float64, after: Float64, triangles: Integer, *, turning: bool
 ) -> tuple[int, int, float]:
     """(triangles turned over, edges torn, share of the moving area turned over)."""
-    moving = (np.abs(after - before).max(axis=1) > 1e-9)[triangles].any(axis=1)
-    moved_triangles = triangles[moving]
+    moved_triangles = triangles[_touching(np.abs(after - before).max(axis=1) > 1e-9, triangles)]
     sides = [
         (
             before[moved_triangles[:, k]] - before[moved_triangles[:, k - 1]],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Iterator
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
@@ -51,16 +51,20 @@ def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Find
 def check_posed(poser: Poser, wanted: Iterable[int]) -> list[Finding]:
     """`check_faps` for a model that already has a `Poser`, which makes repeated checks faster."""
     wanted = list(wanted)
-    findings = [finding for fap in wanted for finding in _check_one(poser, fap)]
+    findings = [finding for fap in wanted for finding in _findings_of_one(poser, fap)]
     return [*findings, *_check_combinations(poser, set(wanted))]
+
+
+def _findings_of_one(poser: Poser, fap: int) -> tuple[Finding, ...]:
+    if fap in poser.model.lost:
+        return ()
+    return poser.findings("one FAP", [fap], partial(_check_one, poser, fap))
 
 
 def _check_one(poser: Poser, fap: int) -> Iterator[Finding]:
     from fba.face.checks._fap_extremes import check_extremes
     from fba.face.checks._fap_points import check_point
 
-    if fap in poser.model.lost:
-        return
     if fap not in poser.model.table_of:
         yield Finding(fap_table()[fap - 1].label, "it has tables or a reason", "neither", "FaceDefTables")
         return
@@ -77,10 +81,10 @@ def _check_combinations(poser: Poser, wanted: set[int]) -> Iterator[Finding]:
     present = set(poser.model.table_of)
     for side, pair in SIDES.items():
         if set(pair) <= present and wanted & set(pair):
-            yield from check_lids(poser, side)
-    mouth = {OPEN_JAW, *(fap for pair in (*PAIRS, *OUTER_PAIRS) for fap in pair)}
-    if wanted & mouth:
-        yield from check_mouth(poser)
+            yield from poser.findings(f"{side} lids", pair, partial(check_lids, poser, side))
+    mouth = (OPEN_JAW, *(fap for pair in (*PAIRS, *OUTER_PAIRS) for fap in pair))
+    if wanted & set(mouth):
+        yield from poser.findings("mouth", mouth, partial(check_mouth, poser))
 
 
 @cache

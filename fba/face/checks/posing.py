@@ -5,7 +5,7 @@ Kept apart from the compiled deformer, which rounds to 32 bits and takes long to
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy.typing as npt
 from fba.arrays import Float64
 from fba.face.authoring.regions.eyes import Eye, find_eyes
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
+from fba.face.checks._findings import Finding
 from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
@@ -26,7 +27,8 @@ KIND_ORDER = ("scale", "rotation", "translation")
 class Poser:
     """Poses a model and measures it.
 
-    like: a Poser whose neutral face is the same apart from its tables: its landmarks and eyes are reused.
+    like: a Poser whose neutral face is the same apart from its tables: its landmarks and eyes are reused, and
+    its findings about tables that both models have.
     """
 
     def __init__(self, model: FaceModel, like: Poser | None = None) -> None:
@@ -37,6 +39,15 @@ class Poser:
             if like is not None and _same_face(model, like.model)
             else _NeutralLandmarks(model)
         )
+
+    def findings(
+        self, rule: str, faps: Iterable[int], check: Callable[[], Iterator[Finding]]
+    ) -> tuple[Finding, ...]:
+        """What a check finds that depends on the neutral face and the tables of these FAPs alone; kept."""
+        key = (rule, *(self.model.table_of.get(fap, fap) for fap in faps))
+        if key not in self._landmarks.findings:
+            self._landmarks.findings[key] = tuple(check())
+        return self._landmarks.findings[key]
 
     def pose(self, values: Mapping[int, float]) -> Float64:
         """(V, 3) float64, metres: all vertices under FAP values by number, without the head's rotation."""
@@ -103,10 +114,14 @@ class Poser:
 
 
 class _NeutralLandmarks:
-    """Landmarks and eyes of a model's neutral face, found when they are first needed."""
+    """Landmarks and eyes of a model's neutral face, found when they are first needed.
+
+    findings: by the name of the rule and the tables (the FAP where it has none) that were checked.
+    """
 
     def __init__(self, model: FaceModel) -> None:
         self._model = model
+        self.findings: dict[tuple[object, ...], tuple[Finding, ...]] = {}
 
     @cached_property
     def marks(self) -> Landmarks:

@@ -12,6 +12,8 @@ from fba.errors import OptionError
 from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.face.checks import Finding, check_faps
+from fba.face.checks.fap_checks import check_posed
+from fba.face.checks.posing import Poser
 from fba.face.feature_points import row_of
 from fba.face.tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from grid_head import grid_head
@@ -71,6 +73,21 @@ def rules(findings: list[Finding]) -> list[str]:
 
 def test_the_whole_model_is_fine(head: FaceModel) -> None:
     assert check_faps(head) == []
+
+
+def test_findings_about_the_same_tables_are_shared_and_no_others(head: FaceModel) -> None:
+    """A mixture of two models' tables is judged as if neither had been checked before."""
+    broken = with_meshes(with_meshes(head, 31, scaled(1.3)), 19, scaled(0.5))
+    mixed = with_table(head, 31, lambda table: broken.table_of[31])
+    lost = head.with_tables(tuple(table for table in head.tables if table.fap != 19), {19: "no lid"})
+    poser = Poser(head)
+    checked = (4, 19, 21, 31)
+    assert check_posed(poser, checked) == []
+    for model, subjects in ((broken, {"FAP 19", "FAP 31"}), (mixed, {"FAP 31"}), (lost, set())):
+        poser = Poser(model, like=poser)
+        findings = check_posed(poser, checked)
+        assert findings == check_faps(model, checked)
+        assert {finding.subject[:6] for finding in findings} == subjects
 
 
 @pytest.mark.parametrize("fap", [2, 69, 0, -5])

@@ -193,13 +193,10 @@ def _coupled_motions(limiter: Limiter, inner: Float64, outer: Float64, fap: int)
     """
     low, high = fap_limits(fap)
     vertices = np.flatnonzero((np.abs(inner) + np.abs(outer)).max(axis=1) > 0)
-    triangles = limiter.triangles_touching(vertices)
+    patch = limiter.patch(vertices)
     most = {}
     for sign, end, cap in zip((-1.0, 1.0), (low, high), human_range(fap), strict=True):
-        reach = [
-            float(limiter.reach(sign * f, triangles).min(initial=np.inf))
-            for f in (inner, outer, inner + outer)
-        ]
+        reach = [patch.least_reach(sign * field) for field in (inner, outer, inner + outer)]
         together = min(cap, np.inf if 0.98 * reach[2] >= abs(end) else max(reach[2], 1.0))
         apart = min(reach[0], reach[1])
         most[sign] = (together, np.inf if 0.98 * apart >= abs(end) else max(apart, 1.0), reach[0] <= reach[1])

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
+from fba.face.authoring.surface.surface import positions_in_rows
+from fba.rotations import cross
 
 LEAST_AREA = 0.12
 """Least share of its area that a triangle keeps, seen along its neutral normal."""
@@ -39,7 +41,7 @@ class Limiter:
     @classmethod
     def from_mesh(cls, vertices: Float64, triangles: Intp) -> Limiter:
         """The limiter of a mesh; triangles without area are left out: they cannot fold."""
-        areas = np.linalg.norm(np.cross(*_two_edges(vertices, triangles)), axis=1)
+        areas = Patch(vertices, triangles).areas
         typical = float(np.median(areas)) if len(areas) else 0.0
         return cls(vertices, triangles[areas > DEGENERATE * typical])
 
@@ -60,92 +62,162 @@ class Limiter:
         count = np.bincount(self.triangles.ravel(), minlength=len(self.vertices))
         return np.concatenate([[0], np.cumsum(count)]), order // 3
 
-    def triangles_touching(self, vertices: Intp) -> Intp:
-        """(M, 3) triangles with a vertex among those given."""
-        touched: Intp
+    def patch(self, vertices: Intp) -> Patch:
+        """The triangles with a vertex among those given (K,)."""
         if len(vertices) > FEW_VERTICES * len(self.vertices):
             moving = np.zeros(len(self.vertices), dtype=bool)
             moving[vertices] = True
-            touched = self.triangles[moving[self.triangles].any(axis=1)]
-            return touched
+            a, b, c = self.triangles.T
+            return Patch(self.vertices, self.triangles[moving[a] | moving[b] | moving[c]])
         starts, fans = self._fans
-        count = starts[vertices + 1] - starts[vertices]
-        rows = np.repeat(starts[vertices] - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
-        touched = self.triangles[np.unique(fans[rows])]
-        return touched
+        touched = np.unique(fans[positions_in_rows(starts, vertices)[0]])
+        return Patch(self.vertices, self.triangles[touched])
 
-    def reach(self, field: Float64, triangles: Intp) -> Float64:
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Triangles of a mesh, measured once for all motions that are tried on them.
+
+    vertices: (N, 3), neutral, metres, those of the whole mesh. triangles: (M, 3).
+    """
+
+    vertices: Float64
+    triangles: Intp
+
+    @cached_property
+    def _corners(self) -> tuple[Float64, Float64, Float64]:
+        """The corners (M, 3) of the triangles, neutral."""
+        a, b, c = self.triangles.T
+        return self.vertices[a], self.vertices[b], self.vertices[c]
+
+    @cached_property
+    def _edges(self) -> tuple[Float64, Float64, Float64]:
+        """The edges (M, 3) from the first corner to the second and the third, and between these."""
+        first, second, third = self._corners
+        e1, e2 = second - first, third - first
+        return e1, e2, e2 - e1
+
+    @cached_property
+    def _normals(self) -> Float64:
+        """(M, 3) normals, twice as long as the triangles are large."""
+        e1, e2, _ = self._edges
+        return cross(e1, e2)
+
+    @cached_property
+    def areas(self) -> Float64:
+        """(M,) twice the areas of the triangles, m²."""
+        return _lengths(self._normals)
+
+    @cached_property
+    def _square_areas(self) -> Float64:
+        return _dot(self._normals, self._normals)
+
+    @cached_property
+    def _edge_lengths(self) -> tuple[Float64, ...]:
+        return tuple(_lengths(edge) for edge in self._edges)
+
+    @cached_property
+    def _typical_length(self) -> float:
+        return float(np.median(self._edge_lengths)) if len(self.triangles) else 0.0
+
+    @cached_property
+    def _most_lengths(self) -> tuple[Float64, ...]:
+        """Lengths of the edges from which on they count as torn."""
+        shortest = TINY_EDGE * self._typical_length
+        return tuple(1.1 * MOST_STRETCH * np.maximum(length, shortest) for length in self._edge_lengths)
+
+    @cached_property
+    def _fans(self) -> tuple[Any, Any]:
+        """Sparse matrix (K, M), 1 where a vertex is a corner of a triangle, and its transpose.
+
+        K: the vertices that are.
+        """
+        from scipy.sparse import csr_array
+
+        vertices, local = np.unique(self.triangles, return_inverse=True)
+        corners = (local.ravel(), np.repeat(np.arange(len(self.triangles)), 3))
+        fans = csr_array((np.ones(self.triangles.size), corners), shape=(len(vertices), len(self.triangles)))
+        return fans, fans.T
+
+    def _facing_neighbours(self, normals: Float64) -> Float64:
+        """(M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any vertex."""
+        fans, transposed = self._fans
+        around = transposed @ (fans @ normals) - 3 * normals
+        product = _lengths(around) * _lengths(normals)
+        result: Float64 = _dot(around, normals) / np.maximum(product, 1e-30)
+        result[product < 1e-30] = 1.0
+        return result
+
+    @cached_property
+    def _folded_before(self) -> Bool:
+        """(M,) mask of the triangles that face away from their neighbours in the neutral face."""
+        return self._facing_neighbours(self._normals) <= 0
+
+    @cached_property
+    def _stretching(self) -> tuple[tuple[Float64, Float64], ...]:
+        """For each edge its squared length, and by how much that may grow."""
+        shortest = (TINY_EDGE * self._typical_length) ** 2
+        squares = (_dot(edge, edge) for edge in self._edges)
+        return tuple((square, MOST_STRETCH**2 * np.maximum(square, shortest) - square) for square in squares)
+
+    def reach(self, field: Float64) -> Float64:
         """(M,) for each triangle the largest s at which vertices + s * field (N, 3) keeps it unfolded."""
-        e1, e2 = _two_edges(self.vertices, triangles)
-        d1, d2 = _two_edges(field, triangles)
-        normal = np.cross(e1, e2)
-        area = (normal**2).sum(axis=1)
-        linear = ((np.cross(e1, d2) + np.cross(d1, e2)) * normal).sum(axis=1) / area
-        square = (np.cross(d1, d2) * normal).sum(axis=1) / area
+        a, b, c = self.triangles.T
+        first = field[a]
+        d1, d2 = field[b] - first, field[c] - first
+        e1, e2, _ = self._edges
+        normal, area = self._normals, self._square_areas
+        linear = _dot(cross(e1, d2) + cross(d1, e2), normal) / area
+        square = _dot(cross(d1, d2), normal) / area
         result = _first_root(square, linear, np.full(len(area), 1 - LEAST_AREA))
-        lengths = np.stack([np.linalg.norm(e, axis=1) for e in (e1, e2, e2 - e1)])
-        typical = float(np.median(lengths)) if lengths.size else 0.0
-        for edge, move in ((e1, d1), (e2, d2), (e2 - e1, d2 - d1)):
-            base = (edge**2).sum(axis=1)
-            longest = MOST_STRETCH**2 * np.maximum(base, (TINY_EDGE * typical) ** 2)
-            stretch = _first_root(-(move**2).sum(axis=1), -2 * (edge * move).sum(axis=1), longest - base)
+        for edge, move, (_, growth) in zip(self._edges, (d1, d2, d2 - d1), self._stretching, strict=True):
+            stretch = _first_root(-_dot(move, move), -2 * _dot(edge, move), growth)
             result = np.minimum(result, stretch)
         return result
 
-    def is_sound(self, shifts: Float64, triangles: Intp, *, turning: bool = False) -> bool:
+    def least_reach(self, field: Float64) -> float:
+        """The largest s at which vertices + s * field (N, 3) folds no triangle; inf without any."""
+        return float(self.reach(field).min(initial=np.inf))
+
+    def is_sound(self, shifts: Float64, *, turning: bool = False) -> bool:
         """Whether no triangle folds or tears at vertices + shifts (N, 3).
 
         turning: as in `soundness`; then tiny folds (`SPECK`) in the corners of eyes and mouth are allowed.
         """
-        fine = self.soundness(shifts, triangles, turning=turning)
+        fine = self.soundness(shifts, turning=turning)
         if not turning or fine.all():
             return bool(fine.all())
-        areas = np.linalg.norm(np.cross(*_two_edges(self.vertices, triangles)), axis=1)
-        return float(areas[~fine].sum()) <= SPECK * float(areas.sum())
+        return float(self.areas[~fine].sum()) <= SPECK * float(self.areas.sum())
 
-    def soundness(self, shifts: Float64, triangles: Intp, *, turning: bool = False) -> Bool:
+    def soundness(self, shifts: Float64, *, turning: bool = False) -> Bool:
         """(M,) mask of the triangles that neither fold nor tear under shifts (N, 3).
 
         turning: the skin may rotate, as a lid does about the eyeball; then a triangle counts as folded if it
         faces away from its neighbours, not if it faces away from its neutral direction.
         """
-        e1, e2 = _two_edges(self.vertices, triangles)
-        f1, f2 = _two_edges(self.vertices + shifts, triangles)
-        before, after = np.cross(e1, e2), np.cross(f1, f2)
+        first, second, third = (
+            corner + shifts[own] for corner, own in zip(self._corners, self.triangles.T, strict=True)
+        )
+        f1, f2 = second - first, third - first
+        after = cross(f1, f2)
         if turning:
-            fans = _vertex_fans(triangles)
-            fine: Bool = (_facing_neighbours(fans, after) >= FOLDED) | (_facing_neighbours(fans, before) <= 0)
+            fine: Bool = (self._facing_neighbours(after) >= FOLDED) | self._folded_before
         else:
-            fine = (before * after).sum(axis=1) >= 0.8 * LEAST_AREA * (before**2).sum(axis=1)
-        lengths = np.linalg.norm(np.stack([e1, e2, e2 - e1]), axis=2)
-        typical = float(np.median(lengths)) if lengths.size else 0.0
-        now = np.linalg.norm(np.stack([f1, f2, f2 - f1]), axis=2)
-        fine &= (now <= 1.1 * MOST_STRETCH * np.maximum(lengths, TINY_EDGE * typical)).all(axis=0)
+            fine = _dot(self._normals, after) >= 0.8 * LEAST_AREA * self._square_areas
+        for edge, most in zip((f1, f2, f2 - f1), self._most_lengths, strict=True):
+            fine &= _lengths(edge) <= most
         return fine
 
 
-def _two_edges(vertices: Float64, triangles: Intp) -> tuple[Float64, Float64]:
-    """The edges (M, 3) from the first corner of each triangle to the second and the third."""
-    first = vertices[triangles[:, 0]]
-    return vertices[triangles[:, 1]] - first, vertices[triangles[:, 2]] - first
-
-
-def _vertex_fans(triangles: Intp) -> Any:
-    """Sparse matrix (K, M), 1 where a vertex is a corner of a triangle (M, 3); K: the vertices that are."""
-    from scipy.sparse import csr_array
-
-    vertices, local = np.unique(triangles, return_inverse=True)
-    entries = (np.ones(triangles.size), (local.ravel(), np.repeat(np.arange(len(triangles)), 3)))
-    return csr_array(entries, shape=(len(vertices), len(triangles)))
-
-
-def _facing_neighbours(fans: Any, normals: Float64) -> Float64:
-    """(M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any vertex."""
-    around = fans.T @ (fans @ normals) - 3 * normals
-    product = np.linalg.norm(around, axis=1) * np.linalg.norm(normals, axis=1)
-    result: Float64 = (around * normals).sum(axis=1) / np.maximum(product, 1e-30)
-    result[product < 1e-30] = 1.0
+def _dot(a: Float64, b: Float64) -> Float64:
+    """(M,) products of vectors (M, 3); by columns: sums along so short an axis take three times as long."""
+    result: Float64 = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
     return result
+
+
+def _lengths(vectors: Float64) -> Float64:
+    """(M,) lengths of vectors (M, 3)."""
+    return np.sqrt(_dot(vectors, vectors))
 
 
 def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
-from fba.face.authoring.surface.fold_limits import Limiter
+from fba.face.authoring.surface.fold_limits import Limiter, Patch
 from fba.face.authoring.surface.motion import Motion, fap_limits
 from fba.face.authoring.surface.surface import Surface
 from fba.face.authoring.surface.unfold import ease_field
@@ -92,9 +93,9 @@ def linear_motion(
     The field is not eased.
     """
     full_field = limiter.spread(vertices, field)
-    triangles = limiter.triangles_touching(vertices)
+    patch = limiter.patch(vertices)
     stops = [
-        min(cap, _largest_value(limiter, full_field * sign, triangles, abs(end)))
+        min(cap, _largest_value(patch, full_field * sign, abs(end)))
         for sign, end, cap in zip((-1, 1), (low, high), most, strict=True)
     ]
     bends = [-bend for bend in knots(stops[0], -low)] + knots(stops[1], high)
@@ -103,34 +104,41 @@ def linear_motion(
     return stop_at_folds(limiter, Motion(values, vertices, limited[:, None, None] * field))
 
 
-def _largest_value(limiter: Limiter, field: Float64, triangles: Intp, limit: float) -> float:
+def _largest_value(patch: Patch, field: Float64, limit: float) -> float:
     """Value that a linear motion (N, 3) reaches without folds, at least 1; inf from `LEAST_REACH` on."""
-    reach = float(limiter.reach(field, triangles).min(initial=np.inf))
+    reach = patch.least_reach(field)
     return np.inf if LEAST_REACH * reach >= limit else max(reach, 1.0)
 
 
 def stop_at_folds(limiter: Limiter, motion: Motion, *, turning: bool = False) -> Motion:
-    """The motion, stopped on each side of 0 where it would fold triangles. turning: as in `soundness`."""
-    triangles = limiter.triangles_touching(motion.vertices)
+    """The motion, stopped on each side of 0 where it would fold triangles.
+
+    turning: as in `Patch.soundness`.
+    """
+    patch = limiter.patch(motion.vertices)
+
+    def is_sound(shifts: Float64) -> bool:
+        return patch.is_sound(limiter.spread(motion.vertices, shifts), turning=turning)
+
     zero = int(np.flatnonzero(motion.values == 0)[0])
-    down = _stop_one_side(limiter, motion, range(zero - 1, -1, -1), triangles, turning)
-    up = _stop_one_side(limiter, motion, range(zero + 1, len(motion.values)), triangles, turning)
+    down = _stop_one_side(motion, range(zero - 1, -1, -1), is_sound)
+    up = _stop_one_side(motion, range(zero + 1, len(motion.values)), is_sound)
     steps = [*down[::-1], (0.0, motion.shifts[zero]), *up]
     return Motion(np.array([v for v, _ in steps]), motion.vertices, np.array([s for _, s in steps]))
 
 
 def _stop_one_side(
-    limiter: Limiter, motion: Motion, side: range, triangles: Intp, turning: bool
+    motion: Motion, side: range, is_sound: Callable[[Float64], bool]
 ) -> list[tuple[float, Float64]]:
     """(value, shifts) outwards from 0 up to where a triangle folds, constant from there on."""
     steps: list[tuple[float, Float64]] = []
     value, shifts = 0.0, np.zeros_like(motion.shifts[0])
     for k in side:
-        if _is_sound(limiter, motion, motion.shifts[k], triangles, turning):
+        if is_sound(motion.shifts[k]):
             value, shifts = float(motion.values[k]), motion.shifts[k]
             steps.append((value, shifts))
             continue
-        share = _last_sound_share(limiter, motion, shifts, motion.shifts[k], triangles, turning)
+        share = _last_sound_share(shifts, motion.shifts[k], is_sound)
         end = float(np.round(value + (motion.values[k] - value) * share))
         if end != value:
             # values are whole; the slope up to here stays the same
@@ -143,18 +151,12 @@ def _stop_one_side(
     return steps
 
 
-def _is_sound(limiter: Limiter, motion: Motion, shifts: Float64, triangles: Intp, turning: bool) -> bool:
-    return limiter.is_sound(limiter.spread(motion.vertices, shifts), triangles, turning=turning)
-
-
-def _last_sound_share(
-    limiter: Limiter, motion: Motion, start: Float64, end: Float64, triangles: Intp, turning: bool
-) -> float:
+def _last_sound_share(start: Float64, end: Float64, is_sound: Callable[[Float64], bool]) -> float:
     """Share of the way between two shifts at which no triangle has folded yet, by bisection."""
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        if _is_sound(limiter, motion, start * (1 - middle) + end * middle, triangles, turning):
+        if is_sound(start * (1 - middle) + end * middle):
             low = middle
         else:
             high = middle

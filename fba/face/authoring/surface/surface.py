@@ -66,6 +66,12 @@ class Surface:
         """(N, N) sparse matrix of edge lengths."""
         return self._edge_matrix(open_edges=1.0)
 
+    def neighbours(self, vertices: Intp) -> Intp:
+        """The vertices at the other ends of the edges of some vertices (M,), in rising order."""
+        positions, _ = positions_in_rows(self.graph.indptr, vertices)
+        found: Intp = np.unique(self.graph.indices[positions])
+        return found
+
     @cached_property
     def rim_graph(self) -> Any:
         """(N, N) sparse matrix of edge lengths, open edges shortened so that paths keep to the rim."""
@@ -169,6 +175,11 @@ class Surface:
         typical = float(np.median(areas[areas > 0])) if (areas > 0).any() else 1.0
         return diags_array(between.sum(axis=1)) - between, np.maximum(areas, 1e-3 * typical)
 
+    @cached_property
+    def laplacian_columns(self) -> Any:
+        """The cotangent Laplacian by columns."""
+        return self.laplacian[0].tocsc()
+
 
 def vertices_of_kinds(parts: Sequence[Part], kinds: Sequence[str]) -> Intp:
     """(V,) vertices of the parts of some kinds, counted through all parts."""
@@ -208,6 +219,18 @@ def positions_in(vertices: Intp, count: int) -> Intp:
     result = np.full(count, -1)
     result[vertices] = np.arange(len(vertices))
     return result
+
+
+def positions_in_rows(starts: Integer, rows: Intp) -> tuple[Intp, Intp]:
+    """((K,) positions of the entries of some rows (M,), row by row; (M,) how many each row has).
+
+    starts: (N + 1,) where each row begins in the list of all entries, as in a sparse matrix.
+    """
+    begin = starts[rows]
+    count = starts[rows + 1] - begin
+    ends = np.cumsum(count)
+    total = int(ends[-1]) if len(ends) else 0
+    return np.repeat(begin - ends + count, count) + np.arange(total), count
 
 
 def _count_edges(triangles: Intp) -> tuple[Intp, Intp]:

@@ -9,7 +9,7 @@ import numpy as np
 from fba.arrays import Bool, Float64, Intp
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion
-from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.surface import Surface, positions_in, positions_in_rows
 
 RINGS = 3
 """Vertices up to this many edges away from folded triangles may be eased."""
@@ -24,25 +24,28 @@ ROUNDS = 2
 def unfold(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool) -> Motion:
     """The motion with the surroundings of folded triangles stretched evenly.
 
-    pinned: (N,) mask of vertices whose shifts must not change. turning: as in `Limiter.soundness`. Folds
+    pinned: (N,) mask of vertices whose shifts must not change. turning: as in `Patch.soundness`. Folds
     remain where this does not help.
     """
     shifts = np.stack([limiter.spread(motion.vertices, step) for step in motion.shifts])
     moved = surface.mask(motion.vertices)
+    patch = limiter.patch(np.flatnonzero(moved))
     zero = int(np.flatnonzero(motion.values == 0)[0])
     for side in (range(zero + 1, len(shifts)), range(zero - 1, -1, -1)):
         for k in side:
             for _ in range(ROUNDS):
-                triangles = limiter.triangles_touching(np.flatnonzero(moved))
-                folded = triangles[~limiter.soundness(shifts[k], triangles, turning=turning)]
-                for group in _connected_groups(folded):
-                    shifts[k] = _ease_around(surface, limiter, shifts[k], group, pinned, turning)
+                folded = patch.triangles[~patch.soundness(shifts[k], turning=turning)]
                 if not len(folded):
                     break
-                moved |= shifts[k].any(axis=1)
-            triangles = limiter.triangles_touching(np.flatnonzero(moved))
-            if not limiter.is_sound(shifts[k], triangles, turning=turning):
-                break  # further out it only gets worse, and there the motion will stop
+                for group in _connected_groups(folded):
+                    shifts[k] = _ease_around(surface, limiter, shifts[k], group, pinned, turning)
+                also = shifts[k].any(axis=1) & ~moved
+                if also.any():
+                    moved |= also
+                    patch = limiter.patch(np.flatnonzero(moved))
+            else:
+                if not patch.is_sound(shifts[k], turning=turning):
+                    break  # further out it only gets worse, and there the motion will stop
     vertices = np.flatnonzero(moved)
     return Motion(motion.values, vertices, shifts[:, vertices])
 
@@ -52,7 +55,7 @@ def ease_field(
 ) -> Float64:
     """A linear motion (N, 3) per unit of value, eased to reach the goals without folds if possible."""
     result = field
-    reached = [_reachable_share(limiter, field, goal) for goal in goals]
+    reached = _reachable_shares(limiter, field, goals)
     for share in STAGES:
         for k, goal in enumerate(goals):
             if reached[k] >= share:
@@ -62,7 +65,7 @@ def ease_field(
             motion = Motion(np.array([0.0, 1.0]), moving, np.stack([0 * moves, moves]))
             unfolded = unfold(surface, limiter, motion, pinned, False)
             trial = limiter.spread(unfolded.vertices, unfolded.shifts[1] / (goal * share))
-            now = [_reachable_share(limiter, trial, each) for each in goals]
+            now = _reachable_shares(limiter, trial, goals)
             if now[k] > reached[k] and all(
                 new >= LEAST_RETAINED * old for new, old in zip(now, reached, strict=True)
             ):
@@ -70,10 +73,10 @@ def ease_field(
     return result
 
 
-def _reachable_share(limiter: Limiter, field: Float64, goal: float) -> float:
-    """Share of a value that a linear motion reaches without folds, at most 1."""
-    triangles = limiter.triangles_touching(np.flatnonzero(field.any(axis=1)))
-    return min(float(limiter.reach(field * goal, triangles).min(initial=np.inf)), 1.0)
+def _reachable_shares(limiter: Limiter, field: Float64, goals: Sequence[float]) -> list[float]:
+    """Shares of some values that a linear motion (N, 3) reaches without folds, at most 1."""
+    patch = limiter.patch(np.flatnonzero(field.any(axis=1)))
+    return [min(patch.least_reach(field * goal), 1.0) for goal in goals]
 
 
 def _connected_groups(triangles: Intp) -> list[Intp]:
@@ -105,12 +108,12 @@ def _ease_around(
         as_one[core] = shifts[fixed if len(fixed) else core].mean(axis=0)
     region = core
     for _ in range(RINGS):
-        region = np.unique(surface.graph[region].indices) if len(region) else region
-        touched = limiter.triangles_touching(region)
+        region = surface.neighbours(region)
+        patch = limiter.patch(region)
         free_region = region[~pinned[region]]
         for start, free in ((shifts, free_region), (as_one, np.setdiff1d(free_region, core))):
             trial = _solve_harmonic(surface, start, free)
-            left = int((~limiter.soundness(trial, touched, turning=turning)).sum())
+            left = int((~patch.soundness(trial, turning=turning)).sum())
             if left < fewest:
                 best, fewest = trial, left
         if not fewest:
@@ -120,15 +123,32 @@ def _ease_around(
 
 def _solve_harmonic(surface: Surface, shifts: Float64, free: Intp) -> Float64:
     """Shifts (N, 3) with those of `free` vertices replaced by the harmonic interpolation of the others."""
+    from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 
+    if not len(free):
+        return shifts
+    size = len(free)
+    position = positions_in(free, len(surface))
+    # The entries of scipy's matrices, picked by hand: there are thousands of small systems.
+    rows, columns = surface.laplacian[0], surface.laplacian_columns
+    entries, count = positions_in_rows(rows.indptr, free)
+    known = shifts[rows.indices[entries]]
+    known[position[rows.indices[entries]] >= 0] = 0.0
+    weighted = rows.data[entries, None] * known
+    row = np.repeat(np.arange(size), count)
+    right = np.stack([np.bincount(row, weighted[:, axis], size) for axis in range(3)], axis=1)
+    entries, count = positions_in_rows(columns.indptr, free)
+    local = position[columns.indices[entries]]
+    inside = local >= 0
+    starts = np.concatenate(
+        [[0], np.cumsum(np.bincount(np.repeat(np.arange(size), count)[inside], minlength=size))]
+    )
+    system = csc_array((columns.data[entries][inside], local[inside], starts), shape=(size, size))
+    try:
+        solved = splu(system).solve(-right)
+    except RuntimeError:  # a piece without fixed vertices
+        return shifts
     result = shifts.copy()
-    if len(free):
-        rows = surface.laplacian[0][free]
-        known = shifts.copy()
-        known[free] = 0.0
-        try:
-            result[free] = np.nan_to_num(splu(rows[:, free].tocsc()).solve(-(rows @ known)))
-        except RuntimeError:  # a piece without fixed vertices
-            return shifts
+    result[free] = np.nan_to_num(solved)
     return result
