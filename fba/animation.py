@@ -7,9 +7,11 @@ that were not sent are stored as 0; `fba.face.resolve` computes what a face show
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cache
 from typing import Any, overload
 
 import numpy as np
@@ -17,6 +19,7 @@ import numpy.typing as npt
 
 from fba.arrays import Array, Bool, Float64, Int64, Intp
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import baps
 from fba.tracks import BodyTrack, FaceTrack, freeze, integers
 
 __all__ = ["Animation", "BodyTrack", "FaceTrack", "Frame"]
@@ -26,6 +29,8 @@ _INDEX_MAX = 1 << 62
 
 _RESAMPLED_BYTES = 10
 """Memory of a resampled parameter in a frame: an int32, masks, and its share of all that comes in between."""
+_HALF_TURN = 1e5 * math.pi
+"""In the unit of angles, 1e-5 rad."""
 _CHUNK = 1 << 14
 """Frames that are interpolated at once, which limits the memory for numbers of 64 bits."""
 
@@ -205,9 +210,11 @@ class Animation:
         """Return the same animation at another frame rate, in evenly spaced frames without gaps.
 
         Low-level FAPs, BAPs, blends and intensities are interpolated linearly between the frames that
-        sent them; selects and masks hold until the next frame; definition flags are set on the first
-        frame at or after the one that carried them. Raises LimitError if the result would have more frames
-        or need more memory than `limits` allow, ValueError for a rate that is not positive.
+        sent them, angles of the body the shorter way round; selects and masks hold until the next frame;
+        definition flags are set on the first frame at or after the one that carried them.
+
+        Raises LimitError if the result would have more frames or need more memory than `limits` allow,
+        ValueError for a rate that is not positive.
         """
         rate = Fraction(rate)
         if rate <= 0:
@@ -241,7 +248,8 @@ class Animation:
         if self.body is not None:
             mask = self.body.mask[before]
             both = mask & self.body.mask[after]
-            body = BodyTrack(_between(self.body.values, before, after, weight, both), mask)
+            between = _between(self.body.values, before, after, weight, both, angles=_body_angles())
+            body = BodyTrack(between, mask)
         return Animation(rate, index, face, body, self.name)
 
 
@@ -264,18 +272,40 @@ def _between(
     after: Intp,
     weight: Float64,
     both: Bool,
+    angles: Bool | None = None,
 ) -> npt.NDArray[np.signedinteger]:
     """Return values (S, columns) between frames before (S,) and after (S,), by weight (S,) in 0..1.
 
     both: bool (S, columns), True where both frames sent the value; elsewhere that of before holds.
+    angles: bool (columns,), True for what takes the shorter way round. It stays within +-pi where both are.
     """
     result = np.empty((len(before), values.shape[1]), dtype=values.dtype)
-    for begin in range(0, len(before), _CHUNK):
-        chunk = slice(begin, begin + _CHUNK)
+    for first in range(0, len(before), _CHUNK):
+        chunk = slice(first, first + _CHUNK)
         start = values[before[chunk]]
         change = np.where(both[chunk], values[after[chunk]].astype(np.float64) - start, 0.0)
-        result[chunk] = np.rint(start + change * weight[chunk, None])
+        between = start + change * weight[chunk, None]
+        if angles is not None:
+            far = np.nonzero((np.abs(change) > _HALF_TURN) & angles)
+            begin, end = start[far].astype(np.float64), values[after[chunk]][far].astype(np.float64)
+            shorter = _within_half_turn(end - begin)
+            moved = begin + shorter * weight[chunk][far[0]]
+            within = np.maximum(np.abs(begin), np.abs(end)) < _HALF_TURN + 1
+            between[far] = np.where(within, _within_half_turn(moved), moved)
+        result[chunk] = np.rint(between)
     return result
+
+
+def _within_half_turn(angles: Float64) -> Float64:
+    """Return angles, in 1e-5 rad, within +-pi."""
+    result: Float64 = angles - 2 * _HALF_TURN * np.rint(angles / (2 * _HALF_TURN))
+    return result
+
+
+@cache
+def _body_angles() -> Bool:
+    """Return bool (296,): True for BAPs that are angles."""
+    return np.array([bap.unit == "1e-5 rad" for bap in baps()])
 
 
 def _resample_face(

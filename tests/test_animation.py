@@ -232,6 +232,23 @@ def test_resample_fills_gaps() -> None:
     assert gap.body.values[:, 0].tolist() == [0, -2, -4, -5, -7]
 
 
+def test_resample_turns_angles_the_short_way() -> None:
+    """From 172 to -166 degrees it is 22 degrees, not 338; a root that is moved has no such way."""
+    values = np.zeros((2, BODY), dtype=np.int32)
+    mask = np.zeros((2, BODY), dtype=bool)
+    mask[:, [0, 180, 183, 184]] = True
+    values[:, 0] = [300_000, -290_000]
+    values[:, 180] = [300_000, -300_000]  # millimetres
+    values[:, 183] = [700_000, 60_000]  # the end is 688319 in turns that go on from the start
+    values[:, 184] = [-100_000, 200_000]
+    got = Animation(Fraction(10), np.arange(2), None, BodyTrack(values, mask)).resample(40).body
+    assert got is not None
+    np.testing.assert_allclose(got.values[:, 0], [300_000, 309_580, -309_159, -299_580, -290_000], atol=1)
+    assert got.values[:, 180].tolist() == [300_000, 150_000, 0, -150_000, -300_000]
+    np.testing.assert_allclose(got.values[:, 183], [700_000, 697_080, 694_159, 691_239, 60_000], atol=1)
+    assert got.values[:, 184].tolist() == [-100_000, -25_000, 50_000, 125_000, 200_000]
+
+
 @pytest.mark.parametrize("rate", [0, -1, Fraction(-1, 2)])
 def test_resample_to_no_rate(rate: Fraction | int) -> None:
     with pytest.raises(ValueError, match="must be positive"):

@@ -35,6 +35,7 @@ class Mutant(NamedTuple):
 
 CLOCK = "fba/codec/_clock.py"
 TIME_BASE = "fba/codec/_time_base.py"
+FULL_TURNS = "fba/codec/_plane/full_turns.py"
 RANGES = "fba/codec/_ranges.py"
 HEADERS = "fba/codec/_headers.py"
 RUNS = "fba/codec/_runs.py"
@@ -79,6 +80,7 @@ PROGRAMS_TEST = "tests/conformance/test_programs.py"
 LOSS_TEST = "tests/codec/test_loss.py"
 DAMAGE_TEST = "tests/codec/test_damage.py"
 TIMES_TEST = "tests/codec/test_codec_rules.py"
+FULL_TURNS_TEST = "tests/codec/test_full_turns.py"
 RANGES_TEST = "tests/codec/test_codec_rules.py tests/codec/test_limits.py"
 BVH_TEST = "tests/formats/bvh/test_bvh_rates.py"
 TEXT_TEST = "tests/formats/text/test_frame_rates.py"
@@ -135,6 +137,16 @@ MUTANTS = (
         RANGES_TEST,
     ),
     Mutant(RANGES, "np.maximum(held, wanted)", "wanted", RANGES_TEST),
+    Mutant(FULL_TURNS, "np.cumsum(-np.rint", "np.cumsum(0 * np.rint", FULL_TURNS_TEST),
+    Mutant(
+        FULL_TURNS, "angles = misfits & angle_slots()", "angles = misfits & ~angle_slots()", FULL_TURNS_TEST
+    ),
+    Mutant(ENCODER, "nearest) <= lacking", "nearest) > lacking", FULL_TURNS_TEST),
+    Mutant(ENCODER, "        if not self.options.clamp:\n            return row\n", "", FULL_TURNS_TEST),
+    Mutant(RANGES, "if one_turn and abs", "if not one_turn and abs", FULL_TURNS_TEST),
+    Mutant(
+        "fba/animation.py", "> _HALF_TURN) & angles", "> 9 * _HALF_TURN) & angles", "tests/test_animation.py"
+    ),
     Mutant(ENCODER, "> SKIP_MAX", ">= SKIP_MAX", RANGES_TEST),
     Mutant(BVH, "r.denominator > 1", "r.denominator < 1", BVH_TEST),
     Mutant(BVH, "> tolerance / 5", "> tolerance", BVH_TEST),

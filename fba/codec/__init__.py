@@ -5,7 +5,13 @@ May use: parameters and the data model.
 
 from fba.codec._damage import Damage
 from fba.codec._decoder import Decoder, decode
-from fba.codec._encoder import Encoder, EncoderStatistics, encode, encode_with_statistics
+from fba.codec._encoder import (
+    ClampedParameter,
+    Encoder,
+    EncoderStatistics,
+    encode,
+    encode_with_statistics,
+)
 from fba.codec._options import EncoderOptions
 from fba.codec._script import encode_planes
 from fba.codec.block import Block
@@ -16,6 +22,7 @@ from fba.codec.verification import Verification, digest, verify_stream
 
 __all__ = [
     "Block",
+    "ClampedParameter",
     "Damage",
     "DecodedFrames",
     "Decoder",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections import Counter
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -13,7 +12,7 @@ from fba.animation import Animation, Frame
 from fba.arrays import Int32, Int64
 from fba.codec import _headers as headers
 from fba.codec._options import EncoderOptions
-from fba.codec._plane import quantiser, slots
+from fba.codec._plane import full_turns, quantiser, slots
 from fba.codec._plane.loops import SKIP_MAX
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec._ranges import CLAMP, Ranges, fitting_ranges
@@ -27,17 +26,44 @@ _CHUNK = 4096
 
 
 @dataclass
+class ClampedParameter:
+    """Values of a parameter that no plane could carry, and that were brought as near as could be.
+
+    count: number of them. first: frame of the first. frame, value, sent: frame, wanted and sent value of the
+    worst. Frames are counted from 0 in the order in which they were encoded.
+    """
+
+    count: int
+    first: int
+    frame: int
+    value: int
+    sent: int
+
+    @property
+    def off(self) -> int:
+        """How far the worst is off, in the parameter's unit."""
+        return abs(self.value - self.sent)
+
+
+@dataclass
 class EncoderStatistics:
-    """Counts of an encoder: planes and I planes written, and values clamped to their range by parameter."""
+    """Counts of an encoder: planes and I planes written, and values clamped, by the parameter's label."""
 
     planes: int = 0
     intra_planes: int = 0
-    clamped_parameters: Counter[str] = field(default_factory=Counter)
+    clamped_parameters: dict[str, ClampedParameter] = field(default_factory=dict)
 
     @property
     def clamped(self) -> int:
         """Number of values clamped."""
-        return self.clamped_parameters.total()
+        return sum(one.count for one in self.clamped_parameters.values())
+
+    def count_clamped(self, label: str, frame: int, value: int, sent: int) -> None:
+        """Count a value of a parameter that was sent as another."""
+        one = self.clamped_parameters.setdefault(label, ClampedParameter(0, frame, frame, value, sent))
+        one.count += 1
+        if abs(value - sent) > one.off:
+            one.frame, one.value, one.sent = frame, value, sent
 
 
 class Encoder:
@@ -147,8 +173,12 @@ class Encoder:
                 limits=(0, INTENSITY_MAX),
                 frame=self._writer.planes + frame,
             ).with_remedies(CLAMP)
+        for frame, column in wrong:
+            value = int(amounts[frame, column])
+            sent = min(max(value, 0), INTENSITY_MAX)
+            label = slots.label(slots.AMOUNTS[column])
+            self.statistics.count_clamped(label, self._writer.planes + frame, value, sent)
         rows[:, slots.AMOUNTS] = np.clip(amounts, 0, INTENSITY_MAX)
-        self._count_clamped([slots.AMOUNTS[column] for _, column in wrong])
 
     def _encode_run(self, run: Run, rate: Fraction) -> None:
         """Encode frames that send the same parameters."""
@@ -157,21 +187,19 @@ class Encoder:
             # The first plane carries every track, even one that sends nothing yet.
             self._encode_intra(run, 0, run.parts if self._writer.planes else list(run.masks), rate)
             position = 1
+        due = self._next_intra(run, position, rate)
         while position < len(run.rows):
-            due = position + self._frames_before_intra(run.index[position:], rate)
-            while due < len(run.rows) and not self._can_be_intra(run, run.rows[due]):
-                due += 1  # put off: P planes reach values that I planes do not
-                due += self._frames_before_intra(run.index[due:], rate)
             try:
                 self._writer.predicted(sum(run.parts), run.rows[position:due], run.skips[position:due])
                 position = due
             except DoesNotFitError as error:
                 position += error.position
-                if self._clamp_difference(run, run.rows[position], error):
+                if self._fit_difference(run, position, error):
                     continue
             if position < len(run.rows):
                 self._encode_intra(run, position, run.parts, rate)
                 position += 1
+                due = self._next_intra(run, position, rate)
 
     def _in_force(self, run: Run, part: int) -> bool:
         """Whether a decoder has the run's masks of a part from an I plane before."""
@@ -182,6 +210,14 @@ class Encoder:
             and np.array_equal(settings.mask, run.masks[part])
             and settings.mask_types == run.mask_types[part]
         )
+
+    def _next_intra(self, run: Run, position: int, rate: Fraction) -> int:
+        """Return the position, from this one on, of the next frame that is due to be an I plane."""
+        due = position + self._frames_before_intra(run.index[position:], rate)
+        while due < len(run.rows) and not self._can_be_intra(run, run.rows[due]):
+            due += 1  # put off: P planes reach values that I planes do not
+            due += self._frames_before_intra(run.index[due:], rate)
+        return due
 
     def _frames_before_intra(self, index: Int64, rate: Fraction) -> int:
         """Return how many of the next frames, with index (T,), come before the next I plane is due.
@@ -206,30 +242,47 @@ class Encoder:
 
     def _can_be_intra(self, run: Run, row: Int32) -> bool:
         """Whether an I plane can carry the values of row (columns,), with the widest ranges."""
-        return all(self._ranges[part].can_carry(run.masks[part], row) for part in run.parts)
+        return not self._lacking(run, self._intra_row(run, row))
 
-    def _clamp_difference(self, run: Run, row: Int32, error: DoesNotFitError) -> bool:
-        """Bring the value that does not fit as near as a P plane can if no I plane can carry it either.
+    def _lacking(self, run: Run, row: Int32) -> int:
+        """Return by how many levels, of all parameters, an I plane misses the values of row (columns,)."""
+        return sum(int(self._ranges_of(part).lacking(run.masks[part], row).sum()) for part in run.parts)
 
-        Return whether that was done; if not, the range of differences is widened for the next I plane.
+    def _intra_row(self, run: Run, row: Int32) -> Int32:
+        """Return the values of row (columns,) for an I plane: with options.clamp, angles may turn fully."""
+        if not self.options.clamp:
+            return row
+        misfits = np.zeros(len(row), dtype=np.bool_)
+        for part in run.parts:
+            misfits |= self._ranges_of(part).lacking(run.masks[part], row) > 0
+        return full_turns.within_half_turn(row, misfits)
+
+    def _fit_difference(self, run: Run, position: int, error: DoesNotFitError) -> bool:
+        """Change the value that does not fit so that a P plane carries it, with options.clamp.
+
+        An angle goes on the short way, in the frames after this, too. Where that does not help and no I plane
+        carries the frame either, the plane that misses by less is taken: in a P plane, the value comes as
+        near as it can. Return False for an I plane. The next one has a wider range of differences.
         """
-        part = slots.part_of(error.slot)
-        ranges = self._ranges[part]
-        if (
-            self.options.clamp
-            and ranges.is_widest(error.slot)
-            and not ranges.changed
-            and not self._can_be_intra(run, row)
-        ):
-            row[error.slot] = self._writer.nearest(error.slot, error.level)
-            self._count_clamped([error.slot])
-            return True
-        ranges.widen(np.array([error.slot]), np.array([[0], [0], [error.level], [-error.level]]))
+        slot, row, ranges = error.slot, run.rows[position], self._ranges[slots.part_of(error.slot)]
+        if self.options.clamp:
+            last = self._writer.last(slot)
+            if full_turns.angle_slots()[slot] and full_turns.follow(run.rows[position:, slot], last):
+                return True
+        ranges.widen(np.array([slot]), np.array([[0], [0], [error.level], [-error.level]]))
+        if self.options.clamp:
+            lacking = self._lacking(run, self._intra_row(run, row))
+            nearest = self._writer.nearest(slot, error.level)
+            if lacking and abs(int(row[slot]) - nearest) <= lacking * self._writer.step(slot):
+                label = slots.label(slot)
+                self.statistics.count_clamped(label, self._writer.planes, int(row[slot]), nearest)
+                row[slot] = nearest
+                return True
         return False
 
     def _encode_intra(self, run: Run, position: int, parts: list[int], rate: Fraction) -> None:
         """Encode the frame at a position of a run as an I plane with these parts."""
-        row = run.rows[position]
+        row = self._intra_row(run, run.rows[position])
         first = self._writer.planes == 0
         if first:
             self._writer.begin_object()
@@ -246,22 +299,24 @@ class Encoder:
             skip=int(run.skips[position]),
             start_code=self.options.start_codes and not first,
         )
-        self._count_clamped(self._writer.intra(plane, row, clamp=True))
+        frame = self._writer.planes
+        for slot in self._writer.intra(plane, row, clamp=True):
+            label, sent = slots.label(slot), self._writer.last(slot)
+            self.statistics.count_clamped(label, frame, int(row[slot]), sent)
         self.statistics.intra_planes += 1
         self._resumable = set(parts) | (set() if self.options.start_codes else self._resumable)
         self._last_intra = int(run.index[position])
 
-    def _count_clamped(self, clamped: list[int]) -> None:
-        """Count values of these slots as clamped."""
-        self.statistics.clamped_parameters.update(map(slots.label, clamped))
+    def _ranges_of(self, part: int) -> Ranges:
+        """Return the ranges of a part; they start from the standard's tables."""
+        if part not in self._ranges:
+            self._ranges[part] = Ranges(part, self.options)
+            self._ranges[part].start_from_tables()
+        return self._ranges[part]
 
     def _part_settings(self, run: Run, part: int, row: Int32) -> PartSettings:
         """Return settings for an I plane, with ranges that hold its values; RangeError if none can."""
-        options, mask = self.options, run.masks[part]
-        if part not in self._ranges:
-            self._ranges[part] = Ranges(part, options)
-            self._ranges[part].start_from_tables()
-        ranges = self._ranges[part]
+        options, mask, ranges = self.options, run.masks[part], self._ranges_of(part)
         ranges.widen_for_intra(mask, row, self._writer.planes)
         in_force = self._writer.settings_in_force(part)
         new_mask = in_force is None or not np.array_equal(in_force.mask, mask)
@@ -284,7 +339,10 @@ def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes
     """
     data, statistics = encode_with_statistics(animation, options)
     if statistics.clamped:
-        names = [f"{name} ({count})" for name, count in statistics.clamped_parameters.most_common(3)]
+        most = sorted(statistics.clamped_parameters.items(), key=lambda pair: -pair[1].count)[:3]
+        names = [
+            f"{name} ({one.count}; frame {one.frame}: {one.value} sent as {one.sent})" for name, one in most
+        ]
         more = len(statistics.clamped_parameters) - len(names)
         warnings.warn(
             f"values limited to what their ranges carry: {statistics.clamped}, of {', '.join(names)}"

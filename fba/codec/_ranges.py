@@ -7,7 +7,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Bool, Int32, Int64, UInt8
 from fba.codec._options import EncoderOptions
-from fba.codec._plane import quantiser, slots
+from fba.codec._plane import full_turns, quantiser, slots
 from fba.codec._plane.loops import quantise, quantise_change
 from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT, RangeLists
 from fba.compiled import compiled
@@ -74,13 +74,15 @@ class Ranges:
         self.codes[2:, columns] = np.minimum(self.codes[2:, columns] + missing, RANGE_CODE_MAX)
         self.changed = True
 
-    def is_widest(self, slot: int) -> bool:
-        """Whether differences of a slot have the widest range there is."""
-        return bool((self.codes[2:, slot - self._first] == RANGE_CODE_MAX).all())
+    def lacking(self, mask: Bool, row: Int32) -> Int64:
+        """Return int64 (columns,): by how many levels an I plane with the widest ranges misses each value.
 
-    def can_carry(self, mask: Bool, row: Int32) -> bool:
-        """Whether an I plane with the widest ranges can carry the values of row (columns,) that are sent."""
-        return bool(self._fit(self._levels(mask, row)[1]).all())
+        0 for what is not sent. row: (columns,).
+        """
+        result = np.zeros(len(row), dtype=np.int64)
+        coded, levels = self._levels(mask, row)
+        result[coded] = np.maximum(np.abs(levels) - RANGE_CODE_MAX * RANGE_UNIT // self._scale, 0)
+        return result
 
     def lists(self) -> RangeLists:
         """Return a copy of all four lists."""
@@ -111,15 +113,17 @@ def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, R
         if track is None:
             continue
         step = quantiser.steps(part, options.quant(part), options.bap_steps)
+        turn = np.where(full_turns.angle_slots() & options.clamp, full_turns.FULL_TURN, 0)
         # The viseme and expression, the first two columns of a face, have fixed ranges.
         skipped, first = 2 * (part == slots.FACE_BIT), slots.BAPS.start
         if part == slots.FACE_BIT:
             step, first = step[slots.FAPS], slots.FAPS.start
+        turn = turn[first : first + len(step)]
         extremes = np.zeros((4, len(step)), dtype=np.int64)
         before = np.zeros(len(step), dtype=np.int64), np.zeros(len(step), dtype=np.bool_)
         for frames in batches(track):
             mask = np.ascontiguousarray(frames.mask[:, skipped:])
-            _extremes(np.ascontiguousarray(frames.values[:, skipped:]), mask, step, extremes, *before)
+            _extremes(np.ascontiguousarray(frames.values[:, skipped:]), mask, step, turn, extremes, *before)
         result[part] = Ranges(part, options)
         result[part].widen(np.arange(len(step)) + first, extremes)
     return result
@@ -127,15 +131,16 @@ def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, R
 
 @compiled
 def _extremes(
-    values: Int32, mask: Bool, step: Int64, extremes: Int64, last_values: Int64, sent: Bool
+    values: Int32, mask: Bool, step: Int64, turn: Int64, extremes: Int64, last_values: Int64, sent: Bool
 ) -> None:
     """Raise extremes (4, columns): largest and negated smallest levels of frames as I and as P planes.
 
+    turn: int64 (columns,), the full turn by which P planes may change a value, or 0.
     last_values: int64 (columns,), as a decoder has them before the first frame, if that before it was `sent`,
     bool (columns,). Both are set to those of the last frame.
     """
     for column in range(values.shape[1]):
-        one_step = int(step[column])
+        one_step, one_turn = int(step[column]), int(turn[column])
         last = int(last_values[column])
         following = bool(sent[column])
         for frame in range(values.shape[0]):
@@ -147,6 +152,8 @@ def _extremes(
             extremes[0, column] = max(int(extremes[0, column]), level)
             extremes[1, column] = max(int(extremes[1, column]), -level)
             if following:
+                if one_turn and abs(value - last) > one_turn // 2:  # as `full_turns.follow` does
+                    value += (last - value + one_turn // 2) // one_turn * one_turn
                 change = quantise_change(value, last, one_step)
                 extremes[2, column] = max(int(extremes[2, column]), change)
                 extremes[3, column] = max(int(extremes[3, column]), -change)

@@ -106,7 +106,8 @@ def test_what_does_not_fit_is_named_or_clamped(run: Run, tmp_path: Path) -> None
     assert not stream.exists()
     code, out, _ = run("encode", path, "-o", stream, "--clamp")
     assert code == 0
-    assert "1 values clamped" in out
+    assert "1 value clamped" in out
+    assert "  clamped: FAP 14 thrust_jaw in frame 0: 2000 sent as 1860, 140 off\n" in out
     assert fba.read(stream).face.values[:, 13].tolist() == [1860, 2100]  # type: ignore[union-attr]
 
 

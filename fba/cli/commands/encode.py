@@ -5,18 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from fba.animation import Animation
 from fba.cli import capture_report, options, step_tables
+from fba.cli.clamped_values import clamped_lines, clamped_values
 from fba.cli.command import Command, examples
 from fba.cli.inputs import EXISTING, check_clip, input_file, read_input
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, rate_text, seconds_text
 from fba.errors import FormatError
 from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.codec import ClampedParameter
 
 CAPTURE = ("spine", "ground", "plant", "origin")
 """Options that say how motion capture becomes BAPs."""
@@ -175,19 +179,31 @@ def command(
         used = {"bap_steps": table if animation.body is not None else None}
         outputs.print_json({"output": str(output), **_figures(coded, animation), **used, **report_values})
         return
-    for line in (_summary(output, coded, animation), *capture_report.report_lines(report_values)):
+    for line in (
+        _summary(output, coded, animation),
+        *clamped_lines(coded.clamped),
+        *capture_report.report_lines(report_values),
+    ):
         outputs.say(line)
     step_tables.remind(output, animation, table, coded.bap_quant)
 
 
 class _Encoded(NamedTuple):
-    """A stream, and what it took. bap_quant: the largest of any plane; 0 if BAPs are unquantised."""
+    """A stream, and what it took.
+
+    clamped: parameters with values that no plane could carry, by label. bap_quant: the largest of any plane;
+    0 if BAPs are unquantised.
+    """
 
     data: bytes
     planes: int
     intra_planes: int
-    clamped: int
+    clamped: dict[str, ClampedParameter]
     bap_quant: int
+
+    @property
+    def clamped_count(self) -> int:
+        return sum(one.count for one in self.clamped.values())
 
 
 def _encode(animation: Animation, settings: Mapping[str, Any]) -> _Encoded:
@@ -196,7 +212,11 @@ def _encode(animation: Animation, settings: Mapping[str, Any]) -> _Encoded:
 
     data, statistics = encode_with_statistics(animation, EncoderOptions(**settings))
     return _Encoded(
-        data, statistics.planes, statistics.intra_planes, statistics.clamped, settings["bap_quant"]
+        data,
+        statistics.planes,
+        statistics.intra_planes,
+        statistics.clamped_parameters,
+        settings["bap_quant"],
     )
 
 
@@ -209,7 +229,7 @@ def _encode_as_epf(epf: Path, animation: Animation, bap_steps: str, limits: Limi
         planes = read_epf(file, limits=limits)
     data = encode_planes(animation, planes, bap_steps=bap_steps)
     quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
-    return _Encoded(data, len(planes), sum(plane.intra for plane in planes), 0, quant)
+    return _Encoded(data, len(planes), sum(plane.intra for plane in planes), {}, quant)
 
 
 def _refuse_beside_epf() -> None:
@@ -246,7 +266,8 @@ def _figures(coded: _Encoded, animation: Animation) -> dict[str, Any]:
         "rate": str(animation.rate),
         "duration": float(animation.duration),
         "bits_per_second": round(_bits_per_second(coded, animation), 3),
-        "clamped": coded.clamped,
+        "clamped": coded.clamped_count,
+        "clamped_parameters": clamped_values(coded.clamped),
     }
 
 
@@ -257,7 +278,8 @@ def _summary(output: Path, coded: _Encoded, animation: Animation) -> str:
         f"{_bits_per_second(coded, animation) / 1000:.2f} kbit/s, "
         f"{coded.intra_planes} I plane{'s' if coded.intra_planes != 1 else ''}"
     )
-    return f"{text}; {coded.clamped} values clamped" if coded.clamped else text
+    count = coded.clamped_count
+    return f"{text}; {count} value{'s' if count != 1 else ''} clamped" if count else text
 
 
 def _is_capture(path: Path, format: str | None) -> bool:

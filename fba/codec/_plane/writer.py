@@ -62,6 +62,14 @@ class PlaneWriter:
         """Return the settings of the last I plane with this part, or None."""
         return self._settings.get(part)
 
+    def last(self, slot: int) -> int:
+        """Return the value of a slot that a decoder has after the last plane."""
+        return int(self.models.last[slot])
+
+    def step(self, slot: int) -> int:
+        """Return the quantiser step of a slot."""
+        return int(self.models.step[slot])
+
     def nearest(self, slot: int, level: int) -> int:
         """Return the value closest to a difference of this level that a P plane can carry in a slot."""
         models = self.models

@@ -1,0 +1,51 @@
+"""Angles that planes cannot carry as they are, but can a full turn away: the pose is the same.
+
+An angle that goes on from pi to -pi changes by a full turn, more than a P plane carries; an angle beyond pi
+is more than an I plane carries. The angles of the body's joints and of its root may be written either way.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from fba.arrays import Bool, Int32
+from fba.codec._plane import slots
+from fba.parameters import baps
+
+FULL_TURN = 628319
+"""2 pi in 1e-5 rad, rounded: so every turn shifts an angle by less than 1e-5 rad."""
+_LARGEST = 2**31 - 1
+
+
+@cache
+def angle_slots() -> Bool:
+    """Return bool (SLOTS,): True for what turns a joint or the root of the body."""
+    result = np.zeros(slots.SLOTS, dtype=np.bool_)
+    result[slots.BAPS] = [bap.unit == "1e-5 rad" for bap in baps()]
+    result.flags.writeable = False
+    return result
+
+
+def follow(column: Int32, last: int) -> bool:
+    """Turn angles (T,) in place so that they go on from the angle `last`, each the short way.
+
+    Return whether that changed the first. An angle that would not fit 32 bits stays as it is.
+    """
+    angles = column.astype(np.int64)
+    changes = np.diff(angles, prepend=last)
+    turns = np.cumsum(-np.rint(changes / FULL_TURN)).astype(np.int64)
+    turned = angles + turns * FULL_TURN
+    column[:] = np.where(np.abs(turned) <= _LARGEST, turned, angles)
+    return bool(column[0] != angles[0])
+
+
+def within_half_turn(row: Int32, misfits: Bool) -> Int32:
+    """Return a row (columns,) with the angles among misfits, bool (columns,), brought within +-pi."""
+    angles = misfits & angle_slots()[: len(row)]
+    if not angles.any():
+        return row
+    result = row.astype(np.int64)
+    result[angles] -= np.rint(result[angles] / FULL_TURN).astype(np.int64) * FULL_TURN
+    return result.astype(np.int32)
