@@ -86,7 +86,7 @@ class Animation:
     name: str = ""
 
     def __post_init__(self) -> None:
-        rate = Fraction(self.rate)
+        rate = self.rate if isinstance(self.rate, Fraction) else Fraction(self.rate)
         if rate <= 0:
             raise ValueError(f"Animation: the frame rate must be positive, not {rate}")
         index = integers(self.index, np.int64, "Animation: index")

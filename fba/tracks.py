@@ -290,17 +290,16 @@ def _check_fields(fields: object, count: int, names: tuple[str, ...], what: str,
 def integers(values: object, dtype: type[np.signedinteger], what: str) -> npt.NDArray[np.signedinteger]:
     """Return an array of this dtype that no caller can change. ValueError if that would lose information."""
     array = np.asarray(values)
+    if array.dtype == dtype:
+        return array.copy() if array.flags.writeable else array
     if array.size == 0 and array.dtype == np.float64:
         array = array.astype(dtype)
     if not np.issubdtype(array.dtype, np.integer):
         raise ValueError(f"{what} must be integers, not {array.dtype}")
-    if array.dtype != dtype:
-        info = np.iinfo(dtype)
-        if array.size and (int(array.min()) < info.min or int(array.max()) > info.max):
-            raise ValueError(f"{what} must fit {info.dtype}: found {array.min()}..{array.max()}")
-    if array.dtype != dtype or array.flags.writeable:
-        array = array.astype(dtype, copy=True)
-    return array
+    info = np.iinfo(dtype)
+    if array.size and (int(array.min()) < info.min or int(array.max()) > info.max):
+        raise ValueError(f"{what} must fit {info.dtype}: found {array.min()}..{array.max()}")
+    return array.astype(dtype)
 
 
 def freeze(instance: object, **fields: object) -> None:

@@ -51,7 +51,9 @@ class StreamClock:
         """Seconds at which the next plane is shown."""
         if self.rate is None:
             return self._anchor
-        return self._anchor + Fraction(self.index - self._anchor_index) / self.rate
+        frames = self.index - self._anchor_index
+        passed = Fraction(frames * self.rate.denominator, self.rate.numerator)
+        return self._anchor + passed if self._anchor else passed
 
     def begin_intra(
         self, frame_rate: FrameRate | None, time_code: TimeCode | None, *, repair: bool = False
@@ -133,10 +135,9 @@ class StreamClock:
 
     def advance(self, skips: Int64) -> Int64:
         """Return the indices of planes with these skips, int64 (T,), and advance the clock past them."""
-        steps = np.cumsum(skips + 1)
-        index = self.index + np.concatenate([[0], steps[:-1]])
-        self.index += int(steps[-1])
-        return index
+        following = self.index + np.cumsum(skips + 1)
+        self.index = int(following[-1])
+        return following - skips - 1
 
 
 def nearest_frame(seconds: int, rate: Fraction) -> int:

@@ -260,10 +260,20 @@ class Decoder:
                     plane=self.planes,
                     bit=8 * buffer.offset + end,
                 ) from None
-            waiting = buffer.length - (self._bit >> 3)
-            self._retry_at = buffer.length + (waiting // 4 if waiting > _LARGE_PLANE else 0)
+            self._await_bytes()
             return None
-        return iter([self._block(planes)] if planes is not None else [])
+        if planes is None:
+            return iter(())
+        block = self._block(planes)
+        if not planes.complete:
+            self._await_bytes()
+        return iter((block,))
+
+    def _await_bytes(self) -> None:
+        """Do not try the next plane again before more bytes of it come."""
+        length = self._buffer.length
+        waiting = length - (self._bit >> 3)
+        self._retry_at = length + (waiting // 4 if waiting > _LARGE_PLANE else 1)
 
     def _resynchronise(self, final: bool) -> Iterator[Block] | None:
         """Look, after damage, for the next start code of an object, or of a plane that is an I plane."""

@@ -114,7 +114,7 @@ class Encoder:
             raise ValueError(
                 f"frame index {animation.index[0]} comes after {pending.index[0]}; they must increase"
             )
-        self._pending = animation[-1:]
+        self._pending = animation if len(animation) == 1 else animation[-1:]
         if pending is not None:
             self._encode(pending, int(animation.index[0]))
         if len(animation) > 1:
@@ -140,7 +140,8 @@ class Encoder:
             self._origin = 0 if self._time_code is not None else first
         for run in find_runs(frames, following, self.options.unsent):
             self._check_skips(run.skips)
-            self._clip_amounts(run.rows)
+            if slots.FACE_BIT in run.masks and run.masks[slots.FACE_BIT][:2].any():
+                self._clip_amounts(run.rows)
             self._encode_run(run, frames.rate)
         self.statistics.planes = self._writer.planes
 

@@ -39,7 +39,7 @@ class Run:
 def find_runs(frames: Animation, following: int, unsent: str) -> Iterator[Run]:
     """Yield the runs of frames, in order. following: index of the frame after them."""
     rows = slots.track_rows(frames.face, frames.body)
-    skips = np.diff(frames.index, append=following) - 1
+    skips = np.concatenate([frames.index[1:], [following]]) - frames.index - 1
     tracks = {
         part: track
         for part, track in ((slots.FACE_BIT, frames.face), (slots.BODY_BIT, frames.body))
@@ -49,12 +49,20 @@ def find_runs(frames: Animation, following: int, unsent: str) -> Iterator[Run]:
     arrays = [track.mask for track in tracks.values()]
     if interpolated is not None:
         arrays.append(interpolated)
-    changes = np.logical_or.reduce([(array[1:] != array[:-1]).any(axis=1) for array in arrays])
-    for start, stop in pairwise([0, *(np.flatnonzero(changes) + 1).tolist(), len(frames)]):
+    for start, stop in pairwise([0, *_changes(arrays), len(frames)]):
         masks = {part: track.mask[start] for part, track in tracks.items()}
         wanted = {slots.FACE_BIT: interpolated[start]} if interpolated is not None else {}
         types = {part: mask_types(part, mask, wanted.get(part), unsent) for part, mask in masks.items()}
         yield Run(rows[start:stop], frames.index[start:stop], skips[start:stop], masks, types)
+
+
+def _changes(arrays: list[Bool]) -> list[int]:
+    """Return at which rows one of the arrays (T, columns) differs from the row before."""
+    if len(arrays[0]) == 1:
+        return []
+    changes = np.logical_or.reduce([(array[1:] != array[:-1]).any(axis=1) for array in arrays])
+    rows: list[int] = (np.flatnonzero(changes) + 1).tolist()
+    return rows
 
 
 def mask_types(part: int, mask: Bool, interpolated: Bool | None, unsent: str) -> tuple[int, ...]:

@@ -6,11 +6,11 @@ from functools import cache
 
 import numpy as np
 
-from fba.arrays import Int64
-from fba.codec._plane import quantiser, slots
-from fba.codec._plane.arithmetic import STRIDE, Counts
+from fba.arrays import Int64, UInt16
+from fba.codec._plane import loops, quantiser, slots
+from fba.codec._plane.arithmetic import STRIDE
 from fba.codec._plane.header_loops import begin_models
-from fba.codec._plane.loops import Coding
+from fba.codec._plane.loops import State
 from fba.codec.settings import RANGE_UNIT, PartSettings
 from fba.parameters import EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, baps, faps
 
@@ -28,37 +28,27 @@ class Models:
     """State that encoder and decoder must share, as arrays over the 372 slots (see `slots`).
 
     `i_minimum`, `i_size`, `minimum`, `size`: smallest level and number of symbols, for I and P planes.
-    `step`, `last`: quantiser step and last value. `usual`, `total`, `below_usual`, `added`, `tree`:
-    the adaptive models of P planes (see `arithmetic`). `lowest`, `highest`: limits of values.
-    `intra` and `predicted` bundle the arrays for the compiled loops.
+    `step`, `last`: quantiser step and last value. `lowest`, `highest`: limits of values. All are rows of
+    `state`, which also holds the adaptive models of P planes (see `arithmetic`): those of the body once one
+    comes, because they take 4 MB.
     """
 
     def __init__(self, bap_table: str = "iso") -> None:
         self.bap_table = bap_table
-        count = slots.SLOTS
         self.limits = default_limits().copy()
-        self.i_minimum = np.zeros(count, dtype=np.int64)
-        self.i_size = np.ones(count, dtype=np.int64)
-        self.minimum = np.zeros(count, dtype=np.int64)
-        self.size = np.ones(count, dtype=np.int64)
-        self.step = np.ones(count, dtype=np.int64)
-        self.last = np.zeros(count, dtype=np.int64)
-        self.usual = np.zeros(count, dtype=np.int64)
-        self.total = np.ones(count, dtype=np.int64)
-        self.below_usual = np.zeros(count, dtype=np.int64)
-        self.added = np.zeros((count, STRIDE), dtype=np.uint16)
-        self.tree = np.zeros((count, STRIDE), dtype=np.uint16)
-        self.lowest = np.full(count, _INT32.min, dtype=np.int64)
-        self.highest = np.full(count, _INT32.max, dtype=np.int64)
+        numbers = np.zeros((loops.NUMBERS, slots.SLOTS), dtype=np.int64)
+        numbers[[loops.I_SIZE, loops.P_SIZE, loops.STEP, loops.TOTAL]] = 1
+        self.i_minimum, self.i_size = numbers[loops.I_MINIMUM], numbers[loops.I_SIZE]
+        self.minimum, self.size = numbers[loops.P_MINIMUM], numbers[loops.P_SIZE]
+        self.step, self.last = numbers[loops.STEP], numbers[loops.LAST]
+        self.lowest, self.highest = numbers[loops.LOWEST], numbers[loops.HIGHEST]
+        self.lowest[:] = _INT32.min
+        self.highest[:] = _INT32.max
         self.lowest[slots.AMOUNTS] = -2 * INTENSITY_MAX  # the quantiser may round them past 0..63
         self.highest[slots.AMOUNTS] = 2 * INTENSITY_MAX
         self.lowest[list(_SELECTS)] = 0
         self.highest[list(_SELECTS)] = _SELECT_LIMITS[list(_SELECTS)]
-
-        shared = (self.usual, self.total, self.below_usual, self.added, self.tree)
-        value = (self.step, self.lowest, self.highest, self.last)
-        self.intra = Coding(self.i_minimum, *value, Counts(self.i_size, *shared))
-        self.predicted = Coding(self.minimum, *value, Counts(self.size, *shared))
+        self.state = State(numbers, _table(slots.BAPS.start), _table(slots.BAPS.start))
 
     def begin_object(self) -> None:
         """Forget all ranges that were sent; the I planes that must come set the rest."""
@@ -67,6 +57,8 @@ class Models:
     def begin_intra(self, part: int, settings: PartSettings) -> None:
         """Apply the settings of an I plane to a part: set ranges and steps, and reset the models."""
         columns = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
+        if len(self.state.added) < columns.stop:
+            self._make_room_for_body()
         coded = settings.mask[2:] if part == slots.FACE_BIT else settings.mask
         for limits, codes in zip(self.limits, settings.ranges, strict=True):
             if codes is not None:
@@ -79,7 +71,13 @@ class Models:
         high_level[slots.AMOUNTS] = (
             (INTENSITY_MAX + settings.quant // 2) // scale if settings.quant else INTENSITY_MAX
         )
-        begin_models((span.start, span.stop), scale, self.limits, high_level, self.intra, self.predicted)
+        begin_models((span.start, span.stop), scale, self.limits, high_level, self.state)
+
+    def _make_room_for_body(self) -> None:
+        """Add the models of the BAPs to those of the FAPs."""
+        face, self.state = self.state, State(self.state.numbers, _table(slots.SLOTS), _table(slots.SLOTS))
+        self.state.added[: len(face.added)] = face.added
+        self.state.tree[: len(face.tree)] = face.tree
 
     def undefined(self, settings: PartSettings, part: int) -> int | None:
         """Return a slot that the settings code without a range having been sent for it, or None."""
@@ -87,6 +85,11 @@ class Models:
             return None
         missing = np.flatnonzero((self.limits[:, slots.BAPS] == UNDEFINED).any(axis=0) & settings.mask)
         return int(missing[0]) + slots.BAPS.start if len(missing) else None
+
+
+def _table(count: int) -> UInt16:
+    """Return zeros, uint16 (count, STRIDE), for the models of so many slots."""
+    return np.zeros((count, STRIDE), dtype=np.uint16)
 
 
 @cache

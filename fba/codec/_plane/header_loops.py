@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Bool, Int64, UInt8
 from fba.codec._plane import slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
-from fba.codec._plane.loops import Coding
+from fba.codec._plane.loops import State, coding_of
 from fba.compiled import compiled, inlined
 from fba.parameters import BAP_COUNT, FAP_COUNT, bap_groups, fap_groups
 
@@ -162,14 +162,14 @@ def begin_models(
     scale: int,
     limits: Int64,
     high_level: Int64,
-    intra: Coding,
-    predicted: Coding,
+    state: State,
 ) -> None:
     """Set the ranges of the slots in a span to limits divided by scale, and all counts of their models to 1.
 
     limits: int64 (4, slots), magnitudes of I max, I min, P max, P min. high_level: limits of the slots before
     the first FAP with ranges: those of visemes and expressions, which are 0..limit in I planes.
     """
+    intra, predicted = coding_of(state, False), coding_of(state, True)
     models = predicted.models
     for slot in range(span[0], span[1]):
         if models.total[slot] != models.size[slot]:  # only few models have learnt something

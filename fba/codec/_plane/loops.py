@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fba.arrays import Int32, Int64, UInt8
+from fba.arrays import Int32, Int64, UInt8, UInt16
 from fba.codec._plane import arithmetic, slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA, Counts, decode_segment, encode_segment, learn
 from fba.compiled import compiled
@@ -54,15 +54,17 @@ class Layout(NamedTuple):
 
 
 class Layouts(NamedTuple):
-    """Layouts of planes with FAPs, with BAPs, and with both: those of both are the FAPs', then the BAPs'.
+    """Layouts of planes with FAPs, with BAPs, and with both.
 
-    available: the parts, added up, that planes can carry. A layout of others is empty.
+    available: the parts, added up, that planes can carry. order, segments: of planes with both; first come
+    `face_slots` slots and `face_segments` segments of the FAPs.
     """
 
     available: int
-    face: Layout
-    body: Layout
-    both: Layout
+    order: Int64
+    segments: Int64
+    face_slots: int
+    face_segments: int
 
 
 class Coding(NamedTuple):
@@ -78,6 +80,33 @@ class Coding(NamedTuple):
     highest: Int64
     last: Int64
     models: Counts
+
+
+# Rows of `State.numbers`. Those that differ between I and P planes: smallest level, size of the alphabet.
+I_MINIMUM, I_SIZE, P_MINIMUM, P_SIZE, STEP, LOWEST, HIGHEST, LAST, USUAL, TOTAL, BELOW_USUAL = range(11)
+NUMBERS = 11
+
+
+class State(NamedTuple):
+    """All that encoder and decoder must share of the slots, in few arrays: passing an array takes a while.
+
+    numbers: int64 (NUMBERS, slots), one row for each array of `Coding` and `Counts`. added, tree: those of
+    `Counts`, for as many slots as are in use.
+    """
+
+    numbers: Int64
+    added: UInt16
+    tree: UInt16
+
+
+@compiled
+def coding_of(state: State, adaptive: bool) -> Coding:
+    """Return the arrays of a state by name. adaptive: for P planes, else for I planes."""
+    numbers = state.numbers
+    size = numbers[P_SIZE] if adaptive else numbers[I_SIZE]
+    models = Counts(size, numbers[USUAL], numbers[TOTAL], numbers[BELOW_USUAL], state.added, state.tree)
+    minimum = numbers[P_MINIMUM] if adaptive else numbers[I_MINIMUM]
+    return Coding(minimum, numbers[STEP], numbers[LOWEST], numbers[HIGHEST], numbers[LAST], models)
 
 
 @compiled
@@ -260,63 +289,89 @@ def decode_values(
 
 
 @compiled
+def decode_intra(
+    data: UInt8, bit: int, end: int, layout: Layout, state: State, values: Int64, flags: Int64
+) -> tuple[int, int]:
+    """Do the same as `decode_values` for an I plane."""
+    symbols = np.zeros(len(layout.order), np.int64)
+    return decode_values(data, bit, end, layout, coding_of(state, False), False, symbols, values, flags)
+
+
+@compiled
+def _body_layout(layouts: Layouts) -> Layout:
+    """Return the layout of planes with BAPs alone."""
+    segments = layouts.segments[layouts.face_segments :].copy()
+    for segment in range(len(segments)):
+        segments[segment, 0] -= layouts.face_slots
+        segments[segment, 1] -= layouts.face_slots
+    return Layout(layouts.order[layouts.face_slots :], segments)
+
+
+@compiled
 def decode_run(
     data: UInt8,
     bit: int,
     end: int,
     after_code: bool,
     layouts: Layouts,
-    coding: Coding,
+    state: State,
     rows: Int32,
     parts: UInt8,
     skips: Int64,
     borders: Int64,
 ) -> tuple[int, int, int, int]:
-    """Decode P planes from `bit` on until something else comes; return (planes, status, bit, place).
+    """Decode P planes from `bit` on until something else comes; return (planes, status, carried, place).
 
-    after_code: a start code ends at `bit`. Fills rows[t] (columns: the slots of layouts.both, then the flags;
-    0 where a plane lacks the part), parts[t] (fba_object_mask), skips[t], borders[t] (first bit) and
+    after_code: a start code ends at `bit`. Fills rows[t] (columns: slots of layouts.order, then the flags; 0
+    where a plane lacks the part), parts[t] (fba_object_mask), skips[t], borders[t] (first bit) and
     borders[t + 1].
 
-    planes: how many were decoded. status: OK if rows are full, else why the run ended. bit: after the last
-    complete plane. place: the bit, or slot, at which the next plane failed. A plane that fails does not
-    change models and `last`.
+    planes: how many were decoded. status: OK if rows are full, else why the run ended. carried: the parts,
+    added up, that planes carry. place: the bit, or slot, at which the next plane failed. A plane that fails
+    does not change models and `last`.
     """
-    width = len(layouts.both.order)
+    coding = coding_of(state, True)
+    both = Layout(layouts.order, layouts.segments)
+    face = Layout(layouts.order[: layouts.face_slots], layouts.segments[: layouts.face_segments])
+    body = _body_layout(layouts)
+    width = len(both.order)
     symbols = np.zeros(width, np.int64)
     values = np.zeros(width, np.int64)
     flags = np.zeros(3, np.int64)
     count = 0
+    carried = 0
     borders[0] = bit
     while count < len(rows):
         code, _ = find_start_code(data, bit, end, after_code and count == 0)
         if code != NO_START_CODE:
-            return count, OUT_OF_DATA if code == UNDECIDED else START_CODE, bit, bit
-        if bit + 4 > end:
-            return count, OUT_OF_DATA, bit, end
+            return count, OUT_OF_DATA if code == UNDECIDED else START_CODE, carried, bit
+        if bit + 3 > end:
+            return count, OUT_OF_DATA, carried, end
         if read_bit(data, bit):
-            return count, INTRA, bit, bit
+            return count, INTRA, carried, bit
         mask = 2 * read_bit(data, bit + 1) + read_bit(data, bit + 2)
         if mask == 0:
-            return count, BAD_MASK, bit, bit + 1
+            return count, BAD_MASK, carried, bit + 1
         if mask & layouts.available != mask:
-            return count, MISSING_PART, bit, bit
-        layout = layouts.both
+            return count, MISSING_PART, carried, bit
+        if bit + 4 > end:
+            return count, OUT_OF_DATA, carried, end
+        layout = both
         first = 0
         if mask == slots.FACE_BIT:
-            layout = layouts.face
+            layout = face
         elif mask == slots.BODY_BIT:
-            layout = layouts.body
-            first = len(layouts.face.order)
+            layout = body
+            first = layouts.face_slots
         place = bit + 4
         skip = 0
         if read_bit(data, bit + 3):
             status, skip, place = read_skip(data, place, end)
             if status != OK:
-                return count, status, bit, place
+                return count, status, carried, place
         status, place = decode_values(data, place, end, layout, coding, True, symbols, values, flags)
         if status != OK:
-            return count, status, bit, place
+            return count, status, carried, place
         order = layout.order
         learn(order, symbols, coding.models)
         if len(order) < width:
@@ -327,11 +382,12 @@ def decode_run(
         for flag in range(rows.shape[1] - width):
             rows[count, width + flag] = flags[flag]
         parts[count] = mask
+        carried |= mask
         skips[count] = skip
         bit = place
         count += 1
         borders[count] = bit
-    return count, OK, bit, bit
+    return count, OK, carried, bit
 
 
 @compiled
@@ -393,6 +449,12 @@ def encode_values(
 
 
 @compiled
+def encode_intra(data: UInt8, bit: int, layout: Layout, state: State, symbols: Int64, flags: Int64) -> int:
+    """Do the same as `encode_values` for an I plane."""
+    return encode_values(data, bit, layout, coding_of(state, False), False, symbols, flags)
+
+
+@compiled
 def _write_nibble(data: UInt8, bit: int, value: int) -> int:
     """Write 4 bits; return the bit after them."""
     for shift in range(3, -1, -1):
@@ -436,7 +498,7 @@ def encode_run(
     before: int,
     object_mask: int,
     layout: Layout,
-    coding: Coding,
+    state: State,
     rows: Int32,
     skips: Int64,
 ) -> tuple[int, int, int, int, int]:
@@ -447,6 +509,7 @@ def encode_run(
     `guard_plane`. OUT_OF_RANGE: the difference of `slot` in the next plane does not fit its range; nothing of
     that plane was written. OUT_OF_DATA: `data` has no room for another plane.
     """
+    coding = coding_of(state, True)
     order, minimum, step, last = layout.order, coding.minimum, coding.step, coding.last
     symbols = np.zeros(len(order), np.int64)
     flags = np.zeros(3, np.int64)

@@ -25,7 +25,8 @@ class Planes:
     """An I plane, or P planes behind one; see `fba.codec.Block` for rows, columns, parts and settings.
 
     borders: int64 (T + 1,), first bit of each plane, and the bit after the last. skips: int64 (T,). doubtful:
-    they depend on ranges that may have been replaced in a lost plane.
+    they depend on ranges that may have been replaced in a lost plane. complete: False if it is known that the
+    plane behind them needs more data.
     """
 
     rows: Int32
@@ -35,6 +36,7 @@ class Planes:
     skips: Int64
     settings: PlaneSettings
     doubtful: bool = False
+    complete: bool = True
 
 
 @dataclass(frozen=True)
@@ -49,13 +51,9 @@ class _Run:
     def prepare(cls, settings: dict[int, PartSettings]) -> _Run:
         """Return layouts and room for planes with these settings of each part."""
         masks = [settings[part].mask if part in settings else None for part, _ in _PARTS]
-        layouts = Layouts(
-            sum(settings),
-            Layout(*slots.coding_order(masks[0], None)),
-            Layout(*slots.coding_order(None, masks[1])),
-            Layout(*slots.coding_order(*masks)),
-        )
-        columns = _columns(layouts.both.order, masks[0])
+        face = slots.coding_order(masks[0], None)
+        layouts = Layouts(sum(settings), *slots.coding_order(*masks), *map(len, face))
+        columns = _columns(layouts.order, masks[0])
         return cls(layouts, columns, np.zeros((_RUN, len(columns)), dtype=np.int32))
 
 
@@ -132,10 +130,11 @@ class PlaneReader:
         BitstreamError and UnsupportedError for the first plane. After an error, only state that the next I
         plane sets has changed.
         """
-        reader = BitReader(data, bit, end)
-        if reader.read(1):
-            return self._read_intra(reader, after_code)
-        return self._read_predicted(reader, after_code)
+        if bit >= end:
+            raise OutOfDataError
+        if data[bit >> 3] & (128 >> (bit & 7)):
+            return self._read_intra(BitReader(data, bit + 1, end), after_code)
+        return self._read_predicted(data, bit, end, after_code)
 
     def _read_intra(self, reader: BitReader, after_code: bool) -> Planes:
         """Read an I plane, whose first bit has been read; one that was incomplete, from where that ended."""
@@ -206,11 +205,9 @@ class PlaneReader:
         """Return slots (K,) and values (K,) of a part in an I plane; also write flags (3,)."""
         face = part == slots.FACE_BIT
         layout = Layout(*slots.coding_order(settings.mask if face else None, None if face else settings.mask))
-        symbols, values = np.zeros_like(layout.order), np.zeros_like(layout.order)
-        own_flags = np.zeros(3, dtype=np.int64)
-        coding = self._models.intra
-        status, place = loops.decode_values(
-            reader.data, reader.bit, reader.end, layout, coding, False, symbols, values, own_flags
+        values, own_flags = np.zeros_like(layout.order), np.zeros(3, dtype=np.int64)
+        status, place = loops.decode_intra(
+            reader.data, reader.bit, reader.end, layout, self._models.state, values, own_flags
         )
         self._check(status, place, reader.bit)
         reader.bit = place
@@ -218,28 +215,25 @@ class PlaneReader:
             flags[:] = own_flags
         return layout.order, values
 
-    def _read_predicted(self, reader: BitReader, after_code: bool) -> Planes | None:
+    def _read_predicted(self, data: UInt8, bit: int, end: int, after_code: bool) -> Planes | None:
         """Read a run of P planes; None if the first is incomplete."""
-        start = reader.bit - 1
-        mask = _read_object_mask(reader)
-        for part, name in _PARTS:
-            if mask & part and part not in self._settings:
-                raise BitstreamError(
-                    f"a P plane carries {name}, but no I plane with {name} came before it in this object",
-                    bit=start,
-                )
         if self._run is None:
             self._run = _Run.prepare(self._settings)
         run = self._run
-        count, status, _, place = loops.decode_run(
-            reader.data, start, reader.end, after_code, run.layouts, self._models.predicted,
+        count, status, carried, place = loops.decode_run(
+            data, bit, end, after_code, run.layouts, self._models.state,
             run.rows, self._parts, self._skips, self._borders,
         )  # fmt: skip
         if count == 0:
-            self._check(status, place, start)
+            if status == loops.MISSING_PART:
+                mask = BitReader(data, bit + 1, end).read(2)
+                name = next(name for part, name in _PARTS if mask & part and part not in self._settings)
+                raise BitstreamError(
+                    f"a P plane carries {name}, but no I plane with {name} came before it in this object",
+                    bit=bit,
+                )
+            self._check(status, place, bit)
             return None
-        parts = self._parts[:count].copy()
-        carried = int(np.bitwise_or.reduce(parts))
         settings = PlaneSettings(
             intra=False,
             face=self._settings[slots.FACE_BIT] if carried & slots.FACE_BIT else None,
@@ -249,11 +243,12 @@ class PlaneReader:
         return Planes(
             run.rows[:count].copy(),
             run.columns,
-            parts,
+            self._parts[:count].copy(),
             self._borders[: count + 1].copy(),
             self._skips[:count].copy(),
             settings,
             bool(carried & self._doubtful_ranges),
+            status != OUT_OF_DATA,
         )
 
     def _check(self, status: int, place: int, start: int) -> None:

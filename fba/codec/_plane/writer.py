@@ -122,9 +122,8 @@ class PlaneWriter:
             syntax.write_part(writer, part, part_settings)
             writer.reserve(17 * len(order) + _SEGMENT_BITS * len(segments))
             symbols = levels - models.i_minimum[order]
-            writer.bit = loops.encode_values(
-                writer.data, writer.bit, Layout(order, segments), models.intra, False, symbols, flags
-            )
+            layout = Layout(order, segments)
+            writer.bit = loops.encode_intra(writer.data, writer.bit, layout, models.state, symbols, flags)
             models.last[order] = levels * models.step[order]
             self._settings[part] = part_settings
         if self._before == loops.AFTER_CODE:
@@ -158,7 +157,7 @@ class PlaneWriter:
                 self._before,
                 mask,
                 layout,
-                models.predicted,
+                models.state,
                 rows[done:],
                 skips[done:],
             )
