@@ -33,6 +33,7 @@ fba.mesh
 fba.gltf
 fba.codec.settings
 fba.codec._plane
+fba.codec._stream
 fba.codec
 fba.face.interpolation
 fba.face

@@ -33,7 +33,7 @@ class Mutant(NamedTuple):
     tests: str
 
 
-CLOCK = "fba/codec/_clock.py"
+CLOCK = "fba/codec/_stream/clock.py"
 TIME_BASE = "fba/codec/_time_base.py"
 FULL_TURNS = "fba/codec/_plane/full_turns.py"
 RANGES = "fba/codec/_ranges.py"
@@ -70,8 +70,8 @@ PLAUSIBILITY = "fba/body/plausibility.py"
 GAIT_CURVES = "fba/body/gait/_signals.py"
 GAIT_DETECTION = "fba/body/gait/_detection.py"
 GAIT_MEASURE = "fba/body/gait/_measure.py"
-DAMAGE = "fba/codec/_damage.py"
-RESTARTS = "fba/codec/_restart_points.py"
+DAMAGE = "fba/codec/_stream/damage.py"
+RESTARTS = "fba/codec/_stream/restart_points.py"
 VALUES = "conformance/fba_conformance/values.py"
 JUDGEMENT = "conformance/fba_conformance/suite/judgement.py"
 TESTED = "conformance/fba_conformance/suite/programs.py"

@@ -3,7 +3,6 @@
 May use: parameters and the data model.
 """
 
-from fba.codec._damage import Damage
 from fba.codec._decoder import Decoder, decode
 from fba.codec._encoder import (
     ClampedParameter,
@@ -14,6 +13,7 @@ from fba.codec._encoder import (
 )
 from fba.codec._options import EncoderOptions
 from fba.codec._script import encode_planes
+from fba.codec._stream.damage import Damage
 from fba.codec.block import Block
 from fba.codec.frame_buffer import DecodedFrames, FrameBuffer
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode

@@ -6,19 +6,15 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Literal
 
-import numpy as np
-
 from fba.animation import Animation, Frame
-from fba.codec._buffer import Buffer
-from fba.codec._clock import StreamClock
 from fba.codec._compact_buffer import CompactBuffer
-from fba.codec._damage import Damage, DamageLog
 from fba.codec._plane import loops, syntax
 from fba.codec._plane.bits import OutOfDataError
 from fba.codec._plane.reader import PlaneReader, Planes
-from fba.codec._restart_points import RestartPoints
+from fba.codec._stream.buffer import Buffer
+from fba.codec._stream.damage import Damage, DamageLog
+from fba.codec._stream.plane_times import PlaneTimes
 from fba.codec.block import Block
-from fba.codec.settings import PlaneSettings
 from fba.errors import BitstreamError, FbaError, FbaWarning, LimitError, UnsupportedError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEP_TABLES
@@ -84,12 +80,8 @@ class Decoder:
         self._closing_code: int | None = None  # last byte of the start code that ended it
         self._kind = ""  # what data without an object start code seems to be
         self._start_error: BitstreamError | None = None  # why the stream does not begin with an object
-        self._clock = StreamClock()
+        self._times = PlaneTimes(self._log if self._salvage else None)
         self._lost_from = 0
-        self._may_step_back = False  # whether frames may have lower indices than misread ones before
-        self._restarts = RestartPoints()
-        self._following = 0  # index after that of the last frame
-        self._catching_up = False  # whether the clock stepped back behind `_following`
         self._reader = PlaneReader(bap_steps)
         self._code_bit: int | None = None  # where the start code before the next plane begins
 
@@ -188,7 +180,7 @@ class Decoder:
             self._scanned = position + 4
             if code in syntax.OBJECT_CODES:
                 if self._start_error is not None and self._objects == 0:
-                    self.damage.append(Damage(self._start_error, 0, buffer.offset + position))
+                    self._log.add(self._start_error, 0, buffer.offset + position)
                 self._bit = 8 * self._scanned
                 self._scanned = 0
                 self._begin_object()
@@ -215,7 +207,7 @@ class Decoder:
         )
         self._begin_object()
         self._reader.forget_values()
-        self.damage.append(Damage(error, 0, self._buffer.offset + position))
+        self._log.add(error, 0, self._buffer.offset + position)
         self._bit = 8 * position
         self._scanned = 0
         self._step = self._decode_planes
@@ -303,27 +295,21 @@ class Decoder:
 
     def _block(self, planes: Planes) -> Block:
         """Return planes with their times, and move on past them."""
-        settings, clock = planes.settings, self._clock
-        if settings.intra:
-            self._set_clock(settings, int(planes.borders[0]))
-        assert clock.rate is not None
+        settings, times = planes.settings, self._times
         borders = planes.borders + 8 * self._buffer.offset
+        if settings.intra:
+            bit = int(borders[0])
+            for problem in times.begin_intra(settings, self.planes, bit):
+                self._warn(f"plane {self.planes}, bit {bit}: {problem}")
         if self._salvage:
             self._log.add_planes(borders, planes.skips)
         if self._code_bit is not None:
             borders[0] = self._code_bit
-        start, index = clock.time, clock.advance(planes.skips)
-        if self._catching_up:
-            late = max(self._following - int(index[0]), 0)
-            self._catching_up = late > 0
-            start += late / clock.rate
-            steps = np.arange(len(index))
-            index = np.maximum(index - steps, self._following) + steps
-        self._following = int(index[-1]) + 1
+        start, index = times.advance(planes.skips)
         block = Block(
             index=index,
             start=start,
-            rate=clock.rate,
+            rate=times.rate,
             number=self.planes,
             borders=borders,
             skips=planes.skips,
@@ -338,45 +324,11 @@ class Decoder:
         self._code_bit = None
         return block
 
-    def _set_clock(self, settings: PlaneSettings, bit: int) -> None:
-        """Set the clock to an I plane that begins at a bit of the buffer; list frames lost before it."""
-        clock, log = self._clock, self._log
-        code, behind_loss = settings.time_code, log.resuming
-        lost = log.estimate() if behind_loss else None
-        if lost is not None and (code is None or not code.marker):
-            expected = self._restarts.nearest(clock.index + lost[0])
-            if expected is not None and expected >= clock.index:
-                lost = expected - clock.index, lost[1]
-                clock.skip_lost(lost[0])
-            else:
-                # In a stream with time codes, the next one sets the clock; until then it must not be ahead.
-                clock.skip_lost(max(lost[0] - lost[1], 0) if clock.agreements else lost[0])
-        agreed, rate = clock.agreements, clock.rate
-        for problem in clock.begin_intra(settings.frame_rate, code, repair=self._salvage):
-            self._warn(f"plane {self.planes}, bit {self._absolute(bit)}: {problem}")
-        jump = clock.jump or 0
-        if settings.start_code:
-            if clock.rate != rate:
-                self._restarts.forget()
-            self._restarts.add(clock.index, behind_loss=behind_loss)
-        if clock.rate != rate:
-            self._catching_up = False  # indices of another rate
-        elif jump < 0:
-            self._catching_up = not self._may_step_back
-        if log.resuming:
-            log.resume(*((max(jump, 0), 0) if clock.jump is not None else lost or (None, None)))
-        elif self._salvage and (jump < 0 or (agreed and jump)):
-            self._report_jump(settings, bit, jump)
-        if clock.refused:
-            bit = self._absolute(bit)
-            error = BitstreamError(clock.refused, plane=self.planes, bit=bit)
-            self.damage.append(Damage(error, bit >> 3, bit >> 3))
-
     def _begin_object(self) -> None:
         """Reset the reader for a new object."""
         self._reader.begin_object()
         self._objects += 1
-        self._clock.begin_object()
+        self._times.begin_object()
         self.ended = False
         self._closing_code = None
         self._code_bit = None
@@ -447,21 +399,7 @@ class Decoder:
         buffer = self._buffer
         length = buffer.offset + buffer.length
         error = BitstreamError(_NO_END, plane=self.planes - 1, bit=8 * length)
-        self.damage.append(Damage(error, min(self._absolute(self._bit) + 7 >> 3, length), length))
-
-    def _report_jump(self, settings: PlaneSettings, bit: int, jump: int) -> None:
-        """List as damage that a time code contradicts the count of planes, with which codes agreed before."""
-        frames = f"{abs(jump)} frame{'s' if abs(jump) != 1 else ''}"
-        found = (
-            f"{frames} are missing before this plane"
-            if jump > 0
-            else f"the planes before it are {frames} late"
-        )
-        bit = self._absolute(bit)
-        error = BitstreamError(
-            f"the time code {settings.time_code} says that {found}", plane=self.planes, bit=bit
-        )
-        self.damage.append(Damage(error, bit >> 3, bit >> 3, max(jump, 0), 0))
+        self._log.add(error, min(self._absolute(self._bit) + 7 >> 3, length), length)
 
     def _raise_pending(self) -> None:
         """Raise the error that an earlier call left."""
@@ -489,7 +427,7 @@ def decode(
     """
     view = memoryview(data)
     decoder = Decoder(bap_steps=bap_steps, on_error=on_error, limits=limits)
-    decoder._may_step_back = True
+    decoder._times.may_step_back = True
     frames = CompactBuffer(limits, len(view))
     for start in range(0, len(view), _CHUNK):
         for block in decoder.push_blocks(view[start : start + _CHUNK]):

@@ -6,7 +6,7 @@ import math
 import warnings
 from fractions import Fraction
 
-from fba.codec._clock import nearest_frame
+from fba.codec._stream.clock import nearest_frame
 from fba.codec.settings import FrameRate, TimeCode
 from fba.errors import FbaWarning, RangeError, Remedy
 

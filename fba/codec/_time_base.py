@@ -9,8 +9,8 @@ from fractions import Fraction
 import numpy as np
 
 from fba.arrays import Int64
-from fba.codec._clock import DEFAULT_RATE
 from fba.codec._rows import Rows
+from fba.codec._stream.clock import DEFAULT_RATE
 
 COMMON_RATE_MAX = 1_000_000
 """Highest rate, in frames per second, that is chosen to make all times exact."""

@@ -81,10 +81,14 @@ class Block:
         """Yield the frames one by one."""
         whole = self.settings
         parts, skips, borders = self.parts.tolist(), self.skips.tolist(), self.borders.tolist()
+        several = len(parts) > 1
         for position, index in enumerate(self.index.tolist()):
             frame = slice(position, position + 1)
             face = self.face if parts[position] & slots.FACE_BIT else None
             body = self.body if parts[position] & slots.BODY_BIT else None
+            if several:
+                face = face[frame] if face is not None else None
+                body = body[frame] if body is not None else None
             settings = PlaneSettings(
                 intra=whole.intra,
                 face_frame=None if face is None else index,
@@ -100,8 +104,8 @@ class Block:
             yield Frame(
                 index,
                 self.rate,
-                face[frame] if face is not None else None,
-                body[frame] if body is not None else None,
+                face,
+                body,
                 PlaneInfo(self.number + position, bit, after - bit, settings, self.doubtful),
             )
 

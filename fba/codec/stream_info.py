@@ -11,9 +11,9 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Int64
-from fba.codec._damage import Damage
 from fba.codec._decoder import Decoder
 from fba.codec._plane import header_loops
+from fba.codec._stream.damage import Damage
 from fba.codec.block import Block
 from fba.codec.settings import PartSettings
 from fba.errors import BitstreamError

@@ -12,8 +12,8 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.codec._compact_buffer import CompactBuffer
-from fba.codec._damage import Damage
 from fba.codec._decoder import Decoder
+from fba.codec._stream.damage import Damage
 from fba.errors import BitstreamError, FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS

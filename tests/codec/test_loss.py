@@ -13,7 +13,7 @@ import pytest
 from codec_streams import END, OBJECT, PLANE, content, decoded, jaw_intra, jaw_predicted, packed
 from fba import Animation, Decoder, Encoder, EncoderOptions, FbaWarning, decode, encode
 from fba.codec import Damage, RangeLists, encode_planes
-from fba.codec._restart_points import RestartPoints
+from fba.codec._stream.restart_points import RestartPoints
 from fba_conformance import _motion as motion
 
 EVERY_SECOND = EncoderOptions(intra_period=1, start_codes=True)

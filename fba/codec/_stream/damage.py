@@ -95,6 +95,17 @@ class DamageLog:
         self._recent.clear()
         self._recent_skips.clear()
 
+    def add(
+        self, error: FbaError, start: int, stop: int | None = None, *, frames_lost: int | None = None
+    ) -> None:
+        """Add damage that planes before and behind it are not lost with. stop: `start` by default.
+
+        frames_lost: exactly how many are missing; None if nothing says so.
+        """
+        uncertainty = None if frames_lost is None else 0
+        stop = start if stop is None else stop
+        self.damage.append(Damage(error, start, stop, frames_lost, uncertainty))
+
     def begin(self, error: FbaError, byte: int, planes: int) -> None:
         """Add damage in the plane at a byte. planes: their number before it."""
         if self.resuming:
