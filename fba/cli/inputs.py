@@ -196,6 +196,6 @@ def read_body(path: Path | None) -> BodyModel | None:
     """Return the body of `--body`, or None for the built-in one."""
     if path is None:
         return None
-    from fba.body.model import BodyModel
+    from fba.formats.gltf.bodies import read_body as read
 
-    return BodyModel.load(path)
+    return read(path)

@@ -82,8 +82,9 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]
         click.option(
             "--body",
             type=click.Path(exists=True, dir_okay=False, path_type=Path),
-            metavar="FILE.glb",
-            help="The body. Default: the built-in person.",
+            metavar="FILE",
+            help="The body: one of this project, or any skinned person (.glb, .vrm) with its own head. "
+            "Default: the built-in person.",
         ),
         click.option("--arrange", type=click.Choice(["side", "over"]), help=arrange),
         options.fps_option(fps),

@@ -79,6 +79,24 @@ def find_bind_pose(
     return BindPose(turns, positions, parents)
 
 
+def bind_matrices(gltf: Gltf, *, skins: bool = True) -> dict[int, Float64]:
+    """Return the matrix (4, 4) to the scene of each joint of a skin, as `find_bind_pose` places it.
+
+    skins: False for the pose of the nodes themselves.
+    """
+    bound: dict[int, Float64] = {}
+    for skin in gltf.skins:
+        for joint, matrix in zip(skin.joints, skin.inverse_bind, strict=True):
+            if joint not in bound:
+                bound[joint] = _invert(gltf, joint, np.asarray(matrix, dtype=np.float64))
+    if not skins or (bound and np.ptp([matrix[:3, 3] for matrix in bound.values()], axis=0).max() <= 0):
+        return {joint: gltf.nodes[joint].world for joint in bound}
+    turn, size = _to_scene(gltf, bound)
+    scene = np.eye(4)
+    scene[:3, :3] = size * turn
+    return {joint: scene @ matrix for joint, matrix in bound.items()}
+
+
 class Sampler:
     """Local transforms of nodes at given times (T,), seconds."""
 

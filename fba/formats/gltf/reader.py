@@ -16,20 +16,17 @@ import numpy as np
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.body.skeleton import ROOT
-from fba.capture import SkeletonMotion, from_skeleton, matching
+from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.skeleton import MOST_FRAMES, check_memory
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_files import find_note, read_note
-from fba.formats.gltf._pose import BindPose, Sampler, find_bind_pose, key_times
+from fba.formats.gltf._pose import BindPose, Sampler, key_times
+from fba.formats.gltf._skeletons import find_joints
 from fba.formats.gltf.clips import choose_clip
-from fba.formats.gltf.humanoid import find_humanoid
 from fba.gltf import Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.mesh.names import UniqueNames
 from fba.source import Path
 
-MAX_JOINTS = 4096
 CHUNK = 200_000
 """Joints times frames that are sampled at once."""
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
@@ -128,11 +125,8 @@ def sample_motion(
 def _sample_motion(
     gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None, limits: Limits
 ) -> SkeletonMotion:
-    humanoid = find_humanoid(gltf)
-    declared = {} if humanoid is None else humanoid.joints
-    nodes = _declared_skeleton(gltf, declared) if declared else _skeleton(gltf)
-    if len(nodes) > MAX_JOINTS:
-        raise ModelError(f"{gltf.file}: the skeleton has {len(nodes)} joints, more than {MAX_JOINTS}")
+    joints = find_joints(gltf)
+    nodes, parents, bind, used = joints.nodes, joints.parents, joints.bind, joints.used
     place = {node: number for number, node in enumerate(nodes)}
     chosen = choose_clip(gltf, clip, place)
     channels = [channel for channel in chosen.channels if channel.node in place]
@@ -150,27 +144,7 @@ def _sample_motion(
         )
     keys = sum(channel.times.nbytes + channel.values.nbytes for channel in channels)
     check_memory(limits, count, len(nodes), what, keys)
-    parents = [-1 if (p := gltf.nodes[node].parent) is None else place.get(p, -1) for node in nodes]
-    bind = find_bind_pose(gltf, nodes, parents, skins=not declared)  # a declared person rests in a T pose
-    hips = [number for number, node in enumerate(nodes) if declared.get(node) == ROOT]
-    used = _descendants(parents, hips[0] if hips else _find_root([gltf.nodes[node].name for node in nodes]))
-    row_of = {number: row for row, number in enumerate(used)}
-    unique = UniqueNames()
-    names = tuple(unique(gltf.nodes[nodes[number]].name) for number in used)
-    motion = SkeletonMotion(
-        names=names,
-        parents=np.array([row_of[parents[n]] if row else -1 for row, n in enumerate(used)]),
-        offsets=bind.offsets()[used],
-        rotations=np.zeros((0, len(used), 4)),
-        positions=np.zeros((0, 3)),
-        rate=frames,
-        name=chosen.name,
-        declared={
-            name: declared[nodes[number]]
-            for name, number in zip(names, used, strict=True)
-            if nodes[number] in declared
-        },
-    )
+    motion = replace(joints.resting(gltf), rate=frames, name=chosen.name)
     turns, root = np.empty((count, len(used), 4)), np.empty((count, 3))
     stretched = np.zeros(len(used), dtype=np.bool_)
     at_once = min(max(CHUNK // len(nodes), 1), count)
@@ -190,7 +164,7 @@ def _sample_motion(
     if stretched.any():
         _warn_of_stretching(chosen.name, [motion.names[row] for row in np.flatnonzero(stretched)])
     motion = replace(motion, rotations=turns, positions=root)
-    return _turn_round(motion) if humanoid is not None and humanoid.kind == "VRM 0" else motion
+    return _turn_round(motion) if joints.humanoid is not None and joints.humanoid.kind == "VRM 0" else motion
 
 
 def _turn_round(motion: SkeletonMotion) -> SkeletonMotion:
@@ -227,89 +201,6 @@ def _world(
             positions[:, number] = positions[:, parent] + (linear[parent] @ shift[:, :, None])[:, :, 0]
         turned[:, number] = bind.turned(number, linear[number])
     return turned, positions
-
-
-def _skeleton(gltf: Gltf) -> list[int]:
-    """Return the nodes of the skeleton, parents first, with one root.
-
-    They are the joints of skins, or else the animated nodes and their children, and all nodes above. Of
-    several skeletons, the one with most known joints; warns (FbaWarning) of the others.
-    """
-    wanted = {joint for skin in gltf.skins for joint in skin.joints}
-    if not wanted:
-        wanted = {channel.node for clip in gltf.animations for channel in clip.channels}
-        wanted |= {number for number, node in enumerate(gltf.nodes) if node.parent in wanted}
-    if not wanted:
-        raise ModelError(
-            f"{gltf.file}: has neither a skin with joints nor an animation; there is no skeleton"
-        )
-    for number in reversed(gltf.order):  # with all nodes above, so that the joints are connected
-        parent = gltf.nodes[number].parent
-        if number in wanted and parent is not None:
-            wanted.add(parent)
-    trees: dict[int, list[int]] = {}
-    root_of: dict[int, int] = {}
-    for number in gltf.order:
-        if number in wanted:
-            parent = gltf.nodes[number].parent
-            root = number if parent is None else root_of[parent]
-            root_of[number] = root
-            trees.setdefault(root, []).append(number)
-    best = max(trees.values(), key=lambda tree: (_fit(gltf, tree), len(tree)))
-    others = [gltf.nodes[root].name for root, tree in trees.items() if tree is not best]
-    if others:
-        warnings.warn(
-            f"{gltf.file}: has several skeletons; {gltf.nodes[best[0]].name!r} is read, "
-            f"the others are left out: {', '.join(others[:5])}{', ...' if len(others) > 5 else ''}",
-            FbaWarning,
-            stacklevel=5,
-        )
-    return best
-
-
-def _declared_skeleton(gltf: Gltf, declared: Mapping[int, str]) -> list[int]:
-    """Return the nodes of the bones that a file declares, and all above them, parents first.
-
-    ModelError if they are not all connected.
-    """
-    inside = set(declared)
-    for number in reversed(gltf.order):
-        parent = gltf.nodes[number].parent
-        if number in inside and parent is not None:
-            inside.add(parent)
-    nodes = [number for number in gltf.order if number in inside]
-    roots = [gltf.nodes[number].name for number in nodes if gltf.nodes[number].parent is None]
-    if len(roots) > 1:
-        raise ModelError(
-            f"{gltf.file}: the bones of the person hang on several nodes, {', '.join(roots[:5])}; "
-            "expected one tree with the hips at its top"
-        )
-    return nodes
-
-
-def _find_root(names: list[str]) -> int:
-    """Return the position of the hips, or 0. Nodes above them (an armature, a game's root) only move all."""
-    try:
-        return matching.match(names)[1]["HumanoidRoot"]
-    except ModelError:
-        return 0
-
-
-def _descendants(parents: list[int], root: int) -> list[int]:
-    """Return a joint and all below it, parents first."""
-    result = {root}
-    for number, parent in enumerate(parents):
-        if parent in result:
-            result.add(number)
-    return sorted(result)
-
-
-def _fit(gltf: Gltf, tree: list[int]) -> int:
-    """Return the number of nodes whose names are known."""
-    try:
-        return len(matching.match([gltf.nodes[number].name for number in tree])[1])
-    except ModelError:
-        return 0
 
 
 def _rate(times: Float64) -> Fraction:

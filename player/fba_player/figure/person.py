@@ -7,8 +7,8 @@ from typing import cast
 
 import numpy as np
 
-from fba.arrays import Float32, Float64
-from fba.body.head_attachment import AttachedHead, attach_head
+from fba.arrays import Bool, Float32, Float64
+from fba.body.head_attachment import AttachedHead, attach_head, skull_of
 from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
 from fba_player.figure._face_parts import detail_levels, make_shape, part_rows, with_triangles
@@ -28,24 +28,44 @@ CARRIED = ("skin", "mouth", "hair", "other")
 class Person:
     """Body and face, moved by joint matrices and FAPs; see `build_person`.
 
-    head: the face on the body. body_shapes, face_shapes: the parts that are drawn, by name. light: that on
-    the body.
+    head: the face on the body, or None for a body with a head of its own. body_shapes, face_shapes: the parts
+    that are drawn, by name. light: that on the body.
     """
 
     body: BodyModel
     figure: FaceFigure
-    head: AttachedHead
+    head: AttachedHead | None
     body_shapes: dict[str, FaceShape]
     face_shapes: dict[str, FaceShape]
     light: BodyLight
 
+    @property
+    def headroom(self) -> float:
+        """Metres from the joint that carries the head to the top of the body's own; 0 without one."""
+        rows = head_rows(self.body)
+        if self.head is not None or not rows.any():
+            return 0.0
+        skull = self.body.bind[skull_of(self.body)]
+        return float(1.1 * ((self.body.vertices[rows] - skull[:3, 3]) @ skull[:3, :3])[:, 1].max())
+
     def joints(self, faps: Float32, matrices: Float64) -> Float64:
         """Joint matrices (J, 4, 4) with the head turned on the skull base by FAPs (68,)."""
-        return self.head.matrices(matrices, self.figure.pose(faps).turn)
+        turn = self.figure.pose(faps).turn
+        return (
+            turn_own_head(self.body, matrices, turn)
+            if self.head is None
+            else self.head.matrices(matrices, turn)
+        )
 
     def frame(self, joints: Float64) -> Float64:
         """(4, 4): from the face model's frame into the world."""
-        return self.head.frame(joints)
+        if self.head is not None:
+            return self.head.frame(joints)
+        skull = skull_of(self.body)
+        place = np.eye(4)
+        place[:3, 3] = head_middle(self.body) - np.array(self.figure.subject.centre)
+        frame: Float64 = joints[skull] @ np.linalg.inv(self.body.bind[skull]) @ place
+        return frame
 
     def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
         """All parts but the eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
@@ -56,6 +76,8 @@ class Person:
             _mesh_in_world(shape, part_rows(self.body, name), positions, normals, light)
             for name, shape in self.body_shapes.items()
         ]
+        if self.head is None:
+            return meshes
         pose = self.figure.pose(faps)
         positions, normals = np.empty_like(pose.positions), np.empty_like(pose.positions)
         self.head.skin(pose.positions, joints, positions, local_normals=pose.normals, normals=normals)
@@ -66,16 +88,20 @@ class Person:
 
     def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
         """The eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
-        return self.figure.eyes(faps, self.frame(joints), turned=True)
+        return [] if self.head is None else self.figure.eyes(faps, self.frame(joints), turned=True)
 
 
 def build_person(body: BodyModel, figure: FaceFigure) -> Person:
-    """A person of a body, which must say where the pupils are, and a face, which is put there.
+    """A person of a body and a face, which is put where the body says that the pupils are.
 
     Triangles of the face under the body's clothes are left out, and so are parts of kind "other" that lie
-    wholly below the chin.
+    wholly below the chin. A body that does not say so keeps its own head, which FAPs turn.
     """
     model = figure.model
+    if body.eyes is None:
+        shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts}
+        light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
+        return Person(body, figure, None, shapes, {}, light)
     skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])
     eyes = model.points[[point_row("3.5"), point_row("3.6")]]
     head = attach_head(body, model.vertices, eyes, skull)
@@ -83,6 +109,43 @@ def build_person(body: BodyModel, figure: FaceFigure) -> Person:
     shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts if part.kind not in left_out}
     light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
     return Person(body, figure, head, shapes, _face_shapes(figure, head), light)
+
+
+def head_rows(body: BodyModel) -> Bool:
+    """Mask (V,) of the body's vertices that its skull carries more than any other joint."""
+    below = body.skeleton.descendants(skull_of(body))
+    mask: Bool = np.isin(body.joints[:, 0], below) & (body.weights[:, 0] > 0)
+    return mask
+
+
+def head_middle(body: BodyModel) -> Float64:
+    """(3,): the middle of the head of a body that has one, as modelled; else the joint that carries heads."""
+    rows = head_rows(body)
+    if not rows.any():
+        joint: Float64 = body.bind[skull_of(body), :3, 3]
+        return joint
+    of_head = body.vertices[rows].astype(np.float64)
+    middle: Float64 = (of_head.min(axis=0) + of_head.max(axis=0)) / 2
+    return middle
+
+
+def turn_own_head(body: BodyModel, matrices: Float64, turn: Float64) -> Float64:
+    """Joint matrices (J, 4, 4) with the head turned about the joint that carries it.
+
+    turn: (4, 4), what FAPs do to a face.
+    """
+    if np.array_equal(turn, np.eye(4)):
+        return matrices
+    skull = skull_of(body)
+    within = np.eye(4)
+    within[:3, :3] = turn[:3, :3]
+    within[:3, 3] = body.bind[skull, :3, 3] - turn[:3, :3] @ body.bind[skull, :3, 3]
+    bind = body.bind[skull]
+    motion = matrices[skull] @ np.linalg.inv(bind) @ within @ bind @ np.linalg.inv(matrices[skull])
+    turned = matrices.copy()
+    below = body.skeleton.descendants(skull)
+    turned[below] = motion @ turned[below]
+    return turned
 
 
 def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]:

@@ -43,8 +43,15 @@ class Extent:
         return Subject((x, (top + bottom) / 2, z), (top - bottom) / 2, half_width, subject.half_depth)
 
 
-def body_extent(positions: Float64, names: tuple[str, ...]) -> Extent:
-    """The extent of joints at positions (T, J, 3), metres, the root first, over T moments."""
+HEADROOM = 0.14
+"""Metres above the highest joint that a head takes."""
+
+
+def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HEADROOM) -> Extent:
+    """The extent of joints at positions (T, J, 3), metres, the root first, over T moments.
+
+    headroom: metres above the highest joint.
+    """
     legs = positions[:, [names.index(name) for name in LEGS if name in names]]
     legs_move = bool(legs.size) and bool(np.abs(legs - legs[0]).max() > STANDING)
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
@@ -52,7 +59,7 @@ def body_extent(positions: Float64, names: tuple[str, ...]) -> Extent:
         x, y, z = (float(v) for v in positions[0, 0])
         subject = Subject((x, y - 0.09, z), BODY_SUBJECT.half_height, BODY_SUBJECT.half_width)
         return Extent(subject, follows=True, legs_move=legs_move)
-    low, high = low - np.array([0.10, 0.06, 0.10]), high + np.array([0.10, 0.14, 0.10])
+    low, high = low - np.array([0.10, 0.06, 0.10]), high + np.array([0.10, max(headroom, HEADROOM), 0.10])
     low = np.minimum(low, np.array(BODY_SUBJECT.centre) - (0.35, 0.95, 0.3) + _aside(low, high))
     x, y, z = (float(v) for v in (low + high) / 2)
     wide = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2

@@ -38,10 +38,11 @@ class Scene(Timed[Timeline]):
 
     animation: at least one frame, else ValueError. model: the face, by default the built-in head; one that is
     not in metres is scaled to a person's size, with an FbaWarning for that and for missing eyes, teeth or
-    tables. body: the body that BAPs move, by default the built-in person; ModelError if it cannot take a
-    face. axes: name of the body's axis convention (`fba.body.convention_names()`). view: "figure" for a
-    person, "points" for feature points with lines and bones; may be set at any time, ValueError for another
-    value. timeline: by default `Timeline(animation, model)`; one that grows shows a stream as it arrives.
+    tables. body: the body that BAPs move, by default the built-in person; one without a place for a face
+    keeps its own head. axes: name of the body's axis convention (`fba.body.convention_names()`). view:
+    "figure" for a person, "points" for feature points with lines and bones; may be set at any time,
+    ValueError for another value. timeline: by default `Timeline(animation, model)`; one that grows shows a
+    stream as it arrives.
 
     `show` sets the `switches` at any time. Figures are built on first use. A `Showable`.
     """
@@ -246,7 +247,8 @@ class Scene(Timed[Timeline]):
             self._sampled_frames = frames
             sampled = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
             baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in sampled])
-            self._extent = body_extent(self._solver.pose(baps)[:, :, :3, 3], self._skeleton.names)
+            positions = self._solver.pose(baps)[:, :, :3, 3]
+            self._extent = body_extent(positions, self._skeleton.names, self.person.headroom)
         return self._extent
 
 

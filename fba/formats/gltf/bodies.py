@@ -1,0 +1,379 @@
+"""Bodies of other makers for display: any skinned person in a glTF file becomes a body that BAPs move.
+
+The person's joints are matched with the standard's as those of a motion are (`fba.capture`). All joints of
+the standard are then placed on the person: those that it has, where it has them; others in between, as the
+default body has them. What a joint of the file carries follows the joint of the standard that turns as the
+file's would: a bone of the spine, for example, the vertebra in its middle (`fba.capture._spine`).
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from fba import rotations
+from fba.arrays import Float32, Float64, Int32
+from fba.body.model import BodyModel, BodyPart
+from fba.body.skeleton import ROOT, Skeleton
+from fba.body.skin.skin_weights import strongest_weights
+from fba.capture.rest import Rest, find_rest
+from fba.errors import FbaWarning, FormatError, ModelError
+from fba.formats.gltf._pose import bind_matrices
+from fba.formats.gltf._skeletons import Joints, find_joints
+from fba.gltf import Gltf, Node, Primitive, read_gltf
+from fba.gltf import Material as GltfMaterial
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.mesh.meshes import Material
+from fba.mesh.names import UniqueNames
+from fba.source import Path
+
+CHUNK = 20_000
+"""Vertices whose weights are reduced at once."""
+VERTEX_BYTES = 600
+"""Memory that a vertex takes, besides its morph targets, which are not read."""
+NEEDED = {
+    "skullbase": "head",
+    **{
+        f"{side}_{joint}": f"{word} {name}"
+        for side, word in (("l", "left"), ("r", "right"))
+        for joint, name in (
+            ("hip", "thigh"),
+            ("knee", "shank"),
+            ("ankle", "foot"),
+            ("shoulder", "upper arm"),
+            ("elbow", "forearm"),
+            ("wrist", "hand"),
+        )
+    },
+}
+"""Joints of the standard that a body must have, and the bones that begin there."""
+KINDS = {"hair": "hair", "skin": "skin", "body": "skin", "head": "skin", "face": "skin", "shoe": "shoe",
+         "footwear": "shoe"}  # fmt: skip
+"""Kinds of parts by words in the names of meshes and materials; others are cloth."""
+
+
+def read_body(
+    path: Path, *, joints: Mapping[str, str] | None = None, limits: Limits = DEFAULT_LIMITS
+) -> BodyModel:
+    """Return the body in a glTF file: one that `BodyModel.save` wrote, or any skinned person.
+
+    joints: as for `fba.capture.from_skeleton`. The body gets the size at which its hips are as high as the
+    default body's, so that the steps of a stream fit it; `notes` says by how much. It has no place for a
+    face: its own head is shown.
+
+    Raises FormatError where the file cannot be read, ModelError for a file that shows no person, or one that
+    lacks a limb, LimitError where it takes more memory than the limits allow.
+    """
+    try:
+        gltf = read_gltf(path, limits=limits)
+        extensions = gltf.document.get("extensions")
+        if extensions is not None and extensions.get("FBA_body") is not None:
+            return BodyModel.load(path, limits=limits)
+        return _import_person(gltf, path, joints)
+    except ModelError as error:
+        raise FormatError(error.finding.removeprefix(f"{path}: "), path=path).with_remedies(
+            *error.remedies
+        ) from error
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """The standard's skeleton on a person, in the body's axes, in the file's unit.
+
+    turn: (3, 3), from the scene's axes to the body's. places: (J, 3) and turns: (J, 3, 3), joints as
+    modelled; turns are relative to the default posture.
+    """
+
+    skeleton: Skeleton
+    turn: Float64
+    places: Float64
+    turns: Float64
+
+    @property
+    def centres(self) -> Float64:
+        """(J, 3): joints in the default posture, the root where it is modelled."""
+        centres = self.places.copy()
+        for joint, parent in enumerate(self.skeleton.parents.tolist()):
+            if parent >= 0:
+                offset = self.places[joint] - self.places[parent]
+                centres[joint] = centres[parent] + self.turns[parent].T @ offset
+        return centres
+
+
+def _import_person(gltf: Gltf, path: Path, joints: Mapping[str, str] | None) -> BodyModel:
+    if not gltf.skins:
+        raise ModelError(
+            f"{gltf.file}: has no skin, so nothing tells which joints carry its meshes; expected a person "
+            "whose mesh is bound to a skeleton"
+        )
+    found = find_joints(gltf)
+    skeleton = Skeleton.default()
+    standing = find_rest(found.resting(gltf), skeleton, joints)
+    mapped = standing.mapped
+    lacking = [bone for joint, bone in NEEDED.items() if joint not in mapped]
+    if lacking:
+        raise ModelError(
+            f"{gltf.file}: its skeleton has no {', no '.join(lacking[:6])}{', ...' if lacking[6:] else ''}; "
+            "expected a person with a head, arms and legs"
+        )
+    fit = _fit(standing, skeleton)
+    parts = _read_parts(gltf, found, _carriers(found, mapped, skeleton), fit)
+    if not parts:
+        raise ModelError(f"{gltf.file}: no mesh hangs on its skeleton; there is nothing to show")
+    name = FilePath(os.fspath(path)).stem
+    return _stand(BodyModel(tuple(parts), *_bound(fit, fit.places), name=name), name)
+
+
+def _fit(rest: Rest, skeleton: Skeleton) -> _Fit:
+    """Place all joints of the standard on a person."""
+    mapped, positions = rest.mapped, rest.positions
+    numbers = {joint: skeleton.number(joint) for joint in skeleton.names}
+    size = _size(positions, mapped, skeleton)
+    places, turns = np.zeros((len(skeleton), 3)), np.zeros((len(skeleton), 3, 3))
+    parents = skeleton.parents.tolist()
+    for joint, number in numbers.items():
+        above = turns[parents[number]] if parents[number] >= 0 else np.eye(3)
+        own = rest.corrections.get(joint) if joint in mapped or joint == "sacroiliac" else None
+        turns[number] = above if own is None else own
+        if joint in mapped:
+            places[number] = positions[mapped[joint]]
+            continue
+        start = number
+        while skeleton.names[start] not in mapped:
+            start = parents[start]
+        if joint == "sacroiliac":
+            places[number] = places[start]
+            continue
+        below = skeleton.descendants(number)[1:]
+        end = next((n for n in below if skeleton.names[n] in mapped), None)
+        step = turns[start] @ (skeleton.centres[number] - skeleton.centres[start])
+        if end is None:
+            places[number] = places[start] + size * step
+            continue
+        ours = turns[start] @ (skeleton.centres[end] - skeleton.centres[start])
+        theirs = positions[mapped[skeleton.names[end]]] - places[start]
+        long, wanted = float(np.linalg.norm(ours)), float(np.linalg.norm(theirs))
+        if min(long, wanted) > 1e-9:
+            step = wanted / long * (rotations.between(ours, theirs) @ step)
+        places[number] = places[start] + step
+    return _Fit(skeleton, rest.turn, places, turns)
+
+
+def _size(positions: Float64, mapped: Mapping[str, int], skeleton: Skeleton) -> float:
+    """Return the ratio of the person's legs to the default body's."""
+    ours = theirs = 0.0
+    for side in "lr":
+        for joint, below in pairwise((f"{side}_hip", f"{side}_knee", f"{side}_ankle")):
+            bone = skeleton.centres[skeleton.number(below)] - skeleton.centres[skeleton.number(joint)]
+            ours += float(np.linalg.norm(bone))
+            theirs += float(np.linalg.norm(positions[mapped[below]] - positions[mapped[joint]]))
+    return theirs / ours
+
+
+def _bound(fit: _Fit, places: Float64) -> tuple[Skeleton, Float64]:
+    """Return the skeleton in the default posture, and its joints (J, 4, 4) as modelled, at places (J, 3)."""
+    bind = np.zeros((len(places), 4, 4))
+    bind[:, :3, :3], bind[:, :3, 3], bind[:, 3, 3] = fit.turns, places, 1.0
+    return replace(fit.skeleton, centres=fit.centres), bind
+
+
+def _stand(body: BodyModel, name: str) -> BodyModel:
+    """Return a body scaled to the default body's legs, with its soles at height 0."""
+    default, own = Skeleton.default(), body.skeleton
+    matrices = np.tile(np.eye(4), (len(own), 1, 1))
+    matrices[:, :3, 3] = own.centres
+    standing = body.skin(matrices)
+    feet = [own.number(f"{side}_{joint}") for side in "lr" for joint in ("midtarsal", "metatarsal")]
+    on_feet = np.isin(body.joints[:, 0], feet)
+    sole = float(standing[on_feet, 1].min() if on_feet.any() else standing[:, 1].min())
+    hips = [own.number("l_hip"), own.number("r_hip")]
+    height = float(own.centres[hips, 1].mean()) - sole
+    if not height > 0:
+        raise ModelError(f"the hips of {name!r} are not above its feet; it cannot stand")
+    size = float(default.centres[hips, 1].mean()) / height
+    shift = default.centres[hips].mean(axis=0) - size * own.centres[hips].mean(axis=0)
+    shift[1] = -size * sole
+    bind = np.array(body.bind)
+    bind[:, :3, 3] = bind[:, :3, 3] * size + shift
+    return BodyModel(
+        tuple(
+            replace(part, vertices=(part.vertices * size + shift).astype(np.float32)) for part in body.parts
+        ),
+        replace(own, centres=own.centres * size + shift),
+        bind,
+        name=name,
+        notes={
+            "size": f"{size:.3f} times that of the file, so that its legs are as long as the default body's"
+        },
+    )
+
+
+def _carriers(found: Joints, mapped: Mapping[str, int], skeleton: Skeleton) -> dict[int, int]:
+    """Return the joint of the skeleton that carries what each node of the person carries."""
+    followers = _followers(mapped, skeleton)
+    joint_of = {found.nodes[found.used[row]]: joint for joint, row in mapped.items()}
+    result: dict[int, int] = {}
+    for node, parent in zip(found.nodes, found.parents, strict=True):
+        if node in joint_of:
+            result[node] = skeleton.number(followers.get(joint_of[node], joint_of[node]))
+        else:
+            result[node] = result[found.nodes[parent]] if parent >= 0 else skeleton.number("sacroiliac")
+    return result
+
+
+def _followers(mapped: Mapping[str, int], skeleton: Skeleton) -> dict[str, str]:
+    """Return the joint that what hangs on a joint of the person follows, where it is another one.
+
+    The parts of a foot, a clavicle and a bone of the spine share the turns of one joint of the person: all of
+    them are reached at the last, or in the spine in the middle.
+    """
+    result = {}
+    for side in "lr":
+        result[f"{side}_ankle"] = f"{side}_midtarsal"
+        result[f"{side}_sternoclavicular"] = f"{side}_acromioclavicular"
+    chain = [skeleton.number("skullbase")]
+    while skeleton.parents[chain[-1]] >= 0:
+        chain.append(int(skeleton.parents[chain[-1]]))
+    spine = [skeleton.names[number] for number in reversed(chain)]
+    anchors = [joint for joint in spine if joint in mapped]
+    for joint, above in pairwise(anchors):
+        between = spine[spine.index(joint) : spine.index(above)]
+        ends = [skeleton.centres[skeleton.number(end)][1] for end in (joint, above)]
+        middle = sum(ends) / 2
+        result[joint] = min(
+            between, key=lambda each: abs(float(skeleton.centres[skeleton.number(each)][1]) - middle)
+        )
+    result[ROOT] = "sacroiliac"
+    return result
+
+
+def _read_parts(gltf: Gltf, found: Joints, carriers: dict[int, int], fit: _Fit) -> list[BodyPart]:
+    """Return the meshes that hang on the person's joints, in the body's axes; warns of others."""
+    bound = bind_matrices(gltf, skins=found.humanoid is None)
+    budget = gltf.budget.copy()
+    names, left_out = UniqueNames(), []
+    parts = []
+    for number in gltf.shown():
+        node = gltf.nodes[number]
+        if node.mesh is None:
+            continue
+        for primitive in gltf.meshes[node.mesh].primitives:
+            if not len(primitive.triangles):
+                continue
+            budget.charge(len(primitive.positions) * VERTEX_BYTES, gltf.document)
+            carried = _carried(gltf, number, node, primitive, bound, carriers)
+            if carried is None:
+                left_out.append(node.name)
+                continue
+            matrices, joints, weights = carried
+            linear = fit.turn @ matrices[..., :3, :3]
+            places = np.einsum("vij,vj->vi", linear, primitive.positions) + matrices[:, :3, 3] @ fit.turn.T
+            normals = None if primitive.normals is None else _unit(linear, primitive.normals)
+            mirrored = float(np.linalg.det(linear[0])) < 0
+            material = None if primitive.material is None else gltf.materials[primitive.material]
+            look, texcoords, colours = _look(primitive, material)
+            name = names(node.name if not node.name.startswith("node ") else gltf.meshes[node.mesh].name)
+            parts.append(
+                BodyPart(
+                    name, _kind(name, material), places.astype(np.float32),
+                    primitive.triangles[:, ::-1].copy() if mirrored else primitive.triangles,
+                    joints, weights, normals, texcoords, colours, look,
+                )
+            )  # fmt: skip
+    if left_out:
+        warnings.warn(
+            f"{gltf.file}: meshes that hang on no joint of the person are left out: "
+            f"{', '.join(left_out[:5])}{', ...' if len(left_out) > 5 else ''}",
+            FbaWarning,
+            stacklevel=5,
+        )
+    return parts
+
+
+def _carried(
+    gltf: Gltf,
+    number: int,
+    node: Node,
+    primitive: Primitive,
+    bound: Mapping[int, Float64],
+    carriers: Mapping[int, int],
+) -> tuple[Float64, Int32, Float32] | None:
+    """Return matrices (V, 4, 4) to the scene with all joints as bound, and joints and weights (V, 4).
+
+    None for a mesh that hangs on no joint of the person.
+    """
+    count = len(primitive.positions)
+    if node.skin is None or primitive.joints is None or primitive.weights is None:
+        above: int | None = number
+        while above is not None and above not in carriers:
+            above = gltf.nodes[above].parent
+        if above is None or (gltf.nodes[above].parent is None and not gltf.nodes[above].children):
+            return None
+        world = gltf.nodes[above].world
+        matrix = bound.get(above, world) @ np.linalg.pinv(world) @ node.world
+        joints, weights = np.zeros((count, 4), dtype=np.int32), np.zeros((count, 4), dtype=np.float32)
+        joints[:, 0], weights[:, 0] = carriers[above], 1.0
+        return np.broadcast_to(matrix, (count, 4, 4)), joints, weights
+    skin = gltf.skins[node.skin]
+    inside = [joint for joint in skin.joints if joint in carriers]
+    if not inside:
+        return None
+    moves = np.stack(
+        [bound[joint] @ inverse for joint, inverse in zip(skin.joints, skin.inverse_bind, strict=True)]
+    )
+    default = carriers[inside[0]]
+    standard = np.array([carriers.get(joint, default) for joint in skin.joints])
+    total = primitive.weights.sum(axis=1, dtype=np.float64)
+    matrices = np.zeros((count, 4, 4))
+    joints, weights = np.zeros((count, 4), dtype=np.int32), np.zeros((count, 4), dtype=np.float32)
+    for start in range(0, count, CHUNK):
+        rows = slice(start, start + CHUNK)
+        dense = np.zeros((len(total[rows]), int(standard.max()) + 1))
+        share = primitive.weights[rows] / np.where(total[rows] > 0, total[rows], 1.0)[:, None]
+        share[total[rows] <= 0, 0] = 1.0
+        for slot in range(primitive.joints.shape[1]):
+            which = primitive.joints[rows, slot]
+            matrices[rows] += share[:, slot, None, None] * moves[which]
+            np.add.at(dense, (np.arange(len(which)), standard[which]), share[:, slot])
+        joints[rows], weights[rows] = strongest_weights(dense)
+    return matrices, joints, weights
+
+
+def _unit(linear: Float64, normals: Float32) -> Float32:
+    """Return normals turned by (V, 3, 3), of length 1."""
+    turned = np.einsum("vij,vj->vi", linear, normals)
+    length = np.linalg.norm(turned, axis=1, keepdims=True)
+    unit: Float32 = np.where(length > 0, turned / np.where(length > 0, length, 1.0), (0.0, 0.0, 1.0)).astype(
+        np.float32
+    )
+    return unit
+
+
+def _look(
+    primitive: Primitive, material: GltfMaterial | None
+) -> tuple[Material, Float32 | None, Float32 | None]:
+    """Return material, texture coordinates and colours of a part."""
+    if material is None:
+        return Material(), None, None
+    texcoords = (
+        primitive.texcoords[material.texcoord] if material.texcoord < len(primitive.texcoords) else None
+    )
+    texture = None if texcoords is None else material.texture
+    look = Material(material.name, material.colour[:3], material.roughness, texture)
+    colours = None
+    if primitive.colours is not None and texture is None:
+        colours = primitive.colours.copy()
+        colours[:, :3] *= np.array(material.colour[:3], dtype=np.float32)
+        colours[:, 3] = 1.0 - material.roughness
+    return look, texcoords if texture is not None else None, colours
+
+
+def _kind(name: str, material: GltfMaterial | None) -> str:
+    words = f"{name} {'' if material is None else material.name}".lower()
+    return next((kind for word, kind in KINDS.items() if word in words), "cloth")
