@@ -123,7 +123,7 @@ def _import_person(gltf: Gltf, path: Path, joints: Mapping[str, str] | None) -> 
             "expected a person with a head, arms and legs"
         )
     fit = _fit(standing, skeleton)
-    parts = _read_parts(gltf, found, _carriers(found, mapped, skeleton), fit)
+    parts = _read_parts(gltf, found, _carriers(gltf, found, mapped, skeleton), fit)
     if not parts:
         raise ModelError(f"{gltf.file}: no mesh hangs on its skeleton; there is nothing to show")
     name = FilePath(os.fspath(path)).stem
@@ -214,16 +214,17 @@ def _stand(body: BodyModel, name: str) -> BodyModel:
     )
 
 
-def _carriers(found: Joints, mapped: Mapping[str, int], skeleton: Skeleton) -> dict[int, int]:
-    """Return the joint of the skeleton that carries what each node of the person carries."""
+def _carriers(gltf: Gltf, found: Joints, mapped: Mapping[str, int], skeleton: Skeleton) -> dict[int, int]:
+    """Return the joint of the skeleton that carries what each node does, for the hips and all nodes below."""
     followers = _followers(mapped, skeleton)
     joint_of = {found.nodes[found.used[row]]: joint for joint, row in mapped.items()}
     result: dict[int, int] = {}
-    for node, parent in zip(found.nodes, found.parents, strict=True):
+    for node in gltf.order:
+        parent = gltf.nodes[node].parent
         if node in joint_of:
             result[node] = skeleton.number(followers.get(joint_of[node], joint_of[node]))
-        else:
-            result[node] = result[found.nodes[parent]] if parent >= 0 else skeleton.number("sacroiliac")
+        elif parent in result:
+            result[node] = result[parent]
     return result
 
 
@@ -313,7 +314,7 @@ def _carried(
         above: int | None = number
         while above is not None and above not in carriers:
             above = gltf.nodes[above].parent
-        if above is None or (gltf.nodes[above].parent is None and not gltf.nodes[above].children):
+        if above is None:
             return None
         world = gltf.nodes[above].world
         matrix = bound.get(above, world) @ np.linalg.pinv(world) @ node.world
@@ -321,14 +322,13 @@ def _carried(
         joints[:, 0], weights[:, 0] = carriers[above], 1.0
         return np.broadcast_to(matrix, (count, 4, 4)), joints, weights
     skin = gltf.skins[node.skin]
-    inside = [joint for joint in skin.joints if joint in carriers]
-    if not inside:
+    if not any(joint in carriers for joint in skin.joints):
         return None
     moves = np.stack(
         [bound[joint] @ inverse for joint, inverse in zip(skin.joints, skin.inverse_bind, strict=True)]
     )
-    default = carriers[inside[0]]
-    standard = np.array([carriers.get(joint, default) for joint in skin.joints])
+    pelvis = Skeleton.default().number("sacroiliac")  # it carries what hangs on joints above the hips
+    standard = np.array([carriers.get(joint, pelvis) for joint in skin.joints])
     total = primitive.weights.sum(axis=1, dtype=np.float64)
     matrices = np.zeros((count, 4, 4))
     joints, weights = np.zeros((count, 4), dtype=np.int32), np.zeros((count, 4), dtype=np.float32)

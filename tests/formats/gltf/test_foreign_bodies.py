@@ -125,6 +125,21 @@ def test_meshes_without_a_skin_hang_on_their_joint(tmp_path: Path) -> None:
     assert len(body.parts) == 2
 
 
+def test_joints_that_a_file_does_not_declare_go_with_those_above(tmp_path: Path) -> None:
+    path = write_person(tmp_path / "p.glb", extension="VRM")
+
+    def forget(document: dict) -> None:  # type: ignore[type-arg]
+        bones = document["extensions"]["VRM"]["humanoid"]["humanBones"]
+        bones[:] = [entry for entry in bones if not entry["bone"].endswith(("Proximal", "Shoulder"))]
+
+    edit(path, forget)
+    body = read_body(path)
+    carried = [body.skeleton.names[body.joints[8 * number, 0]] for number in range(len(BONES))]
+    joints = dict(zip(BONES, carried, strict=True))
+    assert joints["leftMiddleProximal"] == joints["leftHand"] == "l_wrist"
+    assert joints["rightShoulder"] == joints["chest"]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
