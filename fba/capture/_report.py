@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.body import BapSolver
 from fba.capture import _rest_alignment as rest_alignment
-from fba.capture import matching
 from fba.capture.limbs import ground, soles
 from fba.capture.motion import SkeletonMotion
+from fba.capture.preparation import prepare
 from fba.errors import ModelError
 
 CHUNK = 2048
@@ -87,28 +88,29 @@ def retarget_report(
     *,
     joints: Mapping[str, str] | None = None,
     scale: float | None = None,
+    rest: str | int = "auto",
+    up: str = "auto",
     solver: BapSolver | None = None,
 ) -> RetargetReport:
     """Compare an animation, such as a decoded one, with the motion it was made from.
 
-    joints, scale, solver: as they were given to `from_skeleton`. If frame rates differ, the motion is
+    joints, scale, rest, up, solver: as they were given to `from_skeleton`. If rates differ, the motion is
     resampled; frames that only one of the two has are left out. ModelError if the animation has no body or no
     frame in common with the motion; errors of names and skeletons as from `from_skeleton`.
     """
     solver = solver if solver is not None else BapSolver()
     skeleton = solver.skeleton
-    joints = joints if joints is not None else motion.declared or None
-    family, mapped = matching.map_joints(motion.names, joints, skeleton)
     if animation.body is None:
         raise ModelError("retarget_report: the animation has no body")
+    if not len(motion) or not len(animation):
+        raise ModelError("retarget_report: the motion and the animation have no frame in common")
+    ready = prepare(motion, skeleton, joints=joints, rest=rest, up=up)
+    motion, mapped, family = ready.motion, ready.mapped, ready.family
     motion = motion.resample(animation.rate)
     count = min(len(motion), len(animation))
-    if not count:
-        raise ModelError("retarget_report: the motion and the animation have no frame in common")
 
     alignment = rest_alignment.align(motion, mapped, skeleton)
     turned, positions = motion.world()
-    positions = positions @ alignment.upright.T
     order = {name: number for number, name in enumerate(skeleton.names)}
     aims = sorted(alignment.aims.items(), key=lambda pair: order[pair[0]])
     angles = np.zeros((count, len(aims)))
@@ -121,6 +123,10 @@ def retarget_report(
         for column, (joint, aim) in enumerate(aims):
             ours = matrices[:, order[aim], :3, 3] - matrices[:, order[joint], :3, 3]
             theirs = positions[begin:end, mapped[aim]] - positions[begin:end, mapped[joint]]
+            if joint in rest_alignment.neutral_joints():
+                bone = skeleton.centres[order[aim]] - skeleton.centres[order[joint]]
+                frames_of_bone = rotations.matrices(turned[begin:end, mapped[joint]])
+                theirs = frames_of_bone @ (alignment.corrections[joint] @ bone)
             angles[begin:end, column] = _between(ours, theirs)
         frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
         own = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3], toes)
@@ -141,7 +147,7 @@ def retarget_report(
     metres = rest_alignment.scale(motion, mapped, skeleton) if scale is None else scale
     standing = None
     if has_feet and metres:
-        source = soles.source_soles(motion, mapped, alignment.upright, turned, positions, metres)
+        source = soles.source_soles(motion, mapped, turned, positions, metres)
         standing = _feet(source, heights) if source is not None else None
     used = set(mapped.values())
     return RetargetReport(

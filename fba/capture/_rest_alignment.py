@@ -34,7 +34,9 @@ class Bone:
     base: joint whose alignment is rotated as little as possible, or "facing". aims: joints at the bone's
     other end, of which the first mapped one counts. tip: the default posture's joint that a source bone
     without a next joint points to. via: "down" if the rotation goes via a limb that hangs straight down, so
-    that T, A and standing rest poses give the same twist.
+    that T, A and standing rest poses give the same twist; "palm" if the row of knuckles gives the twist;
+    "neutral" if the bone of the rest pose counts as that of the default posture, wherever it points: each
+    maker lets clavicles begin elsewhere; "flat" if only its heading counts, since soles are flat at rest.
     """
 
     joint: str
@@ -55,15 +57,19 @@ def bones() -> tuple[Bone, ...]:
     )
 
 
+@cache
+def neutral_joints() -> frozenset[str]:
+    """Return the joints whose bones count from where they are in the rest pose: clavicles and feet."""
+    return frozenset(bone.joint for bone in bones() if bone.via in ("neutral", "flat"))
+
+
 @dataclass(frozen=True, eq=False)
 class Alignment:
     """Alignment of a source with the body.
 
-    upright: (3, 3), from the source's frame to y up. corrections: joint -> C (3, 3), for upright sources.
-    aims: joint -> joint at the other end of its bone, if both are mapped.
+    corrections: joint -> C (3, 3). aims: joint -> joint at the other end of its bone, if both are mapped.
     """
 
-    upright: Float64
     corrections: dict[str, Float64]
     aims: dict[str, str]
 
@@ -74,9 +80,8 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
     size = float(np.ptp(rest, axis=0).max())
     if size <= 0:
         raise ModelError("the source's joints all coincide in its rest pose; it has no bones")
-    upright, facing = _facing(rest, mapped)
-    rest = rest @ upright.T
-    ends = motion.end_offsets @ upright.T
+    facing = _facing(rest, mapped)
+    ends = motion.end_offsets
     short = SHORT * size
 
     def default_position(joint: str) -> Float64:
@@ -92,10 +97,36 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
             return start
         aims[joint] = aim
         bone = start @ (default_position(aim) - default_position(joint))
-        if via:
+        if via == "down":
             down = np.array([0.0, -1.0, 0.0])
             return rotations.between(down, source) @ rotations.between(bone, down) @ start
         return rotations.between(bone, source) @ start
+
+    def level_foot(joint: str, aim: str) -> Float64:
+        theirs = rest[mapped[aim]] - rest[mapped[joint]]
+        ours = facing @ (default_position(aim) - default_position(joint))
+        if min(np.hypot(line[0], line[2]) for line in (theirs, ours)) <= short:
+            return facing
+        angle = np.arctan2(theirs[0], theirs[2]) - np.arctan2(ours[0], ours[2])
+        return rotations.turn(np.array([0.0, 1.0, 0.0]), np.array(angle)) @ facing
+
+    def turn_palm(joint: str, aim: str) -> None:
+        side = joint[0]
+        one, other = (
+            f"{side}_index1",
+            next((f"{side}_{finger}1" for finger in ("pinky", "ring") if f"{side}_{finger}1" in mapped), ""),
+        )
+        if one not in mapped or not other or joint not in aims:
+            return
+        along = rest[mapped[aim]] - rest[mapped[joint]]
+        row = rest[mapped[other]] - rest[mapped[one]]
+        own = corrections[joint] @ (default_position(other) - default_position(one))
+        along = along / np.linalg.norm(along)
+        row, own = row - along * (along @ row), own - along * (along @ own)
+        if np.linalg.norm(row) <= short or np.linalg.norm(own) == 0:
+            return
+        angle = np.arctan2(np.cross(own, row) @ along, own @ row)
+        corrections[joint] = rotations.turn(along, np.array(angle)) @ corrections[joint]
 
     spine = [joint for joint in spine_joints(skeleton) if joint in mapped]
     for joint, above in pairwise(spine):
@@ -110,6 +141,12 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
         aim = next((aim for aim in bone.aims if aim in mapped), None)
         if aim is not None:
             corrections[bone.joint] = align_bone(bone.joint, aim, start, bone.via)
+            if bone.via == "neutral":
+                corrections[bone.joint] = facing
+            elif bone.via == "flat":
+                corrections[bone.joint] = level_foot(bone.joint, aim)
+            elif bone.via == "palm":
+                turn_palm(bone.joint, aim)
             continue
         corrections[bone.joint] = start
         tips = ends[motion.end_parents == mapped[bone.joint]]
@@ -120,7 +157,7 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
                     start @ (default_position(bone.tip) - default_position(bone.joint)), source
                 )
                 corrections[bone.joint] = turn @ start
-    return Alignment(upright, corrections, aims)
+    return Alignment(corrections, aims)
 
 
 def scale(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> float | None:
@@ -141,29 +178,16 @@ def scale(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
     return None
 
 
-def _facing(rest: Float64, mapped: Mapping[str, int]) -> tuple[Float64, Float64]:
-    """Return upright, and the rotation from the default posture's heading to that of the upright rest pose.
+def _facing(rest: Float64, mapped: Mapping[str, int]) -> Float64:
+    """Return the rotation (3, 3) from the default posture's heading to that of the rest pose, y up.
 
     Only the heading: a rest pose stands on its feet, so if its joints lean, that is due to its proportions.
     """
-    left = np.zeros(3)
     for a, b in (("l_hip", "r_hip"), ("l_shoulder", "r_shoulder"), ("l_knee", "r_knee")):
         if a in mapped and b in mapped:
-            left = rest[mapped[a]] - rest[mapped[b]]
-            if np.linalg.norm(left) > 0:
-                break
-    if not np.linalg.norm(left) > 0:
-        raise ModelError("the source has no pair of hips or shoulders apart, so left and right are unknown")
-    low = [rest[mapped[j]] for j in ("l_ankle", "r_ankle", "l_knee", "r_knee") if j in mapped]
-    high = [rest[mapped[j]] for j in ("skullbase", "vc7", "l_shoulder", "r_shoulder") if j in mapped]
-    root = rest[mapped["HumanoidRoot"]]
-    up = (np.mean(high, axis=0) if high else root) - (np.mean(low, axis=0) if low else root)
-    up = up - left * (up @ left) / (left @ left)
-    axis = np.zeros(3)
-    strongest = int(np.argmax(np.abs(up)))
-    axis[strongest] = np.sign(up[strongest]) or 1.0
-    upright = rotations.between(axis, np.array([0.0, 1.0, 0.0]))
-    side = upright @ left
-    side[1] = 0.0
-    side /= np.linalg.norm(side) or 1.0
-    return upright, np.stack([side, [0.0, 1.0, 0.0], np.cross(side, [0.0, 1.0, 0.0])], axis=1)
+            left = (rest[mapped[a]] - rest[mapped[b]]) * [1.0, 0.0, 1.0]
+            length = float(np.linalg.norm(left))
+            if length > 0:
+                side = left / length
+                return np.stack([side, [0.0, 1.0, 0.0], np.cross(side, [0.0, 1.0, 0.0])], axis=1)
+    raise ModelError("the source has no pair of hips or shoulders apart, so left and right are unknown")

@@ -102,11 +102,7 @@ def map_joints(
     skeleton lacks are left out. ModelError where no family fits or the skeleton's root is not `ROOT`,
     ValueError for an unknown joint.
     """
-    if skeleton.names[0] != ROOT:
-        raise ModelError(
-            f"the root of the body's skeleton is {skeleton.names[0]!r}, but capture moves {ROOT!r}: "
-            "rename the root, or put one above it"
-        )
+    check_root(skeleton)
     if joints is None:
         family, mapped = match(names)
         return family, {joint: number for joint, number in mapped.items() if joint in skeleton}
@@ -120,3 +116,12 @@ def map_joints(
     if ROOT not in mapped:
         raise ValueError(f"joints: one source joint must be given for {ROOT}")
     return "", mapped
+
+
+def check_root(skeleton: Skeleton) -> None:
+    """Raise ModelError if the root of the body's skeleton is not `ROOT`."""
+    if skeleton.names[0] != ROOT:
+        raise ModelError(
+            f"the root of the body's skeleton is {skeleton.names[0]!r}, but capture moves {ROOT!r}: "
+            "rename the root, or put one above it"
+        )

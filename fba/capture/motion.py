@@ -25,6 +25,9 @@ class SkeletonMotion:
     end_parents: int64 (E,), end_offsets: float64 (E, 3): ends of the last bones, where known.
     name: of the performance. declared: joint name -> joint of the standard, where the file itself says which
         bone is which; empty where names must tell.
+    axes: float64 (J, 4), quaternions of the joints' own axes in the rest pose,
+        in the frame of the source; empty for the frame's own axes. posed: whether the rest pose may be any
+        pose, since the source does not say which it is.
 
     Raises ModelError if the parts contradict each other or are not finite.
     """
@@ -39,10 +42,14 @@ class SkeletonMotion:
     end_offsets: Float64 = field(default_factory=lambda: np.zeros((0, 3)))
     name: str = ""
     declared: Mapping[str, str] = field(default_factory=dict)
+    axes: Float64 = field(default_factory=lambda: np.zeros((0, 4)))
+    posed: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "declared", dict(self.declared))
         count = len(self.names)
+        if not np.size(self.axes):
+            object.__setattr__(self, "axes", np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
         for what, kind in (
             ("parents", np.int64),
             ("offsets", np.float64),
@@ -50,6 +57,7 @@ class SkeletonMotion:
             ("positions", np.float64),
             ("end_parents", np.int64),
             ("end_offsets", np.float64),
+            ("axes", np.float64),
         ):
             array = np.array(getattr(self, what), dtype=kind)
             if not np.isfinite(array).all():
@@ -65,6 +73,7 @@ class SkeletonMotion:
             ("positions", (frames, 3)),
             ("end_parents", (ends,)),
             ("end_offsets", (ends, 3)),
+            ("axes", (count, 4)),
         ):
             if getattr(self, what).shape != shape:
                 raise ModelError(f"SkeletonMotion: {what} has shape {getattr(self, what).shape}, not {shape}")

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from fba.arrays import Float64
 from fba.body.skeleton import Skeleton
 from fba.capture import _rest_alignment as rest_alignment
-from fba.capture import matching
 from fba.capture.motion import SkeletonMotion
+from fba.capture.preparation import find_bones, find_upright, turn_axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +29,10 @@ class Rest:
 
 def find_rest(motion: SkeletonMotion, skeleton: Skeleton, joints: Mapping[str, str] | None = None) -> Rest:
     """Return how a skeleton rests. joints: as for `from_skeleton`. ModelError as `from_skeleton`."""
-    joints = joints if joints is not None else motion.declared or None
-    _, mapped = matching.map_joints(motion.names, joints, skeleton)
-    alignment = rest_alignment.align(motion, mapped, skeleton)
+    _, mapped, *_ = find_bones(motion, joints, skeleton)
+    upright = find_upright(motion, mapped)
+    alignment = rest_alignment.align(turn_axes(motion, upright), mapped, skeleton)
     ahead = alignment.corrections["sacroiliac"].T
     corrections = {joint: ahead @ correction for joint, correction in alignment.corrections.items()}
-    turn = ahead @ alignment.upright
+    turn = ahead @ upright
     return Rest(mapped, motion.rest() @ turn.T, corrections, turn)

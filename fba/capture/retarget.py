@@ -49,17 +49,15 @@ def find_targets(
     They are joint -> rotations (T, 3, 3), and the positions of the root (T, 3) in metres. mapped: joint of
     the body -> number of the source's joint. groups: number of groups of vertebrae that share the spine's
     rotations, 0 for only the joints of the source. with_anchors: the source's joints turn, too.
-    scale, ground, plant: as for `fba.capture.from_skeleton`.
+    scale, ground, plant: as for `fba.capture.from_skeleton`. motion: as `fba.capture.preparation` leaves it.
     """
     skeleton = solver.skeleton
     alignment = rest_alignment.align(motion, mapped, skeleton)
-    upright = alignment.upright
     source_rotations, source_positions = motion.world()
-    source_positions = source_positions @ upright.T
     turned: dict[str, Float64] = {}
     for joint, correction in alignment.corrections.items():
         source = mapped.get(joint, mapped["HumanoidRoot"])
-        turned[joint] = upright @ rotations.matrices(source_rotations[:, source]) @ upright.T @ correction
+        turned[joint] = rotations.matrices(source_rotations[:, source]) @ correction
     anchors = [joint for joint in spine.joints(skeleton) if joint in mapped]
     if groups and len(anchors) > 1:
         positions = {joint: source_positions[:, mapped[joint]] for joint in anchors}
@@ -70,7 +68,7 @@ def find_targets(
         if f"{side}_ankle" in turned and f"{side}_subtalar" in skeleton
     }
     targets = Targets(
-        solver, motion, mapped, alignment.aims, upright, source_rotations, source_positions, turned, feet
+        solver, motion, mapped, alignment.aims, source_rotations, source_positions, turned, feet
     )
     for side in "lr":
         _turn_clavicle(targets, side)

@@ -14,8 +14,9 @@ from fba.body import BapSolver
 from fba.body.solve.solver import solve_track
 from fba.capture import _spine as spines
 from fba.capture import _standard_skeleton as standard_skeleton
-from fba.capture import matching, retarget
+from fba.capture import retarget
 from fba.capture.motion import SkeletonMotion
+from fba.capture.preparation import prepare
 from fba.errors import FbaWarning, ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 
@@ -44,6 +45,8 @@ def from_skeleton(
     ground: str = "floor",
     plant: bool = True,
     spine: str | int = "spread",
+    rest: str | int = "auto",
+    up: str = "auto",
     solver: BapSolver | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
@@ -67,6 +70,9 @@ def from_skeleton(
     that one: these keep the rotation of the head, and the rest as closely as possible. "joints" turns one
     vertebra for each joint of the source. solver: skeleton and axes; None for the default body.
 
+    rest, up: the rest pose and the axis that points up; by default both are found, see
+    `fba.capture.preparation.prepare`.
+
     Bones point in the directions of the source's bones. Where the source turns about an axis that a joint
     lacks, the joint before or after it turns instead. BAPs 181..183 are millimetres from the default standing
     position. Angles are within +-pi; they are not clamped to the standard's ranges. A skeleton of the
@@ -83,8 +89,6 @@ def from_skeleton(
     `fba.capture.retarget_report` measures how close the result comes.
     """
     solver = solver if solver is not None else BapSolver()
-    joints = joints if joints is not None else motion.declared or None
-    _, mapped = matching.map_joints(motion.names, joints, solver.skeleton)
     rate = motion.rate if rate is None else Fraction(rate)
     if not len(motion):
         raise ModelError("the motion has no frames")
@@ -97,6 +101,18 @@ def from_skeleton(
     if frames > len(motion):
         own_bytes = motion.rotations.nbytes + motion.positions.nbytes
         check_memory(limits, frames, len(motion.names), f"the motion at {float(rate):g} frames/s", own_bytes)
+    same_joints = spine in ("spread", "joints")
+    direct = (
+        joints is None
+        and not motion.declared
+        and same_joints
+        and (rest, up) == ("auto", "auto")
+        and standard_skeleton.is_direct(motion, solver.skeleton)
+    )
+    mapped: dict[str, int] = {}
+    if not direct:
+        ready = prepare(motion, solver.skeleton, joints=joints, rest=rest, up=up)
+        motion, mapped = ready.motion, ready.mapped
     motion = motion.resample(rate, limits=limits)
     if origin not in ORIGINS:
         raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {origin!r}")
@@ -116,8 +132,7 @@ def from_skeleton(
             FbaWarning,
             stacklevel=2,
         )
-    same_joints = spine in ("spread", "joints")
-    if joints is None and same_joints and standard_skeleton.is_direct(motion, solver.skeleton):
+    if direct:
         turned, root = standard_skeleton.direct_targets(motion, solver.skeleton, scale)
     else:
         turned, root = retarget.find_targets(

@@ -46,9 +46,7 @@ def targets(**joints: np.ndarray) -> Targets:
         ("root",), np.array([-1]), np.zeros((1, 3)), still, np.zeros((count, 3)), Fraction(25)
     )
     aims = {"l_ankle": "l_metatarsal", "l_sternoclavicular": "l_shoulder"}
-    return Targets(
-        BapSolver(), motion, {"l_wrist": 0}, aims, np.eye(3), still, np.zeros((count, 1, 3)), joints, {}
-    )
+    return Targets(BapSolver(), motion, {"l_wrist": 0}, aims, still, np.zeros((count, 1, 3)), joints, {})
 
 
 def test_a_foot_points_where_it_is_to_within_a_thousandth_of_a_degree() -> None:

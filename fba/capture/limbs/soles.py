@@ -65,14 +65,15 @@ class Soles:
     points: Float64
 
 
-def source_soles(motion: SkeletonMotion, mapped: Mapping[str, int], upright: Float64, turned: Float64,
-                 positions: Float64, metres: float) -> Soles | None:  # fmt: skip
+def source_soles(
+    motion: SkeletonMotion, mapped: Mapping[str, int], turned: Float64, positions: Float64, metres: float
+) -> Soles | None:
     """Return the source's soles, or None if it lacks an ankle.
 
-    turned: (T, J, 4), world rotations in the source's frame. positions: (T, J, 3), upright, in its unit.
-    metres: of the body for one unit. The points of a sole are ankle, joints and bone ends below it, and a
-    heel. If no point is behind the ankle, the heel is as far behind it as the body's, and as far below it as
-    the lowest point of the rest pose.
+    turned: (T, J, 4), world rotations. positions: (T, J, 3), in the source's unit. metres: of the body for
+    one unit. The points of a sole are ankle, joints and bone ends below it, and a heel. If no point is behind
+    the ankle, the heel is as far behind it as the body's, and as far below it as the lowest point of the rest
+    pose.
     """
     if "l_ankle" not in mapped or "r_ankle" not in mapped:
         return None
@@ -84,12 +85,12 @@ def source_soles(motion: SkeletonMotion, mapped: Mapping[str, int], upright: Flo
         for joint, parent in enumerate(motion.parents):
             if int(parent) in foot:
                 foot.append(joint)
-        at_rest = [(rest[joint] - rest[ankle]) @ upright.T for joint in foot]
+        at_rest = [rest[joint] - rest[ankle] for joint in foot]
         moving = [positions[:, joint] for joint in foot]
         for parent, offset in zip(motion.end_parents, motion.end_offsets, strict=True):
             if int(parent) in foot:
-                at_rest.append((rest[parent] + offset - rest[ankle]) @ upright.T)
-                turn = upright @ rotations.matrices(turned[:, parent])
+                at_rest.append(rest[parent] + offset - rest[ankle])
+                turn = rotations.matrices(turned[:, parent])
                 moving.append(positions[:, parent] + turn @ offset)
         ahead = max(at_rest, key=lambda point: float(np.hypot(point[0], point[2]))) * [1.0, 0.0, 1.0]
         ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
@@ -98,7 +99,7 @@ def source_soles(motion: SkeletonMotion, mapped: Mapping[str, int], upright: Flo
             heel = moving[int(np.argmin(along))]
         else:
             behind = [0.0, min(float(point[1]) for point in at_rest), 0.0] - ahead * (HEEL / metres)
-            turn = upright @ rotations.matrices(turned[:, ankle]) @ upright.T
+            turn = rotations.matrices(turned[:, ankle])
             heel = positions[:, ankle] + turn @ behind
             moving.append(heel)
         ball = mapped.get(f"{side}_metatarsal")

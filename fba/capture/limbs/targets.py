@@ -18,9 +18,8 @@ class Targets:
 
     motion: the source, T frames. mapped: joint of the body -> number of the source's joint.
     aims: joint -> the joint at the other end of its bone, where the source has both.
-    upright: (3, 3), turns the source's axes to the body's. source_rotations: (T, J, 4), world quaternions of
-    the source's joints in its own axes. source_positions: (T, J, 3), their positions in the body's axes and
-    the source's unit.
+    source_rotations: (T, J, 4), world quaternions of the source's joints. source_positions: (T, J, 3), their
+    positions in the source's unit.
     rotations: joint -> (T, 3, 3), target in world axes; the limbs' functions replace its entries one by one.
     feet: side "l" or "r" -> (T, 3, 3), target of the whole foot, which ankle and subtalar joint share.
     """
@@ -29,7 +28,6 @@ class Targets:
     motion: SkeletonMotion
     mapped: dict[str, int]
     aims: dict[str, str]
-    upright: Float64
     source_rotations: Float64
     source_positions: Float64
     rotations: dict[str, Float64]

@@ -9,6 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from fba import rotations
 from fba.body.skeleton import ROOT
 from fba.capture import SkeletonMotion, matching
 from fba.errors import FbaWarning, ModelError
@@ -53,6 +54,8 @@ class Joints:
                 for name, number in zip(names, self.used, strict=True)
                 if self.nodes[number] in declared
             },
+            axes=rotations.quaternions(self.bind.rotations[self.used]),
+            posed=not declared and not any(node in skin.joints for skin in gltf.skins for node in self.nodes),
         )
 
 

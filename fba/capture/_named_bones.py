@@ -1,0 +1,274 @@
+"""Find the bones of a skeleton from the words in its joints' names, together with where the joints hang.
+
+A word such as "shoulder" or "leg" means one joint in one file and the next in another. So each limb is taken
+as a whole: of all ways to give its joints, in order from the trunk, the parts of a limb, the one counts that
+agrees best with the words and with the lengths of bones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from fba.arrays import Float64, Int64
+from fba.body.skeleton import ROOT, Skeleton
+from fba.capture._bone_words import Meaning, read
+from fba.capture._spine import joints as spine_joints
+
+LIMBS = {
+    "leg": (("thigh", "hip"), ("shank", "knee"), ("foot", "ankle")),
+    "arm": (("upperarm", "shoulder"), ("forearm", "elbow"), ("hand", "wrist")),
+}
+"""Words of the three parts of a limb, and the body's joints where they begin."""
+FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+SHORTEST = 0.3
+"""Length of the shorter of a limb's two bones, relative to the longer, below which it is doubted."""
+HELPER_COST = 3
+"""What a joint loses that its name calls a helper, such as "twist"; a certain word counts 2."""
+LONGEST_CHAIN = 16
+"""Joints of a limb that are tried."""
+MOST_ENDS = 32
+"""Hands or feet of one side that are tried."""
+
+
+def find(names: Sequence[str], parents: Int64, offsets: Float64, skeleton: Skeleton) -> dict[str, int]:
+    """Return joint of the body -> number of the source's joint; empty if there is no pair of whole legs.
+
+    parents: (J,). offsets: (J, 3), whose lengths count only.
+    """
+    meanings = [read(name) for name in names]
+    lengths = np.linalg.norm(offsets, axis=1)
+    mapped: dict[str, int] = {}
+    for side in "lr":
+        for limb, parts in LIMBS.items():
+            mapped |= _limb(side, limb, parts, meanings, parents, lengths)
+    if not all(f"{side}_{joint}" in mapped for side in "lr" for joint in ("hip", "knee", "ankle")):
+        return {}
+    hips = _common(_path(parents, mapped["l_hip"])[:-1], _path(parents, mapped["r_hip"])[:-1])
+    if hips is None:
+        return {}
+    head = next(
+        (n for n, m in enumerate(meanings) if "head" in m.parts and not m.side and not m.helper), hips
+    )
+    trunk = _common(_path(parents, hips), _path(parents, head))
+    if trunk is not None and trunk != hips:  # DAZ: legs and back hang on a joint above the pelvis
+        mapped["sacroiliac"], hips = hips, trunk
+    mapped[ROOT] = hips
+    for side in "lr":
+        mapped |= _toe(side, mapped, meanings, parents)
+        mapped |= _clavicle(side, mapped, meanings, parents)
+        mapped |= _fingers(side, mapped, names, meanings, parents)
+    mapped |= _spine(mapped, meanings, parents, lengths, skeleton)
+    return {joint: number for joint, number in mapped.items() if joint in skeleton}
+
+
+def _path(parents: Int64, joint: int) -> list[int]:
+    """Return the joints from the root down to one."""
+    path = [joint]
+    while (joint := int(parents[joint])) >= 0:
+        path.append(joint)
+    return path[::-1]
+
+
+def _common(first: list[int], second: list[int]) -> int | None:
+    """Return the last joint that two paths from the root share."""
+    shared = [a for a, b in zip(first, second, strict=False) if a == b]
+    return shared[-1] if shared else None
+
+
+def _limb(
+    side: str, limb: str, parts: Sequence[tuple[str, str]], meanings: Sequence[Meaning], parents: Int64,
+    lengths: Float64,
+) -> dict[str, int]:  # fmt: skip
+    """Return the three joints of one limb, or nothing."""
+    words = {part for part, _ in parts}
+    other = {part for key, value in LIMBS.items() if key != limb for part, _ in value}
+    best: tuple[float, tuple[int, ...]] = (-np.inf, ())
+    last = {
+        number
+        for number, meaning in enumerate(meanings)
+        if meaning.side == side and parts[2][0] in meaning.parts and not meaning.helper
+    }
+    for end in sorted(last)[:MOST_ENDS]:
+        path = _path(parents, end)
+        chain = [
+            number
+            for number in path
+            if meanings[number].side in (side, "") and not other & _certain(meanings[number])
+        ][-LONGEST_CHAIN:]
+        chain = [
+            number
+            for number in chain
+            if meanings[number].side == side or meanings[number].parts.keys() & words
+        ]
+        reach = dict(zip(path, np.cumsum(lengths[path]).tolist(), strict=True))
+        for three in combinations(chain, 3):
+            score = sum(
+                _score(meanings[number], part, side) for number, (part, _) in zip(three, parts, strict=True)
+            )
+            bones = [reach[b] - reach[a] for a, b in pairwise(three)]
+            if min(bones) < SHORTEST * max(bones):
+                score -= 2
+            score += 0.01 * (three[0] - end) / max(len(parents), 1)  # of two hips, the one closer to the knee
+            if score > best[0]:
+                best = (score, three)
+    if best[0] < 3:
+        return {}
+    return {f"{side}_{joint}": number for number, (_, joint) in zip(best[1], parts, strict=True)}
+
+
+def _certain(meaning: Meaning) -> set[str]:
+    return {part for part, value in meaning.parts.items() if value > 1}
+
+
+def _score(meaning: Meaning, part: str, side: str) -> float:
+    """Return how well a name agrees with a part of a limb: 2 if it says so, less if it says another."""
+    value = float(meaning.parts.get(part, -1.5 if meaning.parts else -0.5))
+    if part in meaning.parts and len(_certain(meaning) - {part, "hips"}):
+        value -= 1.0  # "LeftHandThumb1" is a thumb
+    return value - HELPER_COST * meaning.helper - (0.5 if meaning.side != side else 0.0)
+
+
+def _below(parents: Int64, joint: int) -> list[int]:
+    """Return all joints below one, in the file's order."""
+    under = {joint}
+    result = []
+    for number, parent in enumerate(parents):
+        if int(parent) in under:
+            under.add(number)
+            result.append(number)
+    return result
+
+
+def _toe(side: str, mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64) -> dict[str, int]:
+    """Return the joint of the toes: the first below the ankle with that name; of several, the middle one."""
+    depth = {mapped[f"{side}_ankle"]: 0}
+    toes: list[int] = []
+    for number in _below(parents, mapped[f"{side}_ankle"]):
+        depth[number] = depth[int(parents[number])] + 1
+        if "toe" in meanings[number].parts and not meanings[number].helper:
+            toes.append(number)
+    if not toes:
+        return {}
+    sure = [t for t in toes if meanings[t].parts["toe"] > 1] or toes
+    first = min(depth[t] for t in sure)
+    level = [t for t in sure if depth[t] == first]
+    return {f"{side}_metatarsal": level[(len(level) - 1) // 2]}
+
+
+def _clavicle(
+    side: str, mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64
+) -> dict[str, int]:
+    """Return the clavicle: the joint between trunk and upper arm that is named so, or has the arm's side."""
+    if f"{side}_shoulder" not in mapped:
+        return {}
+    above = [
+        number
+        for number in _path(parents, mapped[f"{side}_shoulder"])[:-1]
+        if meanings[number].side == side and not meanings[number].helper
+    ]
+    named = [number for number in above if "clavicle" in meanings[number].parts]
+    return {f"{side}_sternoclavicular": (named or above)[0]} if above else {}
+
+
+def _fingers(
+    side: str, mapped: dict[str, int], names: Sequence[str], meanings: Sequence[Meaning], parents: Int64
+) -> dict[str, int]:
+    """Return three joints for each finger below the wrist."""
+    if f"{side}_wrist" not in mapped:
+        return {}
+    numbered = [m.numbers[0] for m in meanings if "finger" in m.parts and m.numbers]
+    first = 0 if any(_digit(number) == 0 for number in numbered) else 1  # the thumb's
+    chains: dict[str, list[int]] = {}
+    for number in _below(parents, mapped[f"{side}_wrist"]):
+        meaning = meanings[number]
+        finger = next((f for f in FINGERS if f in meaning.parts), None)
+        above = next((f for f, chain in chains.items() if int(parents[number]) in chain), None)
+        if above is not None and (finger in (None, above)):
+            finger = above
+        elif finger is None and "finger" in meaning.parts and meaning.numbers:
+            which = meaning.numbers[0] if len(meaning.numbers) > 1 else _digit(meaning.numbers[0])
+            which -= first
+            finger = FINGERS[which] if 0 <= which < len(FINGERS) else None
+        if finger is None or meaning.helper or (above is None and finger in chains):
+            continue
+        if "meta" in meaning.parts or "inhand" in names[number].lower():  # Rokoko: "LeftInHandIndex"
+            continue
+        chain = chains.setdefault(finger, [])
+        if chain and meanings[chain[-1]] == meaning:
+            chain[-1] = number  # DAZ: "__lthumb" above "lthumb" stands still
+        else:
+            chain.append(number)
+    result = {}
+    for finger, chain in chains.items():
+        in_palm = len(chain) > 3 and not meanings[chain[0]].numbers and bool(meanings[chain[1]].numbers)
+        start = 1 if in_palm else 0
+        for position, number in enumerate(chain[start : start + 3], 1):
+            result[f"{side}_{finger}{position}"] = number
+    return result
+
+
+def _digit(number: int) -> int:
+    """Return the first digit: Biped's fingers are 0, 01, 02, 1, 11, 12, ..."""
+    return int(str(number)[0])
+
+
+def _spine(
+    mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64, lengths: Float64, skeleton: Skeleton
+) -> dict[str, int]:
+    """Return the joints of back, neck and head, spread over the vertebrae by their heights on the spine."""
+    hips = mapped[ROOT]
+    limbs = set(mapped.values()) - {hips}
+    heads = [
+        number
+        for number in _below(parents, hips)
+        if "head" in meanings[number].parts and not meanings[number].side and not meanings[number].helper
+    ]
+    necks = [
+        number
+        for number in _below(parents, hips)
+        if "neck" in meanings[number].parts and not meanings[number].side and not meanings[number].helper
+    ]
+    result: dict[str, int] = {}
+    arms = [mapped[f"{side}_shoulder"] for side in "lr" if f"{side}_shoulder" in mapped]
+    if heads:
+        top = heads[0]
+        result["skullbase"] = top
+    elif necks:
+        top = necks[-1]
+    elif len(arms) == 2:
+        top = _common(_path(parents, arms[0]), _path(parents, arms[1])) or hips
+    else:
+        return {}
+    way = _path(parents, top)
+    if hips not in way:
+        return result
+    line = [number for number in way[way.index(hips) + 1 :] if number not in limbs]
+    neck = [number for number in line if number in necks][:2]
+    if neck:
+        result["vc7"] = neck[0]
+        if len(neck) > 1:
+            result["vc4"] = neck[1]
+    end = line.index(neck[0]) if neck else len(line) - (1 if heads else 0)
+    back = line[:end]
+    total = float(sum(lengths[number] for number in line[: end + 1]))
+    chain = spine_joints(skeleton)
+    if "vc7" not in chain or "vl5" not in chain or not back or total <= 0:
+        return result
+    centres = np.array([skeleton.centres[skeleton.number(joint)] for joint in chain])
+    height = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))])
+    first, last = chain.index("vl5"), chain.index("vc7")
+    reach = 0.0
+    at = first
+    for count, number in enumerate(back):
+        reach += float(lengths[number])
+        room = last - (len(back) - count)
+        wanted = reach / total * height[last]
+        nearest = int(np.argmin(np.abs(height - wanted)))
+        at = min(max(nearest, at), room)
+        if at >= first:
+            result[chain[at]] = number
+        at += 1
+    return result

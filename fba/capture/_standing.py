@@ -1,0 +1,162 @@
+"""Measure how far joints are from those of a person who stands: upright, symmetric, with straight limbs.
+
+The same measure tells whether a file's rest pose is one that a person can take, and in which frames of a
+motion somebody stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.arrays import Bool, Float64
+from fba.body.skeleton import ROOT
+
+MOST = {
+    "thigh": 45.0,
+    "knee": 50.0,
+    "back": 40.0,
+    "shoulders": 40.0,
+    "legs": 40.0,
+    "arms": 50.0,
+    "elbow": 60.0,
+    "toes": 100.0,
+}
+"""Largest angles in degrees of a rest pose: thigh from straight down, bend of knees and elbows, back and neck
+from straight up, shoulders against hips, left limbs against the mirrored right ones, toes from ahead."""
+FREE = {
+    "thigh": 8.0,
+    "knee": 8.0,
+    "back": 10.0,
+    "shoulders": 6.0,
+    "legs": 5.0,
+    "arms": 8.0,
+    "elbow": 15.0,
+    "toes": 35.0,
+}
+"""Angles up to which a person stands as well as can be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """How poses stand. up, left: unit (T, 3), of the trunk. angles: what -> (T,), degrees, see `MOST`."""
+
+    up: Float64
+    left: Float64
+    angles: dict[str, Float64]
+
+    @property
+    def possible(self) -> Bool:
+        """Whether each pose (T,) could be a rest pose."""
+        result: Bool = np.ones(len(self.up), dtype=np.bool_)
+        for what, angle in self.angles.items():
+            result &= angle <= MOST[what]
+        return result
+
+    @property
+    def distance(self) -> Float64:
+        """Degrees (T,) by which poses differ from standing straight, as the root of a mean of squares."""
+        parts = [np.maximum(angle - FREE[what], 0.0) for what, angle in self.angles.items()]
+        result: Float64 = np.sqrt(np.mean(np.square(parts), axis=0)) if parts else np.zeros(len(self.up))
+        return result
+
+    def worst(self, row: int) -> str:
+        """Return what is farthest from standing in a pose: "thigh 87 degrees"."""
+        if not self.angles:
+            return "nothing"
+        what = max(self.angles, key=lambda key: float(self.angles[key][row]) / MOST[key])
+        return f"{what} {self.angles[what][row]:.0f} degrees"
+
+
+def measure(positions: Float64, mapped: Mapping[str, int]) -> Stance:
+    """Return how poses stand. positions: (T, J, 3), in any axes. mapped: body's joint -> source's joint."""
+
+    def middle(*joints: str) -> Float64 | None:
+        numbers = [mapped[joint] for joint in joints if joint in mapped]
+        result: Float64 | None = positions[:, numbers].mean(axis=1) if len(numbers) == len(joints) else None
+        return result
+
+    count = len(positions)
+    pairs = [
+        positions[:, mapped[f"l_{joint}"]] - positions[:, mapped[f"r_{joint}"]]
+        for joint in ("hip", "shoulder", "knee")
+        if f"l_{joint}" in mapped and f"r_{joint}" in mapped
+    ]
+    left = next((pair for pair in pairs if np.linalg.norm(pair, axis=1).min() > 0), None)
+    if left is None:
+        left = pairs[0] if pairs else np.tile([1.0, 0.0, 0.0], (count, 1))
+    left = unit(left)
+    below = middle("l_hip", "r_hip")
+    below = positions[:, mapped[ROOT]] if below is None else below
+    tops = [middle("l_shoulder", "r_shoulder"), middle("vc7"), middle("skullbase")]
+    above = next((top for top in tops if top is not None), None)
+    if above is None:
+        feet = middle("l_ankle", "r_ankle")
+        feet = middle("l_knee", "r_knee") if feet is None else feet
+        above = 2 * below - feet if feet is not None else below + np.array([0.0, 1.0, 0.0])
+    up = above - below
+    up = unit(up - left * np.sum(up * left, axis=1, keepdims=True))
+    ahead = np.cross(left, up)
+    axes = np.stack([left, up, ahead], axis=1)  # (T, 3, 3): rows; axes @ v gives parts along left, up, ahead
+
+    def bone(a: str, b: str) -> Float64 | None:
+        if a not in mapped or b not in mapped:
+            return None
+        line = positions[:, mapped[b]] - positions[:, mapped[a]]
+        return unit((axes @ line[:, :, None])[:, :, 0])
+
+    angles: dict[str, Float64] = {}
+
+    def add(what: str, angle: Float64) -> None:
+        angles[what] = np.maximum(angles.get(what, np.zeros(count)), angle)
+
+    limbs = {}
+    for side in "lr":
+        for a, b in (
+            ("hip", "knee"),
+            ("knee", "ankle"),
+            ("shoulder", "elbow"),
+            ("elbow", "wrist"),
+            ("ankle", "metatarsal"),
+        ):
+            limbs[side, a] = bone(f"{side}_{a}", f"{side}_{b}")
+        if (thigh := limbs[side, "hip"]) is not None:
+            add("thigh", between(thigh, np.array([0.0, -1.0, 0.0])))
+            if (shank := limbs[side, "knee"]) is not None:
+                add("knee", between(thigh, shank))
+        if (arm := limbs[side, "shoulder"]) is not None and (fore := limbs[side, "elbow"]) is not None:
+            add("elbow", between(arm, fore))
+        if (foot := limbs[side, "ankle"]) is not None:
+            add(
+                "toes",
+                between(
+                    foot * np.array([1.0, 0.0, 1.0]) + np.array([0.0, 0.0, 1e-9]), np.array([0.0, 0.0, 1.0])
+                ),
+            )
+    for what, a in (("legs", "hip"), ("legs", "knee"), ("arms", "shoulder"), ("arms", "elbow")):
+        one, other = limbs["l", a], limbs["r", a]
+        if one is not None and other is not None:
+            add(what, between(one, other * [-1.0, 1.0, 1.0]))
+    shoulders = middle("l_shoulder"), middle("r_shoulder")
+    if shoulders[0] is not None and shoulders[1] is not None:
+        line = (axes @ unit(shoulders[0] - shoulders[1])[:, :, None])[:, :, 0]
+        add("shoulders", between(line, np.array([1.0, 0.0, 0.0])))
+    neck = bone("vc7", "skullbase")
+    if neck is not None:
+        add("back", between(neck, np.array([0.0, 1.0, 0.0])) * 0.8)
+    return Stance(up, left, angles)
+
+
+def unit(vectors: Float64) -> Float64:
+    """Return vectors (..., 3) of length 1; zero stays zero."""
+    result: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+    return result
+
+
+def between(a: Float64, b: Float64) -> Float64:
+    """Return the angles in degrees between vectors (..., 3)."""
+    sine = np.linalg.norm(np.cross(a, b), axis=-1)
+    result: Float64 = np.degrees(np.arctan2(sine, np.sum(a * b, axis=-1)))
+    return result
