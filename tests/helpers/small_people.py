@@ -87,7 +87,8 @@ def write_person(
         roots.append(special[name])
     builder.add("scenes", {"nodes": roots})
     for name, clip in (clips or {}).items():
-        frames = max([len(turns) for turns in clip.values()] + [len(hips), len(gaze), 1])
+        weights = [*(morphs or {}).values(), *(expressions or {}).values()]
+        frames = max(len(rows) for rows in (*clip.values(), *weights, hips, gaze, [0]))
         times = builder.data((np.arange(frames) / rate).astype(np.float32), bounds=True)
         samplers: list[dict[str, Any]] = []
         channels: list[dict[str, Any]] = []

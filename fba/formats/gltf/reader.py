@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -23,6 +23,8 @@ from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, key_times
 from fba.formats.gltf._skeletons import find_joints
 from fba.formats.gltf.clips import choose_clip
+from fba.formats.gltf.face_motion import find_face_clip, nodes_of_faces, read_face_motion
+from fba.gltf import Animation as Clip
 from fba.gltf import Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
@@ -31,6 +33,8 @@ CHUNK = 200_000
 """Joints times frames that are sampled at once."""
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 DEFAULT_RATE = Fraction(30)
+FACE_BYTES = 2500
+"""Memory that a frame of a face takes."""
 HALF_TURN = (-1, 1, -1)
 """What half a turn about +y multiplies vectors by, and the last three numbers of quaternions."""
 MOST_APART = 1.5
@@ -59,7 +63,7 @@ def read(
     clip: str | int | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
-    """Read the animation of a glTF skeleton as BAPs.
+    """Read the animation of a glTF skeleton as BAPs, and that of its face as FAPs, see `read_face_motion`.
 
     The options are those of `fba.capture.from_skeleton`; clip: see `read_motion`. BAPs and FAPs in files of
     this project are read as they are, with their own frames, unless an option other than clip and rate asks
@@ -79,11 +83,24 @@ def read(
             if note is not None:
                 animation = read_note(gltf, own, note)
                 return animation if rate is None else animation.resample(Fraction(rate), limits=limits)
-        motion = sample_motion(gltf, clip=clip, rate=rate, limits=limits)
-        return from_skeleton(
-            motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine,
-            limits=limits,
-        )  # fmt: skip
+        if (face_clip := _clip_of_face_alone(gltf, clip)) is not None:
+            return _read_face_alone(gltf, face_clip, rate, limits)
+        try:
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always", FbaWarning)
+                sampled = _sample(gltf, clip, rate, limits)
+                animation = from_skeleton(
+                    sampled.motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant,
+                    spine=spine, limits=limits,
+                )  # fmt: skip
+        except ModelError:
+            if joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
+                raise
+            return _read_face_alone(gltf, face_clip, rate, limits)
+        for each in said:  # not what concerns a skeleton that turned out to be none
+            warnings.warn(each.message, each.category, stacklevel=2)
+        times = sampled.start + np.arange(len(animation)) / float(animation.rate)
+        return replace(animation, face=read_face_motion(gltf, sampled.clip, times))
     except ModelError as error:
         raise FormatError(error.finding.removeprefix(f"{path}: "), path=path).with_remedies(
             *error.remedies
@@ -116,32 +133,71 @@ def sample_motion(
 ) -> SkeletonMotion:
     """Do the same as `read_motion` for a file that has been read."""
     try:
-        return _sample_motion(gltf, clip, rate, limits)
+        return _sample(gltf, clip, rate, limits).motion
     except ModelError as error:
         found = error.finding.removeprefix(f"{gltf.file}: ")
         raise ModelError(f"{gltf.file}: {found}").with_remedies(*error.remedies) from error
 
 
-def _sample_motion(
+@dataclass(frozen=True, eq=False)
+class _Sampled:
+    """A clip, and the motion of the skeleton in it, from start on, seconds."""
+
+    motion: SkeletonMotion
+    clip: Clip
+    start: float
+
+
+def _clip_of_face_alone(gltf: Gltf, clip: str | int | None) -> Clip | None:
+    """Return the clip to read if it moves a face and turns nothing else, else None."""
+    clips = gltf.animations if clip is None else [choose_clip(gltf, clip, range(len(gltf.nodes)))]
+    faces = nodes_of_faces(gltf)
+    if any(c.path != "weights" and c.node not in faces for each in clips for c in each.channels):
+        return None
+    return find_face_clip(gltf, clip)
+
+
+def _read_face_alone(gltf: Gltf, clip: Clip, rate: Fraction | int | str | None, limits: Limits) -> Animation:
+    """Return a clip that moves a face alone."""
+    times = key_times(clip.channels)
+    frames, count = _count_frames(gltf, clip, times, rate, limits)
+    limits.check_frames(count, f"{gltf.file}: animation {clip.name!r}")
+    keys = sum(channel.times.nbytes + channel.values.nbytes for channel in clip.channels)
+    limits.check_bytes(count * FACE_BYTES, f"{gltf.file}: animation {clip.name!r}", source=keys)
+    face = read_face_motion(gltf, clip, float(times[0]) + np.arange(count) / float(frames))
+    return Animation(frames, np.arange(count), face, None, clip.name)
+
+
+def _count_frames(
+    gltf: Gltf, clip: Clip, times: Float64, rate: Fraction | int | str | None, limits: Limits
+) -> tuple[Fraction, int]:
+    """Return the frame rate and the number of frames of a clip with keys at times (T,)."""
+    frames = Fraction(rate) if rate is not None else _rate(times)
+    if frames <= 0:
+        raise ValueError(f"rate must be positive, not {rate}")
+    seconds = float(times[-1] - times[0])
+    count = int(seconds * float(frames) + 1e-6) + 1
+    what = f"{gltf.file}: animation {clip.name!r}, {seconds:.0f} s at {float(frames):g} frames/s,"
+    limits.check_seconds(seconds, what)
+    if count > MOST_FRAMES:
+        raise ModelError(
+            f"{what} has {count} frames, more than {MOST_FRAMES}; give a lower rate, or cut it into pieces"
+        )
+    return frames, count
+
+
+def _sample(
     gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None, limits: Limits
-) -> SkeletonMotion:
+) -> _Sampled:
     joints = find_joints(gltf)
     nodes, parents, bind, used = joints.nodes, joints.parents, joints.bind, joints.used
     place = {node: number for number, node in enumerate(nodes)}
     chosen = choose_clip(gltf, clip, place)
     channels = [channel for channel in chosen.channels if channel.node in place]
     times = key_times(channels)
-    frames = Fraction(rate) if rate is not None else _rate(times)
-    if frames <= 0:
-        raise ValueError(f"rate must be positive, not {rate}")
-    first, last = float(times[0]), float(times[-1])
-    count = int((last - first) * float(frames) + 1e-6) + 1
-    what = f"{gltf.file}: animation {chosen.name!r}, {last - first:.0f} s at {float(frames):g} frames/s,"
-    limits.check_seconds(last - first, what)
-    if count > MOST_FRAMES:
-        raise ModelError(
-            f"{what} has {count} frames, more than {MOST_FRAMES}; give a lower rate, or cut it into pieces"
-        )
+    frames, count = _count_frames(gltf, chosen, times, rate, limits)
+    first = float(times[0])
+    what = f"{gltf.file}: animation {chosen.name!r} at {float(frames):g} frames/s"
     keys = sum(channel.times.nbytes + channel.values.nbytes for channel in channels)
     check_memory(limits, count, len(nodes), what, keys)
     motion = replace(joints.resting(gltf), rate=frames, name=chosen.name)
@@ -164,7 +220,9 @@ def _sample_motion(
     if stretched.any():
         _warn_of_stretching(chosen.name, [motion.names[row] for row in np.flatnonzero(stretched)])
     motion = replace(motion, rotations=turns, positions=root)
-    return _turn_round(motion) if joints.humanoid is not None and joints.humanoid.kind == "VRM 0" else motion
+    if joints.humanoid is not None and joints.humanoid.kind == "VRM 0":
+        motion = _turn_round(motion)
+    return _Sampled(motion, chosen, first)
 
 
 def _turn_round(motion: SkeletonMotion) -> SkeletonMotion:

@@ -1,0 +1,274 @@
+"""The motion of a face in a glTF file as FAPs: weights of morph targets, expressions of VRMA, eyes and jaws.
+
+`shape_faps.csv` lists what shapes mean, at weight 1: those of ARKit, the expressions of VRM, the visemes of
+Oculus, and some of VRoid's. The amplitudes are those of an adult's face, in FAPUs, so that the motion fits
+every face. "viseme10" and "expression1" stand for the FAPs of a viseme or an expression at full intensity.
+Shapes that are named after FAPs have the amplitude that this project's own files use.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from fba.animation import FaceTrack
+from fba.arrays import Bool, Float64
+from fba.errors import FbaWarning
+from fba.face.authoring.shapes.shape_names import arkit_of, fap_of
+from fba.face.expressions import Definitions
+from fba.face.gltf.morphs import morph_values
+from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
+from fba.formats.gltf.clips import choose_clip
+from fba.formats.gltf.humanoid import find_humanoid
+from fba.gltf import Animation as Clip
+from fba.gltf import Gltf
+from fba.gltf.values import Value, optional_member
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
+
+LARGEST = 1 << 30
+RADIAN = 1e5
+"""Units of the FAPs that turn eyeballs."""
+JAW_OPEN = np.radians(20.0)
+"""Angle of a jaw bone at which the mouth is as open as by a shape "jawOpen" of weight 1."""
+NO_EYE = re.compile("brow|lid|lash|end|target|look|aim")
+EYES = {
+    "l": re.compile("left_?eye|eye(ball)?_?left|(^|_)l_?(face)?_?eye(ball)?$|eye(ball)?[_.]?l$"),
+    "r": re.compile("right_?eye|eye(ball)?_?right|(^|_)r_?(face)?_?eye(ball)?$|eye(ball)?[_.]?r$"),
+}
+"""What the names of bones of eyes contain, in small letters."""
+JAW = re.compile("(^|_)(lower)?jaw(bone|root|_?master)?$")
+NAMED = 6
+"""Most names in a message."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Bone:
+    """A bone of the face: the FAPs that its turns stand for."""
+
+    node: int
+    kind: str
+
+
+def read_face_motion(gltf: Gltf, clip: Clip, times: Float64) -> FaceTrack | None:
+    """Return the FAPs of a clip at times (T,), seconds; None if it does not move a face.
+
+    Warns (FbaWarning) of morph targets whose names mean nothing here.
+    """
+    values = np.zeros((len(times), FAP_COUNT))
+    sent = np.zeros(FAP_COUNT, dtype=bool)
+
+    def add(weights: Float64, amounts: Float64) -> None:
+        np.add(values, weights[:, None] * amounts, out=values)
+        sent[amounts != 0] = True
+
+    turned = np.zeros(FAP_COUNT, dtype=bool)  # where eyes turn, shapes that look aside move their lids
+    _turn_eyes(_gaze(gltf, clip, times), "lr", values, turned)
+    for bone in _face_bones(gltf, clip):
+        forward = _turns(gltf, clip, times, bone.node)[:, :, 2]
+        if bone.kind == "jaw":
+            add(np.arctan2(-forward[:, 1], forward[:, 2]) / JAW_OPEN, _table()["jawopen"])
+        else:
+            _turn_eyes(forward, bone.kind, values, turned)
+    sent |= turned
+    for name, weights in _weights(gltf, clip, times).items():
+        amounts = amounts_of(name)
+        if amounts is not None:
+            add(weights, np.where(turned, 0.0, amounts))
+    if not sent.any():
+        return None
+    for fap in faps():  # else a decoder would copy the other side
+        if fap.left_right_mate is not None and sent[fap.left_right_mate - 1]:
+            sent[fap.number - 1] = True
+    rounded = np.rint(np.clip(values, -LARGEST, LARGEST)).astype(np.int32)
+    return FaceTrack(rounded, np.broadcast_to(sent, rounded.shape))
+
+
+def find_face_clip(gltf: Gltf, clip: str | int | None) -> Clip | None:
+    """Return the clip of this name or number, or the first, that moves a face; None if there is none.
+
+    Blender writes an action for each object that a take moves, "head|Take 1" and "eyes|Take 1": they are put
+    together.
+    """
+    clips = gltf.animations if clip is None else [choose_clip(gltf, clip, range(len(gltf.nodes)))]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)
+        chosen = next((each for each in clips if read_face_motion(gltf, each, np.zeros(1)) is not None), None)
+    if chosen is None or "|" not in chosen.name:
+        return chosen
+    channels = list(chosen.channels)
+    for other in gltf.animations:
+        taken = {(channel.node, channel.path) for channel in channels}
+        own = {(channel.node, channel.path) for channel in other.channels}
+        if other.name.partition("|")[2] == chosen.name.partition("|")[2] and not own & taken:
+            channels += other.channels
+    return replace(chosen, channels=tuple(channels))
+
+
+def nodes_of_faces(gltf: Gltf) -> frozenset[int]:
+    """Return the nodes that only a face uses: expressions and the gaze of VRMA."""
+    look = optional_member(optional_member(_animation_extension(gltf), "lookAt"), "node")
+    nodes = [node for _, node in _expressions(gltf)]
+    return frozenset([*nodes, *([] if look is None else [look.index(len(gltf.nodes), "node")])])
+
+
+@cache
+def amounts_of(name: str) -> Float64 | None:
+    """Return FAPs (68,) of a shape at weight 1, by its name; None if it is not known."""
+    number = fap_of(name)
+    if number is not None:
+        amounts = np.zeros(FAP_COUNT)
+        amounts[number - 1] = morph_values().get(number, 0)
+        return amounts
+    table = _table()
+    plain = re.split(r"[.:|/]", name)[-1]
+    shape = arkit_of(name) or plain
+    return next((table[_key(word)] for word in (name, plain, shape) if _key(word) in table), None)
+
+
+@cache
+def _table() -> dict[str, Float64]:
+    """Return FAPs (68,) at weight 1 by the key of each shape's name."""
+    table: dict[str, Float64] = {}
+    text = (files(__package__) / "shape_faps.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        sides = re.search(r"\((\w+)\|(\w+)\)", row["shape"])
+        for side, word in zip("lr", sides.groups(), strict=True) if sides else [("", "")]:
+            name = row["shape"].replace(sides[0], word) if sides else row["shape"]
+            table[_key(name)] = _amounts((row["faps"] or "").replace("?", side))
+    return table
+
+
+def _amounts(text: str) -> Float64:
+    """Return FAPs (68,) from text such as "open_jaw=500 viseme10=1"."""
+    amounts = np.zeros(FAP_COUNT)
+    definitions = Definitions.default()
+    for entry in text.split():
+        name, _, value = entry.partition("=")
+        group = re.fullmatch(r"(viseme|expression)(\d+)", name)
+        if group is None:
+            amounts[fap_numbers()[name] - 1] += float(value)
+            continue
+        rows = definitions.visemes if group[1] == "viseme" else definitions.expressions
+        amounts += float(value) * rows[int(group[2])].astype(np.float64)
+    amounts[: FIRST_LOW_LEVEL_FAP - 1] = 0
+    return amounts
+
+
+def _key(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _weights(gltf: Gltf, clip: Clip, times: Float64) -> dict[str, Float64]:
+    """Return the weights (T,) of morph targets and of VRMA's expressions by name; warns of unknown targets.
+
+    Of several meshes with targets of one name, which share their weights, the first counts.
+    """
+    result: dict[str, Float64] = {}
+    unknown = []
+    for channel in clip.channels:
+        mesh = gltf.nodes[channel.node].mesh
+        if channel.path != "weights" or mesh is None:
+            continue
+        weights = sample(channel, times)
+        for column, name in enumerate(gltf.meshes[mesh].morph_names):
+            if amounts_of(name) is None and np.ptp(channel.values.reshape(len(channel.times), -1)) > 0:
+                unknown.append(name)
+            result.setdefault(name, weights[:, column])
+    for name, node in _expressions(gltf):
+        shift = next((c for c in clip.channels if (c.node, c.path) == (node, "translation")), None)
+        if shift is not None:
+            result.setdefault(name, np.clip(sample(shift, times)[:, 0], 0.0, 1.0))
+    strange = sorted(set(unknown))
+    if strange:
+        warnings.warn(
+            f"{gltf.file}: {len(strange)} animated morph targets are left out, as their names say no FAP: "
+            f"{', '.join(strange[:NAMED])}{', ...' if len(strange) > NAMED else ''}",
+            FbaWarning,
+            stacklevel=6,
+        )
+    return result
+
+
+def _animation_extension(gltf: Gltf) -> Value | None:
+    return optional_member(gltf.document.get("extensions"), "VRMC_vrm_animation")
+
+
+def _expressions(gltf: Gltf) -> list[tuple[str, int]]:
+    """Return names and nodes of the expressions that a VRMA file animates."""
+    listed = optional_member(_animation_extension(gltf), "expressions")
+    result = []
+    for group in ("preset", "custom"):
+        entries = optional_member(listed, group)
+        for name, entry in entries.members() if entries is not None else ():
+            result.append((name, entry.member("node").index(len(gltf.nodes), "node")))
+    return result
+
+
+def _gaze(gltf: Gltf, clip: Clip, times: Float64) -> Float64 | None:
+    """Return the directions (T, 3) in which a VRMA file looks, +z ahead; None if it says nothing."""
+    node = optional_member(optional_member(_animation_extension(gltf), "lookAt"), "node")
+    if node is None:
+        return None
+    number = node.index(len(gltf.nodes), "node")
+    if not any((channel.node, channel.path) == (number, "rotation") for channel in clip.channels):
+        return None
+    return nearest_rotation(Sampler(gltf, clip.channels, times).linear(number))[:, :, 2]
+
+
+def _turn_eyes(forward: Float64 | None, sides: str, values: Float64, sent: Bool) -> None:
+    """Add the turns of eyes that look in directions (T, 3), +x to the subject's left."""
+    if forward is None:
+        return
+    yaw = np.arctan2(forward[:, 0], forward[:, 2]) * RADIAN
+    pitch = np.arctan2(-forward[:, 1], np.hypot(forward[:, 0], forward[:, 2])) * RADIAN
+    for side in sides:
+        for name, angles in ((f"yaw_{side}_eyeball", yaw), (f"pitch_{side}_eyeball", pitch)):
+            column = fap_numbers()[name] - 1
+            values[:, column] += angles
+            sent[column] = True
+
+
+def _face_bones(gltf: Gltf, clip: Clip) -> list[_Bone]:
+    """Return the bones of eyes and jaw that a clip turns: declared ones, else those with usual names."""
+    turned = [channel.node for channel in clip.channels if channel.path == "rotation"]
+    humanoid = find_humanoid(gltf)
+    declared: Mapping[str, int] = {} if humanoid is None else humanoid.bones
+    result = []
+    for kind, bone in (("l", "leftEye"), ("r", "rightEye"), ("jaw", "jaw")):
+        if humanoid is not None:
+            nodes = [declared[bone]] if bone in declared else []
+        else:
+            nodes = [node for node in turned if _is_named(gltf.nodes[node].name, kind)]
+        result += [_Bone(node, kind) for node in nodes[:1] if node in turned]
+    return result
+
+
+def _is_named(name: str, kind: str) -> bool:
+    """Whether a bone's name says that it is the jaw, or the eye on side "l" or "r"."""
+    plain = name.rpartition(":")[2].lower()
+    if kind == "jaw":
+        return JAW.search(plain) is not None
+    return EYES[kind].search(plain) is not None and NO_EYE.search(plain) is None
+
+
+def _turns(gltf: Gltf, clip: Clip, times: Float64, node: int) -> Float64:
+    """Return turns (T, 3, 3) of a bone of the head from its rest pose, in the axes of the scene at rest.
+
+    People of VRM 0 face -z; they are turned round.
+    """
+    parent = gltf.nodes[node].parent
+    above = np.eye(3) if parent is None else nearest_rotation(gltf.nodes[parent].world[:3, :3])
+    humanoid = find_humanoid(gltf)
+    if humanoid is not None and humanoid.kind == "VRM 0":
+        above = np.diag([-1.0, 1.0, -1.0]) @ above
+    rest = nearest_rotation(gltf.nodes[node].local[:3, :3])
+    local = nearest_rotation(Sampler(gltf, clip.channels, times).linear(node))
+    result: Float64 = above @ local @ rest.T @ above.T
+    return result

@@ -1,0 +1,148 @@
+"""Faces that move in glTF files become FAPs: named morph targets, expressions and gaze of VRMA, bones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import fba
+from fba.errors import FbaWarning
+from fba.face.expressions import Definitions
+from fba.formats.gltf.face_motion import amounts_of
+from fba.gltf import read_gltf
+from fba.parameters import fap_numbers
+from gltf_edits import edit
+from small_people import write_person
+
+FRAMES = 5
+RAMP = np.linspace(0, 1, FRAMES)
+ARM = {"leftUpperArm": [Rotation.from_euler("z", -60 * s, degrees=True) for s in RAMP]}
+
+
+def column(animation: fba.Animation, name: str) -> np.ndarray:
+    assert animation.face is not None
+    return animation.face.values[:, fap_numbers()[name] - 1]
+
+
+def test_body_and_face_come_from_one_file(tmp_path: Path) -> None:
+    morphs = {"jawOpen": RAMP, "blendShape1.eyeBlink_R": RAMP / 2, "viseme_PP": np.zeros(FRAMES)}
+    animation = fba.read(write_person(tmp_path / "p.glb", clips={"talk": ARM}, morphs=morphs))
+    assert animation.body is not None
+    assert len(animation) == FRAMES
+    jaw = column(animation, "open_jaw")
+    np.testing.assert_allclose(jaw, RAMP * jaw[-1], atol=1)
+    assert 800 < jaw[-1] <= 1080  # what an I plane of the standard carries, from fap.csv
+    np.testing.assert_allclose(column(animation, "close_t_r_eyelid"), RAMP * 450, atol=1)
+    assert not column(animation, "close_t_l_eyelid").any()
+    assert animation.face is not None
+    sent = animation.face.mask.all(axis=0)
+    assert sent[fap_numbers()["close_t_l_eyelid"] - 1]  # else the left eye would blink with the right one
+    assert not sent[fap_numbers()["raise_l_ear"] - 1]
+
+
+def test_a_face_alone(tmp_path: Path) -> None:
+    path = write_person(tmp_path / "p.glb", clips={"talk": {}}, morphs={"mouthSmileLeft": RAMP})
+    animation = fba.read(path)
+    assert animation.body is None
+    assert (column(animation, "raise_l_cornerlip") > 0).sum() == FRAMES - 1
+    assert len(fba.read(path, rate=60)) == 2 * FRAMES - 1
+
+
+def test_expressions_and_gaze_of_vrma(tmp_path: Path) -> None:
+    gaze = [Rotation.from_euler("YX", [20 * s, -10 * s], degrees=True) for s in RAMP]
+    expressions = {"happy": RAMP, "aa": RAMP * 2, "blinkLeft": np.ones(FRAMES)}
+    path = write_person(
+        tmp_path / "p.vrma", clips={"talk": ARM}, extension="VRMC_vrm_animation", skin=False,
+        expressions=expressions, gaze=gaze,
+    )  # fmt: skip
+    animation = fba.read(path)
+    assert animation.body is not None
+    joy = Definitions.default().expressions[1, fap_numbers()["raise_l_cornerlip"] - 1]
+    corner = column(animation, "raise_l_cornerlip") - column(animation, "raise_l_cornerlip")[0]
+    middle = FRAMES // 2  # there "aa" is at 1 already: a weight of 2 counts as 1
+    assert corner[-1] - corner[middle] == pytest.approx(joy / 2, abs=1)
+    np.testing.assert_allclose(np.diff(column(animation, "open_jaw"))[middle:], 12.5, atol=1)  # 50 for joy
+    assert (column(animation, "close_t_l_eyelid") > 800).all()
+    for side in "lr":
+        yaw, pitch = (column(animation, f"{what}_{side}_eyeball")[-1] / 1e5 for what in ("yaw", "pitch"))
+        assert np.degrees(yaw) == pytest.approx(20, abs=0.2)
+        assert np.degrees(pitch) == pytest.approx(-10, abs=0.2)
+
+
+def test_bones_of_eyes_and_jaw(tmp_path: Path) -> None:
+    """They hang on a head that is turned in itself, as in files of Blender."""
+    path = write_person(tmp_path / "p.glb", clips={"talk": ARM | {"head": [Rotation.identity()] * FRAMES}})
+
+    def add(document: dict) -> None:  # type: ignore[type-arg]
+        nodes, clip = document["nodes"], document["animations"][0]
+        head = next(number for number, node in enumerate(nodes) if node["name"] == "head")
+        turned = [0, 0, float(np.sin(np.pi / 4)), float(np.cos(np.pi / 4))]
+        nodes[head].setdefault("children", []).append(len(nodes))
+        nodes.append({"name": "skull", "rotation": turned, "children": [len(nodes) + 1, len(nodes) + 2]})
+        nodes += [{"name": "LeftEye"}, {"name": "jaw"}]
+        still = next(c for c in clip["channels"] if c["target"]["node"] == head)
+        moving = next(c for c in clip["channels"] if c["target"]["node"] != head)
+        assert still is not moving
+        for node in (len(nodes) - 2, len(nodes) - 1):
+            channel = {"sampler": moving["sampler"], "target": {"node": node, "path": "rotation"}}
+            clip["channels"].append(channel)
+
+    edit(path, add)
+    animation = fba.read(path)
+    # about the head's -z at rest, which the skull's own turn leaves: neither yaw nor pitch nor an open jaw
+    for name in ("yaw_l_eyeball", "pitch_l_eyeball", "open_jaw"):
+        assert np.abs(column(animation, name)).max() <= 1
+
+    def turn(document: dict) -> None:  # type: ignore[type-arg]
+        skull = next(node for node in document["nodes"] if node["name"] == "skull")
+        skull["rotation"] = [-float(np.sin(np.pi / 4)), 0, 0, float(np.cos(np.pi / 4))]
+
+    edit(path, turn)  # its own z is now the head's y: -60 degrees about it look to the right
+    yaw = column(fba.read(path), "yaw_l_eyeball") / 1e5
+    np.testing.assert_allclose(np.degrees(yaw), -60 * RAMP, atol=0.5)
+
+
+def test_unknown_targets_are_named(tmp_path: Path) -> None:
+    path = write_person(tmp_path / "p.glb", clips={"talk": ARM}, morphs={"jawOpen": RAMP, "Wobble": RAMP})
+    with pytest.warns(FbaWarning, match="1 animated morph targets are left out.*Wobble"):
+        assert fba.read(path).face is not None
+    path = write_person(tmp_path / "q.glb", clips={"talk": ARM}, morphs={"Wobble": RAMP})
+    with pytest.warns(FbaWarning, match="Wobble"):
+        assert fba.read(path).face is None
+
+
+def test_names_in_all_spellings() -> None:
+    jaw = amounts_of("jawOpen")
+    assert jaw is not None
+    for name in ("jaw_open", "blendShape1.jawOpen", "JawOpen"):
+        other = amounts_of(name)
+        assert other is not None
+        np.testing.assert_array_equal(other, jaw)
+    smile = amounts_of("mouthSmile_R")
+    assert smile is not None
+    assert smile[fap_numbers()["raise_r_cornerlip"] - 1] == 400
+    assert amounts_of("Wobble") is None
+
+
+def test_both_ends_of_a_take_of_blender(tmp_path: Path) -> None:
+    """One action an object, of one take: all are read together."""
+    turns = [Rotation.from_euler("y", 20 * s, degrees=True) for s in RAMP]
+    clips = {"Key|Take 1": {}, "eyes|Take 1": {"head": turns}, "eyes|Take 2": {"head": turns[::-1]}}
+    path = write_person(tmp_path / "p.glb", clips=clips, morphs={"jawOpen": RAMP})
+
+    def add(document: dict) -> None:  # type: ignore[type-arg]
+        document["nodes"].append({"name": "eyeRight"})
+        document["scenes"][0]["nodes"].append(len(document["nodes"]) - 1)
+        for clip in document["animations"][1:]:
+            channels = [channel for channel in clip["channels"] if channel["target"]["path"] == "rotation"]
+            channels[0]["target"]["node"] = len(document["nodes"]) - 1
+            clip["channels"] = channels
+
+    edit(path, add)
+    assert len(read_gltf(path).animations) == 3
+    animation = fba.read(path)
+    assert column(animation, "open_jaw").any()
+    np.testing.assert_allclose(column(animation, "yaw_r_eyeball") / 1e5, np.radians(20) * RAMP, atol=1e-3)
