@@ -45,10 +45,7 @@ WINDOW = "opens a window, which stays until somebody closes it"
 ARRIVING = "waits for a stream that arrives over a network"
 SYSTEM = "installs system packages"
 CHECKOUT = "sets up or tests the checkout, which .ci/run does"
-MISMATCH = (
-    "fba: warning: walk.fba: BAPs look implausible with the BAP steps 'iso' "
-    "(the root goes 25.0 m/s where the legs"
-)
+MISMATCH = "fba: walk.fba: BAP steps visage: the stream says so"
 ILLUSTRATIONS = {
     ("README.md", "./dev demo --out demo"): CHECKOUT,
     ("README.md", ". .venv/bin/activate"): "chooses an environment",

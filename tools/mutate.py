@@ -67,6 +67,8 @@ HINGES = "fba/capture/limbs/hinges.py"
 LEG_IK = "fba/capture/limbs/_leg_ik.py"
 READ_AHEAD = "player/fba_player/sound/_read_ahead.py"
 PLAUSIBILITY = "fba/body/plausibility.py"
+MARK = "fba/codec/_plane/mark.py"
+DECODER = "fba/codec/_decoder.py"
 GAIT_CURVES = "fba/body/gait/_signals.py"
 GAIT_DETECTION = "fba/body/gait/_detection.py"
 GAIT_MEASURE = "fba/body/gait/_measure.py"
@@ -102,6 +104,9 @@ CAPTURE_RULES_TEST = "tests/capture/test_capture_rules.py"
 AUDIO_TEST = "tests/player/sound/test_audio.py -k in_advance"
 PLAUSIBLE_TEST = "tests/body/test_plausibility.py -k 'limits or twenty or carry or underground'"
 MOMENT_TEST = "tests/body/test_plausibility.py -k moment"
+JUMP_TEST = "tests/body/test_plausibility.py -k jump"
+STEP_CHOICE_TEST = "tests/formats/test_step_choice.py -k 'round or coarse'"
+MARK_TEST = "tests/codec/test_mark.py"
 LONG_TEST = "tests/body/test_plausibility.py -k long_motion"
 GAIT_TEST = "tests/body/gait/test_gait_rules.py"
 
@@ -256,6 +261,26 @@ MUTANTS = (
     Mutant(PLAUSIBILITY, "STANDS = 0.15", "STANDS = 0.17", PLAUSIBLE_TEST),
     Mutant(PLAUSIBILITY, "SUNK = -2.0", "SUNK = -1.8", PLAUSIBLE_TEST),
     Mutant(PLAUSIBILITY, "SUNK = -2.0", "SUNK = -2.2", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 0.9", JUMP_TEST),
+    Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 1.1", JUMP_TEST),
+    Mutant(PLAUSIBILITY, "ROUND = 5.0", "ROUND = 6.0", STEP_CHOICE_TEST),
+    Mutant(
+        PLAUSIBILITY,
+        "ROUND_LEAST, ROUND_MORE = 6.0, 2.0",
+        "ROUND_LEAST, ROUND_MORE = 1.0, 2.0",
+        STEP_CHOICE_TEST,
+    ),
+    Mutant(
+        PLAUSIBILITY,
+        "ROUND_LEAST, ROUND_MORE = 6.0, 2.0",
+        "ROUND_LEAST, ROUND_MORE = 30.0, 2.0",
+        STEP_CHOICE_TEST,
+    ),
+    Mutant(PLAUSIBILITY, "axis=None) != 1", "axis=None) < 1", STEP_CHOICE_TEST),
+    Mutant(MARK, "position = start\n", "position = start + 99\n", MARK_TEST),
+    Mutant(MARK, "begin = end\n", "begin = 0\n", MARK_TEST),
+    Mutant(DECODER, "mark.begin <= byte < mark.end", "byte < mark.end", MARK_TEST),
+    Mutant(DECODER, "code == USER_DATA and directly and self.ended", "code == USER_DATA", MARK_TEST),
     Mutant(PLAUSIBILITY, "LEAST = 1.0", "LEAST = 0.9", MOMENT_TEST),
     Mutant(PLAUSIBILITY, "LEAST = 1.0", "LEAST = 1.1", MOMENT_TEST),
     Mutant(PLAUSIBILITY, "SAMPLES = 32", "SAMPLES = 31", LONG_TEST),

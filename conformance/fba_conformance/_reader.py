@@ -189,10 +189,12 @@ def _stuffing(bits: int) -> int:
 OBJECT_START_CODES = (0x1BA, 0x101)
 PLANE_START_CODES = (0x1BB, 0x103)
 """The standard's code, and that of one vendor's older tools."""
+USER_DATA_START_CODE = 0x1B2
 START_CODES = {
     0x1BA: "fba_object_start_code",
     0x101: "fba_object_start_code (old)",
     0x1BB: "fba_object_plane_start_code",
     0x103: "fba_object_plane_start_code (old)",
     0x1B1: "visual_object_sequence_end_code",
+    USER_DATA_START_CODE: "user_data_start_code",
 }

@@ -19,6 +19,7 @@ from fba_conformance._reader import (
     OBJECT_START_CODES,
     PLANE_START_CODES,
     TRAILING_BYTES_SHOWN,
+    USER_DATA_START_CODE,
     Element,
     Levels,
     Reader,
@@ -149,13 +150,24 @@ class Walker:
         reader.start_code(0)
 
     def _read_rest(self) -> None:
-        """Record all data after the object as one element. A plane that belongs to no object is an error."""
+        """Record user data after the object, and all other data there as one element.
+
+        A plane that belongs to no object is an error.
+        """
         reader = self.reader
         objects = [_find_code(reader.data, code, reader.bit // 8) for code in OBJECT_START_CODES]
         stray = [_find_code(reader.data, code, reader.bit // 8) for code in PLANE_START_CODES]
         if min(stray) < min(objects):
             reader.plane = self.count
             raise reader.error("a plane start code behind the end of the object", bit=8 * min(stray))
+        user_data = USER_DATA_START_CODE.to_bytes(4, "big")
+        while reader.data[reader.bit // 8 :].startswith(user_data):
+            reader.start_code(0)
+            bit, after = reader.bit, reader.data.find(b"\0\0\1", reader.bit // 8)
+            reader.bit = 8 * after if after >= 0 else reader.size
+            content = reader.data[bit // 8 : reader.bit // 8]
+            text = content.decode() if content.isascii() else content[:TRAILING_BYTES_SHOWN].hex()
+            reader.record(bit, "user_data", text, "object")
         left = reader.size - reader.bit
         if left:
             bit = reader.bit

@@ -19,6 +19,7 @@ from fba.cli import step_tables
 from fba.cli.command import STANDARD_INPUT
 from fba.errors import FbaError, FbaWarning, FormatError, OptionError
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import read_whole
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
@@ -95,25 +96,27 @@ def renamed(path: Path, name: str) -> Iterator[None]:
 def read_input(
     path: Path,
     *,
-    bap_steps: str = "iso",
+    bap_steps: str = step_tables.AUTO,
     fps: Fraction | None = None,
     header_fps: Fraction | None = None,
     name: str | None = None,
     salvage: bool = False,
     capture: Mapping[str, object] | None = None,
     doubts: list[str] | None = None,
+    tables: list[str] | None = None,
     format: str | None = None,
     clip: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the animation of a file of any format, or of the one that `format` names.
 
-    Warns if the BAPs of a stream look wrong with these steps.
+    bap_steps: "auto" prints which table a stream is decoded with, and why; otherwise warns if its BAPs look
+    wrong with these steps.
 
     fps resamples the animation, and motion capture before it is retargeted. It, or header_fps, and name
     replace a header that a file lacks. capture: options for the readers of motion capture. doubts: that
     warning is appended to it. clip: of several animations in the file, the one to read, by name or number;
-    without effect where the format holds one.
+    without effect where the format holds one. tables: the table of a stream with a body is appended to it.
     """
     from fba.formats import read
 
@@ -122,9 +125,13 @@ def read_input(
     options |= capture or {}
     with input_file(path) as file:
         reader = _find_format(file, format)
+        if reader.name == "fba":
+            options["bap_steps"] = step_tables.table_to_read(path, read_whole(file), bap_steps, limits)
         animation = read(file, format=reader.name, **_taken(reader, options))
-    if reader.name == "fba" and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
-        (doubts if doubts is not None else []).append(doubt)
+    if reader.name == "fba" and animation.body is not None:
+        (tables if tables is not None else []).append(str(options["bap_steps"]))
+        if bap_steps != step_tables.AUTO and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
+            (doubts if doubts is not None else []).append(doubt)
     if fps is not None and animation.rate != fps:
         animation = animation.resample(fps, limits=limits)
     return animation
@@ -133,7 +140,6 @@ def read_input(
 def probe_input(
     path: Path,
     *,
-    bap_steps: str,
     fps: Fraction | None,
     format: str | None,
     salvage: bool,
@@ -150,7 +156,7 @@ def probe_input(
     options = (
         {} if reader.name == "fba" else _taken(reader, {"fps": fps, "salvage": salvage or None, "clip": clip})
     )
-    return probe(path, bap_steps=bap_steps, format=reader.name, limits=limits, **options)
+    return probe(path, format=reader.name, limits=limits, **options)
 
 
 def list_clips(path: Path, format: str | None, limits: Limits) -> tuple[ClipInfo, ...]:
@@ -181,6 +187,11 @@ def _find_format(file: Path, format: str | None) -> Format:
         return format_of(file, format)
     except OptionError as error:
         raise click.BadParameter(str(error), param_hint="--from") from error
+
+
+def is_capture(path: Path, format: str | None) -> bool:
+    """Whether a file holds the motion of a skeleton; False for standard input, which is read only once."""
+    return str(path) != "-" and _find_format(path, format).read_motion is not None
 
 
 def read_model(path: Path | None) -> FaceModel | None:

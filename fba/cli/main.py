@@ -114,9 +114,9 @@ class _Commands(Group):
     cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=examples(
-        "fba encode walk.bvh -o walk.fba --bap-steps visage",
-        "fba info walk.fba --bap-steps visage",
-        "fba play walk.fba --bap-steps visage",
+        "fba encode walk.bvh -o walk.fba",
+        "fba info walk.fba",
+        "fba play walk.fba",
     ),
 )
 @click.version_option(__version__, prog_name="fba")

@@ -147,9 +147,25 @@ def choice_option(flag: str, text: str, *choices: str) -> Callable[[Decorated], 
 
 bap_steps_option = choice_option(
     "--bap-steps",
-    "Table of BAP quantiser steps: the standard's, or one vendor's. Streams do not say which.",
+    "Table of BAP steps of a stream, the standard's or one vendor's; auto: the one that it names, else "
+    "the one that looks right.",
+    "auto",
     "iso",
     "visage",
+)
+written_bap_steps_option = choice_option(
+    "--bap-steps",
+    "Table of BAP steps of a stream, the standard's or one vendor's, which is finer; auto: the finer one for "
+    "motion capture and walks, that of a stream for what comes from one, else the standard's.",
+    "auto",
+    "iso",
+    "visage",
+)
+mark_option = click.option(
+    "--mark/--no-mark",
+    default=None,
+    help="Name the table of BAP steps behind the end of the stream, where other decoders do not read; "
+    "default: yes, if it has a body.",
 )
 
 

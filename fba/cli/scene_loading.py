@@ -32,10 +32,12 @@ Opened = tuple["Animation | LiveAnimation", bool]
 """The animation of a file, and whether it is a stream that grows."""
 
 
-def open_file(file: Path, how: SceneOptions, doubts: list[str] | None = None) -> Opened:
+def open_file(
+    file: Path, how: SceneOptions, doubts: list[str] | None = None, tables: list[str] | None = None
+) -> Opened:
     """Return a file's animation, and whether it grows: that of an FBA stream on standard input or in a FIFO.
 
-    Other formats are read to their end first. doubts: see `inputs.read_input`.
+    Other formats are read to their end first. doubts, tables: see `inputs.read_input`.
     Raises click.UsageError if standard input is a terminal, and what `inputs.read_input` and
     `LiveAnimation.wait` raise.
     """
@@ -50,6 +52,7 @@ def open_file(file: Path, how: SceneOptions, doubts: list[str] | None = None) ->
             header_fps=fps,
             salvage=salvage,
             doubts=doubts,
+            tables=tables,
             format=how.format,
             clip=how.clip,
             limits=how.limit,
@@ -69,6 +72,8 @@ def open_file(file: Path, how: SceneOptions, doubts: list[str] | None = None) ->
         close = stack.pop_all().close
         live = LiveAnimation(source, head=head, name=name, bap_steps=bap_steps, at_end=close)  # type: ignore[arg-type]
     wait_for(live, lambda text: click.echo(f"fba: {text}", err=True))
+    if live.steps_reason:
+        click.echo(f"fba: {name}: BAP steps {live.bap_steps}: {live.steps_reason}", err=True)
     return live, True
 
 

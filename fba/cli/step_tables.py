@@ -1,37 +1,75 @@
-"""Hints and warnings about the table of BAP steps, which streams do not name."""
+"""Which table of BAP steps a stream is read and written with, and what users are told about it."""
 
 from __future__ import annotations
 
 import shlex
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
 from fba.cli.program import as_typed
 from fba.errors import FbaWarning
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
 from fba.tracks import batches
 
 if TYPE_CHECKING:
     from fba.animation import Animation
-    from fba.codec.block import Block
 
+AUTO = "auto"
 DEFAULT = BAP_STEP_TABLES[0]
-FRAMES_CHECKED = 2048
-"""Frames of a stream that are decoded for the check, if a command does not decode it anyway."""
-_CHUNK = 1 << 14
+FINE = "visage"
 
 
-def remind(output: Path, animation: Animation, table: str, quant: int = 1) -> None:
+def explain_choice(data: bytes, asked: str, limits: Limits = DEFAULT_LIMITS) -> str:
+    """Return a stream's table, and why: "visage: the stream says so"; "" if it makes no difference."""
+    from fba.formats.step_choice import choose_steps
+
+    if asked != AUTO:
+        return f"{asked}: as given"
+    choice = choose_steps(data, limits=limits)
+    return f"{choice.table}: {choice.reason}" if choice.reason else ""
+
+
+def table_to_read(
+    name: str | Path, data: bytes, asked: str, limits: Limits = DEFAULT_LIMITS, *, shown: bool = True
+) -> str:
+    """Return the table with which a stream is to be decoded; print in one line which it is, and why.
+
+    asked: the value of --bap-steps. shown: whether its BAPs are shown or written at all. Nothing is printed
+    where they are not, where `asked` names a table, or where none makes a difference.
+    """
+    from fba.formats.step_choice import choose_steps
+
+    if asked != AUTO:
+        return asked
+    choice = choose_steps(data, limits=limits)
+    if choice.reason and shown:
+        click.echo(f"fba: {_display_name(name)}: {choice}", err=True)
+    return choice.table
+
+
+def table_to_write(asked: str, *, made: bool, marked: bool, read: str | None = None) -> str:
+    """Return the table with which a body is to be encoded.
+
+    asked: the value of --bap-steps. made: whether the body is motion capture, or was generated. marked:
+    whether the stream will say which table it is. read: the table of the stream that the body comes from.
+    """
+    if asked != AUTO:
+        return asked
+    if read is not None:
+        return read
+    return FINE if made and marked else DEFAULT
+
+
+def remind(output: Path, animation: Animation, table: str, quant: int = 1, *, marked: bool = True) -> None:
     """Print the option that later commands need to read a stream that was just written, if any.
 
     Unquantised BAPs (quant 0) are the same under every table.
     """
-    if animation.body is not None and table != DEFAULT and quant > 0:
+    if animation.body is not None and table != DEFAULT and quant > 0 and not marked:
         again = as_typed(f"fba play {shlex.quote(str(output))} --bap-steps {table}")
         click.echo(f"Play it with: {again}", err=True)
 
@@ -49,7 +87,7 @@ def warn_of_coarse_steps(animation: Animation, table: str, quant: int = 1, *, ca
     if captured or between:
         warnings.warn(
             "the standard's BAP steps move the root by 64 mm at a time and code angles up to 1.19 rad; "
-            "--bap-steps visage has 2 mm and 3.16 rad (decode, play and render need the same option)",
+            f"--bap-steps {FINE} has 2 mm and 3.16 rad",
             FbaWarning,
             stacklevel=2,
         )
@@ -64,38 +102,19 @@ def warn_of_doubt(name: str | Path, animation: Animation, table: str) -> str | N
     doubt = find_doubt(animation.body, animation.index, animation.rate, table)
     if doubt is None:
         return None
-    text = f"{'standard input' if str(name) == '-' else name}: {doubt}"
+    text = f"{_display_name(name)}: {doubt}"
     warnings.warn(text, FbaWarning, stacklevel=2)
     return text
 
 
 def warn_of_doubtful_stream(name: str | Path, data: bytes, table: str) -> None:
-    """Do the same for a stream, whose first `FRAMES_CHECKED` frames with a body are decoded."""
-    from fba.animation import Animation, BodyTrack
+    """Do the same for a stream, of which the first frames with a body are decoded."""
+    from fba.formats.step_choice import first_frames
 
-    blocks: list[Block] = []
-    count = 0
-    for block in _blocks(data, table):
-        if block.body is None or block.rate != (blocks or [block])[0].rate:
-            continue
-        blocks.append(block)
-        count += len(block.index)
-        if count >= FRAMES_CHECKED:
-            break
-    tracks = [block.body for block in blocks if block.body is not None]
-    if not tracks:
-        return
-    body = BodyTrack(
-        np.concatenate([track.values for track in tracks]), np.concatenate([track.mask for track in tracks])
-    )
-    index = np.concatenate([block.index for block in blocks])
-    warn_of_doubt(name, Animation(blocks[0].rate, index, None, body), table)
+    moving = first_frames(data, table)
+    if moving is not None:
+        warn_of_doubt(name, moving, table)
 
 
-def _blocks(data: bytes, table: str) -> Iterator[Block]:
-    from fba.codec import Decoder
-
-    decoder = Decoder(bap_steps=table, on_error="salvage")
-    for start in range(0, len(data), _CHUNK):
-        yield from decoder.push_blocks(data[start : start + _CHUNK])
-    yield from decoder.finish_blocks()
+def _display_name(name: str | Path) -> str:
+    return "standard input" if str(name) == "-" else str(name)

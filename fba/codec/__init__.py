@@ -12,6 +12,7 @@ from fba.codec._encoder import (
     encode_with_statistics,
 )
 from fba.codec._options import EncoderOptions
+from fba.codec._plane.mark import marked_table, write_mark
 from fba.codec._script import encode_planes
 from fba.codec._stream.damage import Damage
 from fba.codec.block import Block
@@ -44,6 +45,8 @@ __all__ = [
     "encode",
     "encode_planes",
     "encode_with_statistics",
+    "marked_table",
     "probe_stream",
     "verify_stream",
+    "write_mark",
 ]

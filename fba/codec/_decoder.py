@@ -10,6 +10,7 @@ from fba.animation import Animation, Frame
 from fba.codec._compact_buffer import CompactBuffer
 from fba.codec._plane import loops, syntax
 from fba.codec._plane.bits import OutOfDataError
+from fba.codec._plane.mark import LONGEST, USER_DATA, Mark, find_marks, read_mark
 from fba.codec._plane.reader import PlaneReader, Planes
 from fba.codec._stream.buffer import Buffer
 from fba.codec._stream.damage import Damage, DamageLog
@@ -22,6 +23,7 @@ from fba.recognition import HEAD_BYTES, recognition_hint
 
 _CHUNK = 1 << 16
 """Bytes that `decode` passes to the decoder at once, so that few blocks are in memory."""
+_DEFAULT_TABLE = BAP_STEP_TABLES[0]
 _END = bytes([*syntax.START_CODE_PREFIX, syntax.END_CODE])
 _NO_END = "the stream ends without the end code 00 00 01 b1: it may have been cut off behind this plane"
 _FRAME_BYTES = 500
@@ -33,10 +35,11 @@ _LARGE_PLANE = 4096
 class Decoder:
     """Decodes an FBA stream that arrives in chunks of any size, down to a byte.
 
-    bap_steps: "iso" or "visage", the table of BAP quantiser steps that the stream was made with; the stream
-    itself does not say. on_error: "raise", or "salvage" to continue after damage at the next start code
-    before an I plane; `damage` then lists what was lost. Frame numbers increase in any case: where a time
-    code shows that misread planes took too many frames, those behind it follow them at once.
+    bap_steps: "iso" or "visage", the table of BAP quantiser steps that the stream was made with; None: "iso",
+    because a mark that says otherwise comes behind the frames (`mark` has it then, and an FbaWarning says so;
+    `decode` looks for it first). on_error: "raise", or "salvage" to continue after damage at the next start
+    code before an I plane; `damage` then lists what was lost. Frame numbers increase in any case: where a
+    time code shows that misread planes took too many frames, those behind it follow them at once.
 
     limits: see `fba.Limits`; `bytes` bounds what one call returns.
 
@@ -52,11 +55,11 @@ class Decoder:
     def __init__(
         self,
         *,
-        bap_steps: str = "iso",
+        bap_steps: str | None = None,
         on_error: Literal["raise", "salvage"] = "raise",
         limits: Limits = DEFAULT_LIMITS,
     ) -> None:
-        if bap_steps not in BAP_STEP_TABLES:
+        if bap_steps not in (None, *BAP_STEP_TABLES):
             raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {bap_steps!r}")
         if on_error not in ("raise", "salvage"):
             raise ValueError(f'on_error must be "raise" or "salvage", not {on_error!r}')
@@ -66,6 +69,8 @@ class Decoder:
         """Planes decoded so far."""
         self.ended = False
         """Whether an end code closed the last object. A stream without may have been cut off."""
+        self.mark: str | None = None
+        """The table of BAP steps that the mark behind the last object names; None without one."""
         self._salvage = on_error == "salvage"
         self._limits = limits
         self._buffer = Buffer()
@@ -82,7 +87,11 @@ class Decoder:
         self._start_error: BitstreamError | None = None  # why the stream does not begin with an object
         self._times = PlaneTimes(self._log if self._salvage else None)
         self._lost_from = 0
-        self._reader = PlaneReader(bap_steps)
+        self._bap_steps = bap_steps
+        self._marks: tuple[Mark, ...] = ()  # those of the whole stream, if they are known beforehand
+        self._bodies = 0  # planes of this object that carry BAPs
+        self._reader = PlaneReader(bap_steps or _DEFAULT_TABLE)
+        self._behind_user_data = False  # whether user data follow the last object, up to what comes next
         self._code_bit: int | None = None  # where the start code before the next plane begins
 
     # ---- what users call
@@ -177,13 +186,22 @@ class Decoder:
                     break  # the first bit of the plane is not here yet
                 if position + 4 < buffer.length and buffer.data[position + 4] & 0x80:
                     return self._join(position)
+            if code == USER_DATA and position + LONGEST > buffer.length and not final:
+                break  # a mark may not be complete
+            directly = self._objects > 0 and buffer.offset + position == self._object_end
+            if self._behind_user_data:
+                self._object_end = buffer.offset + position
+            self._behind_user_data = code == USER_DATA and buffer.offset + position == self._object_end
+            if code == USER_DATA and directly and self.ended:
+                stop = min(position + LONGEST, buffer.length)
+                self._compare_mark(buffer.data[position + 4 : stop].tobytes())
             self._scanned = position + 4
             if code in syntax.OBJECT_CODES:
                 if self._start_error is not None and self._objects == 0:
                     self._log.add(self._start_error, 0, buffer.offset + position)
                 self._bit = 8 * self._scanned
                 self._scanned = 0
-                self._begin_object()
+                self._begin_object(buffer.offset + position)
                 self._step = self._decode_planes
                 return iter(())
         else:
@@ -194,7 +212,7 @@ class Decoder:
                     f"no FBA object start code (00 00 01 ba) in the stream{self._kind}", plane=0, bit=0
                 )
             rest = buffer.offset + buffer.length - self._object_end
-            if rest > 0:
+            if rest > 0 and not self._behind_user_data:
                 self._warn(f"{rest} bytes follow the end of the FBA object; they were not read")
         else:
             self._bit = max(self._bit, 8 * self._scanned)
@@ -205,7 +223,7 @@ class Decoder:
         error = self._start_error or BitstreamError(
             "the object start code 00 00 01 ba is missing", plane=0, bit=0
         )
-        self._begin_object()
+        self._begin_object(self._buffer.offset + position)
         self._reader.forget_values()
         self._log.add(error, 0, self._buffer.offset + position)
         self._bit = 8 * position
@@ -236,7 +254,7 @@ class Decoder:
             elif self._code_bit is None:
                 self._code_bit = self._absolute(start)
             if code in syntax.OBJECT_CODES:
-                self._begin_object()
+                self._begin_object(self._absolute(after) // 8 - 4)
             elif code not in syntax.PLANE_CODES:
                 self._end_object(code)
             return iter(())
@@ -320,13 +338,16 @@ class Decoder:
             doubtful=planes.doubtful,
         )
         self.planes += len(planes.skips)
+        self._bodies += settings.body is not None
         self._bit = int(planes.borders[-1])
         self._code_bit = None
         return block
 
-    def _begin_object(self) -> None:
-        """Reset the reader for a new object."""
-        self._reader.begin_object()
+    def _begin_object(self, byte: int) -> None:
+        """Reset the reader for a new object, which begins at this byte of the stream."""
+        marked = (mark.table for mark in self._marks if mark.begin <= byte < mark.end)
+        self._reader.begin_object(self._bap_steps or next(marked, _DEFAULT_TABLE))
+        self._bodies = 0
         self._objects += 1
         self._times.begin_object()
         self.ended = False
@@ -350,6 +371,16 @@ class Decoder:
         self._scanned = self._bit >> 3
         self._object_end = self._buffer.offset + self._scanned
         self._step = self._find_object
+
+    def _compare_mark(self, content: bytes) -> None:
+        """Take user data behind an object; an FbaWarning if they say that it was decoded with wrong steps."""
+        self.mark = read_mark(content) or self.mark
+        used = self._reader.bap_table
+        if self.mark not in (None, used) and self._bodies:
+            self._warn(
+                f"the stream says behind its end that it was made with the BAP steps {self.mark!r}; it was "
+                f"decoded with {used!r}"
+            )
 
     # ---- damage
 
@@ -415,18 +446,20 @@ class Decoder:
 def decode(
     data: bytes | bytearray | memoryview,
     *,
-    bap_steps: str = "iso",
+    bap_steps: str | None = None,
     on_error: Literal["raise", "salvage"] = "raise",
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the animation of a complete FBA stream.
 
-    bap_steps, on_error: see `Decoder`; with "salvage", FbaWarnings say what was lost. Times come from frame
-    rate, skips and time codes. A stream that changes its rate is returned at the lowest rate at which all its
-    times are exact. An FbaWarning says if the end code is missing. Raises BitstreamError, UnsupportedError.
+    bap_steps: "iso" or "visage", the table of BAP steps with which it was made; None: the one that its mark
+    names (see `fba.codec.write_mark`), "iso" without a mark. on_error: see `Decoder`; with "salvage",
+    FbaWarnings say what was lost. Times come from frame rate, skips and time codes. A stream that changes
+    its rate is returned at the lowest rate at which all its times are exact. An FbaWarning says if the end
+    code is missing. Raises BitstreamError, UnsupportedError.
     """
     view = memoryview(data)
-    decoder = Decoder(bap_steps=bap_steps, on_error=on_error, limits=limits)
+    decoder = decoder_for(view, bap_steps=bap_steps, on_error=on_error, limits=limits)
     decoder._times.may_step_back = True
     frames = CompactBuffer(limits, len(view))
     for start in range(0, len(view), _CHUNK):
@@ -442,3 +475,19 @@ def decode(
         error = decoder.damage[0].error if decoder.damage else None
         raise BitstreamError("the stream holds no plane that can be decoded", plane=0) from error
     return frames.animation()
+
+
+def decoder_for(
+    data: memoryview,
+    *,
+    bap_steps: str | None,
+    on_error: Literal["raise", "salvage"] = "raise",
+    limits: Limits = DEFAULT_LIMITS,
+) -> Decoder:
+    """Return a decoder for a complete stream, which knows the marks behind its objects beforehand."""
+    decoder = Decoder(bap_steps=bap_steps, on_error=on_error, limits=limits)
+    if bap_steps is None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)  # the decoder gives them when it comes there
+            decoder._marks = find_marks(data)
+    return decoder

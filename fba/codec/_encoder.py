@@ -14,6 +14,7 @@ from fba.codec import _headers as headers
 from fba.codec._options import EncoderOptions
 from fba.codec._plane import full_turns, quantiser, slots
 from fba.codec._plane.loops import SKIP_MAX
+from fba.codec._plane.mark import write_mark
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec._ranges import CLAMP, Ranges, fitting_ranges
 from fba.codec._runs import Run, find_runs
@@ -122,7 +123,7 @@ class Encoder:
         return self._writer.take_bytes()
 
     def finish(self) -> bytes:
-        """End the stream; return the last bytes, with alignment and end code. ValueError without a frame."""
+        """End the stream; return the last bytes: alignment, end code, mark. ValueError without a frame."""
         if self._finished:
             return b""
         if self._pending is None:
@@ -130,7 +131,10 @@ class Encoder:
         self._encode(self._pending, int(self._pending.index[0]) + 1)
         self._finished = True
         self._writer.end_object()
-        return self._writer.take_bytes()
+        marked = (
+            self.options.mark and self.options.bap_quant and self._writer.settings_in_force(slots.BODY_BIT)
+        )
+        return self._writer.take_bytes() + (write_mark(self.options.bap_steps) if marked else b"")
 
     def _encode(self, frames: Animation, following: int) -> None:
         """Encode frames. following: index of the frame after them, which determines the last skip."""

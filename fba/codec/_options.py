@@ -27,7 +27,8 @@ class EncoderOptions:
         that a decoder can start there or resume after damage.
     time_codes: with start codes, also the time at which decoding goes on after damage: I planes come at
         whole seconds where the intra period allows it, and carry a time code there. Takes 18 bits each.
-    bap_steps: "iso" or "visage", the table of BAP steps; the decoder must be given the same.
+    bap_steps: "iso" or "visage", the table of BAP steps. mark: say behind the end of a stream with BAPs which
+        it is, where other decoders do not read (see `fba.codec.write_mark`); else a decoder must be told.
     preset: "reference", ranges that fit the data.
     unsent: what a decoder does with an unsent FAP, unless the animation says so itself
         (`FaceTrack.interpolated`): "keep" its last value (mask type 1) or "interpolate" it from others
@@ -45,6 +46,7 @@ class EncoderOptions:
     start_codes: bool = False
     time_codes: bool = True
     bap_steps: str = "iso"
+    mark: bool = False
     preset: str = "reference"
     unsent: str = "keep"
     gender: int = 0

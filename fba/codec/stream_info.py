@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Int64
-from fba.codec._decoder import Decoder
+from fba.codec._decoder import Decoder, decoder_for
 from fba.codec._plane import header_loops
 from fba.codec._stream.damage import Damage
 from fba.codec.block import Block
@@ -53,7 +53,8 @@ class StreamInfo:
     after the last. skipped: frames left out between frames. bits_per_second: size over duration.
 
     For FBA streams: intra_planes, start_codes (planes with one before them), plane_bits int64 (T,) and
-    plane_intra bool (T,), frame_index int64 (T,), and damage that was skipped.
+    plane_intra bool (T,), frame_index int64 (T,), and damage that was skipped; bap_steps, the table that the
+    mark behind the stream names, None without a mark.
     """
 
     format: str
@@ -71,6 +72,7 @@ class StreamInfo:
     plane_intra: Bool | None = field(default=None, repr=False)
     frame_index: Int64 | None = field(default=None, repr=False)
     damage: tuple[Damage, ...] = ()
+    bap_steps: str | None = None
 
     @property
     def bits_per_second(self) -> float:
@@ -99,6 +101,7 @@ class StreamInfo:
             "body": part(self.body),
             "intra_planes": self.intra_planes,
             "start_codes": self.start_codes,
+            "bap_steps": self.bap_steps,
             "damage": [d.to_dict() for d in self.damage],
         }
 
@@ -157,14 +160,14 @@ class _PartCount:
 
 
 def probe_stream(
-    data: bytes | bytearray | memoryview, *, bap_steps: str = "iso", limits: Limits = DEFAULT_LIMITS
+    data: bytes | bytearray | memoryview, *, bap_steps: str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> StreamInfo:
     """Return the description of an FBA stream: planes, rates, parameters, bits.
 
     Decodes it, because only the arithmetic decoder finds the ends of planes, but stores no values. Skips
     damage and lists it. Raises BitstreamError if no plane can be decoded.
     """
-    decoder = Decoder(bap_steps=bap_steps, on_error="salvage", limits=limits)
+    decoder = decoder_for(memoryview(data), bap_steps=bap_steps, on_error="salvage", limits=limits)
     face, body = _PartCount(), _PartCount()
     bits: list[Int64] = []
     intra: list[Bool] = []
@@ -204,6 +207,7 @@ def probe_stream(
         plane_intra=all_intra,
         frame_index=all_index,
         damage=tuple(decoder.damage),
+        bap_steps=decoder.mark,
     )
 
 

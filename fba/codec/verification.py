@@ -12,7 +12,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.codec._compact_buffer import CompactBuffer
-from fba.codec._decoder import Decoder
+from fba.codec._decoder import decoder_for
 from fba.codec._stream.damage import Damage
 from fba.errors import BitstreamError, FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -72,15 +72,15 @@ class Verification:
 
 
 def verify_stream(
-    data: bytes | bytearray | memoryview, *, bap_steps: str = "iso", limits: Limits = DEFAULT_LIMITS
+    data: bytes | bytearray | memoryview, *, bap_steps: str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> Verification:
     """Check an FBA stream: decode all that can be decoded, and return what was found.
 
-    bap_steps: "iso" or "visage"; it changes the digest of a stream with a body. Raises BitstreamError if no
+    bap_steps: as for `fba.decode`; it changes the digest of a stream with a body. Raises BitstreamError if no
     plane can be decoded, LimitError beyond `limits`.
     """
     view = memoryview(data)
-    decoder = Decoder(bap_steps=bap_steps, on_error="salvage", limits=limits)
+    decoder = decoder_for(view, bap_steps=bap_steps, on_error="salvage", limits=limits)
     frames = CompactBuffer(limits, len(view))
     doubtful: set[int] = set()
     with warnings.catch_warnings(record=True) as odd:

@@ -12,11 +12,13 @@ from fba.animation import Animation
 from fba.atomic import atomic
 from fba.errors import BitstreamError, LimitError, OptionError, RangeError, UnsupportedError
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import BAP_STEP_TABLES
 from fba.source import Path, read_whole
 
 if TYPE_CHECKING:
     from fba.codec import EncoderOptions
 
+DEFAULT = BAP_STEP_TABLES[0]
 START_CODES = (b"\0\0\1\xba", b"\0\0\1\x01")
 """fba_object_start_code, and the one of old streams."""
 _BEFORE = (b"\0\0\1\xb0", b"\0\0\1\xb5")
@@ -38,18 +40,24 @@ def sniff_fba(head: bytes, suffix: str) -> bool:
 
 
 def read_fba(
-    path: Path, *, bap_steps: str = "iso", salvage: bool = False, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, bap_steps: str | None = None, salvage: bool = False, limits: Limits = DEFAULT_LIMITS
 ) -> Animation:
     """Decode an FBA file.
 
-    bap_steps: "iso" or "visage", the step table with which it was encoded. salvage: skip damage with an
-    FbaWarning instead of raising. limits: see `fba.Limits`. The animation is named after the file.
+    bap_steps: "iso" or "visage", the table of BAP steps with which it was encoded; None: the one that its
+    mark names, "iso" without a mark; "auto": without a mark, the one with which it moves like a person (see
+    `fba.formats.step_choice`). salvage: skip damage with an FbaWarning instead of raising. limits: see
+    `fba.Limits`. The animation is named after the file.
 
     Raises FormatError for the file, BitstreamError, UnsupportedError and LimitError for the stream.
     """
     from fba.codec import decode
 
     data = read_whole(path)
+    if bap_steps == "auto":
+        from fba.formats.step_choice import choose_steps
+
+        bap_steps = choose_steps(data, limits=limits).table
     with naming_file(path):
         animation = decode(
             data, bap_steps=bap_steps, on_error="salvage" if salvage else "raise", limits=limits
@@ -63,15 +71,16 @@ def write_fba(
 ) -> None:
     """Encode an animation into an FBA file.
 
-    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Raises OptionError if both
-    are given, RangeError for values that no stream can carry, FormatError if the file cannot be written.
+    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Unless they say otherwise, a
+    file whose BAP steps are not the standard's is marked (see `fba.codec.write_mark`). Raises OptionError if
+    both are given, RangeError for values that no stream can carry, FormatError if the file cannot be written.
     """
     from fba.codec import EncoderOptions, encode
 
     if settings:
         if options is not None:
             raise OptionError(f"give either options or {', '.join(settings)}, not both")
-        options = EncoderOptions(**settings)
+        options = EncoderOptions(**{"mark": settings.get("bap_steps", DEFAULT) != DEFAULT, **settings})
     with naming_file(path):
         data = encode(animation, options)
     with atomic(path) as file:

@@ -219,7 +219,7 @@ def writer_for(path: Path, format: str | None = None) -> Format:
 def probe(
     data_or_path: bytes | bytearray | memoryview | Path,
     *,
-    bap_steps: str = "iso",
+    bap_steps: str | None = None,
     format: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
     **options: Any,

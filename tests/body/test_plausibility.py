@@ -173,6 +173,16 @@ def test_legs_that_walk_carry_the_root() -> None:
     assert not is_doubted(replace(walks, along=0.1), carried=0.21)  # the other reading stands still, too
 
 
+def test_a_jump_is_no_travel_of_the_root() -> None:
+    """Up to a metre: an athlete's leap, or someone who lies down."""
+    times = np.arange(60) / 30
+    for height, travels in ((950, False), (1050, True)):
+        hop = root_moves(np.rint(height * (1 - (2 * (times % 1) - 1) ** 2)).astype(int))
+        assert hop.body is not None
+        found = plausibility.measure(hop.body.values.astype(np.int64), hop.index, hop.rate)
+        assert (found.travel > 0.5) == travels
+
+
 def test_a_body_two_metres_down_is_underground() -> None:
     assert is_doubted(height=-2.1)
     assert not is_doubted(height=-1.9)

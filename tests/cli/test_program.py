@@ -95,4 +95,4 @@ def test_only_commands_are_replaced() -> None:
 def test_the_hint_of_the_demo(tmp_path: Path) -> None:
     out = tmp_path / "my demo"
     done = ran(sys.executable, "-m", "fba", "demo", "--no-play", "--out", out, FBA_DEV="./dev")
-    assert f"to see it again: ./dev fba play --bap-steps visage '{out}/hello.fba'\n" in done.stdout
+    assert f"to see it again: ./dev fba play '{out}/hello.fba'\n" in done.stdout

@@ -1,4 +1,4 @@
-"""The table of BAP steps, which no stream names: reminders after writing, warnings after reading."""
+"""The table of BAP steps: which one is written and read, and what users are told about it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ import pytest
 import fba
 from fba import Animation, player
 from fba.body import gait
+from fba.codec import marked_table
 
 Run = Callable[..., Any]
 
+CHOSEN = "BAP steps visage: the stream does not say, and with iso the root goes "
 WARNED = "BAPs look implausible with the BAP steps 'iso' (the root goes "
 ASKED = "; made with --bap-steps visage?\n"
 
@@ -29,9 +31,9 @@ def a_display(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def walk(tmp_path: Path) -> Path:
-    """A walk, made with the table that is not the default."""
+    """A walk, made with the table that is not the default, as other encoders make it: without a mark."""
     path = tmp_path / "a walk.fba"
-    fba.write(path, gait.walk(), bap_steps="visage")
+    fba.write(path, gait.walk(), bap_steps="visage", mark=False)
     return path
 
 
@@ -42,33 +44,60 @@ def files_with_a_body(folder: Path) -> dict[str, Path]:
     return paths
 
 
-def test_the_reminder_is_a_command_that_works(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_written_is_read_rightly(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the mark nothing has to be given; without it, the reminder is a command that works."""
     shown = []
     monkeypatch.setattr(player, "play", lambda scene, **_: shown.append(scene.animation) or ())
     source, target = files_with_a_body(tmp_path)["bap"], tmp_path / "my walk.fba"
-    written = {
-        "encode": ("encode", source, "-o", target),
-        "convert": ("convert", source, target),
-        "gait": ("gait", "-o", target),
-    }
-    for arguments in written.values():
+    for arguments in (("encode", source, "-o", target), ("convert", source, target), ("gait", "-o", target)):
         done = run(*arguments, "--bap-steps", "visage")
-        assert (done.code, done.err) == (0, f"Play it with: fba play '{target}' --bap-steps visage\n")
-        played = run(*shlex.split(done.err.partition(": ")[2])[1:])
-        assert (played.code, played.err) == (0, "")
-        apart = shown.pop().body.values.astype(int) - gait.walk().body.values  # type: ignore[union-attr]
+        assert (done.code, done.err) == (0, "")
+        apart = fba.read(target).body.values.astype(int) - gait.walk().body.values  # type: ignore[union-attr]
         assert abs(apart[:, 180:183]).max() <= 1
+        done = run(*arguments, "--bap-steps", "visage", "--no-mark")
+        assert (done.code, done.err) == (0, f"Play it with: fba play '{target}' --bap-steps visage\n")
+    played = run(*shlex.split(done.err.partition(": ")[2])[1:])
+    assert (played.code, played.err) == (0, "")
+    apart = shown.pop().body.values.astype(int) - gait.walk().body.values  # type: ignore[union-attr]
+    assert abs(apart[:, 180:183]).max() <= 1
+
+
+def test_which_steps_are_written(run: Run, tmp_path: Path, bvh: Path, walk: Path, face: Animation) -> None:
+    """Captures and walks get the finer steps where the stream can say so; other bodies keep theirs."""
+    talk, target, paths = tmp_path / "talk.fap", tmp_path / "out.fba", files_with_a_body(tmp_path)
+    fba.write(talk, face)
+    epf = tmp_path / "walk.epf"
+    assert run("decode", walk, "--epf", epf).code == 0
+    for arguments, table, marked in (
+        (("encode", bvh, "-o", target), "visage", True),
+        (("convert", bvh, target), "visage", True),
+        (("gait", "-o", target), "visage", True),
+        (("encode", bvh, "-o", target, "--no-mark"), "iso", False),
+        (("encode", bvh, "-o", target, "--bap-steps", "iso"), "iso", True),
+        (("encode", paths["bap"], "-o", target, "--clamp"), "iso", True),
+        (("encode", walk, "-o", target), "visage", True),
+        (("convert", walk, target), "visage", True),
+        (("encode", paths["iso"], "-o", target), "iso", True),
+        (("encode", walk, "-o", target, "--epf", epf), "visage", False),
+        (("encode", walk, "-o", target, "--epf", epf, "--mark"), "visage", True),
+        (("encode", talk, "-o", target), "iso", False),
+    ):
+        assert run(*arguments).code == 0, arguments
+        assert marked_table(target.read_bytes()) == (table if marked else None), arguments
+        if table == "visage" and "encode" in arguments and walk in arguments:
+            assert fba.read(target, bap_steps=table).body == fba.read(walk, bap_steps=table).body, arguments
+    done = run("convert", walk, tmp_path / "out.bap", "--mark")
+    assert done.code == 2
+    assert "--mark is for streams, and" in done.err
 
 
 def test_no_reminder_where_no_option_is_needed(run: Run, tmp_path: Path, face: Animation) -> None:
     talk, target = tmp_path / "talk.fap", tmp_path / "out.fba"
     fba.write(talk, face)
-    assert run("encode", talk, "-o", target, "--bap-steps", "visage").err == ""
+    assert run("encode", talk, "-o", target, "--bap-steps", "visage", "--no-mark").err == ""
     paths = files_with_a_body(tmp_path)
     assert "Play it with" not in run("encode", paths["bap"], "-o", target, "--clamp").err
-    unquantised = ("--bap-quant", 0, "--clamp", "--bap-steps", "visage")
+    unquantised = ("--bap-quant", 0, "--clamp", "--bap-steps", "visage", "--no-mark")
     assert run("encode", paths["bap"], "-o", target, *unquantised).err == ""
     assert run("convert", paths["bap"], tmp_path / "out.bvh", "--bap-steps", "visage").err == ""
 
@@ -93,9 +122,36 @@ def test_every_writer_warns_that_the_standards_steps_are_coarse(run: Run, tmp_pa
     coarse = "fba: warning: the standard's BAP steps move the root by 64 mm at a time"
     assert run("encode", paths["bap"], "-o", target, "--clamp").err.startswith(coarse)
     assert run("convert", paths["bap"], target).err.startswith(coarse)
-    assert run("gait", "-o", target).err.startswith(coarse)
+    assert run("gait", "-o", target, "--bap-steps", "iso").err.startswith(coarse)
+    assert run("gait", "-o", target, "--no-mark").err.startswith(coarse)
+    assert run("gait", "-o", target).err == ""
     # What has these steps already loses nothing by them
-    assert run("convert", paths["iso"], target).err == ""
+    assert "coarse" not in run("convert", paths["iso"], target).err
+
+
+def test_every_reader_finds_the_steps(run: Run, tmp_path: Path, walk: Path) -> None:
+    """In one line, and the same values as with the right option."""
+    marked, iso = tmp_path / "marked.fba", files_with_a_body(tmp_path)["iso"]
+    fba.write(marked, gait.walk(), bap_steps="visage")
+    out = tmp_path / "out.bap"
+    for command in (("decode", "--bap", out), ("convert", out), ("verify",)):
+        for path, said in (
+            (walk, CHOSEN),
+            (marked, "BAP steps visage: the stream says so\n"),
+            (iso, "BAP steps iso: the stream does not say, and with these nothing looks wrong\n"),
+        ):
+            out.unlink(missing_ok=True)
+            done = run(command[0], path, *command[1:])
+            assert done.code == 0, (command, path)
+            assert done.err.startswith(f"fba: {path}: {said}"), (command, path)
+            assert done.err.count("\n") == 1
+            if out.exists():
+                table = "iso" if path == iso else "visage"
+                assert fba.read(out).body == fba.read(path, bap_steps=table).body
+    shown = run("info", walk).out
+    assert "  steps    visage: the stream does not say, and with iso the root goes " in shown
+    assert "  steps    visage: the stream says so\n" in run("info", marked).out
+    assert json.loads(run("info", "--json", marked).out)["bap_steps"] == "visage"
 
 
 def test_every_reader_warns(run: Run, tmp_path: Path, walk: Path) -> None:
@@ -108,13 +164,13 @@ def test_every_reader_warns(run: Run, tmp_path: Path, walk: Path) -> None:
         ("gait", "--find", walk),
     ]
     for arguments in commands:
-        wrong, right = run(*arguments), run(*arguments, "--bap-steps", "visage")
+        wrong, right = run(*arguments, "--bap-steps", "iso"), run(*arguments, "--bap-steps", "visage")
         assert (wrong.code, right.code) == (0, 0), arguments
         assert wrong.err.startswith(f"fba: warning: {walk}: {WARNED}"), arguments
         assert ASKED in wrong.err
         assert wrong.err.count("implausible") == 1
         assert "implausible" not in right.err
-    assert run("info", files_with_a_body(tmp_path)["iso"]).err == ""
+    assert run("info", files_with_a_body(tmp_path)["iso"], "--bap-steps", "iso").err == ""
 
 
 def test_the_other_way_round(run: Run, tmp_path: Path) -> None:
@@ -127,12 +183,15 @@ def test_the_other_way_round(run: Run, tmp_path: Path) -> None:
 def test_the_window_is_told(run: Run, walk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {}
     monkeypatch.setattr(player, "play", lambda _, **options: given.update(options) or ())
-    done = run("play", walk)
+    done = run("play", walk, "--bap-steps", "iso")
     assert done.code == 0
+    assert given["bap_steps"] == "iso"
     assert given["warnings"] == (done.err.removeprefix("fba: warning: ").strip(),)
     assert WARNED in done.err
     assert run("play", walk, "--bap-steps", "visage").err == ""
     assert given["warnings"] == ()
+    assert CHOSEN in run("play", walk).err
+    assert (given["bap_steps"], given["warnings"]) == ("visage", ())
 
 
 def test_a_picture_is_made_with_the_warning(
@@ -141,8 +200,10 @@ def test_a_picture_is_made_with_the_warning(
     from fba_player.export import render
 
     monkeypatch.setattr(render, "render", lambda *_, **__: "the picture")
-    done = run("render", walk, "-o", tmp_path / "walk.png")
+    done = run("render", walk, "-o", tmp_path / "walk.png", "--bap-steps", "iso")
     assert (done.code, WARNED in done.err) == (0, True)
+    done = run("render", walk, "-o", tmp_path / "walk.png")
+    assert (done.code, CHOSEN in done.err) == (0, True)
 
 
 def test_a_stream_that_arrives(run: Run, walk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,31 +220,10 @@ def test_a_stream_that_arrives(run: Run, walk: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(player, "play", play)
     monkeypatch.setattr("sys.stdin", Stdin())
-    done = run("play", "-")
+    done = run("play", "-", "--bap-steps", "iso")
     assert done.code == 0
     assert done.err.startswith(f"fba: warning: standard input: {WARNED}")
     monkeypatch.setattr("sys.stdin", Stdin())
     assert run("play", "-", "--bap-steps", "visage").err == ""
-
-
-def test_only_the_beginning_is_decoded_twice(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from fba.cli import step_tables
-
-    path = tmp_path / "long.fba"
-    once = gait.walk(cycles=8)
-    rows = [frame % len(once) for frame in range(6000)]
-    assert once.body is not None
-    body = fba.BodyTrack(once.body.values[rows], once.body.mask[rows])
-    fba.write(path, Animation(30, range(6000), None, body), bap_steps="visage")  # type: ignore[arg-type]
-    looked = []
-    warn = step_tables.warn_of_doubt
-
-    def counting(name: Path, animation: Animation, table: str) -> str | None:
-        looked.append(len(animation))
-        return warn(name, animation, table)
-
-    monkeypatch.setattr(step_tables, "warn_of_doubt", counting)
-    assert WARNED in run("info", path).err
-    assert step_tables.FRAMES_CHECKED <= looked[0] < 4000
+    monkeypatch.setattr("sys.stdin", Stdin())
+    assert run("play", "-").err.startswith(f"fba: standard input: {CHOSEN}")

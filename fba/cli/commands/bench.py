@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from fba.cli import options
+from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, input_file
 from fba.cli.printing import print_json
@@ -49,6 +49,7 @@ def _measure(file: Path, rounds: int, bap_steps: str, limits: Limits) -> dict[st
 
     with input_file(file) as path:
         data = path.read_bytes()
+    bap_steps = step_tables.table_to_read(file, data, bap_steps, limits)
     animation = decode(data, bap_steps=bap_steps, limits=limits)
     tracks = [track for track in (animation.face, animation.body) if track is not None]
     symbols = sum(int(track.mask.sum()) for track in tracks)

@@ -10,7 +10,7 @@ import click
 
 from fba.cli import options, step_tables, writer_options
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, check_clip, read_input
+from fba.cli.inputs import EXISTING, check_clip, is_capture, read_input
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
@@ -29,7 +29,7 @@ from fba.limits import Limits
         "fba convert walk.bvh walk.bap --fps 30",
         "fba convert talk.fba decoded.fap",
         "fba convert walk.bap walk.bvh --joints moving",
-        "fba convert both.fba person.glb --bap-steps visage --model head.glb",
+        "fba convert both.fba person.glb --model head.glb",
         "fba convert walk.bvh - --to bap | less",
     ),
 )
@@ -41,7 +41,8 @@ from fba.limits import Limits
 @options.to_option
 @options.no_clobber_option
 @writer_options.writer_options
-@options.bap_steps_option
+@options.written_bap_steps_option
+@options.mark_option
 @options.salvage_option
 @options.limit_option
 def command(
@@ -53,6 +54,7 @@ def command(
     to: str | None,
     no_clobber: bool,
     bap_steps: str,
+    mark: bool | None,
     salvage: bool,
     limit: Limits,
     **given: Any,
@@ -71,16 +73,22 @@ def command(
         no_clobber=no_clobber,
     )
     extra = writer_options.settings(target, writing, given)
-    if writing.name == "fba":
-        extra["bap_steps"] = bap_steps
     check_clip(clip, [source], format)
+    if mark is not None and writing.name != "fba":
+        raise click.UsageError(f"--mark is for streams, and {display_name(target)} becomes none")
+    tables: list[str] = []
     animation = read_input(
-        source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format, clip=clip
-    )
+        source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format, clip=clip,
+        tables=tables,
+    )  # fmt: skip
+    marked = mark is not False
     if writing.name == "fba":
-        step_tables.warn_of_coarse_steps(animation, bap_steps)
+        made = is_capture(source, format)
+        table = step_tables.table_to_write(bap_steps, made=made, marked=marked, read=next(iter(tables), None))
+        step_tables.warn_of_coarse_steps(animation, table)
+        extra |= {"bap_steps": table, "mark": marked}
     with outputs.file(target) as file:
         write(file, animation, format=writing.name, **extra)
     outputs.say(f"{display_name(target)}: {len(animation)} frames, {writing.written or writing.description}")
     if writing.name == "fba":
-        step_tables.remind(target, animation, bap_steps)
+        step_tables.remind(target, animation, extra["bap_steps"], marked=marked)

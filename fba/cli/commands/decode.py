@@ -40,10 +40,10 @@ _FOLDER_OR_FILE = OutputType(folders=True)
     cls=Command,
     epilog=examples(
         "fba decode talk.fba --fap decoded.fap",
-        "fba decode both.fba --fap face.fap --bap body.bap --bap-steps visage",
+        "fba decode both.fba --fap face.fap --bap body.bap",
         "fba decode talk.fba --fap decoded.fap --epf talk.epf    # encode --epf makes the same bytes again",
-        "fba decode both.fba -o person.glb --bap-steps visage",
-        "fba decode walk.fba -o walk.bvh --bap-steps visage --joints moving",
+        "fba decode both.fba -o person.glb",
+        "fba decode walk.fba -o walk.bvh --joints moving",
         "fba decode talk.fba --fap - | less",
         "fba decode archive/*.fba --fap decoded/",
         "fba decode archive/*.fba -o decoded/ --to glb",
@@ -204,10 +204,13 @@ def _decode(
 
     with input_file(path) as file:
         data = file.read_bytes()
+    with_body = any(target.writing is not None and "body" in target.writing.carries for target in targets)
+    table = step_tables.table_to_read(path, data, bap_steps, limits, shown=with_body)
     animation, planes = _read(
-        data, _name(path), any(t.writing is None for t in targets), bap_steps, salvage, limits
+        data, _name(path), any(t.writing is None for t in targets), table, salvage, limits
     )
-    step_tables.warn_of_doubt(path, animation, bap_steps)
+    if bap_steps != step_tables.AUTO:
+        step_tables.warn_of_doubt(path, animation, table)
     parts = {"face": "FAPs", "body": "BAPs"}
     for target in targets:
         held = parts if target.writing is None else target.writing.carries

@@ -69,16 +69,16 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
         f"animation: {seconds_text(animation.duration)}, body at {rate_text(body.rate)} and "
         f"face at {rate_text(face.rate)} frames/s, {source_bytes} bytes of text"
     )
-    data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
+    data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS, mark=True))
     outputs.write(stream, data)
-    info = probe_stream(data, bap_steps=BAP_STEPS)
+    info = probe_stream(data)
     click.echo(
         f"encoded: {stream}: {len(data)} bytes, {info.bits_per_second / 1000:.2f} kbit/s, "
         f"{source_bytes / len(data):.0f} times smaller"
     )
-    decoded = read(stream, bap_steps=BAP_STEPS)
+    decoded = read(stream)
     click.echo(f"decoded: {len(decoded)} frames at {rate_text(decoded.rate)} frames/s")
-    again = as_typed(f"fba play --bap-steps {BAP_STEPS} {shlex.quote(str(stream))}")
+    again = as_typed(f"fba play {shlex.quote(str(stream))}")
     click.echo(f"to see it again: {again}")
     if play is not False and _play(player, decoded, asked=play is True):
         return

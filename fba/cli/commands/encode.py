@@ -13,7 +13,7 @@ from fba.animation import Animation
 from fba.cli import capture_report, options, step_tables
 from fba.cli.clamped_values import clamped_lines, clamped_values
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, check_clip, input_file, read_input
+from fba.cli.inputs import EXISTING, check_clip, input_file, is_capture, read_input
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, rate_text, seconds_text
 from fba.errors import FormatError
@@ -29,11 +29,11 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 @click.command(
     cls=Command,
     epilog=examples(
-        "fba encode walk.bvh -o walk.fba --bap-steps visage",
+        "fba encode walk.bvh -o walk.fba",
         "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4 --bap-steps visage",
         "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
         "fba encode talk.fap -o again.fba --epf talk.epf",
-        "fba encode walk.bvh -o walk.fba --bap-steps visage --report --limits report",
+        "fba encode walk.bvh -o walk.fba --report --limits report",
     ),
 )
 @click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=EXISTING)
@@ -82,7 +82,8 @@ CAPTURE = ("spine", "ground", "plant", "origin")
     show_default=True,
     help="With --start-codes: I planes at whole seconds with a time code: damage shifts nothing behind it.",
 )
-@options.bap_steps_option
+@options.written_bap_steps_option
+@options.mark_option
 @options.choice_option(
     "--preset", "Ranges of the arithmetic coder: the reference encoder's, which fit the data.", "reference"
 )
@@ -145,24 +146,28 @@ def command(
     salvage: bool,
     as_json: bool,
     limit: Limits,
+    mark: bool | None,
+    bap_steps: str,
     **settings: Any,
 ) -> None:
     """Encode FAP, BAP or motion-capture files as an FBA stream.
 
     A face file and a body file together become one stream. Ranges fit the data. A value that no range
-    can carry is an error; --clamp limits it to the codable range.
+    can carry is an error; --clamp limits it to the codable range. With --epf, only what that file says is
+    written, and no mark unless you ask for one.
     """
     if epf is not None:
         _refuse_beside_epf()
     check_clip(clip, inputs, format)
     outputs = Outputs([Output("--output", output)], [*inputs, epf], no_clobber=no_clobber)
     capture = {option: settings.pop(option) for option in CAPTURE}
+    tables: list[str] = []
     with Progress("reading", len(inputs)) as step:
         animation = _read_all(
-            inputs, fps=fps, name=name, bap_steps=settings["bap_steps"], salvage=salvage, step=step,
-            capture=capture, format=format, clip=clip, limits=limit,
+            inputs, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, step=step,
+            capture=capture, format=format, clip=clip, limits=limit, tables=tables,
         )  # fmt: skip
-    captures = [path for path in inputs if _is_capture(path, format)]
+    captures = [path for path in inputs if is_capture(path, format)]
     animation, report_values = capture_report.apply_limits(animation, limits)
     if report:
         if animation.body is None:
@@ -170,9 +175,15 @@ def command(
         report_values = capture_report.compare(captures, animation, format, clip) | report_values
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
-    table = settings["bap_steps"]
+    mark = mark if mark is not None else epf is None
+    table = step_tables.table_to_write(
+        bap_steps, made=bool(captures), marked=mark, read=tables[0] if tables else None
+    )
+    settings |= {"bap_steps": table, "mark": mark}
     with Progress("encoding", None):
-        coded = _encode(animation, settings) if epf is None else _encode_as_epf(epf, animation, table, limit)
+        coded = (
+            _encode(animation, settings) if epf is None else _encode_as_epf(epf, animation, settings, limit)
+        )
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
     if as_json:
@@ -185,7 +196,7 @@ def command(
         *capture_report.report_lines(report_values),
     ):
         outputs.say(line)
-    step_tables.remind(output, animation, table, coded.bap_quant)
+    step_tables.remind(output, animation, table, coded.bap_quant, marked=mark)
 
 
 class _Encoded(NamedTuple):
@@ -220,15 +231,18 @@ def _encode(animation: Animation, settings: Mapping[str, Any]) -> _Encoded:
     )
 
 
-def _encode_as_epf(epf: Path, animation: Animation, bap_steps: str, limits: Limits) -> _Encoded:
+def _encode_as_epf(epf: Path, animation: Animation, settings: Mapping[str, Any], limits: Limits) -> _Encoded:
     """Return the stream of an animation, coded plane by plane as an EPF file says."""
-    from fba.codec import encode_planes
+    from fba.codec import encode_planes, write_mark
     from fba.formats.epf.epf import read_epf
 
     with input_file(epf) as file:
         planes = read_epf(file, limits=limits)
-    data = encode_planes(animation, planes, bap_steps=bap_steps)
+    table = settings["bap_steps"]
+    data = encode_planes(animation, planes, bap_steps=table)
     quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
+    if settings["mark"] and quant:
+        data += write_mark(table)
     return _Encoded(data, len(planes), sum(plane.intra for plane in planes), {}, quant)
 
 
@@ -282,12 +296,6 @@ def _summary(output: Path, coded: _Encoded, animation: Animation) -> str:
     return f"{text}; {count} value{'s' if count != 1 else ''} clamped" if count else text
 
 
-def _is_capture(path: Path, format: str | None) -> bool:
-    from fba.formats import format_of
-
-    return str(path) != "-" and format_of(path, format).read_motion is not None
-
-
 def _read_all(
     inputs: tuple[Path, ...],
     *,
@@ -300,6 +308,7 @@ def _read_all(
     format: str | None,
     clip: str | None,
     limits: Limits,
+    tables: list[str],
 ) -> Animation:
     """Return face and body of all inputs as one animation."""
     from fba.formats import merge
@@ -308,7 +317,7 @@ def _read_all(
     for path in inputs:
         animation = read_input(
             path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture, format=format,
-            clip=clip, limits=limits,
+            clip=clip, limits=limits, tables=tables,
         )  # fmt: skip
         step.advance()
         if not len(animation):

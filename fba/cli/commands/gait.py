@@ -32,7 +32,7 @@ DEFAULT_RATE = Fraction(30)
 @click.command(
     cls=Command,
     epilog=examples(
-        "fba gait --stride 0.7 --character bored --bap-steps visage -o walk.fba",
+        "fba gait --stride 0.7 --character bored -o walk.fba",
         "fba gait --character hurried --seconds 10 --fps 25 -o walk.bap",
         "fba gait --list",
         "fba gait --find walk.bap",
@@ -60,7 +60,8 @@ DEFAULT_RATE = Fraction(30)
 )
 @options.to_option
 @options.no_clobber_option
-@options.bap_steps_option
+@options.written_bap_steps_option
+@options.mark_option
 @click.option("--list", "listed", is_flag=True, help="List the characters.")
 @click.option(
     "--find",
@@ -82,6 +83,7 @@ def command(
     to: str | None,
     no_clobber: bool,
     bap_steps: str,
+    mark: bool | None,
     listed: bool,
     find: Path | None,
     as_json: bool,
@@ -89,8 +91,8 @@ def command(
 ) -> None:
     """Generate a walk: body animation from four characteristic poses and a character.
 
-    A foot on the ground does not move. For FBA streams, --bap-steps visage keeps it so: the standard's steps
-    move the body by 64 mm at a time. Play and render with the same option.
+    A foot on the ground does not move. The standard's BAP steps (--bap-steps iso) move the body by 64 mm at a
+    time; a stream gets finer ones, and says so.
     """
     if sum((output is not None, listed, find is not None)) != 1:
         raise click.UsageError("give one of -o OUT, --list and --find FILE")
@@ -111,18 +113,22 @@ def command(
         outputs = Outputs([out], no_clobber=no_clobber)
         with usage_errors("walk: "):
             animation = gait.walk(character=character, rate=fps or DEFAULT_RATE, **made)
-        _write(animation, writing, output, outputs, bap_steps)
+        marked = mark is not False
+        table = step_tables.table_to_write(bap_steps, made=True, marked=marked)
+        _write(animation, writing, output, outputs, bap_steps=table, mark=marked)
         outputs.say(_summary(animation, output, character, in_place=in_place))
         if writing.name == "fba":
-            step_tables.remind(output, animation, bap_steps)
+            step_tables.remind(output, animation, table, marked=marked)
 
 
-def _write(animation: Animation, writing: Format, output: Path, outputs: Outputs, bap_steps: str) -> None:
+def _write(
+    animation: Animation, writing: Format, output: Path, outputs: Outputs, *, bap_steps: str, mark: bool
+) -> None:
     from fba.formats import write
 
     extra: dict[str, Any] = {}
     if writing.name == "fba":
-        extra = {"bap_steps": bap_steps, "clamp": True}
+        extra = {"bap_steps": bap_steps, "mark": mark, "clamp": True}
         step_tables.warn_of_coarse_steps(animation, bap_steps)
     with outputs.file(output) as file:
         write(file, animation, format=writing.name, **extra)

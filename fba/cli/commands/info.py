@@ -67,16 +67,18 @@ def command(
     reports = []
     for path in files:
         with each.file(path), input_file(path) as file:
-            info = probe_input(
-                file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage, clip=clip, limits=limit
-            )
+            steps = ""
+            info = probe_input(file, fps=fps, format=format, salvage=salvage, clip=clip, limits=limit)
             clips = list_clips(file, info.format, limit)
             if info.format == "fba" and info.body is not None:
-                step_tables.warn_of_doubtful_stream(path, file.read_bytes(), bap_steps)
-            report = {"file": str(path), **info.to_dict()}
+                data = file.read_bytes()
+                steps = step_tables.explain_choice(data, bap_steps, limit)
+                if bap_steps != step_tables.AUTO:
+                    step_tables.warn_of_doubtful_stream(path, data, bap_steps)
+            report = {"file": str(path), **info.to_dict(), "bap_steps_choice": steps or None}
             reports.append(report | ({"clips": [asdict(clip) for clip in clips]} if clips else {}))
             if not as_json:
-                _print(path, info, clips)
+                _print(path, info, clips, steps)
     if as_json:
         print_json(reports if len(files) > 1 else reports[0])
     each.finish()
@@ -89,7 +91,8 @@ def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:
     from fba_conformance.trace import trace
 
     with input_file(path) as file:
-        elements = trace(file.read_bytes(), bap_steps=bap_steps)
+        data = file.read_bytes()
+        elements = trace(data, bap_steps=step_tables.table_to_read(path, data, bap_steps, shown=values))
     if as_json:
         for element in elements:
             click.echo(json.dumps(element_dict(element)))
@@ -98,7 +101,7 @@ def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:
         click.echo(line)
 
 
-def _print(path: Path, info: StreamInfo, clips: tuple[ClipInfo, ...]) -> None:
+def _print(path: Path, info: StreamInfo, clips: tuple[ClipInfo, ...], steps: str) -> None:
     click.echo(f"{path}: {info.format.upper()}, {info.size} bytes")
     skipped = f", {info.skipped} skipped" if info.skipped else ""
     start = f", starts at {seconds_text(info.start)}" if info.start else ""
@@ -118,6 +121,8 @@ def _print(path: Path, info: StreamInfo, clips: tuple[ClipInfo, ...]) -> None:
     if len(clips) > 1:
         for number, clip in enumerate(clips):
             click.echo(f"  {'clips' if not number else '':8} {clip.name!r}, {seconds_text(clip.seconds)}")
+    if steps:
+        click.echo(f"  steps    {steps}")
     for damage in info.damage:
         click.echo(f"  damage   {damage}")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.cli import options, scene_options
+from fba.cli import options, scene_options, step_tables
 from fba.cli.command import Command, examples
 from fba.cli.scene_options import MOST, SceneOptions, SoundOptions, check_files
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     epilog=examples(
         "fba play talk.fba",
         "fba play talk.fba --audio voice.mp3",
-        "fba play walk.fba --bap-steps visage",
+        "fba play walk.fba",
         "fba play walk.bvh --loop --speed 0.5",
         "fba play original.fap decoded.fba --compare",
         "nc host 7000 | fba play -",
@@ -116,9 +116,9 @@ def _play(
     audio = scene_loading.find_sound(files, sound, "played without sound")
     streams = []
     try:
-        opened, doubts = [], list[str]()
+        opened, doubts, tables = [], list[str](), list[str]()
         for file in files:
-            opened.append(scene_loading.open_file(file, how, doubts))
+            opened.append(scene_loading.open_file(file, how, doubts, tables))
             if opened[-1][1]:
                 streams.append(opened[-1][0])
         names = [
@@ -138,7 +138,7 @@ def _play(
             audio=audio,
             audio_offset=sound.audio_offset,
             file=files[0] if single else None,
-            bap_steps=how.bap_steps,
+            bap_steps=tables[0] if tables else step_tables.DEFAULT,
             warnings=tuple(doubts),
             panels=("differences",) if compare else (),
             **window,

@@ -44,7 +44,7 @@ class SheetType(click.ParamType[str | int]):
     epilog=examples(
         "fba render talk.fba -o talk.mp4",
         "fba render talk.fba -o talk.mp4 --audio voice.wav",
-        "fba render walk.fba -o walk.png --bap-steps visage --frame 40 --size 800x600",
+        "fba render walk.fba -o walk.png --frame 40 --size 800x600",
         "fba render walk.bvh -o part.gif --start 2 --end 5 --camera front",
         "fba render walk.bvh -o frames/%05d.png --transparent",
         "fba render walk.bvh -o sheet.png --contact-sheet 12",

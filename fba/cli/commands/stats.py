@@ -30,8 +30,8 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool, limit: Limit
     for path in files:
         with each.file(path), input_file(path) as file:
             data = file.read_bytes()
-            info = probe_stream(data, bap_steps=bap_steps, limits=limit)
-            if info.body is not None:
+            info = probe_stream(data, limits=limit)
+            if info.body is not None and bap_steps != step_tables.AUTO:
                 step_tables.warn_of_doubtful_stream(path, data, bap_steps)
             rows.append({"file": str(path), **statistics(info)})
     if as_json:

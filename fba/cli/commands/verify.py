@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from fba.cli import options
+from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, input_file
 from fba.cli.printing import Progress, print_json, print_table
@@ -53,7 +53,9 @@ def command(
     with Progress("checking", len(files)) as step:
         for path in files:
             with each.file(path), input_file(path) as file:
-                found = verify_stream(file.read_bytes(), bap_steps=bap_steps, limits=limit)
+                data = file.read_bytes()
+                table = step_tables.table_to_read(path, data, bap_steps, limit)
+                found = verify_stream(data, bap_steps=table, limits=limit)
                 report = {"file": str(path), **found.to_dict()}
                 if against is not None:
                     earlier = known.get(str(path))

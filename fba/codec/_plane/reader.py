@@ -106,8 +106,14 @@ class PlaneReader:
         self._skips = np.zeros(_RUN, dtype=np.int64)
         self._borders = np.zeros(_RUN + 1, dtype=np.int64)
 
-    def begin_object(self) -> None:
-        """Reset all state, including ranges."""
+    @property
+    def bap_table(self) -> str:
+        """The table of BAP steps."""
+        return self._models.bap_table
+
+    def begin_object(self, bap_table: str) -> None:
+        """Reset all state, including ranges. bap_table: of the BAP steps in this object."""
+        self._models.bap_table = bap_table
         self._models.begin_object()
         self.forget_values()
         self._doubtful_ranges = 0

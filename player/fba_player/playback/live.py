@@ -18,6 +18,7 @@ from fba.arrays import Int64
 from fba.codec import Decoder, FrameBuffer, StreamInfo
 from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaError, FbaWarning
+from fba.formats.step_choice import AUTO, DEFAULT, choose_steps
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import BUFFER
 
@@ -28,6 +29,8 @@ PATIENCE = 0.5
 a face and a body."""
 CHECK_BAP_STEPS_AFTER = 4
 """Seconds of a body after which it is checked, once, whether they look right with these BAP steps."""
+CHOOSE_BAP_STEPS_AFTER = 1.25
+"""Seconds of a body that are held back until the BAP steps are chosen by the way it moves."""
 
 
 class Readable(Protocol):
@@ -41,8 +44,11 @@ class LiveAnimation:
     """The part of an FBA stream that has arrived; it has the fields of `Animation`, which grow.
 
     source: read by a thread until its end, whatever the player does meanwhile. head: bytes that were already
-    read from it. name: of the stream. bap_steps: see `fba.Decoder`. at_end: called when nothing more is read,
-    to close the source.
+    read from it. name: of the stream. bap_steps: "iso" or "visage"; or "auto": they are chosen from the first
+    `CHOOSE_BAP_STEPS_AFTER` seconds of a body, for which nothing is shown. at_end: called when nothing more
+    is read, to close the source.
+
+    `bap_steps` is then the table used, `steps_reason` says why, and is "" where it makes no difference.
 
     After damage, decoding goes on at the next I plane behind a start code. `message` says in a few words what
     is wrong, `details` gives the full error; both are "" where nothing is. `doubt` is set once
@@ -68,14 +74,18 @@ class LiveAnimation:
         """Bytes that have arrived."""
         self._source = source
         self._at_end = at_end
-        self._decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
+        self.bap_steps = DEFAULT if bap_steps == AUTO else bap_steps
+        self.steps_reason = ""
+        self._held: bytearray | None = bytearray() if bap_steps == AUTO else None  # until they are chosen
+        self._held_blocks: list[Block] = []
+        self._decoder = Decoder(bap_steps=self.bap_steps, on_error="salvage")
         self._buffer = FrameBuffer()
         self._now = self._buffer.decoded()
         self._changed = threading.Condition()
         self._closing = False
         self._failure: BaseException | None = None
         self._losses = 0
-        self._bap_steps, self._checked_bap_steps = bap_steps, False
+        self._checked_bap_steps = bap_steps == AUTO
         self._thread = threading.Thread(target=self._read, args=(head,), name="fba live", daemon=True)
         self._thread.start()
 
@@ -144,9 +154,12 @@ class LiveAnimation:
         is closed, without a frame that can be decoded, OSError where it cannot be read.
         """
         with self._changed:
-            if not self._changed.wait_for(lambda: len(self) or not self.growing, timeout):
+            if not self._changed.wait_for(
+                lambda: len(self) or self._held_blocks or not self.growing, timeout
+            ):
                 return False
             self._changed.wait_for(self._enough, PATIENCE)
+            self._choose_bap_steps()
             if not len(self):
                 raise self._failure or BitstreamError("the stream ended before its first I plane", plane=0)
             self._buffer.fix_parts()
@@ -172,11 +185,13 @@ class LiveAnimation:
             chunk = head or self._source.read1(CHUNK)
             while chunk and not self._closing:
                 self.received += len(chunk)
-                self._add_blocks(self._decoder.push_blocks(chunk))
+                self._decode(chunk)
                 self._check_bap_steps()
                 chunk = self._source.read1(CHUNK)
             if not self._closing:
-                self._add_blocks(self._decoder.finish_blocks())
+                with self._changed:
+                    self._choose_bap_steps()
+                    self._add_blocks(self._decoder.finish_blocks())
                 self._check_bap_steps(at_end=True)
         except (FbaError, FbaWarning, OSError, ValueError) as error:
             self._failure = error
@@ -185,6 +200,35 @@ class LiveAnimation:
             if self._at_end is not None:
                 self._at_end()
             self._end()
+
+    def _decode(self, chunk: bytes) -> None:
+        """Add what a chunk brings, or hold it back while the BAP steps are not chosen."""
+        with self._changed:
+            blocks = self._decoder.push_blocks(chunk)
+            if self._held is None:
+                self._add_blocks(blocks)
+                return
+            self._held += chunk
+            self._held_blocks += blocks
+            bodies = [block for block in self._held_blocks if block.settings.body is not None]
+            seconds = sum(len(block.index) / block.rate for block in bodies)
+            if self._held_blocks and (not bodies or seconds >= CHOOSE_BAP_STEPS_AFTER):
+                self._choose_bap_steps()
+            self._changed.notify_all()
+
+    def _choose_bap_steps(self) -> None:
+        """Choose the BAP steps, if they are not chosen yet, and add what was held back."""
+        if self._held is None:
+            return
+        held, blocks = bytes(self._held), self._held_blocks
+        self._held, self._held_blocks = None, []
+        choice = choose_steps(held)
+        self.steps_reason = choice.reason
+        if choice.table != self.bap_steps:
+            self.bap_steps = choice.table
+            self._decoder = Decoder(bap_steps=choice.table, on_error="salvage")
+            blocks = self._decoder.push_blocks(held)
+        self._add_blocks(blocks)
 
     def _add_blocks(self, blocks: list[Block]) -> None:
         with self._changed:
@@ -218,7 +262,7 @@ class LiveAnimation:
         from fba.body.plausibility import find_doubt
 
         self._checked_bap_steps = True
-        self.doubt = str(find_doubt(now.body, now.index, now.rate, self._bap_steps) or "")
+        self.doubt = str(find_doubt(now.body, now.index, now.rate, self.bap_steps) or "")
 
     def _end(self) -> None:
         with self._changed:

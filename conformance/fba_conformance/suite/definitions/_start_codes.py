@@ -172,6 +172,13 @@ def surrounding_cases() -> Iterator[Case]:
         lambda: write_stream(plain) + b"FBA\x00\xff" + bytes(range(32)),
         encodes=False,
     )
+    yield Case(
+        "marked_steps",
+        "user data behind the end code, which name the table of BAP steps",
+        lambda: write_stream(plain, bap_steps="visage") + _code(_USER_DATA) + b"fba bap_steps=visage;",
+        bap_steps="visage",
+        encodes=False,
+    )
 
 
 def _ending(bits: int) -> bytes:

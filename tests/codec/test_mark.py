@@ -1,0 +1,159 @@
+"""The mark behind the end of a stream, which names its table of BAP steps."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation, BodyTrack, Decoder, EncoderOptions, FaceTrack, FbaWarning
+from fba.codec import marked_table, probe_stream, verify_stream
+from fba.codec._plane.mark import find_marks
+from fba_conformance.trace import decode_values, trace
+
+MARK = b"\0\0\1\xb2fba bap_steps=visage;"
+STEP = 170
+"""Units of l_shoulder_flexion in the steps of "visage"; "iso" has 64."""
+SHOULDER = 31
+
+
+def body(frames: int = 6) -> Animation:
+    values = np.zeros((frames, 296), dtype=np.int32)
+    values[:, SHOULDER] = STEP * np.arange(frames)
+    return Animation(
+        25, range(frames), None, BodyTrack(values, values.any(axis=0) | np.zeros((frames, 1), bool))
+    )  # type: ignore[arg-type]
+
+
+def stream(table: str = "visage", *, mark: bool = True, **options: int) -> bytes:
+    return fba.encode(body(), EncoderOptions(bap_steps=table, mark=mark, **options))  # type: ignore[arg-type]
+
+
+def shoulder(animation: Animation) -> list[int]:
+    assert animation.body is not None
+    return animation.body.values[:, SHOULDER].tolist()
+
+
+RIGHT = [STEP * frame for frame in range(6)]
+
+
+def test_the_mark_stands_behind_the_end_and_changes_nothing_else() -> None:
+    plain = stream(mark=False)
+    assert plain.endswith(b"\0\0\1\xb1")
+    assert stream() == plain + MARK
+    assert fba.encode(body(), EncoderOptions(bap_steps="visage")) == plain
+    assert stream("iso", clamp=True).endswith(b"fba bap_steps=iso;")
+
+
+def test_what_needs_no_mark_has_none() -> None:
+    values, mask = np.zeros((3, 68), np.int32), np.zeros((3, 68), bool)
+    mask[:, 2] = True
+    face = Animation(25, range(3), FaceTrack(values, mask))  # type: ignore[arg-type]
+    assert fba.encode(face, EncoderOptions(mark=True)) == fba.encode(face)
+    assert not marked_table(stream(bap_quant=0))  # unquantised: the same under every table
+
+
+def test_decoders_go_by_the_mark() -> None:
+    data = stream()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert shoulder(fba.decode(data)) == RIGHT
+        assert fba.decode(data) == fba.decode(stream(mark=False), bap_steps="visage")
+        assert probe_stream(data).bap_steps == "visage"
+        assert verify_stream(data).digest == verify_stream(stream(mark=False), bap_steps="visage").digest
+        assert verify_stream(data).intact
+    assert shoulder(fba.decode(stream(mark=False))) != RIGHT
+    assert probe_stream(stream(mark=False)).bap_steps is None
+
+
+def test_streams_one_after_another_each_go_by_their_own() -> None:
+    plain, iso = stream(mark=False), stream("iso", mark=True)
+    unmarked = shoulder(fba.decode(plain))
+    for parts, wanted in (
+        ((stream(), iso), RIGHT + shoulder(fba.decode(iso))),
+        ((iso, stream()), shoulder(fba.decode(iso)) + RIGHT),
+        ((plain, stream()), unmarked + RIGHT),
+        ((stream(), plain), RIGHT + unmarked),
+    ):
+        assert shoulder(fba.decode(b"".join(parts))) == wanted
+    assert [mark.table for mark in find_marks(stream() + iso)] == ["visage", "iso"]
+    assert marked_table(stream() + iso) is None
+
+
+@pytest.mark.parametrize("size", [1, 7, 100])
+def test_a_decoder_that_was_not_told_says_so_at_the_end(size: int) -> None:
+    data, decoder = stream(), Decoder()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        frames = [f for start in range(0, len(data), size) for f in decoder.push(data[start : start + size])]
+        frames += decoder.finish()
+    said = "the stream says behind its end that it was made with the BAP steps 'visage'; "
+    assert [str(one.message) for one in caught] == [said + "it was decoded with 'iso'"]
+    assert (len(frames), decoder.mark, decoder.ended, decoder.damage) == (6, "visage", True, [])
+    told = Decoder(bap_steps="visage")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        told.push(data)
+        told.finish()
+    assert told.mark == "visage"
+
+
+def test_what_is_asked_for_is_done_in_spite_of_the_mark() -> None:
+    with pytest.warns(FbaWarning, match="made with the BAP steps 'visage'"):
+        decoded = fba.decode(stream(), bap_steps="iso")
+    assert decoded == fba.decode(stream(mark=False), bap_steps="iso")
+
+
+def test_salvage_knows_the_mark() -> None:
+    options = EncoderOptions(bap_steps="visage", mark=True, start_codes=True, intra_period=0.2)
+    data = bytearray(fba.encode(body(40), options))
+    data[3] = 0  # the object start code is lost
+    with pytest.warns(FbaWarning, match="the object start code 00 00 01 ba is missing"):
+        found = fba.decode(bytes(data), on_error="salvage")
+    assert set(shoulder(found)) <= {STEP * frame for frame in range(40)}
+    assert max(shoulder(found)) == STEP * 39
+
+
+@pytest.mark.parametrize("cut", range(1, len(MARK) - 4))
+def test_a_mark_that_was_cut_off_is_none(cut: int) -> None:
+    data = stream()[:-cut]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert marked_table(data) is None
+        assert fba.decode(data) == fba.decode(stream(mark=False))
+
+
+def test_a_table_of_the_future_is_named() -> None:
+    data = stream(mark=False) + MARK.replace(b"visage", b"better")
+    with pytest.warns(FbaWarning, match="made with the BAP steps 'better', which are not known here"):
+        assert fba.decode(data) == fba.decode(stream(mark=False))
+
+
+def test_other_user_data_and_data_inside_are_no_mark() -> None:
+    plain = stream(mark=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert fba.decode(plain + b"\0\0\1\xb2somebody's words") == fba.decode(plain)
+    with pytest.warns(FbaWarning, match="bytes follow the end"):
+        assert fba.decode(plain + b"?" + MARK) == fba.decode(plain)
+
+
+def test_the_second_decoder_reads_nothing_behind_the_end() -> None:
+    """Which is what the first one of another maker does: the mark leaves its values as they are."""
+    assert decode_values(stream(), bap_steps="visage") == decode_values(
+        stream(mark=False), bap_steps="visage"
+    )
+    names = [(element.name, element.value) for element in trace(stream(), bap_steps="visage")]
+    assert names[-2:] == [("user_data_start_code", 0x1B2), ("user_data", "fba bap_steps=visage;")]
+
+
+def test_files_say_what_is_not_the_standard(tmp_path: object) -> None:
+    path = f"{tmp_path}/a.fba"
+    for options, marked in (({"bap_steps": "visage"}, "visage"), ({}, None), ({"mark": True}, "iso"),
+                            ({"bap_steps": "visage", "mark": False}, None)):  # fmt: skip
+        fba.write(path, body(), **options)
+        assert fba.probe(path).bap_steps == marked
+    fba.write(path, body(), bap_steps="visage")
+    assert shoulder(fba.read(path)) == RIGHT

@@ -1,0 +1,108 @@
+"""How a stream's table of BAP steps is chosen: by its mark, else by the way it moves, else the standard's."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation, BodyTrack, EncoderOptions
+from fba.body.plausibility import find_doubt
+from fba.formats import step_choice
+from fba.formats.step_choice import StepChoice, choose_steps
+from tests.helpers.made_streams import made_streams
+
+UNTOLD = {
+    "generated/vreng_bye_b_vis_q1.fba",
+    "generated/vreng_hi_b_vis_q1.fba",
+    "generated/vreng_nak_b_vis_q1.fba",
+    "generated/vreng_pivot_b_vis_q1.fba",
+    "real/perfumist_basicMotion.fba",
+}
+"""Foreign streams in the other table in which nothing shows that: arms move less, or the body turns less."""
+
+
+def test_made_streams() -> None:
+    """The first 16 of those of which `python -m tests.helpers.made_streams 500` tries more."""
+    seen = set()
+    for made in made_streams(16):
+        assert choose_steps(made.marked) == StepChoice(made.table, "the stream says so")
+        choice = choose_steps(made.unmarked)
+        assert choice.table == made.table or "nothing looks wrong" in choice.reason, made.kind
+        seen.add((made.table, choice.table))
+    assert seen == {("iso", "iso"), ("visage", "visage"), ("visage", "iso")}
+
+
+def test_foreign_streams(shared: Path) -> None:
+    """Of 177, 70 have a body. None of the standard' is taken for another; five others cannot be told."""
+    folder, wrong, checked = shared / "vectors", set(), 0
+    for record in json.loads((folder / "index.json").read_text(encoding="utf-8")):
+        if "decoded_bap" not in record:
+            continue
+        data, right = (folder / record["stream"]).read_bytes(), record["bap_steps"]
+        checked += 1
+        chosen = choose_steps(data).table
+        if chosen != right:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", fba.FbaWarning)
+                if fba.decode(data, bap_steps=chosen) != fba.decode(data, bap_steps=right):
+                    wrong.add(record["stream"])
+    assert (checked, wrong) == (70, UNTOLD)
+
+
+def keyed(degrees: list[float]) -> bytes:
+    """Both elbows go straight from key to key, half a second each, in the steps of "visage"."""
+    times = np.arange(15 * (len(degrees) - 1) + 1) / 15
+    values = np.zeros((len(times), 296), dtype=np.int32)
+    values[:, [37, 38]] = np.rint(np.radians(np.interp(times, range(len(degrees)), degrees)) * 1e5)[:, None]
+    body = BodyTrack(values, values.any(axis=0) | np.zeros((len(times), 1), bool))
+    return fba.encode(Animation(30, range(len(times)), None, body), EncoderOptions(bap_steps="visage"))  # type: ignore[arg-type]
+
+
+def test_round_angles_tell_the_table() -> None:
+    assert choose_steps(keyed([0, 90, 35, 60, 5, 75])) == StepChoice(
+        "visage",
+        "the stream does not say, and with iso angles are odd that visage makes multiples of 5 degrees",
+    )
+    assert choose_steps(keyed([0, 88, 33, 61, 7, 73])).table == "iso"
+    assert choose_steps(keyed([0, 90])).table == "iso"  # may be chance
+
+
+def test_coarse_quantisers_make_round_angles_of_their_own() -> None:
+    """Every seventh step of the standard's, 64 units: with the other table some are round by chance alone."""
+    rng = np.random.default_rng(3)
+    values = np.zeros((200, 296), dtype=np.int32)
+    values[:, 31:36] = 64 * 9 * rng.integers(-40, 40, (200, 5))
+    unit = np.rint(np.radians(5) * 1e5 / 170 / 9)
+    values[:, 37] = 64 * 9 * unit * rng.integers(0, 12, 200)
+    assert find_doubt(BodyTrack(values, values != 0), np.arange(200), Fraction(25), "iso") is None
+
+
+def test_nothing_is_said_where_the_table_makes_no_difference() -> None:
+    body = BodyTrack(np.ones((2, 296), np.int32), np.ones((2, 296), bool))
+    unquantised = fba.encode(Animation(30, range(2), None, body), EncoderOptions(bap_quant=0))  # type: ignore[arg-type]
+    for data in (unquantised, b"", b"no stream at all"):
+        assert choose_steps(data) == StepChoice("iso", "")
+
+
+def test_only_the_beginning_is_decoded_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = keyed([0, 90, 35, 60, 5, 75])
+    monkeypatch.setattr(step_choice, "FRAMES_CHECKED", 5)
+    monkeypatch.setattr(step_choice, "_CHUNK", 64)
+    found = step_choice.first_frames(data, "iso")
+    assert found is not None
+    assert 5 <= len(found) < 40
+    monkeypatch.setattr(step_choice, "FRAMES_SEARCHED", 0)
+    assert step_choice.first_frames(data, "iso") is None
+
+
+def test_read_chooses_only_when_asked(tmp_path: Path) -> None:
+    path = tmp_path / "keyed.fba"
+    path.write_bytes(keyed([0, 90, 35, 60, 5, 75]))
+    assert fba.read(path) == fba.read(path, bap_steps="iso") != fba.read(path, bap_steps="auto")
+    assert fba.read(path, bap_steps="auto") == fba.read(path, bap_steps="visage")
