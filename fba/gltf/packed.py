@@ -14,7 +14,8 @@ from fba.arrays import Array
 from fba.gltf.document import Document
 from fba.gltf.values import Value
 
-LEVEL = 9
+LEVEL = 7
+"""Of deflate: level 9 takes four times as long, for files 0.5 % smaller."""
 
 
 def pack(array: Array) -> bytes:

@@ -207,6 +207,10 @@ def start(folder: Path) -> None:
     for name in FOREIGN:
         with contextlib.suppress(ImportError):
             import_module(name)
+    with contextlib.suppress(ImportError):
+        import numba
+
+        numba.njit(lambda number: number)(0)  # its own tables, which it fills before the first function
     assert not {"fba", "fba_player", "fba_conformance"} & set(sys.modules)
     out = os.dup(1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -127,26 +126,28 @@ class Patch:
         return tuple(1.1 * MOST_STRETCH * np.maximum(length, shortest) for length in self._edge_lengths)
 
     @cached_property
-    def _fans(self) -> tuple[Any, Any]:
-        """Sparse matrix (K, M), 1 where a vertex is a corner of a triangle, and its transpose.
-
-        K: the vertices that are.
-        """
-        from scipy.sparse import csr_array
-
-        vertices, local = np.unique(self.triangles, return_inverse=True)
-        corners = (local.ravel(), np.repeat(np.arange(len(self.triangles)), 3))
-        fans = csr_array((np.ones(self.triangles.size), corners), shape=(len(vertices), len(self.triangles)))
-        return fans, fans.T
+    def _local_corners(self) -> Intp:
+        """(M, 3) the corners of the triangles, counted through the vertices of this patch."""
+        corners: Intp = np.unique(self.triangles, return_inverse=True)[1].reshape(-1, 3)
+        return corners
 
     def _facing_neighbours(self, normals: Float64) -> Float64:
         """(M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any vertex."""
-        fans, transposed = self._fans
-        around = transposed @ (fans @ normals) - 3 * normals
+        around = self._sum_around(normals) - 3 * normals
         product = _lengths(around) * _lengths(normals)
         result: Float64 = _dot(around, normals) / np.maximum(product, 1e-30)
         result[product < 1e-30] = 1.0
         return result
+
+    def _sum_around(self, normals: Float64) -> Float64:
+        """(M, 3) sums of the normals (M, 3) of all triangles at the corners of each, itself thrice."""
+        corners = self._local_corners
+        if not len(corners):
+            return np.zeros((0, 3))
+        sums = np.stack([np.bincount(corners.ravel(), np.repeat(axis, 3)) for axis in normals.T], axis=1)
+        low, middle, high = np.sort(corners, axis=1).T
+        around: Float64 = sums[low] + sums[middle] + sums[high]
+        return around
 
     @cached_property
     def _folded_before(self) -> Bool:

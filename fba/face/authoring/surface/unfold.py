@@ -150,5 +150,5 @@ def _solve_harmonic(surface: Surface, shifts: Float64, free: Intp) -> Float64:
     except RuntimeError:  # a piece without fixed vertices
         return shifts
     result = shifts.copy()
-    result[free] = np.nan_to_num(solved)
+    result[free] = solved if np.isfinite(solved).all() else np.nan_to_num(solved)
     return result
