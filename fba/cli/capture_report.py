@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -35,11 +35,16 @@ def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str
 
 
 def compare(
-    captures: Sequence[Path], animation: Animation, format: str | None = None, clip: str | None = None
+    captures: Sequence[Path],
+    animation: Animation,
+    format: str | None = None,
+    clip: str | None = None,
+    joints: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """Return a report of the angles between the bones of captures and of the body, before coding.
 
-    clip: the animation that was read of a file with several, by name or number.
+    clip: the animation that was read of a file with several, by name or number. joints: the map of joints
+    that was given.
     """
     from fba.capture import retarget_report
     from fba.formats import format_of
@@ -49,7 +54,7 @@ def compare(
         reader = format_of(path, format)
         assert reader.read_motion is not None  # the caller names captures only
         motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": clip}))
-        report = asdict(retarget_report(motion, animation))
+        report = asdict(retarget_report(motion, animation, joints=joints))
         reports.append({"input": str(path), **report})
     return {"captures": reports}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,7 @@ OPTIONS = {
     "replace": "replace",
     "limits": "limit",
     "clip": "clip",
+    "joints": "maps",
 }
 """Arguments of the library, and the parameters of commands that do the same."""
 OTHER_COMMANDS = (("encode",), ("convert",), ("model", "import"))
@@ -81,6 +83,8 @@ def _remedy_text(remedy: Remedy, context: click.Context) -> str:
     name = OPTIONS.get(remedy.argument)
     if remedy.call == "fba.write" and name == "format":
         name = "to"
+    if remedy.call.endswith(".read_body"):  # the joints of a body that is shown, not of a capture
+        name = None
     option = _option_text(context.command, name, remedy.value)
     if option is not None:
         return remedy.fill_in(option)
@@ -101,6 +105,8 @@ def _option_text(command: click.Command, name: str | None, value: str) -> str | 
     for param in command.params:
         if isinstance(param, click.Option) and param.name == name:
             text = value.removeprefix("fba.Limits(").removesuffix(")").strip("'")
+            if pair := re.match(r"\{'(.*?)': '(.*?)'", text):  # the first pair of a mapping
+                text = "=".join(pair.groups())
             return param.opts[0] if param.is_flag else f"{param.opts[0]} {text}"
     return None
 

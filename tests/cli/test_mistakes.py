@@ -10,12 +10,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
 import fba
 from fba import Animation
 from fba.cli.main import _COMMANDS, group
 from fba.errors import FormatError, Remedy
+from small_people import BONES, write_person
 
 Run = Callable[..., tuple[int, str, str]]
 SAMPLE = Path(fba.__file__).parent / "samples" / "hello.bvh"
@@ -82,8 +84,6 @@ def test_info_has_the_salvage_that_it_names(run: Run, cut: Path) -> None:
 
 
 def test_an_option_of_another_command_is_named_with_it(run: Run, tmp_path: Path) -> None:
-    import numpy as np
-
     values, mask = np.zeros((1, 68), dtype=np.int32), np.zeros((1, 68), dtype=bool)
     values[0, 13], mask[0, 13] = 2000, True
     fba.write(tmp_path / "wild.fap", Animation(25, np.arange(1), fba.FaceTrack(values, mask)))
@@ -92,13 +92,12 @@ def test_an_option_of_another_command_is_named_with_it(run: Run, tmp_path: Path)
     assert err.endswith("or bring what does not fit as near as can be with --clamp of `fba encode`\n")
 
 
-def test_what_only_python_can_do_is_shown_as_python(run: Run, bvh: Path) -> None:
+def test_joints_that_names_do_not_tell_can_be_given(run: Run, bvh: Path, tmp_path: Path) -> None:
     bvh.write_text(re.sub(r"(ROOT|JOINT) (\w+)", lambda m: f"{m[1]} part{m.start()}", bvh.read_text()))
     code, _, err = run("info", bvh)
     assert code == 1
     assert err.endswith(
-        "name each joint's counterpart in the standard with fba.read(FILE, joints={'Pelvis': 'HumanoidRoot', "
-        "...}) in Python; the command line has no option for it\n"
+        "name each joint's counterpart in the standard with --map Pelvis=HumanoidRoot of `fba encode`\n"
     )
     names = re.findall(r"(?:ROOT|JOINT) (\w+)", bvh.read_text())
     ends = ("hip", "knee", "ankle")
@@ -107,6 +106,22 @@ def test_what_only_python_can_do_is_shown_as_python(run: Run, bvh: Path) -> None
     assert len(animation) == 3
     assert animation.body is not None
     assert animation.body.mask.any()
+    pairs = [word for name, joint in zip(names, joints, strict=True) for word in ("--map", f"{name}={joint}")]
+    assert run("convert", bvh, tmp_path / "out.bap", *pairs)[0] == 0
+    written = fba.read(tmp_path / "out.bap").body
+    assert written is not None
+    assert np.array_equal(written.values, animation.body.values)
+
+
+def test_what_only_python_can_do_is_shown_as_python(run: Run, tmp_path: Path, face: Animation) -> None:
+    path = write_person(tmp_path / "p.glb", names={bone: f"n{k}" for k, bone in enumerate(BONES)})
+    fba.write(tmp_path / "a.fap", face)
+    code, _, err = run("render", tmp_path / "a.fap", "-o", tmp_path / "a.png", "--body", path)
+    assert code == 1
+    assert err.endswith(
+        "with fba.formats.gltf.bodies.read_body(FILE, joints={'Pelvis': 'HumanoidRoot', ...}) in Python; "
+        "the command line has no option for it\n"
+    )
 
 
 def test_a_format_can_be_named(run: Run, tmp_path: Path) -> None:

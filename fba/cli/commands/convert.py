@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from fba.cli import options, step_tables, writer_options
+from fba.cli import joint_options, options, step_tables, writer_options
 from fba.cli.command import Command, examples
 from fba.cli.inputs import EXISTING, check_clip, is_capture, read_input
 from fba.cli.outputs import (
@@ -40,6 +40,7 @@ from fba.limits import Limits
 @options.clip_option
 @options.to_option
 @options.no_clobber_option
+@joint_options.map_options(out=False)
 @writer_options.writer_options
 @options.written_bap_steps_option
 @options.mark_option
@@ -53,6 +54,7 @@ def command(
     clip: str | None,
     to: str | None,
     no_clobber: bool,
+    maps: tuple[Path | joint_options.Pair, ...],
     bap_steps: str,
     mark: bool | None,
     salvage: bool,
@@ -76,14 +78,16 @@ def command(
     check_clip(clip, [source], format)
     if mark is not None and writing.name != "fba":
         raise click.UsageError(f"--mark is for streams, and {display_name(target)} becomes none")
+    captures = [source] if is_capture(source, format) else []
+    joints = joint_options.read_joints(maps, captures, format, clip, limit)
     tables: list[str] = []
     animation = read_input(
         source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format, clip=clip,
-        tables=tables,
+        tables=tables, capture={"joints": joints},
     )  # fmt: skip
     marked = mark is not False
     if writing.name == "fba":
-        made = is_capture(source, format)
+        made = bool(captures)
         table = step_tables.table_to_write(bap_steps, made=made, marked=marked, read=next(iter(tables), None))
         step_tables.warn_of_coarse_steps(animation, table)
         extra |= {"bap_steps": table, "mark": marked}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from fba.animation import Animation
-from fba.cli import capture_report, options, step_tables
+from fba.cli import capture_report, joint_options, options, step_tables
 from fba.cli.clamped_values import clamped_lines, clamped_values
 from fba.cli.command import Command, examples
 from fba.cli.inputs import EXISTING, check_clip, input_file, is_capture, read_input
@@ -121,6 +121,7 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 @options.choice_option(
     "--origin", "Motion capture: what is placed at the default position.", "source", "start", "middle"
 )
+@joint_options.map_options(out=True)
 @options.choice_option(
     "--limits",
     "Report where joints exceed normal human motion, or clamp them to it.",
@@ -141,6 +142,8 @@ def command(
     clip: str | None,
     name: str | None,
     epf: Path | None,
+    maps: tuple[Path | joint_options.Pair, ...],
+    map_out: Path | None,
     limits: str,
     report: bool,
     salvage: bool,
@@ -159,20 +162,25 @@ def command(
     if epf is not None:
         _refuse_beside_epf()
     check_clip(clip, inputs, format)
-    outputs = Outputs([Output("--output", output)], [*inputs, epf], no_clobber=no_clobber)
-    capture = {option: settings.pop(option) for option in CAPTURE}
+    saved = [] if map_out is None else [Output("--map-out", map_out, True)]
+    read = [*inputs, epf, *(each for each in maps if isinstance(each, Path))]
+    outputs = Outputs([Output("--output", output), *saved], read, no_clobber=no_clobber)
+    captures = [path for path in inputs if is_capture(path, format)]
+    if map_out is not None and not captures:
+        raise click.UsageError("--map-out goes with motion capture: a BVH or glTF file")
+    joints = joint_options.read_joints(maps, captures, format, clip, limit)
+    capture = {option: settings.pop(option) for option in CAPTURE} | {"joints": joints}
     tables: list[str] = []
     with Progress("reading", len(inputs)) as step:
         animation = _read_all(
             inputs, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, step=step,
             capture=capture, format=format, clip=clip, limits=limit, tables=tables,
         )  # fmt: skip
-    captures = [path for path in inputs if is_capture(path, format)]
     animation, report_values = capture_report.apply_limits(animation, limits)
     if report:
         if animation.body is None:
             raise click.UsageError("--report compares bones of motion capture, and there is no body")
-        report_values = capture_report.compare(captures, animation, format, clip) | report_values
+        report_values = capture_report.compare(captures, animation, format, clip, joints) | report_values
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
     mark = mark if mark is not None else epf is None
@@ -186,6 +194,10 @@ def command(
         )
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
+    if map_out is not None:
+        with outputs.file(map_out) as file:
+            mapped = joint_options.write_joints(file, joints, captures[0], format, clip, limit)
+        outputs.say(f"{display_name(map_out)}: {mapped} joints of {captures[0]}")
     if as_json:
         used = {"bap_steps": table if animation.body is not None else None}
         outputs.print_json({"output": str(output), **_figures(coded, animation), **used, **report_values})

@@ -77,9 +77,10 @@ def read_body(
             return BodyModel.load(path, limits=limits)
         return _import_person(gltf, path, joints)
     except ModelError as error:
-        raise FormatError(error.finding.removeprefix(f"{path}: "), path=path).with_remedies(
-            *error.remedies
-        ) from error
+        call = f"{__name__}.read_body"
+        remedies = [replace(each, call=call) for each in error.remedies]
+        finding = error.finding.removeprefix(f"{path}: ")
+        raise FormatError(finding, path=path).with_remedies(*remedies) from error
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,149 @@
+"""Maps from the joints of a capture to those of the standard: found, corrected by hand, in TOML files."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import textwrap
+import tomllib
+from collections.abc import Mapping
+
+from fba.atomic import atomic
+from fba.body.skeleton import ROOT, Skeleton
+from fba.capture.motion import SkeletonMotion
+from fba.capture.preparation import find_bones
+from fba.errors import FormatError, ModelError, OptionError, did_you_mean
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import Path, read_whole
+
+MOST_BYTES = 1 << 20
+"""Longest file of a map."""
+TABLE = "joints"
+NAMED = 12
+"""Most joints that a comment names in a line."""
+
+
+def find_map(motion: SkeletonMotion, joints: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Return the joints of a capture that move joints of the standard, and these, in the capture's order.
+
+    joints: as for `from_skeleton`; None to find them. ModelError where none are found.
+    """
+    _, mapped, *_ = find_bones(motion, joints, Skeleton.default())
+    by_number = sorted((number, joint) for joint, number in mapped.items())
+    return {motion.names[number]: joint for number, joint in by_number}
+
+
+def change_map(
+    motion: SkeletonMotion, base: Mapping[str, str] | None, pairs: Mapping[str, str]
+) -> dict[str, str]:
+    """Return a map with some joints of a capture given by hand.
+
+    base: the map that is changed; None for what is found, or for an empty one where nothing is. pairs: joint
+    of the capture -> joint of the standard, or "" to leave the joint out. Another joint of the capture that
+    had the same joint of the standard loses it.
+
+    OptionError for a joint that the capture or the standard lacks, and where no joint is the root.
+    """
+    if base is None:
+        try:
+            base = find_map(motion)
+        except ModelError:
+            base = {}
+    result = dict(base)
+    for source, joint in pairs.items():
+        if source not in motion.names:
+            raise OptionError(
+                f"the motion has no joint {source!r}{did_you_mean(source, motion.names)}; it has "
+                f"{_list(motion.names)}"
+            )
+        _check_joint(joint, allow_none=True)
+        result = {each: taken for each, taken in result.items() if each != source and taken != joint}
+        if joint:
+            result[source] = joint
+    if ROOT not in result.values():
+        raise OptionError(
+            f"no joint of the motion is mapped to {ROOT}, the hips: give one, such as Hips={ROOT}"
+        )
+    order = {name: number for number, name in reversed(list(enumerate(motion.names)))}
+    return dict(sorted(result.items(), key=lambda pair: order.get(pair[0], len(order))))
+
+
+def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
+    """Return the map in a TOML file: the table "joints", joint of the capture -> joint of the standard.
+
+    Raises FormatError for a file that is none, with the line, and for joints that the standard lacks.
+    """
+    data = read_whole(path)
+    if len(data) > MOST_BYTES:
+        raise FormatError(f"has {len(data)} bytes, more than the {MOST_BYTES} that a map may have", path=path)
+    limits.check_bytes(40 * len(data), f"{os.fspath(path)}: the map", source=len(data))
+    try:
+        content = tomllib.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise FormatError(f"is not UTF-8 text (byte {error.start})", path=path) from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        raise FormatError(
+            f"is not TOML: {str(error)[:200]}; expected lines such as \"Hips\" = \"{ROOT}\" below [{TABLE}]",
+            path=path, line=int(line[1]) if line else None,
+        ) from None  # fmt: skip
+    table = content.get(TABLE)
+    if not isinstance(table, dict) or not table:
+        raise FormatError(
+            f'has no table [{TABLE}]; expected one with lines such as "Hips" = "{ROOT}"', path=path
+        )
+    taken: dict[str, str] = {}
+    for source, joint in table.items():
+        if not isinstance(joint, str):
+            raise FormatError(f"{source!r} must name one joint of the standard, not {joint!r}", path=path)
+        try:
+            _check_joint(joint)
+        except OptionError as error:
+            raise FormatError(f"{source!r}: {error}", path=path) from None
+        if joint in taken:
+            raise FormatError(f"{taken[joint]!r} and {source!r} are both mapped to {joint!r}", path=path)
+        taken[joint] = source
+    if ROOT not in taken:
+        raise FormatError(f"maps no joint to {ROOT}, the hips", path=path)
+    return dict(table)
+
+
+def write_map(path: Path, joints: Mapping[str, str], motion: SkeletonMotion | None = None) -> None:
+    """Write a map as TOML; comments name the joints without a counterpart, if the motion is given."""
+    lines = [
+        "# Joints of a capture, and the joints of ISO/IEC 14496-2 that they move.",
+        "# Change it and give it to `fba encode --map`.",
+        "",
+        f"[{TABLE}]",
+    ]
+    for source, joint in joints.items():
+        lines.append(f"{json.dumps(source, ensure_ascii=False)} = {json.dumps(joint)}")
+    if motion is not None:
+        unused = [name for name in motion.names if name not in joints]
+        free = [joint for joint in Skeleton.default().names if joint not in joints.values()]
+        for whose, names in (("capture that move nothing", unused), ("standard that are free", free)):
+            if names:
+                # a name with a line break in it must not end the comment
+                quoted = ", ".join(json.dumps(name)[1:-1] for name in names)
+                lines += textwrap.wrap(
+                    f"Joints of the {whose}: {quoted}", 100, initial_indent="# ", subsequent_indent="#   "
+                )
+    with atomic(path) as file:
+        file.write(("\n".join(lines) + "\n").encode())
+
+
+def _check_joint(joint: str, allow_none: bool = False) -> None:
+    """Raise OptionError for a joint that the standard lacks."""
+    names = Skeleton.default().names
+    if joint not in names and not (allow_none and not joint):
+        near = did_you_mean(joint, names)
+        raise OptionError(
+            f"the standard has no joint {joint!r}{near}; it has {ROOT}, vl5 to vl1, vt12 to vt1, vc7 to vc1, "
+            "skullbase, l_hip, l_knee, l_ankle, l_metatarsal, l_sternoclavicular, l_shoulder, l_elbow, "
+            "l_wrist, l_thumb1 to l_pinky3, and the same with r_"
+        )
+
+
+def _list(names: tuple[str, ...]) -> str:
+    return ", ".join(names[:NAMED]) + (f", and {len(names) - NAMED} more" if len(names) > NAMED else "")

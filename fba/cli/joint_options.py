@@ -1,0 +1,123 @@
+"""`--map` and `--map-out`: which joint of a capture is which joint of the standard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli.command import Decorated
+from fba.cli.inputs import input_file
+from fba.cli.outputs import OutputType
+from fba.errors import OptionError
+from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.capture.motion import SkeletonMotion
+
+Pair = tuple[str, str]
+
+
+class MapType(click.ParamType["Path | Pair"]):
+    """A joint of the capture and one of the standard, Pelvis=HumanoidRoot, or a file of such pairs."""
+
+    name = "map"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path | Pair:
+        if isinstance(value, (Path, tuple)):
+            return value
+        text = str(value)
+        if Path(text).is_file():
+            return Path(text)
+        source, equals, joint = text.rpartition("=")
+        if not equals or not source:
+            self.fail(
+                f"{text!r} is neither a file nor a pair of joints such as Pelvis=HumanoidRoot", param, ctx
+            )
+        return source, joint
+
+
+def map_options(*, out: bool) -> Callable[[Decorated], Decorated]:
+    """Return a decorator that adds `--map`, and `--map-out` if `out`."""
+    given = click.option(
+        "--map",
+        "maps",
+        type=MapType(),
+        multiple=True,
+        metavar="JOINT=JOINT|FILE",
+        help="Motion capture: which joint of the standard a joint of the file is, Pelvis=HumanoidRoot; none: "
+        "Hat=. Repeatable. Or a TOML file of such pairs, instead of what is found.",
+    )
+    saved = click.option(
+        "--map-out",
+        type=OutputType(),
+        metavar="FILE.toml",
+        help="Motion capture: write the joints that were found, to be changed and read with --map.",
+    )
+
+    def decorate(command: Decorated) -> Decorated:
+        decorated: Any = saved(command) if out else command
+        return given(decorated)  # type: ignore[no-any-return]
+
+    return decorate
+
+
+def read_joints(
+    maps: Sequence[Path | Pair],
+    captures: Sequence[Path],
+    format: str | None,
+    clip: str | None,
+    limits: Limits,
+) -> dict[str, str] | None:
+    """Return the map that `--map` gives, None without; click.UsageError where there is nothing to map."""
+    if not maps:
+        return None
+    from fba.capture.joint_maps import change_map, read_map
+    from fba.formats.gltf.humanoid import joints_of_bones
+
+    if not captures:
+        raise click.UsageError("--map goes with motion capture: a BVH or glTF file")
+    saved = [each for each in maps if isinstance(each, Path)]
+    bones = joints_of_bones()  # VRM's names are known to many
+    pairs = {
+        source: bones.get(joint, joint) for source, joint in (p for p in maps if not isinstance(p, Path))
+    }
+    if len(saved) > 1:
+        raise click.UsageError("--map: give one file of joints at most; pairs change what it says")
+    base = read_map(saved[0], limits=limits) if saved else None
+    if not pairs:
+        return base
+    try:
+        return change_map(read_capture(captures[0], format, clip, limits), base, pairs)
+    except OptionError as error:
+        raise click.UsageError(f"--map: {error}") from error
+
+
+def write_joints(
+    target: Path, joints: dict[str, str] | None, capture: Path, format: str | None, clip: str | None,
+    limits: Limits,
+) -> int:  # fmt: skip
+    """Write the map that was used for a capture; return the number of its joints."""
+    from fba.capture.joint_maps import find_map, write_map
+
+    motion = read_capture(capture, format, clip, limits)
+    used = find_map(motion, joints)
+    write_map(target, used, motion)
+    return len(used)
+
+
+def read_capture(path: Path, format: str | None, clip: str | None, limits: Limits) -> SkeletonMotion:
+    """Return the motion of a capture, without the warnings that reading it a second time would repeat."""
+    import warnings
+
+    from fba.errors import FbaWarning
+    from fba.formats import format_of
+
+    with input_file(path) as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)
+        reader = format_of(file, format)
+        assert reader.read_motion is not None  # the caller names captures only
+        options: dict[str, Any] = {} if reader.list_clips is None else {"clip": clip}
+        return reader.read_motion(file, limits=limits, **options)

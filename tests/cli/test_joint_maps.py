@@ -1,0 +1,121 @@
+"""`--map` and `--map-out`: joints of captures that names do not tell, and maps in TOML files."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from small_people import BONES, write_person
+
+Run = Callable[..., tuple[int, str, str]]
+STEPS = ("--bap-steps", "visage")
+RIDDLES = {bone: f"n{number}" for number, bone in enumerate(BONES)}
+"""Names that say nothing."""
+LIMBS = {
+    "hips": "HumanoidRoot", "spine": "vl5", "head": "skullbase",
+    **{
+        f"{word}{bone}": f"{side}_{joint}"
+        for side, word in (("l", "left"), ("r", "right"))
+        for bone, joint in (
+            ("UpperArm", "shoulder"), ("LowerArm", "elbow"), ("Hand", "wrist"), ("UpperLeg", "hip"),
+            ("LowerLeg", "knee"), ("Foot", "ankle"), ("Toes", "metatarsal"),
+        )
+    },
+}  # fmt: skip
+"""Bones of VRM and joints of the standard, from its list of joints."""
+
+
+def person(path: Path, names: dict[str, str] | None = None) -> Path:
+    arm = [Rotation.from_euler("z", -20 * step, degrees=True) for step in range(4)]
+    knee = [Rotation.from_euler("x", 10 * step, degrees=True) for step in range(4)]
+    return write_person(path, clips={"move": {"leftUpperArm": arm, "rightLowerLeg": knee}}, names=names)
+
+
+def test_what_was_found_is_saved_and_read_again(run: Run, tmp_path: Path) -> None:
+    source, saved = person(tmp_path / "p.glb"), tmp_path / "map.toml"
+    code, out, _ = run("encode", source, "-o", tmp_path / "one.fba", *STEPS, "--map-out", saved)
+    assert code == 0
+    found = tomllib.loads(saved.read_text())["joints"]
+    assert f"{saved}: {len(found)} joints of {source}" in out
+    assert found.items() >= LIMBS.items()
+    assert "# Joints of the standard that are free: sacroiliac" in saved.read_text()
+    assert run("encode", source, "-o", tmp_path / "two.fba", *STEPS, "--map", saved)[0] == 0
+    assert (tmp_path / "one.fba").read_bytes() == (tmp_path / "two.fba").read_bytes()
+
+
+def test_pairs_name_joints_that_names_do_not_tell(run: Run, tmp_path: Path) -> None:
+    riddle = person(tmp_path / "riddle.glb", RIDDLES)
+    code, _, err = run("encode", riddle, "-o", tmp_path / "out.fba", *STEPS)
+    assert code == 1
+    assert "name each joint's counterpart in the standard with --map Pelvis=HumanoidRoot" in err
+    pairs = [word for bone, joint in LIMBS.items() for word in ("--map", f"{RIDDLES[bone]}={joint}")]
+    assert run("encode", riddle, "-o", tmp_path / "out.fba", *STEPS, *pairs)[0] == 0
+    plain = person(tmp_path / "plain.glb")
+    left_out = [word for bone in BONES if bone not in LIMBS for word in ("--map", f"{bone}=")]
+    assert run("encode", plain, "-o", tmp_path / "plain.fba", *STEPS, *left_out)[0] == 0
+    assert (tmp_path / "out.fba").read_bytes() == (tmp_path / "plain.fba").read_bytes()
+
+
+def test_pairs_change_what_is_found(run: Run, tmp_path: Path) -> None:
+    """The names of VRM serve for the standard's; a joint that loses its place moves nothing."""
+    source, saved = person(tmp_path / "p.glb"), tmp_path / "map.toml"
+    given = ("--map", "leftHand=leftLowerArm", "--map", "rightToes=", "--map-out", saved)
+    assert run("encode", source, "-o", tmp_path / "out.fba", *STEPS, *given)[0] == 0
+    joints = tomllib.loads(saved.read_text())["joints"]
+    assert joints["leftHand"] == "l_elbow"
+    assert "leftLowerArm" not in joints
+    assert "rightToes" not in joints
+    assert joints["rightLowerArm"] == "r_elbow"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('[joints]\n"hips" = HumanoidRoot\n', "map.toml:2: is not TOML"),
+        ('"hips" = "HumanoidRoot"\n', "has no table [joints]"),
+        ('[joints]\n"hips" = "HumanoidRoots"\n', "did you mean 'HumanoidRoot'?"),
+        ('[joints]\n"hips" = 3\n', "'hips' must name one joint of the standard, not 3"),
+        (
+            '[joints]\n"hips" = "HumanoidRoot"\n"spine" = "HumanoidRoot"\n',
+            "are both mapped to 'HumanoidRoot'",
+        ),
+        ('[joints]\n"head" = "skullbase"\n', "maps no joint to HumanoidRoot"),
+    ],
+)
+def test_bad_files(run: Run, tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "map.toml").write_text(text)
+    source = person(tmp_path / "p.glb")
+    code, _, err = run("convert", source, tmp_path / "out.bap", "--map", tmp_path / "map.toml")
+    assert code == 1
+    assert message in err
+
+
+def test_mistakes(run: Run, tmp_path: Path) -> None:
+    source = person(tmp_path / "p.glb")
+    fap = tmp_path / "a.fap"
+    fap.write_text("2.1 a 25 1\n" + "0 " * 68 + "\n0\n")
+    for words, message in (
+        ((source, "--map", "leftHant=l_wrist"), "no joint 'leftHant' (did you mean 'leftHand'?)"),
+        ((source, "--map", "leftHand=l_wrists"), "no joint 'l_wrists' (did you mean 'l_wrist'?)"),
+        ((source, "--map", "nothing"), "'nothing' is neither a file nor a pair of joints"),
+        ((source, "--map", "hips="), "no joint of the motion is mapped to HumanoidRoot"),
+        ((fap, "--map", "hips=HumanoidRoot"), "--map goes with motion capture"),
+        ((fap, "--map-out", tmp_path / "m.toml"), "--map-out goes with motion capture"),
+    ):
+        code, _, err = run("encode", *words, "-o", tmp_path / "out.fba", *STEPS)
+        assert (code, message in err) == (2, True), err
+    assert not (tmp_path / "out.fba").exists()
+
+
+def test_hands_are_found(run: Run, tmp_path: Path) -> None:
+    saved = tmp_path / "map.toml"
+    source = person(tmp_path / "p.glb")
+    assert run("encode", source, "-o", tmp_path / "out.fba", *STEPS, "--map-out", saved)[0] == 0
+    joints = tomllib.loads(saved.read_text())["joints"]
+    assert joints["leftMiddleProximal"] == "l_middle1"
+    assert np.array_equal(sorted(joints.values()), sorted(set(joints.values())))
