@@ -148,7 +148,7 @@ def retarget_report(
     standing = None
     if has_feet and metres:
         source = soles.source_soles(motion, mapped, turned, positions, metres)
-        standing = _feet(source, heights) if source is not None else None
+        standing = _feet(source, heights, float(motion.rate)) if source is not None else None
     used = set(mapped.values())
     return RetargetReport(
         family,
@@ -167,11 +167,12 @@ def _between(a: Float64, b: Float64) -> Float64:
     return result
 
 
-def _feet(source: soles.Soles, body: Float64) -> FeetError | None:
+def _feet(source: soles.Soles, body: Float64, rate: float) -> FeetError | None:
     """Return the errors of the soles' heights, body (2, T); None if no foot is on the ground."""
     middles = source.points.mean(axis=1)
-    level = ground.find(source.lowest, middles).under(middles)[:, : body.shape[1]]
-    above = source.lowest[:, : body.shape[1]] - level
+    level = ground.find(source.lowest, middles).under(middles)
+    above = soles.settle(source.lowest - level, source.points, rate)[:, : body.shape[1]]
+    level = level[:, : body.shape[1]]
     standing = above < CLOSE
     if not standing.any():
         return None

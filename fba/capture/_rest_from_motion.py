@@ -32,6 +32,8 @@ SAME_AXIS = 45.0
 """The same, if it is the axis that the bone above has."""
 EXACT_AXIS = 5.0
 """The same for directions that are known from positions of joints."""
+ON_AXES = 0.65
+"""Share of directions close to axes, of which random ones would be almost half, that is evidence enough."""
 LEAST_BEND = 0.15
 """Sine of the bend of an elbow or a knee from which on it shows the axis."""
 LOW_ARM = 0.6
@@ -73,6 +75,7 @@ class _Finder:
         self.left = stance.left
         self.rest: dict[int, Float64] = {}
         self.evidence: list[float] = []
+        self.on_axes: list[bool] = []
 
     def apply(self, motion: SkeletonMotion) -> FoundRest:
         """Return the motion, all its frames, with the rest pose."""
@@ -80,13 +83,16 @@ class _Finder:
         self._limbs()
         self._others()
         rest = np.stack([self.rest[number] for number in range(len(motion.names))])
-        confidence = float(np.clip(1.3 - self.distance[self.standing].mean() / 60.0, 0.0, 1.0))
-        sure = float(np.mean(self.evidence)) if self.evidence else 0.0
+        away = float(self.distance[self.standing].mean())
+        bend = float(np.mean(self.evidence)) if self.evidence else 0.0
+        exact = float(np.mean(self.on_axes)) if self.on_axes else 0.0
+        # directions that are axes show that they are right, however little somebody stands
+        confidence = max(1.3 - away / 60.0, 0.5 + 1.25 * (exact - ON_AXES))
         reason = (
-            f"standing in {len(self.standing)} of {len(self.distance)} frames to within "
-            f"{self.distance[self.standing].mean():.0f} degrees; {100 * sure:.0f} % of elbows and knees bend"
+            f"{100 * exact:.0f} % of directions are axes of joints, {100 * bend:.0f} % of elbows and knees "
+            f"bend, people stand to within {away:.0f} degrees"
         )
-        return FoundRest(with_rest(motion, rest), min(confidence, 0.6 + 0.4 * sure), reason)
+        return FoundRest(with_rest(motion, rest), float(np.clip(confidence, 0.0, 0.6 + 0.4 * bend)), reason)
 
     # directions in the axes of a joint
 
@@ -107,6 +113,7 @@ class _Finder:
         best = int(np.argmax(np.abs(sizes)))
         axis: Float64 = axes[best] * np.sign(sizes[best])
         angle = float(standing.between(axis, direction))
+        self.on_axes.append(angle <= within)
         if angle <= within:
             return axis
         if like is not None and angle <= SAME_AXIS and float(standing.between(axis, like)) < 1.0:

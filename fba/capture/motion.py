@@ -27,7 +27,8 @@ class SkeletonMotion:
         bone is which; empty where names must tell.
     axes: float64 (J, 4), quaternions of the joints' own axes in the rest pose,
         in the frame of the source; empty for the frame's own axes. posed: whether the rest pose may be any
-        pose, since the source does not say which it is.
+        pose, since the source does not say which it is. up: the axis that the format says is up, such as
+        "+y"; empty where it says nothing.
 
     Raises ModelError if the parts contradict each other or are not finite.
     """
@@ -44,6 +45,7 @@ class SkeletonMotion:
     declared: Mapping[str, str] = field(default_factory=dict)
     axes: Float64 = field(default_factory=lambda: np.zeros((0, 4)))
     posed: bool = False
+    up: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "declared", dict(self.declared))

@@ -101,7 +101,7 @@ def prepare(
     few = _few(motion)
     positions = few.world()[1]
     at_rest = standing.measure(motion.rest()[None], mapped)
-    axis, confidence["up"], reasons["up"] = _find_up(positions, mapped, at_rest, up)
+    axis, confidence["up"], reasons["up"] = _find_up(positions, mapped, at_rest, up, motion.up)
     turn = rotations.between(_axis(axis), np.array([0.0, 1.0, 0.0]))
     level = motion if axis == "+y" else turn_axes(motion, turn)
     chosen, confidence["rest"], reasons["rest"] = _choose_rest(motion, positions, mapped, at_rest, rest)
@@ -224,11 +224,11 @@ def _name(axis: Float64) -> str:
 
 
 def _find_up(
-    positions: Float64, mapped: Mapping[str, int], at_rest: standing.Stance, up: str
+    positions: Float64, mapped: Mapping[str, int], at_rest: standing.Stance, up: str, by_format: str
 ) -> tuple[str, float, str]:
     """Return the axis that points up, the confidence, and a reason.
 
-    positions: (T, J, 3), of the source.
+    positions: (T, J, 3), of the source. up: as given. by_format: what the file's format says, or "".
     """
     if up != "auto":
         return up, 1.0, f"{up} as given"
@@ -238,9 +238,11 @@ def _find_up(
     axis = _nearest_axis(mean)
     clear = float(mean @ axis)
     own = _nearest_axis(at_rest.up[0]) if bool(at_rest.possible[0]) else None
+    own = _axis(by_format) if by_format else own
+    source = "as the format says" if by_format else "as in the rest pose"
     if own is None or (own == axis).all():
         if clear >= CLEAR_UP or (own is not None and clear > 0):
-            agrees = ", as in the rest pose" if own is not None else ""
+            agrees = f", {source}" if own is not None else ""
             return _name(axis), max(clear, 0.8 if own is not None else 0.0), (
                 f"{_name(axis)}: people stand along it{agrees} ({100 * clear:.0f} %)"
             )  # fmt: skip
@@ -248,10 +250,10 @@ def _find_up(
     floors = [_stands_on_zero(positions, candidate) for candidate in (own, axis)]
     if clear >= CLEAR_UP and (floors[1] or not floors[0]):
         return _name(axis), 0.8, (
-            f"{_name(axis)}: the body stands along it while it moves, not along {_name(own)} as at rest"
+            f"{_name(axis)}: the body stands along it while it moves, not along {_name(own)}, {source}"
         )  # fmt: skip
     sure = 0.7 if clear < CLEAR_UP or floors[0] else 0.4
-    return _name(own), sure, f"{_name(own)}, as in the rest pose; the body hardly stands upright"
+    return _name(own), sure, f"{_name(own)}, {source}; the body hardly stands upright"
 
 
 def _stands_on_zero(positions: Float64, axis: Float64) -> bool:

@@ -9,7 +9,7 @@ weights in the standard's terms (`rig.py`).
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import clothes
@@ -26,6 +26,7 @@ from fba.body import Skeleton
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.skin.skin_weights import strongest_weights
 from fba.body.solve.bind_pose import FINGERS
+from fba.easing import smoothstep
 from fba.face.model import FaceModel, point_row
 from fba.mesh.meshes import vertex_normals
 from fba_player.figure.occlusion import bake
@@ -40,6 +41,8 @@ TUCKED = 0.011
 """Metres of neck under the collar: more would show through when the head is thrown back."""
 EVENED = 1.46
 """Height above which the skull's weights are smoothed, metres."""
+ROUNDS = 3
+"""Rounds that bring soles to the ground."""
 SKULL_ALONE = 0.9
 """From this share of the skull on, vertices move with it alone: jaw and chin do not lag behind."""
 
@@ -211,8 +214,30 @@ def model() -> BodyModel:
     )
 
 
+def with_soles_on_the_ground(body: BodyModel) -> BodyModel:
+    """Return a body whose soles are at height 0 in the default posture.
+
+    There legs are straighter than as modelled, so that shoes reach deeper: what is low on them is raised,
+    less the higher it is.
+    """
+    standing = np.tile(np.eye(4), (len(body.skeleton), 1, 1))
+    standing[:, :3, 3] = body.skeleton.centres
+    for _ in range(ROUNDS):
+        depth = float(body.skin(standing)[:, 1].min())
+        parts = []
+        for part in body.parts:
+            if part.kind == "shoe":
+                vertices = np.array(part.vertices, dtype=np.float64)
+                vertices[:, 1] -= depth * (1.0 - smoothstep(vertices[:, 1] / shoes.TOP_HEIGHT))
+                parts.append(replace(part, vertices=vertices))
+            else:
+                parts.append(part)
+        body = replace(body, parts=tuple(parts))
+    return body
+
+
 if __name__ == "__main__":
-    made = model()
+    made = with_soles_on_the_ground(model())
     made.save(TARGET)
     print(f"{TARGET}: {TARGET.stat().st_size} bytes")
     for part in made.parts:

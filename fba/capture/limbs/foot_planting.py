@@ -69,7 +69,7 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
         return root
     middles = source.points.mean(axis=1)
     level = ground.find(source.lowest, middles).under(middles)
-    above = source.lowest - level
+    above = soles.settle(source.lowest - level, source.points, rate)
     under = np.zeros_like(level) if floor == "floor" else level
     stiff = np.ones_like(above)
     if plant and all(targets.aims.get(f"{side}_hip") == f"{side}_knee" for side in "lr"):

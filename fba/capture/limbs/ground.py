@@ -11,7 +11,8 @@ from fba.arrays import Float64
 LOWEST = 20
 """Percentile of the lower foot's height that is taken for the ground: single frames may be below it."""
 FAR = 0.15
-"""Largest height in metres of the ground above or below 0; beyond, feet stand on a chair, or leap."""
+"""Largest height in metres of the ground above 0; beyond, feet stand on a chair, or leap. Below 0, the ground
+may be at any depth: no feet are under it."""
 STEEPEST = 0.08
 """Largest rise over run of the ground; beyond, the source climbs or uses stairs."""
 LONG = 1.0
@@ -48,7 +49,7 @@ def find(lowest: Float64, points: Float64) -> Ground:
     frames = np.arange(len(lower))
     heights, positions = lowest[lower, frames], points[lower, frames]
     level = float(np.percentile(heights, LOWEST))
-    flat = Ground(level if abs(level) <= FAR else 0.0)
+    flat = Ground(level if level <= FAR else 0.0)
     middle = positions[:, [0, 2]].mean(axis=0)
     across = positions[:, [0, 2]] - middle
     if np.ptp(across, axis=0).max() < LONG:
@@ -61,7 +62,7 @@ def find(lowest: Float64, points: Float64) -> Ground:
     sloping = float(np.percentile(over, LOWEST))
     # if the plane is the ground, standing feet are all at one height above it
     spread = [np.ptp(np.percentile(values, [LOWEST / 2, 60])) for values in (over, heights)]
-    if abs(sloping) > FAR or spread[0] > 0.6 * spread[1]:
+    if sloping > FAR or spread[0] > 0.6 * spread[1]:
         return flat
     return Ground(sloping - float(middle @ plane[1:]), (float(plane[1]), float(plane[2])))
 

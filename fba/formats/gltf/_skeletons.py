@@ -55,6 +55,7 @@ class Joints:
                 if self.nodes[number] in declared
             },
             axes=rotations.quaternions(self.bind.rotations[self.used]),
+            up="+y",
             posed=not declared and not any(node in skin.joints for skin in gltf.skins for node in self.nodes),
         )
 
