@@ -16,33 +16,19 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64
+from fba.body.footing import OUTLINE, TIP
 from fba.body.skeleton import Skeleton
 from fba.capture.limbs._coupled_paths import chain
 from fba.capture.motion import SkeletonMotion
-from fba.easing import smoothstep
 
-OUTLINE = (
-    ("ankle", 0.011, 0.0, -0.0685), ("ankle", -0.028, 0.0, -0.040), ("ankle", 0.043, 0.0, -0.040),
-    ("ankle", -0.038, 0.0, 0.055), ("ankle", 0.055, 0.0, 0.055),
-    ("metatarsal", -0.046, 0.0, 0.0), ("metatarsal", 0.065, 0.0, 0.0),
-)  # fmt: skip
-"""Edge of the shown person's soles: the joint that it moves with, and metres from that joint, outwards and
-ahead, at a height above the ground in the default posture. Measured on `fba/body/builtin/body.glb`."""
-TIP = (
-    ("metatarsal", -0.045, 0.002, 0.031), ("metatarsal", 0.053, 0.002, 0.031),
-    ("metatarsal", -0.033, 0.0067, 0.070), ("metatarsal", 0.023, 0.0067, 0.070),
-    ("metatarsal", -0.005, 0.008, 0.0745),
-)  # fmt: skip
-"""The same for what is ahead of the ball."""
-NEAR_GROUND = 0.02
-"""Height in metres of a source's sole below which it is taken to be closer to the ground than it is captured:
-at half of it, the height is halved."""
 STILL = 0.15
 """Speed in metres per second below which a heel or a ball stands."""
 STILL_SECONDS = 0.1
 """For so long at least: at the top of a leap, feet are still for less."""
 SUPPORT = 0.08
 """Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
+LEVEL_SECONDS = 0.2
+"""Seconds over which the height of the ground under feet that stand is averaged."""
 HEEL = 0.045
 """Metres from an ankle back to the heel."""
 ON_GROUND = 0.015
@@ -135,7 +121,7 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64,
 
     wanted: joint -> world rotations (T, 3, 3); other joints turn with their parents. root: (T, 3), metres.
     toes: whether the tips of the toes count, besides heel and ball. The lowest points are of the soles' edge,
-    see `OUTLINE`.
+    see `fba.body.footing`.
     """
     lows, points = [], []
     for side in "lr":
@@ -149,18 +135,18 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64,
             parts[2]: np.array([ball[0], 0.0, ball[2]]),
         }
         outwards = 1.0 if side == "l" else -1.0
-        edge: dict[str, list[Float64]] = {}
+        rim: dict[str, list[Float64]] = {}
         for joint, x, y, z in (*OUTLINE, *(TIP if toes else ())):
             name = f"{side}_{joint}"
             start = centres[skeleton.number(name)]
-            edge.setdefault(name, []).append(np.array([outwards * x, y - start[1], z]))
+            rim.setdefault(name, []).append(np.array([outwards * x, y - start[1], z]))
         own, lowest = [], []
         for name, position, frame in joint_frames(skeleton, wanted, root, parts[3]):
             if name in soles:
                 own.append(position + frame @ (soles[name] - centres[skeleton.number(name)]))
-            if name in edge:
-                heights = frame[:, 1] @ np.array(edge[name]).T  # (T, points)
-                lowest.append(position[:, 1] + heights.min(axis=1))
+            if name in rim:
+                heights = frame[..., 1, :] @ np.array(rim[name]).T  # (T, points)
+                lowest.append(position[:, 1] + heights.min(axis=-1))
         lows.append(np.min(lowest, axis=0))
         points.append(own)
     return Soles(np.array(lows), np.array(points))
@@ -206,8 +192,8 @@ def settle(above: Float64, points: Float64, rate: float) -> Float64:
     """Return heights (2, T) of soles above the ground without what captures leave of it in feet that stand.
 
     above: (2, T), metres. points: (2, 2, T, 3), of the soles. The lower foot, while it is still and not far
-    from the ground, stands on it; in between, the ground follows from one such moment to the next. Nobody is
-    under the ground, and a sole a few millimetres above it stands; see `NEAR_GROUND`.
+    from the ground, stands on it; in between, the ground goes from one such height to the next. Nobody is
+    under the ground.
     """
     frames = np.arange(above.shape[1])
     if len(frames) > 1:
@@ -219,9 +205,9 @@ def settle(above: Float64, points: Float64, rate: float) -> Float64:
         height = above[lower, frames]
         still = (fastest[lower, frames] < STILL) & (height < SUPPORT)
         if still.any():
-            above = above - np.interp(frames, frames[still], np.maximum(height[still], 0.0))
-    height = np.maximum(above, 0.0)
-    result: Float64 = height * smoothstep(height / NEAR_GROUND)
+            level = np.interp(frames, frames[still], height[still])
+            above = above - smooth(level, rate * LEVEL_SECONDS / SMOOTH)
+    result: Float64 = np.maximum(above, 0.0)
     return result
 
 

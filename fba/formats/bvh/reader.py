@@ -39,6 +39,8 @@ NOMINAL_RATES = tuple(
 """Frame rates, one of which a rounded frame time probably means."""
 MAX_LINE = 1 << 20
 """Longest line, in characters: far more than 4096 joints have numbers."""
+MOST_OF_BODY = 0.75
+"""Share of all joints below one that carries the body's motion in place of the root."""
 STRETCH = 1e-3
 """Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
 
@@ -371,7 +373,7 @@ def _motion(
     turned[:, :, 0] = 1.0
     positions = np.tile(offsets[0], (frames, 1))
     size = float(np.abs(offsets).sum(axis=1).max()) or 1.0
-    stretched = []
+    moved: dict[int, Float64] = {}  # positions relative to the parent, where they vary
     column = 0
     for joint, channels in enumerate(tree.channels):
         translation = np.tile(offsets[joint], (frames, 1))
@@ -387,8 +389,21 @@ def _motion(
             positions = translation
         elif any(c.endswith("position") for c in channels):
             if np.abs(translation - translation[0]).max() > STRETCH * size:
-                stretched.append(tree.names[joint])
+                moved[joint] = translation
             offsets[joint] = np.median(translation, axis=0)
+    turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
+    hips = _moving_body(tree.parents, moved)
+    if hips:
+        above = hips
+        turn, place = turned[:, hips], moved[hips]
+        while (above := tree.parents[above]) >= 0:
+            shift = (
+                positions if above == 0 else moved.get(above, np.broadcast_to(offsets[above], place.shape))
+            )
+            place = shift + (rotations.matrices(turned[:, above]) @ place[:, :, None])[:, :, 0]
+            turn = rotations.multiply(turned[:, above], turn)
+        turned[:, hips], positions, offsets[hips] = turn, place, place[0]
+    stretched = [tree.names[joint] for joint in moved if joint > hips]
     if stretched:
         warnings.warn(
             f"{path or 'BVH'}: joints whose offset from the parent varies keep the median of it: "
@@ -396,15 +411,38 @@ def _motion(
             FbaWarning,
             stacklevel=4,
         )
-    turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
+    kept = _subtree(tree.parents, hips)
+    row_of = {joint: row for row, joint in enumerate(kept)}
+    ends = [row for row, joint in enumerate(tree.end_parents) if joint in row_of]
     return SkeletonMotion(
-        names=tuple(tree.names),
-        parents=np.array(tree.parents, dtype=np.int64),
-        offsets=offsets,
-        rotations=turned,
+        names=tuple(tree.names[joint] for joint in kept),
+        parents=np.array([row_of.get(tree.parents[joint], -1) for joint in kept], dtype=np.int64),
+        offsets=offsets[kept],
+        rotations=turned[:, kept] if hips else turned,
         positions=positions,
         rate=rate,
-        end_parents=np.array(tree.end_parents, dtype=np.int64),
-        end_offsets=np.array(tree.end_offsets, dtype=np.float64).reshape(-1, 3),
+        end_parents=np.array([row_of[tree.end_parents[row]] for row in ends], dtype=np.int64),
+        end_offsets=np.array([tree.end_offsets[row] for row in ends], dtype=np.float64).reshape(-1, 3),
         name=name,
     )
+
+
+def _moving_body(parents: list[int], moved: dict[int, Float64]) -> int:
+    """Return the joint below the root that moves with most of the body, such as hips under a scene's root.
+
+    moved: joints whose positions vary relative to their parents. 0, the root, where there is none.
+    """
+    size = [1] * len(parents)
+    for joint in range(len(parents) - 1, 0, -1):
+        size[parents[joint]] += size[joint]
+    bodies = [joint for joint in moved if size[joint] >= MOST_OF_BODY * len(parents)]
+    return bodies[0] if bodies else 0
+
+
+def _subtree(parents: list[int], root: int) -> list[int]:
+    """Return a joint and all below it, in order."""
+    inside = {root}
+    for joint in range(root + 1, len(parents)):
+        if parents[joint] in inside:
+            inside.add(joint)
+    return sorted(inside)

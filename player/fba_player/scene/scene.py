@@ -74,13 +74,13 @@ class Scene(Timed[Timeline]):
         self._extent: Extent | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
-            from fba.body import BapSolver
+            from fba.body.footing import GroundedPoser
             from fba.body.model import BodyModel
             from fba_player.scene._bones import Bones
 
             self._body = body or BodyModel.default()
             self._skeleton = self._body.skeleton
-            self._solver = BapSolver(self._skeleton, axes)
+            self._poser = GroundedPoser(self._skeleton, axes)
             self._bones = Bones.from_skeleton(self._skeleton)
 
     @property
@@ -168,7 +168,7 @@ class Scene(Timed[Timeline]):
 
         baps are ignored if the animation has no body.
         """
-        return self._make_view(faps, self._solver.pose(baps) if self.has_body else None)
+        return self._make_view(faps, self._poser.pose(baps) if self.has_body else None)
 
     def still(self, faps: Float32) -> View:
         """The view for FAPs (68,), in the body's pose at the start."""
@@ -235,7 +235,7 @@ class Scene(Timed[Timeline]):
         faps = self.timeline.faps(time)
         if not self.has_body:
             return faps, None
-        return faps, self._solver.pose(self.timeline.baps(time))
+        return faps, self._poser.pose(self.timeline.baps(time))
 
     def _face_matrix(self, joints: Float64 | None) -> Float64:
         """(4, 4): from the face model's frame into the world, without the head's own turn."""
@@ -247,7 +247,7 @@ class Scene(Timed[Timeline]):
             self._sampled_frames = frames
             sampled = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
             baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in sampled])
-            positions = self._solver.pose(baps)[:, :, :3, 3]
+            positions = self._poser.pose(baps)[:, :, :3, 3]
             self._extent = body_extent(positions, self._skeleton.names, self.person.headroom)
         return self._extent
 
