@@ -60,6 +60,7 @@ fba.body.gait
 fba.body.importers
 fba.capture.motion
 fba.capture.limbs
+fba.capture.comparison
 fba.capture
 fba.formats
 fba.formats.text

@@ -1,16 +1,50 @@
-"""Reports of `fba encode` on motion capture: errors of bones, and joints beyond human limits."""
+"""Reports of `fba encode` on motion capture: what differs from the source, and joints beyond human limits."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import click
 
 from fba.animation import Animation
+from fba.parameters import baps
 
-NAME_WIDTH = 32
+if TYPE_CHECKING:
+    from fba.capture import SkeletonMotion
+    from fba.capture.comparison import Comparison, Difference
+    from fba.codec import ClampedParameter
+
+NAME_WIDTH, PART_WIDTH = 16, 24
 MOST_NAMES = 12
+SAMPLE = 2048
+"""Frames that are compared where no report is asked for."""
+PICTURES = 4
+"""Frames that a report shows."""
+APART = 0.5
+"""Seconds between these, at least."""
+SUFFIXES = (".html", ".png")
+"""Of files for reports."""
+
+
+@dataclass(frozen=True, eq=False)
+class CaptureReport:
+    """A capture beside the person that its stream shows.
+
+    path: of the capture. motion: what was read of it. mapped: joint of the standard -> number of the
+    source's. animation: what a decoder returns. comparison: how they differ. bones: what `retarget_report`
+    says of the motion before coding; None where no report was asked for.
+    """
+
+    path: Path
+    motion: SkeletonMotion
+    mapped: Mapping[str, int]
+    animation: Animation
+    comparison: Comparison
+    bones: dict[str, Any] | None = None
 
 
 def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str, Any]]:
@@ -34,19 +68,28 @@ def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str
     return animation, {"limits": rows, "limits_clamped": limits == "clamp"}
 
 
-def compare(
+def compare_captures(
     captures: Sequence[Path],
     animation: Animation,
+    decoded: Animation,
+    clamped: Mapping[str, ClampedParameter],
+    *,
+    ground: str,
+    detailed: bool,
     format: str | None = None,
     clip: str | None = None,
     joints: Mapping[str, str] | None = None,
-) -> dict[str, Any]:
-    """Return a report of the angles between the bones of captures and of the body, before coding.
+) -> list[CaptureReport]:
+    """Return reports of captures.
 
-    clip: the animation that was read of a file with several, by name or number. joints: the map of joints
-    that was given.
+    animation, decoded: before coding and after. clamped: what the encoder clamped. ground: the value of
+    `--ground`. detailed: compare all frames, and bones before coding. clip: the animation that was read of a
+    file with several, by name or number. joints: the map of joints that was given.
     """
+    from fba.body import Skeleton
     from fba.capture import retarget_report
+    from fba.capture.comparison import compare
+    from fba.capture.preparation import find_bones
     from fba.formats import format_of
 
     reports = []
@@ -54,39 +97,176 @@ def compare(
         reader = format_of(path, format)
         assert reader.read_motion is not None  # the caller names captures only
         motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": clip}))
-        report = asdict(retarget_report(motion, animation, joints=joints))
-        reports.append({"input": str(path), **report})
-    return {"captures": reports}
+        _, mapped, _, _ = find_bones(motion, joints, Skeleton.default())
+        level = 0.0 if ground == "floor" else None
+        comparison = compare(motion, decoded, mapped, level=level, most=None if detailed else SAMPLE)
+        comparison = comparison.with_more(_clamped_differences(clamped))
+        bones = asdict(retarget_report(motion, animation, joints=joints)) if detailed else None
+        reports.append(CaptureReport(path, motion, mapped, decoded, comparison, bones))
+    return reports
 
 
-def report_lines(report: dict[str, Any]) -> list[str]:
-    """Return reports as lines of text."""
-    result = []
-    for capture in report.get("captures", ()):
-        result.append(f"{capture['input']}: bones against the source's, degrees ({capture['frames']} frames)")
-        result.append(f"  {'bone':{NAME_WIDTH}}{'mean':>8}{'worst':>8}  frame")
-        for bone in capture["bones"]:
-            name = f"{bone['joint']} - {bone['aim']}"
-            result.append(f"  {name:{NAME_WIDTH}}{bone['mean']:8.3f}{bone['worst']:8.3f}  {bone['frame']}")
-        if (feet := capture["feet"]) is not None:
-            result.append(
-                f"  feet on the ground: {1000 * feet['mean']:.1f} mm off on average, "
-                f"{1000 * feet['worst']:.1f} mm at worst, {100 * feet['within']:.1f} % within 1 cm"
-            )
-        for what, names in (
-            ("unused joints of the source", capture["unused"]),
-            ("joints that the source lacks", capture["missing"]),
-        ):
-            if names:
-                more = f", and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-                result.append(f"  {what}: {', '.join(names[:MOST_NAMES])}{more}")
-    if "limits" in report:
-        verb = "held within" if report["limits_clamped"] else "beyond"
-        if not report["limits"]:
-            result.append("all joints keep within the limits of human motion")
-        result += [
-            f"{excess['limit']}: {verb} {excess['low']:g}..{excess['high']:g} degrees in "
-            f"{excess['frames']} frames, {excess['worst']:.1f} too much at worst"
-            for excess in report["limits"]
-        ]
+def report_values(report: CaptureReport) -> dict[str, Any]:
+    """Return a report for programs."""
+    differences = [
+        {**asdict(one), "grade": one.grade, "unit": _unit(one)} for one in report.comparison.differences
+    ]
+    verdict = {"verdict": report.comparison.verdict, "differences": differences}
+    return {"input": str(report.path), **verdict, **(report.bones or {})}
+
+
+def report_lines(report: CaptureReport) -> list[str]:
+    """Return a report as lines of text: the worst part of each measure, and all that is not good."""
+    comparison = report.comparison
+    result = [f"{report.path}: {comparison.frames} frames beside the source: {comparison.verdict}"]
+    result.append(
+        f"  {'measure':{NAME_WIDTH}}{'part':{PART_WIDTH}}{'typical':>8}{'worst':>8}  unit     frame  grade"
+    )
+    shown: set[str] = set()
+    for one in comparison.differences:
+        if one.measure in shown and one.grade == "good":
+            continue
+        shown.add(one.measure)
+        result.append(
+            f"  {one.measure:{NAME_WIDTH}}{one.part:{PART_WIDTH}}{one.typical:8.1f}{one.worst:8.1f}  "
+            f"{_unit(one):8} {one.frame:5}  {_coloured(one.grade, one.grade)}"
+        )
+    bones = report.bones or {}
+    for what, key in (("unused joints of the source", "unused"), ("joints that the source lacks", "missing")):
+        if names := bones.get(key):
+            more = f", and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+            result.append(f"  {what}: {', '.join(names[:MOST_NAMES])}{more}")
     return result
+
+
+def limit_lines(limits: Mapping[str, Any]) -> list[str]:
+    """Return what `apply_limits` reports as lines of text."""
+    if "limits" not in limits:
+        return []
+    if not limits["limits"]:
+        return ["all joints keep within the limits of human motion"]
+    verb = "held within" if limits["limits_clamped"] else "beyond"
+    return [
+        f"{excess['limit']}: {verb} {excess['low']:g}..{excess['high']:g} degrees in "
+        f"{excess['frames']} frames, {excess['worst']:.1f} too much at worst"
+        for excess in limits["limits"]
+    ]
+
+
+def poor_line(report: CaptureReport, *, detailed: bool) -> str:
+    """Return a line, in red, that says what is wrong with a poor result; "" for any other."""
+    reasons = report.comparison.reasons
+    if report.comparison.verdict != "poor":
+        return ""
+    more = f", and {len(reasons) - 1} more" if len(reasons) > 1 else ""
+    ask = "" if detailed else "; --report FILE.html shows it"
+    worst = f"{reasons[0].sentence} in frame {reasons[0].frame}"
+    return _coloured(f"fba: poor: {report.path}: {worst}{more}{ask}", "poor")
+
+
+def draw_report(report: CaptureReport) -> bytes:
+    """Return a picture, PNG, of the source and the result side by side in the worst frames."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    from fba.capture.comparison import bounds, find_sticks
+    from fba_player.export.capture_sheet import Sight, draw_sheet
+
+    rate = float(report.animation.rate)
+    worst = report.comparison.worst_frames(PICTURES, max(1, round(APART * rate)))
+    sticks = find_sticks(report.motion, report.animation, report.mapped, [one.frame for one in worst])
+    sights = [
+        Sight(
+            one.frame,
+            one.sentence,
+            f"frame {one.frame}, {one.frame / rate:.2f} s: {one.grade} (fair from "
+            f"{bounds()[one.measure].fair:g}, poor from {bounds()[one.measure].poor:g})",
+            one.grade,
+            "right" if one.part.startswith("right") else "left",
+            stick,
+        )
+        for one, stick in zip(worst, sticks, strict=True)
+    ]
+    headline = f"{report.path.name}: {report.comparison.verdict}"
+    pixels = draw_sheet(report.animation, sights, headline, report.comparison.verdict)
+    file = BytesIO()
+    Image.fromarray(pixels).save(file, "png", optimize=True)
+    return file.getvalue()
+
+
+def write_page(report: CaptureReport) -> bytes:
+    """Return a page, HTML, with the picture and all differences."""
+    from base64 import b64encode
+    from html import escape
+
+    from fba.capture.comparison import bounds
+
+    comparison = report.comparison
+    rows = "".join(
+        f'<tr class="{one.grade}"><td>{escape(one.measure)}<td>{escape(one.part)}<td>{one.typical:.1f}'
+        f"<td>{one.worst:.1f}<td>{escape(_unit(one))}<td>{one.frame}<td>{bounds()[one.measure].fair:g}"
+        f"<td>{bounds()[one.measure].poor:g}<td>{one.grade}\n"
+        for one in comparison.differences
+    )
+    picture = b64encode(draw_report(report)).decode()
+    measures = "".join(f"<dt>{one.measure}<dd>{escape(one.says)}\n" for one in bounds().values())
+    name = escape(report.path.name)
+    return _PAGE.format(
+        name=name, verdict=comparison.verdict, frames=comparison.frames, rows=rows, picture=picture,
+        measures=measures,
+    ).encode()  # fmt: skip
+
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en"><meta charset="utf-8"><title>{name}: {verdict}</title>
+<style>
+body {{ font: 15px/1.45 system-ui, sans-serif; max-width: 1640px; margin: 2em auto; padding: 0 1em;
+  color: #20242c }}
+h1 {{ font-size: 1.5em }} img {{ max-width: 100%; border: 1px solid #dfe2e8 }}
+table {{ border-collapse: collapse; margin: 1em 0 }} td, th {{ padding: .2em .8em; text-align: right }}
+td:nth-child(-n+2), th:nth-child(-n+2), td:last-child, th:last-child {{ text-align: left }}
+tr:nth-child(even) {{ background: #f4f5f7 }}
+.good td:last-child {{ color: #2e7d32 }} .fair td {{ color: #a86500 }}
+.poor td {{ color: #c62828; font-weight: 600 }} dt {{ font-weight: 600 }}
+</style>
+<h1>{name}: {verdict}</h1>
+<p>{frames} frames of the source beside the person that a decoder shows. Thin lines over the result are the
+source's bones. Blue is left, red is right; palms are light, backs of hands dark.</p>
+<p><img alt="Source and result in the worst frames" src="data:image/png;base64,{picture}"></p>
+<table><tr><th>measure<th>part<th>typical<th>worst<th>unit<th>frame<th>fair from<th>poor from<th>grade
+{rows}</table>
+<dl>
+{measures}</dl>
+</html>
+"""
+
+
+def _clamped_differences(clamped: Mapping[str, ClampedParameter]) -> tuple[Difference, ...]:
+    """Return what the encoder clamped of bodies, in degrees and mm."""
+    from math import degrees
+
+    from fba.capture.comparison import Difference
+
+    result = []
+    for label, one in clamped.items():
+        kind, number, name = label.split(maxsplit=2)
+        if kind != "BAP":
+            continue
+        angle = baps()[int(number) - 1].unit != "mm"
+        worst = degrees(one.off * 1e-5) if angle else float(one.off)
+        result.append(Difference("clamped" if angle else "clamped root", name, 0.0, worst, one.frame))
+    return tuple(result)
+
+
+def _unit(one: Difference) -> str:
+    from fba.capture.comparison import bounds
+
+    return bounds()[one.measure].unit
+
+
+def _coloured(text: str, grade: str) -> str:
+    """Return text in the colour of a grade, where colours are wanted; `click.echo` drops it for files."""
+    if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return text
+    return click.style(text, fg={"good": "green", "fair": "yellow", "poor": "red"}[grade])

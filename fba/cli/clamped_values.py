@@ -1,18 +1,50 @@
-"""What `fba encode` says of values that no plane could carry."""
+"""Values that no plane can carry: what `fba encode` does about them, and what it says."""
 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from fba.parameters import baps
+import numpy as np
+
+from fba.animation import Animation
+from fba.errors import FbaWarning
+from fba.parameters import bap_numbers, bap_steps, baps
+from fba.tracks import BodyTrack
 
 if TYPE_CHECKING:
     from fba.codec import ClampedParameter
 
 MOST_LINES = 6
+MOST_STEPS = 1860
+"""Quantiser steps that an I plane carries."""
+
+
+def bring_near(animation: Animation, table: str, quant: int) -> Animation:
+    """Return a capture, moved to begin at the default place if no first plane carries where it begins.
+
+    Warns (FbaWarning) that it was moved. table, quant: of the BAPs.
+    """
+    if animation.body is None:
+        return animation
+    numbers = bap_numbers()
+    columns = [numbers[f"HumanoidRoot_tr_{way}"] - 1 for way in ("lateral", "frontal")]
+    begin = animation.body.values[0, columns]
+    most = (bap_steps(table)[columns] if quant else np.ones(2, dtype=np.int64)) * MOST_STEPS
+    if (np.abs(begin) <= most).all():
+        return animation
+    values = animation.body.values.copy()
+    values[:, columns] -= begin
+    warnings.warn(
+        f"the capture begins {np.linalg.norm(begin) / 1000:.1f} m from its origin; the first plane carries "
+        f"{most.min() / 1000:.1f} m; it is moved to begin at the default place, as with --origin start",
+        FbaWarning,
+        stacklevel=2,
+    )
+    return replace(animation, body=BodyTrack(values, animation.body.mask))
 
 
 def clamped_lines(clamped: Mapping[str, ClampedParameter]) -> list[str]:

@@ -6,6 +6,7 @@ import json
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,6 +46,7 @@ def bvh(tmp_path: Path) -> Path:
     return path
 
 
+Run = Callable[..., Any]
 Encode = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
@@ -64,8 +66,9 @@ def test_report_and_limits_as_text(encode: Encode, tmp_path: Path) -> None:
         bvh(tmp_path), "-o", tmp_path / "out.fba", "--bap-steps", "visage", "--report", "--limits", "report"
     )
     assert result.returncode == 0, result.stderr
-    assert "l_hip - l_knee" in result.stdout
-    assert "feet on the ground" in result.stdout
+    assert "kick.bvh: 3 frames beside the source: " in result.stdout
+    rows = {line.split("  ")[1] for line in result.stdout.splitlines() if line.startswith("  ")}
+    assert rows >= {"direction", "foot", "path", "floor", "jump", "leap"}
     assert "joints that the source lacks:" in result.stdout
     assert "left thigh flexion: beyond -20..120 degrees in 1 frames" in result.stdout
 
@@ -74,6 +77,9 @@ def test_report_as_json(encode: Encode, tmp_path: Path) -> None:
     result = encode(bvh(tmp_path), "-o", tmp_path / "out.fba", "--json", "--report", "--limits", "report")
     said = json.loads(result.stdout)
     (capture,) = said["captures"]
+    assert said["verdict"] == capture["verdict"]
+    thigh = next(one for one in capture["differences"] if one["part"] == "left thigh")
+    assert (thigh["measure"], thigh["unit"], thigh["grade"]) == ("direction", "degrees", "good")
     assert capture["family"] == "collar"
     assert {bone["joint"] for bone in capture["bones"]} >= {"l_hip", "l_knee", "r_knee", "vc7"}
     assert all(bone["mean"] < 1 and bone["worst"] < 5 for bone in capture["bones"])
@@ -82,6 +88,33 @@ def test_report_as_json(encode: Encode, tmp_path: Path) -> None:
     assert thigh["first"] == 2
     assert thigh["worst"] == pytest.approx(30, abs=4)
     assert not said["limits_clamped"]
+
+
+def test_a_poor_result_is_said_in_one_line_and_shown(run: Run, tmp_path: Path) -> None:
+    """A first frame 5 m from the origin is moved; where the origin is asked for, the hips leap by 1.3 m."""
+    path, page = tmp_path / "far.bvh", tmp_path / "report.html"
+    rows = np.zeros((3, 33))
+    rows[:, 0], rows[:, 1] = 500, 95
+    path.write_text(BVH + "\n".join(" ".join(f"{n:g}" for n in row) for row in rows) + "\n")
+    near = run("encode", path, "-o", tmp_path / "out.fba", "--report", page)
+    assert near.code == 0, near.err
+    assert "it is moved to begin at the default place" in near.err
+    assert "poor" not in near.err
+    text = page.read_text()
+    assert text.count("<tr class=") > 10
+    assert '<img alt="Source and result in the worst frames" src="data:image/png;base64,' in text
+    far = run("encode", "--report", path, "-o", tmp_path / "out.fba", "--origin", "source")
+    assert far.code == 0, far.err
+    (line,) = [line for line in far.err.splitlines() if line.startswith("fba: poor: ")]
+    assert "HumanoidRoot_tr_lateral is sent 1344 mm off in frame 0, and 1 more" in line
+    leap = next(line for line in far.out.splitlines() if line.startswith("  leap"))
+    assert leap.split() == ["leap", "hips", "0.0", "1344.0", "mm", "1", "poor"]
+    assert "\x1b" not in far.err + far.out  # colours are for terminals
+    silent = run("encode", path, "-o", tmp_path / "out.fba", "--origin", "source")
+    assert "--report FILE.html shows it" in silent.err
+    wrong = run("encode", path, "-o", tmp_path / "out.fba", "--report=table.txt")
+    assert wrong.code == 2
+    assert "a page, .html, or a picture, .png" in wrong.err
 
 
 def test_limits_clamp(encode: Encode, tmp_path: Path) -> None:

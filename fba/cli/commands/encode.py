@@ -11,7 +11,7 @@ import click
 
 from fba.animation import Animation
 from fba.cli import capture_report, joint_options, options, step_tables
-from fba.cli.clamped_values import clamped_lines, clamped_values
+from fba.cli.clamped_values import bring_near, clamped_lines, clamped_values
 from fba.cli.command import Command, examples
 from fba.cli.inputs import EXISTING, check_clip, input_file, is_capture, read_input
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
@@ -26,8 +26,20 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 """Options that say how motion capture becomes BAPs."""
 
 
+class _EncodeCommand(Command):
+    """`fba encode`, whose --report takes the next word only if that names a page or a picture."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        following = [*args[1:], ""]
+        words = [
+            "--report=" if word == "--report" and Path(after).suffix not in capture_report.SUFFIXES else word
+            for word, after in zip(args, following, strict=True)
+        ]
+        return super().parse_args(ctx, words)
+
+
 @click.command(
-    cls=Command,
+    cls=_EncodeCommand,
     epilog=examples(
         "fba encode walk.bvh -o walk.fba",
         "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4 --bap-steps visage",
@@ -129,7 +141,13 @@ CAPTURE = ("spine", "ground", "plant", "origin")
     "report",
     "clamp",
 )
-@click.option("--report", is_flag=True, help="Motion capture: print how far each bone is from the source's.")
+@click.option(
+    "--report",
+    is_flag=False,
+    flag_value="",
+    metavar="[FILE.html|.png]",
+    help="Motion capture: print how the result differs from the source; with FILE, show it in pictures, too.",
+)
 @options.salvage_option
 @options.limit_option
 @options.json_option
@@ -145,7 +163,7 @@ def command(
     maps: tuple[Path | joint_options.Pair, ...],
     map_out: Path | None,
     limits: str,
-    report: bool,
+    report: str | None,
     salvage: bool,
     as_json: bool,
     limit: Limits,
@@ -162,9 +180,11 @@ def command(
     if epf is not None:
         _refuse_beside_epf()
     check_clip(clip, inputs, format)
+    page = _report_file(report)
+    written = [Output("--output", output), *([Output("--report", page)] if page is not None else [])]
     saved = [] if map_out is None else [Output("--map-out", map_out, True)]
     read = [*inputs, epf, *(each for each in maps if isinstance(each, Path))]
-    outputs = Outputs([Output("--output", output), *saved], read, no_clobber=no_clobber)
+    outputs = Outputs([*written, *saved], read, no_clobber=no_clobber)
     captures = [path for path in inputs if is_capture(path, format)]
     if map_out is not None and not captures:
         raise click.UsageError("--map-out goes with motion capture: a BVH or glTF file")
@@ -176,11 +196,9 @@ def command(
             inputs, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, step=step,
             capture=capture, format=format, clip=clip, limits=limit, tables=tables,
         )  # fmt: skip
-    animation, report_values = capture_report.apply_limits(animation, limits)
-    if report:
-        if animation.body is None:
-            raise click.UsageError("--report compares bones of motion capture, and there is no body")
-        report_values = capture_report.compare(captures, animation, format, clip, joints) | report_values
+    if report is not None and (animation.body is None or not captures):
+        raise click.UsageError("--report compares motion capture with its result, and there is none")
+    animation, limit_values = capture_report.apply_limits(animation, limits)
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
     mark = mark if mark is not None else epf is None
@@ -188,6 +206,8 @@ def command(
         bap_steps, made=bool(captures), marked=mark, read=tables[0] if tables else None
     )
     settings |= {"bap_steps": table, "mark": mark}
+    if captures and _is_left_open("origin"):
+        animation = bring_near(animation, table, settings["bap_quant"])
     with Progress("encoding", None):
         coded = (
             _encode(animation, settings) if epf is None else _encode_as_epf(epf, animation, settings, limit)
@@ -198,17 +218,53 @@ def command(
         with outputs.file(map_out) as file:
             mapped = joint_options.write_joints(file, joints, captures[0], format, clip, limit)
         outputs.say(f"{display_name(map_out)}: {mapped} joints of {captures[0]}")
+    detailed = report is not None
+    reports = []
+    if captures and animation.body is not None:
+        with Progress("comparing", None):
+            decoded = _decode(coded.data, bap_steps=table)
+            reports = capture_report.compare_captures(
+                captures, animation, decoded, coded.clamped, ground=str(capture["ground"]), detailed=detailed,
+                format=format, clip=clip, joints=joints,
+            )  # fmt: skip
+            if page is not None:
+                draw = capture_report.write_page if page.suffix == ".html" else capture_report.draw_report
+                outputs.write(page, draw(reports[0]))
+    for one in reports:
+        if line := capture_report.poor_line(one, detailed=detailed):
+            click.echo(line, err=True)
     if as_json:
         used = {"bap_steps": table if animation.body is not None else None}
-        outputs.print_json({"output": str(output), **_figures(coded, animation), **used, **report_values})
+        said: dict[str, Any] = {"verdict": reports[0].comparison.verdict} if reports else {}
+        if detailed:
+            said["captures"] = [capture_report.report_values(one) for one in reports]
+        figures = _figures(coded, animation)
+        outputs.print_json({"output": str(output), **figures, **used, **said, **limit_values})
         return
     for line in (
         _summary(output, coded, animation),
         *clamped_lines(coded.clamped),
-        *capture_report.report_lines(report_values),
+        *(line for one in reports if detailed for line in capture_report.report_lines(one)),
+        *capture_report.limit_lines(limit_values),
     ):
         outputs.say(line)
     step_tables.remind(output, animation, table, coded.bap_quant, marked=mark)
+
+
+def _is_left_open(option: str) -> bool:
+    """Whether an option has its default value because nobody gave it."""
+    source = click.get_current_context().get_parameter_source(option)
+    return source is click.core.ParameterSource.DEFAULT
+
+
+def _report_file(report: str | None) -> Path | None:
+    """Return the file of `--report`, or None."""
+    if not report:
+        return None
+    path = Path(report)
+    if path.suffix not in capture_report.SUFFIXES:
+        raise click.UsageError(f"--report={report}: a report is a page, .html, or a picture, .png")
+    return path
 
 
 class _Encoded(NamedTuple):
@@ -241,6 +297,12 @@ def _encode(animation: Animation, settings: Mapping[str, Any]) -> _Encoded:
         statistics.clamped_parameters,
         settings["bap_quant"],
     )
+
+
+def _decode(data: bytes, bap_steps: str) -> Animation:
+    from fba.codec import decode
+
+    return decode(data, bap_steps=bap_steps)
 
 
 def _encode_as_epf(epf: Path, animation: Animation, settings: Mapping[str, Any], limits: Limits) -> _Encoded:

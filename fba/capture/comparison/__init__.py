@@ -1,0 +1,27 @@
+"""A captured motion beside the person that a decoder shows: measures, and a verdict.
+
+The source's bones come from its own forward kinematics, those of the result from BAPs: what retargeting
+assumes of rest poses has no part in it, so that a wrong rest pose is seen and not explained away.
+
+May use: parameters, the body, and captured motion.
+"""
+
+from fba.capture.comparison.figure import Figure, find_up, source_figure
+from fba.capture.comparison.measurement import compare, source_scale
+from fba.capture.comparison.stick import Stick, find_sticks
+from fba.capture.comparison.verdict import GRADES, Bounds, Comparison, Difference, bounds
+
+__all__ = [
+    "GRADES",
+    "Bounds",
+    "Comparison",
+    "Difference",
+    "Figure",
+    "Stick",
+    "bounds",
+    "compare",
+    "find_sticks",
+    "find_up",
+    "source_figure",
+    "source_scale",
+]

@@ -1,0 +1,157 @@
+"""`Figure`: where joints are and how they are turned, of the source and of the result, in the same terms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fba import rotations
+from fba.arrays import Array, Float64
+from fba.body import BapSolver
+from fba.capture.motion import SkeletonMotion
+
+SIDES = ("l", "r")
+FINGERS = ("index", "middle", "ring", "pinky")
+LEVEL = 0.6
+"""Length of the mean direction from feet to head along an axis from which on a person stands along it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A moving person.
+
+    points: joint of the standard -> (T, 3), metres, y up. frames: joint -> (T, 3, 3), rotations of its own
+    axes, whatever these are. tips: joint -> (T, 3), the end of its bone where no joint is: of heads and feet.
+    """
+
+    points: Mapping[str, Float64]
+    frames: Mapping[str, Float64]
+    tips: Mapping[str, Float64] = field(default_factory=dict)
+
+    def direction(self, start: str, end: str) -> Float64 | None:
+        """Return unit vectors (T, 3) from a joint to another, or None where one is missing."""
+        if start not in self.points or end not in self.points:
+            return None
+        return unit(self.points[end] - self.points[start])
+
+    def middle(self, joint: str) -> Float64 | None:
+        """Return (T, 3), the point between a left and a right joint, or None."""
+        if f"l_{joint}" not in self.points or f"r_{joint}" not in self.points:
+            return None
+        result: Float64 = (self.points[f"l_{joint}"] + self.points[f"r_{joint}"]) / 2
+        return result
+
+    def toe(self, side: str) -> Float64 | None:
+        """Return (T, 3), the ball or the tip of a foot, or None."""
+        return self.points.get(f"{side}_metatarsal", self.tips.get(f"{side}_ankle"))
+
+    def knuckles(self, side: str) -> dict[str, Float64]:
+        """Return finger -> (T, 3), the knuckles of a hand that are there, from the forefinger on."""
+        names = {finger: f"{side}_{finger}1" for finger in FINGERS}
+        return {finger: self.points[name] for finger, name in names.items() if name in self.points}
+
+    def palm(self, side: str, fingers: tuple[str, str]) -> Float64:
+        """Return unit normals (T, 3) of a hand between the knuckles of two fingers, out of its palm."""
+        wrist = self.points[f"{side}_wrist"]
+        first, last = (self.points[f"{side}_{finger}1"] - wrist for finger in fingers)
+        return unit(np.cross(last, first) if side == "l" else np.cross(first, last))
+
+
+def source_figure(motion: SkeletonMotion, mapped: Mapping[str, int], up: Float64, metres: float) -> Figure:
+    """Return the figure of a capture.
+
+    mapped: joint of the standard -> number of the source's. up: (3, 3), from the source's frame to y up, see
+    `find_up`. metres: in one unit of the source, as large as the body.
+    """
+    turned, positions = motion.world()
+    positions = positions @ up.T * metres
+    points = {joint: positions[:, number] for joint, number in mapped.items()}
+    frames = {joint: up @ rotations.matrices(turned[:, number]) for joint, number in mapped.items()}
+    tips = {}
+    for joint in ("l_ankle", "r_ankle", "skullbase"):
+        if joint in mapped and (ends := _ends(motion, mapped[joint], frames[joint], metres)):
+            tips[joint] = points[joint] + np.mean(ends, axis=0)
+    return Figure(points, frames, tips)
+
+
+def result_figure(solver: BapSolver, baps: Array) -> Figure:
+    """Return the figure that a decoder shows for BAPs (T, 296)."""
+    skeleton = solver.skeleton
+    matrices = solver.pose(baps)
+    points = {name: matrices[:, number, :3, 3] for number, name in enumerate(skeleton.names)}
+    frames = {name: matrices[:, number, :3, :3] for number, name in enumerate(skeleton.names)}
+    tips = {"skullbase": points["skullbase"] + frames["skullbase"][..., 1] * 0.2}
+    return Figure(points, frames, tips)
+
+
+def find_up(motion: SkeletonMotion, mapped: Mapping[str, int]) -> Float64:
+    """Return (3, 3), the rotation of the source's frame that brings up what is up in its motion.
+
+    That is the axis along which the person stands for most of the time, or else that of the rest pose.
+    """
+    top = [mapped[j] for j in ("skullbase", "vc7", "l_shoulder", "r_shoulder") if j in mapped]
+    low = [mapped[j] for j in ("l_ankle", "r_ankle", "l_knee", "r_knee") if j in mapped]
+    if not top or not low:
+        return np.eye(3)
+    _, positions = motion.world()
+    rest = motion.rest()[None]
+    axis = np.array([0.0, 1.0, 0.0])
+    for places in (positions, rest):
+        stands = unit(places[:, top].mean(axis=1) - places[:, low].mean(axis=1)).mean(axis=0)
+        strongest = int(np.argmax(np.abs(stands)))
+        if abs(stands[strongest]) > LEVEL:
+            axis = np.eye(3)[strongest] * np.sign(stands[strongest])
+            break
+    return rotations.between(axis, np.array([0.0, 1.0, 0.0]))
+
+
+def leg_lengths(figure: Figure) -> float:
+    """Return the length of the legs, or else the arms, of a figure in its first frame; 0 without either."""
+    for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")):
+        length = 0.0
+        for side in SIDES:
+            if all(f"{side}_{joint}" in figure.points for joint in chain):
+                ends = [figure.points[f"{side}_{joint}"][0] for joint in chain]
+                length += float(np.linalg.norm(np.diff(ends, axis=0), axis=1).sum())
+        if length > 0:
+            return length
+    return 0.0
+
+
+def unit(vectors: Float64) -> Float64:
+    """Return vectors (..., 3) of length 1; 0 stays 0."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    result: Float64 = vectors / np.where(length > 1e-12, length, 1.0)
+    return result
+
+
+def degrees_between(one: Float64, other: Float64) -> Float64:
+    """Return angles (T,) in degrees between vectors (T, 3)."""
+    sine = np.linalg.norm(np.cross(one, other), axis=-1)
+    result: Float64 = np.degrees(np.arctan2(sine, (one * other).sum(axis=-1)))
+    return result
+
+
+def degrees_turned(turns: Float64) -> Float64:
+    """Return angles (T,) in degrees of rotations (T, 3, 3)."""
+    sine = np.linalg.norm(
+        np.stack([turns[..., i, j] - turns[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1), axis=-1
+    )
+    result: Float64 = np.degrees(np.arctan2(sine, np.trace(turns, axis1=-2, axis2=-1) - 1))
+    return result
+
+
+def mean_rotation(turns: Float64) -> Float64:
+    """Return the rotation (3, 3) nearest to the mean of rotations (T, 3, 3)."""
+    u, _, v = np.linalg.svd(turns.mean(axis=0))
+    result: Float64 = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
+    return result
+
+
+def _ends(motion: SkeletonMotion, joint: int, frames: Float64, metres: float) -> list[Float64]:
+    """Return (T, 3) from a joint to each end or child. frames: (T, 3, 3), from its axes to the world."""
+    offsets = [motion.end_offsets[n] for n in np.flatnonzero(motion.end_parents == joint)]
+    offsets += [motion.offsets[n] for n in np.flatnonzero(motion.parents == joint)]
+    return [frames @ (offset * metres) for offset in offsets if np.linalg.norm(offset) > 0]

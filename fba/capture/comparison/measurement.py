@@ -1,0 +1,156 @@
+"""Compare a captured motion with the person that a decoder shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import minimum_filter1d
+
+from fba.animation import Animation
+from fba.arrays import Float64
+from fba.body import BapSolver
+from fba.capture.comparison import figure, measures
+from fba.capture.comparison.figure import Figure
+from fba.capture.comparison.measures import Row
+from fba.capture.comparison.soles import sole_heights
+from fba.capture.comparison.verdict import Comparison, Difference, bounds, in_order
+from fba.capture.motion import SkeletonMotion
+from fba.errors import ModelError
+from fba.parameters import BAP_COUNT
+
+PIECE = 8192
+"""Frames that are compared at once, which bounds the memory; each piece is measured by itself."""
+RUNS = 4
+"""Runs of frames that stand for a long motion."""
+MOVES = 10.0
+"""Degrees that a joint turns to count as moving."""
+LIMBS = {
+    "left arm": ("l_shoulder", "l_elbow"), "right arm": ("r_shoulder", "r_elbow"),
+    "left leg": ("l_hip", "l_knee"), "right leg": ("r_hip", "r_knee"), "head": ("skullbase", "vc7"),
+}  # fmt: skip
+"""Limbs, and joints without which they do not move."""
+
+
+def compare(
+    motion: SkeletonMotion,
+    animation: Animation,
+    mapped: Mapping[str, int],
+    *,
+    scale: float | None = None,
+    level: float | None = 0.0,
+    solver: BapSolver | None = None,
+    most: int | None = None,
+) -> Comparison:
+    """Return how an animation, best a decoded one, differs from the motion that it was made from.
+
+    mapped: joint of the standard -> number of the source's. scale: metres of the body in one unit of the
+    source; None for the ratio of legs, or else arms. level: height of the floor in metres; None where there
+    is none, then soles may be at any height, but the same everywhere. solver: as for `from_skeleton`. most:
+    frames that are compared, in four runs evenly spread, of a motion that has more; None for all.
+
+    If rates differ, the motion is resampled; frames that only one of the two has are left out. ModelError if
+    the animation has no body or no frame in common with the motion.
+    """
+    solver = solver if solver is not None else BapSolver()
+    if animation.body is None:
+        raise ModelError("the animation has no body to compare with the motion")
+    motion = motion.resample(animation.rate)
+    count = min(len(motion), len(animation))
+    if not count:
+        raise ModelError("the motion and the animation have no frame in common")
+    first = rows_of(motion, slice(0, min(count, PIECE)))
+    up = figure.find_up(first, mapped)
+    neutral = figure.result_figure(solver, np.zeros((1, BAP_COUNT), dtype=np.int32))
+    metres = source_scale(motion, mapped, neutral, up) if scale is None else scale
+    rest = rest_figure(motion, mapped, up, metres)
+    found: dict[tuple[str, str], list[Difference]] = {}
+    for piece in _pieces(count, most):
+        baps = animation.body.values[piece]
+        source = figure.source_figure(rows_of(motion, piece), mapped, up, metres)
+        result = figure.result_figure(solver, baps)
+        rows = _measure(source, result, rest, neutral, sole_heights(solver, baps), float(motion.rate), level)
+        for row in rows:
+            one = _difference(row, float(motion.rate), piece.start)
+            found.setdefault((one.measure, one.part), []).append(one)
+    differences = [
+        replace(max(ones, key=lambda one: one.worst), typical=float(np.mean([one.typical for one in ones])))
+        for ones in found.values()
+    ]
+    differences += _unmatched(first, mapped)
+    compared = sum(piece.stop - piece.start for piece in _pieces(count, most))
+    return Comparison(compared, in_order(tuple(differences)))
+
+
+def _pieces(count: int, most: int | None) -> list[slice]:
+    """Return the frames to be compared, in pieces."""
+    if most is None or count <= most:
+        return [slice(begin, min(begin + PIECE, count)) for begin in range(0, count, PIECE)]
+    length = most // RUNS
+    return [
+        slice(begin, begin + length) for begin in np.linspace(0, count - length, RUNS).astype(int).tolist()
+    ]
+
+
+def source_scale(motion: SkeletonMotion, mapped: Mapping[str, int], neutral: Figure, up: Float64) -> float:
+    """Return metres of the body in one unit of the source, by the lengths of limbs; 1 without limbs."""
+    theirs = figure.leg_lengths(figure.source_figure(rows_of(motion, slice(0, 1)), mapped, up, 1.0))
+    return figure.leg_lengths(neutral) / theirs if theirs > 0 else 1.0
+
+
+def _measure(
+    source: Figure,
+    result: Figure,
+    rest: Figure,
+    neutral: Figure,
+    soles: dict[str, Float64],
+    rate: float,
+    level: float | None,
+) -> Iterator[Row]:
+    standing = measures.find_standing(source, rate)
+    yield from measures.directions(source, result)
+    yield from measures.palms(source, result)
+    yield from measures.turns(source, result)
+    yield from measures.feet(source, result, standing, rest)
+    yield from measures.heads(source, result, rest)
+    yield from measures.clavicles(source, result, neutral)
+    yield from measures.paths(source, result)
+    yield from measures.floors(source, soles, standing, level)
+    yield from measures.slips(source, result, standing, rate)
+    yield from measures.jumps(source, result)
+
+
+def _difference(row: Row, rate: float, begin: int) -> Difference:
+    """Return the typical and the worst value of a row whose first frame has the number `begin`."""
+    known = row.values[~np.isnan(row.values)]
+    typical = float(np.median(known)) if len(known) else 0.0
+    values = np.nan_to_num(row.values, nan=0.0)
+    frames = min(max(1, round(bounds()[row.name].hold * rate)), len(values))
+    held = minimum_filter1d(values, frames, mode="nearest") if frames > 1 else values
+    worst = int(held.argmax())
+    return Difference(row.name, row.part, typical, float(held[worst]), begin + worst)
+
+
+def _unmatched(motion: SkeletonMotion, mapped: Mapping[str, int]) -> list[Difference]:
+    """Return the limbs that nothing was matched with, if the source has joints that move and are not used."""
+    used = set(mapped.values())
+    from_first = np.abs((motion.rotations * motion.rotations[:1]).sum(axis=-1)).min(axis=0)
+    turned = np.degrees(2 * np.arccos(np.clip(from_first, 0.0, 1.0)))
+    moving = [number for number in range(len(motion.names)) if number not in used and turned[number] > MOVES]
+    return [
+        Difference("unmatched", limb, float(len(moving)), float(len(moving)), 0)
+        for limb, joints in LIMBS.items()
+        if moving and not any(joint in mapped for joint in joints)
+    ]
+
+
+def rest_figure(motion: SkeletonMotion, mapped: Mapping[str, int], up: Float64, metres: float) -> Figure:
+    """Return the source in the rest pose that its file has, whatever that is."""
+    unturned = np.tile([1.0, 0.0, 0.0, 0.0], (1, len(motion.names), 1))
+    return figure.source_figure(replace(rows_of(motion, slice(0, 1)), rotations=unturned), mapped, up, metres)
+
+
+def rows_of(motion: SkeletonMotion, rows: slice) -> SkeletonMotion:
+    """Return some frames of a motion."""
+    return replace(motion, rotations=motion.rotations[rows], positions=motion.positions[rows])

@@ -1,0 +1,336 @@
+"""Measures of how a result differs from its source, each over all frames.
+
+Each function returns rows of `Row`: name, unit and values (T,), 0 or more; NaN where nothing can be compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from fba import rotations
+from fba.arrays import Bool, Float64
+from fba.capture.comparison.figure import (
+    SIDES,
+    Figure,
+    degrees_between,
+    degrees_turned,
+    mean_rotation,
+    unit,
+)
+
+MOST_PAIRS = 4
+"""Pairs of joints, left and right, that show whether a pose is its own mirror image."""
+MIRRORED, STRAIGHT = 0.05, 0.9
+"""Share of the legs' length by which they may differ, and least cosine of trunk and legs to straight up."""
+
+WORDS = {"l": "left", "r": "right"}
+LIMBS = (
+    ("upper arm", "shoulder", "elbow"),
+    ("forearm", "elbow", "wrist"),
+    ("thigh", "hip", "knee"),
+    ("shank", "knee", "ankle"),
+)
+DIGITS = ("thumb", "index", "middle", "ring", "pinky")
+TURNING = (
+    ("pelvis", "HumanoidRoot", "sacroiliac"),
+    ("head", "skullbase", "skullbase"),
+    *((f"{WORDS[s]} {what}", f"{s}_{joint}", f"{s}_{shown}") for s in SIDES for what, joint, shown in (
+        ("hand", "wrist", "wrist"), ("shank", "knee", "knee"), ("foot", "ankle", "midtarsal"),
+    )),
+)  # fmt: skip
+"""Parts, the source's joint that turns each, and that of the result."""
+CHEST = ("vt1", "vt4", "vt6", "vt8", "vt9", "vt10", "vt12", "vl1", "vl2", "vl3", "vl5")
+"""Where a source may have the joint of its chest, from the top."""
+HANGS = 0.5
+"""Cosine of the angle to straight down up to which an arm hangs."""
+STEEP = 0.85
+"""Cosine of the angle between a foot's bone and straight down beyond which it points nowhere."""
+STILL = 0.25
+"""Metres a second up to which a foot stands."""
+LOW = 0.05
+"""Metres above the lowest heights up to which a foot stands."""
+
+
+class Row(NamedTuple):
+    """A measure of a part in every frame."""
+
+    name: str
+    part: str
+    values: Float64
+
+
+def directions(source: Figure, result: Figure) -> Iterator[Row]:
+    """Angles in degrees between bones: arms, legs, hands, fingers, trunk, lines of hips and shoulders."""
+    for side in SIDES:
+        for what, start, end in LIMBS:
+            yield from _angle(
+                "direction", f"{WORDS[side]} {what}", source, result, f"{side}_{start}", f"{side}_{end}"
+            )
+        both = source.knuckles(side).keys() & result.knuckles(side).keys()
+        if len(both) > 1 and f"{side}_wrist" in source.points:
+            ways = [
+                unit(np.mean([one.knuckles(side)[f] for f in both], axis=0) - one.points[f"{side}_wrist"])
+                for one in (source, result)
+            ]
+            yield Row("direction", f"{WORDS[side]} hand", degrees_between(*ways))
+        for digit in DIGITS:
+            rows = [
+                row.values
+                for n in (1, 2)
+                for row in _angle(
+                    "finger", "", source, result, f"{side}_{digit}{n}", f"{side}_{digit}{n + 1}"
+                )
+            ]
+            if rows:
+                yield Row("finger", f"{WORDS[side]} {digit}", np.max(rows, axis=0))
+    for what in ("hip", "shoulder"):
+        yield from _angle("direction", f"line of the {what}s", source, result, f"r_{what}", f"l_{what}")
+    trunks = [_trunk(one) for one in (source, result)]
+    if trunks[0] is not None and trunks[1] is not None:
+        yield Row("trunk", "trunk", degrees_between(trunks[0], trunks[1]))
+
+
+def palms(source: Figure, result: Figure) -> Iterator[Row]:
+    """Angles in degrees between the palms, where the source has knuckles of two fingers."""
+    for side in SIDES:
+        both = [f for f in source.knuckles(side) if f in result.knuckles(side)]
+        if len(both) > 1 and f"{side}_wrist" in source.points:
+            ends = both[0], both[-1]
+            angles = degrees_between(source.palm(side, ends), result.palm(side, ends))
+            yield Row("palm", f"{WORDS[side]} hand", angles)
+
+
+def turns(source: Figure, result: Figure) -> Iterator[Row]:
+    """Angles in degrees by which parts turn otherwise than the source's; constant ones do not count."""
+    for part, joint, shown in TURNING:
+        if joint in source.frames and shown in result.frames:
+            between = np.swapaxes(source.frames[joint], 1, 2) @ result.frames[shown]
+            yield Row("turn", part, degrees_turned(between @ mean_rotation(between).T))
+
+
+def feet(source: Figure, result: Figure, standing: dict[str, Bool], rest: Figure) -> Iterator[Row]:
+    """Angles in degrees between the feet as frames: where toes point and how soles are turned.
+
+    The source's soles are level on average where it stands, or in a rest pose that stands: what fits better.
+    """
+    for side in SIDES:
+        toe, shown = source.toe(side), result.toe(side)
+        if f"{side}_ankle" not in source.frames or toe is None or shown is None:
+            continue
+        rows = [
+            _foot(source, result, side, level[side], toe, shown)
+            for level in (_levels_from_motion(source, standing), _levels_from_rest(rest))
+            if side in level
+        ]
+        if rows:
+            yield Row("foot", f"{WORDS[side]} foot", min(rows, key=lambda row: float(np.median(row))))
+
+
+def level_soles(source: Figure, standing: dict[str, Bool], rest: Figure) -> dict[str, Float64]:
+    """Return by side (3,): up, as the axes of a foot see it whose sole is level."""
+    return _levels_from_rest(rest) | _levels_from_motion(source, standing)
+
+
+def _levels_from_motion(source: Figure, standing: dict[str, Bool]) -> dict[str, Float64]:
+    frames = {side: source.frames.get(f"{side}_ankle") for side in standing if standing[side].any()}
+    return {
+        side: unit(one[standing[side], 1].mean(axis=0)) for side, one in frames.items() if one is not None
+    }
+
+
+def _levels_from_rest(rest: Figure) -> dict[str, Float64]:
+    if _standing_axes(rest) is None:
+        return {}
+    return {side: rest.frames[f"{side}_ankle"][0, 1] for side in SIDES}
+
+
+def _foot(source: Figure, result: Figure, side: str, level: Float64, toe: Float64, shown: Float64) -> Float64:
+    """Return angles (T,) between feet. level: (3,), up in the source's foot's axes. toe, shown: (T, 3)."""
+    frames = source.frames[f"{side}_ankle"]
+    ups = frames @ level, result.frames[f"{side}_midtarsal"][..., 1]
+    bone = unit(toe - source.points[f"{side}_ankle"])
+    if np.median(np.abs((bone * ups[0]).sum(axis=1))) > STEEP:
+        return degrees_between(*ups)  # the bone does not show where the toes point
+    ahead = [
+        _along(end - one.points[f"{side}_ankle"], up)
+        for one, end, up in ((source, toe, ups[0]), (result, shown, ups[1]))
+    ]
+    own = [np.stack([np.cross(u, a), u, a], axis=-1) for u, a in zip(ups, ahead, strict=True)]
+    return degrees_turned(np.swapaxes(own[0], 1, 2) @ own[1])
+
+
+def heads(source: Figure, result: Figure, rest: Figure) -> Iterator[Row]:
+    """Angle in degrees between the heads, where the source's rest pose shows where its head looks.
+
+    rest: the source's, which shows that if it stands as a mirror would show it.
+    """
+    ahead = _standing_axes(rest)
+    if ahead is None or "skullbase" not in source.frames:
+        return
+    looks = source.frames["skullbase"] @ rest.frames["skullbase"][0].T @ ahead, result.frames["skullbase"]
+    yield Row("head", "head", degrees_turned(np.swapaxes(looks[0], 1, 2) @ looks[1]))
+
+
+def clavicles(source: Figure, result: Figure, neutral: Figure) -> Iterator[Row]:
+    """Angles in degrees of the clavicles from where they belong.
+
+    That is the default posture's place while the source's are where they are with hanging arms; from there
+    they move as the source's do. neutral: the body in its default posture.
+    """
+    chest = next((joint for joint in CHEST if joint in source.frames), None)
+    for side in SIDES:
+        names = f"{side}_sternoclavicular", f"{side}_shoulder"
+        own, rest = result.direction(*names), neutral.direction(*names)
+        assert own is not None
+        assert rest is not None
+        frames = result.frames["vt1"]
+        expected = frames @ rest[0]
+        theirs = source.direction(*names)
+        arm = source.direction(f"{side}_shoulder", f"{side}_elbow")
+        if theirs is not None and chest is not None:
+            inside = rotations.inside(source.frames[chest], theirs)
+            hangs = arm is not None and arm[:, 1] < -HANGS
+            usual = unit(np.median(inside[hangs] if np.any(hangs) else inside, axis=0))
+            moved = rotations.between_all(np.broadcast_to(source.frames[chest] @ usual, theirs.shape), theirs)
+            expected = (moved @ expected[..., None])[..., 0]
+        yield Row("clavicle", f"{WORDS[side]} clavicle", degrees_between(own, expected))
+
+
+def find_standing(source: Figure, rate: float) -> dict[str, Bool]:
+    """Return by side bool (T,): whether a foot of the source stands: low, and hardly moving."""
+    result = {}
+    for side in SIDES:
+        points = [p for p in (source.points.get(f"{side}_ankle"), source.toe(side)) if p is not None]
+        if not points:
+            continue
+        count = len(points[0])
+        ok = np.zeros(count, dtype=bool)
+        for point in points:
+            speed = np.linalg.norm(np.diff(point, axis=0, append=point[-1:]), axis=1) * rate
+            ok |= speed < STILL
+        ok &= points[-1][:, 1] < np.percentile(points[-1][:, 1], 5) + LOW
+        result[side] = ok
+    return result
+
+
+def paths(source: Figure, result: Figure) -> Iterator[Row]:
+    """Distances in mm between the hips; where both are on the whole does not count (`--origin`)."""
+    theirs, ours = (pelvis(one) for one in (source, result))
+    if theirs is not None and ours is not None:
+        apart = ours - theirs
+        yield Row("path", "hips", 1000 * np.linalg.norm(apart - np.median(apart, axis=0), axis=1))
+
+
+def floors(
+    source: Figure, soles: dict[str, Float64], standing: dict[str, Bool], level: float | None
+) -> Iterator[Row]:
+    """Heights in mm by which soles miss the floor while the source's foot stands; NaN in other frames.
+
+    soles: by side (T,), height in metres of the lowest point of the person's shoe. level: height of the
+    floor, None for that where the feet stand most. The source's foot is level where it usually stands.
+    """
+    heights = {side: _lowest(source, side) for side in soles}
+    known = {side: height for side, height in heights.items() if height is not None and standing[side].any()}
+    if not known:
+        return
+    ground = float(np.median(np.concatenate([known[side][standing[side]] for side in known])))
+    own = np.concatenate([soles[side][standing[side]] for side in known])
+    floor = float(np.median(own)) if level is None else level
+    for side, height in known.items():
+        off = np.abs(soles[side] - floor - (height - ground))
+        yield Row("floor", f"{WORDS[side]} sole", np.where(standing[side], 1000 * off, np.nan))
+
+
+def slips(source: Figure, result: Figure, standing: dict[str, Bool], rate: float) -> Iterator[Row]:
+    """Speeds in cm/s at which standing feet slip along the floor while the source's do not; NaN elsewhere."""
+    for side in SIDES:
+        toe, shown = source.toe(side), result.toe(side)
+        if side not in standing or toe is None or shown is None:
+            continue
+        change = np.diff(shown - toe, axis=0, append=(shown - toe)[-1:])[:, [0, 2]]
+        speed = 100 * rate * np.linalg.norm(change, axis=1)
+        yield Row("slip", f"{WORDS[side]} foot", np.where(standing[side], speed, np.nan))
+
+
+def jumps(source: Figure, result: Figure) -> Iterator[Row]:
+    """Angles in degrees, and ways in mm, by which parts move from frame to frame, and the source's do not."""
+    pairs = [(part, joint, shown) for part, joint, shown in TURNING]
+    pairs += [
+        (f"{WORDS[side]} {what}", f"{side}_{start}", f"{side}_{start}")
+        for side in SIDES
+        for what, start, _ in LIMBS
+    ]
+    for part, joint, shown in pairs:
+        if joint not in source.frames or shown not in result.frames:
+            continue
+        theirs, ours = _steps(source.frames[joint]), _steps(result.frames[shown])
+        near = np.pad(theirs, 1, mode="edge")
+        most = np.maximum(np.maximum(near[:-2], near[1:-1]), near[2:])
+        yield Row("jump", part, np.maximum(ours - most, 0.0))
+    hips = [pelvis(one) for one in (source, result)]
+    if hips[0] is not None and hips[1] is not None:
+        theirs, ours = hips[0], hips[1]
+        apart = np.diff(ours - theirs, axis=0, prepend=(ours - theirs)[:1])
+        yield Row("leap", "hips", 1000 * np.linalg.norm(apart, axis=1))
+
+
+def pelvis(figure: Figure) -> Float64 | None:
+    """Return (T, 3), the point between the hips, else the root; None without either."""
+    middle = figure.middle("hip")
+    return figure.points.get("HumanoidRoot") if middle is None else middle
+
+
+def _lowest(figure: Figure, side: str) -> Float64 | None:
+    """Return (T,), the height of the lowest point of a foot."""
+    points = [p for p in (figure.points.get(f"{side}_ankle"), figure.toe(side)) if p is not None]
+    return np.min([point[:, 1] for point in points], axis=0) if points else None
+
+
+def _steps(frames: Float64) -> Float64:
+    """Return (T,), angles in degrees from each frame to the next before it; 0 for the first."""
+    return np.concatenate([[0.0], degrees_turned(np.swapaxes(frames[:-1], 1, 2) @ frames[1:])])
+
+
+def _angle(name: str, part: str, source: Figure, result: Figure, start: str, end: str) -> Iterator[Row]:
+    theirs, ours = source.direction(start, end), result.direction(start, end)
+    if theirs is not None and ours is not None:
+        yield Row(name, part, degrees_between(theirs, ours))
+
+
+def _trunk(figure: Figure) -> Float64 | None:
+    hips, shoulders = figure.middle("hip"), figure.middle("shoulder")
+    return None if hips is None or shoulders is None else unit(shoulders - hips)
+
+
+def _standing_axes(rest: Figure) -> Float64 | None:
+    """Return (3, 3): to the left, up and ahead, of a figure that stands straight, or None.
+
+    Left and right must be mirror images of each other, the trunk above the legs.
+    """
+    pairs = [
+        (p, f"r{n[1:]}") for n, p in rest.points.items() if n.startswith("l_") and f"r{n[1:]}" in rest.points
+    ]
+    trunk, left = _trunk(rest), rest.direction("r_hip", "l_hip")
+    foot = rest.middle("ankle")
+    if trunk is None or left is None or foot is None or len(pairs) < MOST_PAIRS:
+        return None
+    middle = rest.middle("hip")
+    assert middle is not None
+    normal, size = left[0], float(np.linalg.norm(middle[0] - foot[0]))
+    ends = np.array([[one[0], rest.points[other][0]] for one, other in pairs]) - middle[0]
+    mirrored = ends[:, 0] - 2 * (ends[:, 0] @ normal)[:, None] * normal
+    off = np.linalg.norm(mirrored - ends[:, 1], axis=1).max()
+    upright = min(float(trunk[0, 1]), float(unit(middle - foot)[0, 1]))
+    if off > MIRRORED * size or upright < STRAIGHT:
+        return None
+    up = np.array([0.0, 1.0, 0.0])
+    side = _along(left, up[None])[0]
+    return np.stack([side, up, np.cross(side, up)], axis=-1)
+
+
+def _along(vectors: Float64, normal: Float64) -> Float64:
+    """Return unit vectors (T, 3) without their part along normals (T, 3)."""
+    return unit(vectors - normal * (vectors * normal).sum(axis=-1, keepdims=True))

@@ -1,0 +1,219 @@
+"""A captured motion beside the person who plays it, as a picture; needs no OpenGL.
+
+Triangles are painted from back to front, so it works on every machine, and gives the same picture everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from fba.animation import Animation
+from fba.arrays import Float64, UInt8
+from fba.capture.comparison import Stick
+from fba_player.scene.scene import Scene
+from fba_player.view.camera import Camera, Subject
+from fba_player.view.view import View
+
+TILE = (400, 480)
+"""Width and height of one of the two pictures of a frame, in pixels."""
+FINER = 2
+"""Everything is painted so many times larger, and then reduced, which smooths edges."""
+HIDDEN_KINDS = ("teeth", "tongue", "lash", "mouth")
+"""Parts of a face that are too small to see, or behind the lips."""
+COLOURS = {"l": "#1f77b4", "r": "#d1495b", "": "#4a4e57"}
+PALM, BACK, SOLE = "#f2b880", "#8d6b4f", "#b9bec9"
+PAPER, FLOOR, INK, FAINT = "#f4f5f7", "#dfe2e8", "#20242c", "#6b7280"
+GRADES = {"good": "#2e7d32", "fair": "#a86500", "poor": "#c62828"}
+LIGHT = np.array([0.35, 0.75, 0.56])
+FILL = 0.45
+"""Share of light that reaches what looks away from the lamp."""
+YAW, PITCH = 32.0, 7.0
+"""Degrees by which the camera looks from the side, and from above."""
+MARGIN = 0.16
+"""Metres around the figures."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A frame to show: its number and time, what is to be seen, and the source as a stick figure.
+
+    title: in large letters. note: under it. grade: "good", "fair" or "poor". side: "left" or "right" for a
+    camera on that side of the person.
+    """
+
+    frame: int
+    title: str
+    note: str
+    grade: str
+    side: str
+    stick: Stick
+
+
+def draw_sheet(animation: Animation, sights: Sequence[Sight], headline: str, grade: str) -> UInt8:
+    """Return a picture, uint8 (H, W, 3): for every sight the source on the left, the result on the right.
+
+    animation: the result, decoded. headline, grade: of the whole.
+    """
+    width, height = TILE
+    head, caption = 44, 52
+    columns = min(len(sights), 2) or 1
+    rows = -(-len(sights) // columns)
+    sheet = Image.new("RGB", (columns * 2 * width, head + rows * (height + caption)), PAPER)
+    draw = ImageDraw.Draw(sheet)
+    draw.text((14, 10), headline, GRADES[grade], font=_font(20))
+    assert animation.body is not None
+    frames = [sight.frame for sight in sights]
+    chosen = replace(animation.body, values=animation.body.values[frames], mask=animation.body.mask[frames])
+    scene = Scene(Animation(Fraction(1), np.arange(max(len(frames), 1)), body=chosen)) if frames else None
+    for number, sight in enumerate(sights):
+        assert scene is not None
+        x, y = number % columns * 2 * width, head + number // columns * (height + caption)
+        view = scene.view_at(float(number))
+        for offset, picture in zip((0, width), _draw_pair(view, sight), strict=True):
+            sheet.paste(picture, (x + offset, y + caption))
+        draw.text((x + 14, y + 6), sight.title, GRADES[sight.grade], font=_font(16))
+        draw.text((x + 14, y + 28), sight.note, FAINT, font=_font(13))
+        draw.text((x + 14, y + caption + 6), "source", FAINT, font=_font(13))
+        draw.text((x + width + 14, y + caption + 6), "result", FAINT, font=_font(13))
+        draw.line([(x + width, y + caption), (x + width, y + caption + height)], FLOOR)
+    return np.asarray(sheet)
+
+
+def _draw_pair(view: View, sight: Sight) -> list[Image.Image]:
+    """Return the pictures of the source and of the result, by the same camera."""
+    triangles, colours = _person(view)
+    corners = np.concatenate([sight.stick.corners, triangles.reshape(-1, 3)])
+    camera = _camera(corners, triangles, sight)
+    size = (TILE[0] * FINER, TILE[1] * FINER)
+    result = []
+    for what in ("source", "result"):
+        picture = Image.new("RGB", size, PAPER)
+        draw = ImageDraw.Draw(picture)
+        _draw_floor(draw, camera, size, corners)
+        if what == "result":
+            _draw_triangles(draw, camera, size, triangles, colours)
+            _draw_lines(draw, camera, size, sight.stick, thin=True)
+        else:
+            _draw_stick(draw, camera, size, sight.stick)
+        result.append(picture.resize(TILE, Image.Resampling.LANCZOS))
+    return result
+
+
+def _camera(corners: Float64, triangles: Float64, sight: Sight) -> Camera:
+    """Return the camera that sees both figures, from ahead of the person and from one side."""
+    low, high = np.percentile(corners, [0.5, 99.5], axis=0)
+    low[1] = min(low[1], 0.0)
+    centre = (low + high) / 2
+    half = (high - low) / 2 + MARGIN
+    left = _left(sight.stick)
+    facing = np.degrees(np.arctan2(-left[2], left[0]))
+    across = float(np.hypot(half[0], half[2]))
+    subject = Subject(tuple(centre.tolist()), float(half[1]), across, across / 2)
+    yaw = (facing + (YAW if sight.side == "left" else -YAW) + 180.0) % 360.0 - 180.0
+    return Camera(yaw=float(yaw), pitch=PITCH).fit(subject, TILE[0] / TILE[1])
+
+
+def _left(stick: Stick) -> Float64:
+    """Return the way from the middle of the right to that of the left parts, on the ground."""
+    sides = np.array(stick.sides)
+    places = stick.lines.mean(axis=1)
+    if not (sides == "l").any() or not (sides == "r").any():
+        return np.array([1.0, 0.0, 0.0])
+    # the ends of the first bones of each side, which are at the hips, say it best
+    begin = [stick.lines[sides == side][0].mean(axis=0) for side in "lr"]
+    way = begin[0] - begin[1]
+    if np.hypot(way[0], way[2]) < 1e-3:
+        way = places[sides == "l"].mean(axis=0) - places[sides == "r"].mean(axis=0)
+    return np.array([way[0], 0.0, way[2]])
+
+
+def _project(points: Float64, camera: Camera, size: tuple[int, int]) -> tuple[Float64, Float64]:
+    """Return pixels (..., 2) and distances (...) of points (..., 3)."""
+    matrix = camera.view_matrix()
+    seen = points @ matrix[:3, :3].T + matrix[:3, 3]
+    away = np.maximum(-seen[..., 2], 1e-3)
+    scale = size[1] / 2 / np.tan(np.radians(camera.field_of_view) / 2)
+    pixels = seen[..., :2] / away[..., None] * scale * [1.0, -1.0] + np.array(size) / 2
+    return pixels, away
+
+
+def _person(view: View) -> tuple[Float64, Float64]:
+    """Return the triangles (N, 3, 3) of a view's person, in the world, and their colours (N, 3), linear."""
+    triangles, colours = [], []
+    for mesh in view.faces:
+        if mesh.shape.kind in HIDDEN_KINDS or mesh.shape.across is not None:
+            continue
+        points = mesh.positions.astype(np.float64) @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]
+        colour = mesh.shape.colours[:, :3].astype(np.float64)
+        if mesh.shape.kind == "skin" and mesh.shape.picture is not None:
+            colour = colour * SKIN
+        triangles.append(points[mesh.shape.triangles])
+        colours.append(colour[mesh.shape.triangles].mean(axis=1))
+    return np.concatenate(triangles), np.concatenate(colours)
+
+
+SKIN = np.array([0.62, 0.34, 0.23])
+"""Mean colour, linear, of a skin that has a picture."""
+
+
+def _draw_triangles(
+    draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], triangles: Float64, colours: Float64
+) -> None:
+    """Paint triangles that face the camera, from back to front."""
+    pixels, away = _project(triangles, camera, size)
+    one, other = pixels[:, 1] - pixels[:, 0], pixels[:, 2] - pixels[:, 0]
+    seen = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    axes = camera.view_matrix()[:3, :3]
+    shade = FILL + (1 - FILL) * np.clip(normals @ axes.T @ LIGHT, 0.0, 1.0)
+    shown = (np.clip(colours * shade[:, None], 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)
+    chosen = np.flatnonzero(seen)
+    for number in chosen[np.argsort(-away[chosen].mean(axis=1))].tolist():
+        draw.polygon(pixels[number].ravel().tolist(), fill=tuple(shown[number].tolist()))
+
+
+def _draw_floor(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], corners: Float64) -> None:
+    """Paint the floor at height 0 as lines half a metre apart."""
+    middle = np.round(corners.mean(axis=0)[[0, 2]] * 2) / 2
+    for step in np.arange(-1.5, 1.51, 0.5):
+        for ends in (((step, -1.5), (step, 1.5)), ((-1.5, step), (1.5, step))):
+            points = np.array([[middle[0] + x, 0.0, middle[1] + z] for x, z in ends])
+            pixels, _ = _project(points, camera, size)
+            draw.line(pixels.ravel().tolist(), FLOOR, FINER)
+
+
+def _draw_stick(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick) -> None:
+    """Paint a stick figure: areas of palms and soles, bones from back to front."""
+    for sole in stick.soles:
+        pixels, _ = _project(sole, camera, size)
+        draw.polygon(pixels.ravel().tolist(), fill=SOLE, outline=INK)
+    _draw_lines(draw, camera, size, stick, thin=False)
+    eye = camera.eye
+    for palm in stick.palms:
+        pixels, _ = _project(palm, camera, size)
+        normal = np.cross(palm[1] - palm[0], palm[3] - palm[0])
+        colour = PALM if normal @ (eye - palm.mean(axis=0)) > 0 else BACK
+        draw.polygon(pixels.ravel().tolist(), fill=colour, outline=INK)
+
+
+def _draw_lines(
+    draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick, *, thin: bool
+) -> None:
+    pixels, away = _project(stick.lines, camera, size)
+    width = FINER if thin else 4 * FINER
+    for number in np.argsort(-away.mean(axis=1)).tolist():
+        colour = COLOURS[stick.sides[number]]
+        draw.line(pixels[number].ravel().tolist(), colour, width, joint="curve")
+        if not thin:
+            x, y = pixels[number, 1].tolist()
+            draw.ellipse((x - 2.5 * FINER, y - 2.5 * FINER, x + 2.5 * FINER, y + 2.5 * FINER), colour)
+
+
+def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size)

@@ -1,0 +1,200 @@
+"""A capture beside its result: each measure sees its fault, and says how large it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from capture_bodies import motion
+from fba import Animation, FaceTrack
+from fba.body import Skeleton
+from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture.comparison import Comparison, Difference, bounds, compare, find_sticks, find_up
+from fba.capture.matching import map_joints
+from fba.errors import ModelError
+from fba.parameters import bap_numbers
+
+FRAMES = 30
+
+
+def standing() -> SkeletonMotion:
+    """Someone who stands still, arms bent by a right angle: two seconds at 15 frames/s."""
+    bend = Rotation.from_euler("x", -90, degrees=True)
+    turns = {"LeftForeArm": bend, "RightForeArm": bend}
+    return motion("standing", FRAMES, turns=turns, rate=15)
+
+
+@pytest.fixture(scope="module")
+def source() -> SkeletonMotion:
+    return standing()
+
+
+@pytest.fixture(scope="module")
+def mapped(source: SkeletonMotion) -> dict[str, int]:
+    return map_joints(source.names, None, Skeleton.default())[1]
+
+
+@pytest.fixture(scope="module")
+def result(source: SkeletonMotion) -> Animation:
+    return from_skeleton(source)
+
+
+def changed(result: Animation, name: str, value: float, frames: slice = slice(None)) -> Animation:
+    """The result with a BAP that is larger by a value, degrees or mm, in some frames."""
+    assert result.body is not None
+    values = result.body.values.copy()
+    amount = value if "_tr_" in name else np.radians(value) * 1e5
+    values[frames, bap_numbers()[name] - 1] += round(amount)
+    mask = np.ones_like(result.body.mask)
+    return replace(result, body=replace(result.body, values=values, mask=mask))
+
+
+def find(comparison: Comparison, measure: str, part: str) -> Difference:
+    return next(one for one in comparison.differences if (one.measure, one.part) == (measure, part))
+
+
+def test_a_result_as_it_should_be_is_good(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    comparison = compare(source, result, mapped)
+    assert comparison.verdict == "good"
+    assert comparison.reasons == ()
+    assert comparison.frames == FRAMES
+    assert find(comparison, "direction", "left forearm").worst < 1
+    assert find(comparison, "foot", "left foot").worst < 3
+    assert find(comparison, "path", "hips").worst < 5
+
+
+@pytest.mark.parametrize(
+    ("bap", "value", "measure", "part", "worst"),
+    [
+        ("l_elbow_flexion", 30, "direction", "left forearm", 30),
+        ("r_knee_flexion", 40, "direction", "right shank", 40),
+        ("l_shoulder_flexion", -20, "direction", "left upper arm", 20),
+        ("l_ankle_flexion", 35, "foot", "left foot", 35),
+        ("skullbase_torsion", 38, "head", "head", 38),
+        ("l_sternoclavicular_abduct", 30, "clavicle", "left clavicle", 30),
+    ],
+)
+def test_what_is_off_all_the_time_is_seen(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int], bap: str, value: float, measure: str,
+    part: str, worst: float,
+) -> None:  # fmt: skip
+    before = find(compare(source, result, mapped), measure, part).worst
+    one = find(compare(source, changed(result, bap, value), mapped), measure, part)
+    assert one.worst == pytest.approx(worst, abs=before + 4)
+    assert one.typical == pytest.approx(one.worst, abs=1)
+    assert one.grade == ("poor" if worst >= bounds()[measure].poor else "fair")
+    assert f" {one.worst:.0f} " in one.sentence
+
+
+def test_a_hand_that_turns_over_is_seen_without_fingers(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    """Half of the time it is turned by 90 degrees: 45 from the mean of both."""
+    turned = changed(result, "l_wrist_twisting", 90, slice(15, None))
+    one = find(compare(source, turned, mapped), "turn", "left hand")
+    assert one.worst == pytest.approx(45, abs=1)
+    assert one.grade == "poor"
+
+
+def test_a_flip_for_one_frame_is_a_jump(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    flipped = changed(result, "HumanoidRoot_rt_body_turn", 178, slice(7, 8))
+    comparison = compare(source, flipped, mapped)
+    one = find(comparison, "jump", "pelvis")
+    assert one.worst == pytest.approx(178, abs=1)
+    assert one.frame in (7, 8)
+    assert comparison.verdict == "poor"
+    assert comparison.differences[0].measure == "jump"
+    assert find(comparison, "direction", "line of the hips").worst < 1  # it does not last
+
+
+def test_a_leap_of_the_root_and_a_floor_out_of_reach(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    leapt = compare(source, changed(result, "HumanoidRoot_tr_frontal", 900, slice(3, 4)), mapped)
+    assert find(leapt, "leap", "hips").worst == pytest.approx(900, abs=1)
+    sunk = changed(result, "HumanoidRoot_tr_vertical", -960)
+    one = find(compare(source, sunk, mapped), "floor", "left sole")
+    assert one.worst == pytest.approx(960, abs=25)
+    assert one.grade == "poor"
+    floating = find(compare(source, sunk, mapped, level=None), "floor", "left sole")
+    assert floating.worst < 25  # where there is no floor, its height does not matter
+
+
+def test_a_limb_that_was_not_matched_is_seen(source: SkeletonMotion, result: Animation) -> None:
+    swing = Rotation.from_rotvec(np.linspace(0, 1, FRAMES)[:, None] * [1.0, 0.0, 0.0])
+    moving = motion("standing", FRAMES, turns={"LeftArm": swing}, rate=15)
+    mapped = {
+        joint: n
+        for joint, n in map_joints(moving.names, None, Skeleton.default())[1].items()
+        if joint[:2] != "l_"
+    }
+    comparison = compare(moving, result, mapped)
+    assert find(comparison, "unmatched", "left arm").grade == "poor"
+    assert "1 moving joints are left over" in find(comparison, "unmatched", "left leg").sentence
+
+
+def test_the_way_up_comes_from_the_motion_before_the_rest_pose(mapped: dict[str, int]) -> None:
+    """Z up, in a file whose rest pose lies along x."""
+    lying = Rotation.from_euler("z", -90, degrees=True)
+    for world, expected in (
+        (Rotation.identity(), [0, 1, 0]),
+        (Rotation.from_euler("x", 90, degrees=True), [0, 0, 1]),
+    ):
+        captured = motion("standing", 3, world=world)
+        np.testing.assert_allclose(find_up(captured, mapped)[1], expected, atol=1e-9)
+        back = (lying.inv()).as_quat()[[3, 0, 1, 2]]
+        rest = captured.offsets @ lying.as_matrix().T
+        quaternions = captured.rotations.copy()
+        quaternions[:, 0] = back
+        np.testing.assert_allclose(
+            find_up(replace(captured, offsets=rest, rotations=quaternions), mapped)[1], expected, atol=1e-9
+        )
+
+
+def test_long_motions_are_sampled_in_runs(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    comparison = compare(source, changed(result, "l_elbow_flexion", 60, slice(26, 30)), mapped, most=20)
+    assert comparison.frames == 20
+    assert find(comparison, "direction", "left forearm").worst == pytest.approx(60, abs=1)
+    assert find(comparison, "direction", "left forearm").frame >= 26
+
+
+def test_worst_frames_lie_apart() -> None:
+    ones = (
+        Difference("direction", "left forearm", 0.0, 90.0, 10),
+        Difference("direction", "right forearm", 0.0, 80.0, 12),
+        Difference("direction", "left thigh", 0.0, 30.0, 40),
+        Difference("head", "head", 0.0, 1.0, 80),
+    )
+    comparison = Comparison(100, ()).with_more(ones)
+    assert [one.frame for one in comparison.worst_frames(3, 10)] == [10, 40, 80]
+    assert comparison.verdict == "poor"
+    assert [one.part for one in comparison.reasons] == ["left forearm", "right forearm", "left thigh"]
+
+
+def test_a_source_with_nothing_in_common(source: SkeletonMotion, mapped: dict[str, int]) -> None:
+    empty = Animation(Fraction(15), np.arange(2), FaceTrack.empty(2))
+    with pytest.raises(ModelError, match="no body"):
+        compare(source, empty, mapped)
+
+
+def test_sticks_stand_where_the_result_stands(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    (near,) = find_sticks(source, result, mapped, [4])
+    (far,) = find_sticks(source, changed(result, "HumanoidRoot_tr_frontal", 2000), mapped, [4])
+    np.testing.assert_allclose(
+        far.lines - near.lines, np.broadcast_to([0, 0, 2.0], near.lines.shape), atol=2e-3
+    )
+    assert near.sides.count("l") == near.sides.count("r") == 8
+    assert len(near.soles) == 2
+    assert abs(near.soles[0][:, 1].mean()) < 0.03
