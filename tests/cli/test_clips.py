@@ -56,7 +56,7 @@ def test_each_command_reads_the_clip_that_it_is_given(run: Run, people: Path, tm
     )
     assert code == 0
     assert "animations" not in err
-    assert "(10 frames)" in out
+    assert "10 frames beside the source" in out
 
 
 def test_a_clip_that_is_not_there(run: Run, people: Path, bvh: Path, tmp_path: Path) -> None:

@@ -197,7 +197,9 @@ def command(
             capture=capture, format=format, clip=clip, limits=limit, tables=tables,
         )  # fmt: skip
     if report is not None and (animation.body is None or not captures):
-        raise click.UsageError("--report compares motion capture with its result, and there is none")
+        raise click.UsageError(
+            "--report compares motion capture with its result, and there is no body to compare"
+        )
     animation, limit_values = capture_report.apply_limits(animation, limits)
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
