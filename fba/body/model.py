@@ -19,6 +19,7 @@ from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh.meshes import Material, Meshes, join_rows, mesh_arrays
 
 if TYPE_CHECKING:
+    from fba.body.own_head import OwnHead
     from fba.body.skin.skinning import Skinner
 
 __all__ = ["BODY_PART_KINDS", "BodyModel", "BodyPart", "Material"]
@@ -91,6 +92,7 @@ class BodyModel(Meshes[BodyPart]):
     eyes: Float64 | None = None
     name: str = ""
     notes: Mapping[str, str] = field(default_factory=dict)
+    own_head: OwnHead | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parts", tuple(self.parts))

@@ -20,10 +20,12 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float32, Float64, Int32
 from fba.body.model import BodyModel, BodyPart
+from fba.body.own_head import OwnHead
 from fba.body.skeleton import ROOT, Skeleton
 from fba.body.skin.skin_weights import strongest_weights
 from fba.capture.rest import Rest, find_rest
 from fba.errors import FbaWarning, FormatError, ModelError
+from fba.formats.gltf._own_heads import PlacedMesh, read_head
 from fba.formats.gltf._pose import bind_matrices
 from fba.formats.gltf._skeletons import Joints, find_joints
 from fba.gltf import Gltf, Node, Primitive, read_gltf
@@ -65,7 +67,8 @@ def read_body(
 
     joints: as for `fba.capture.from_skeleton`. The body gets the size at which its hips are as high as the
     default body's, so that the steps of a stream fit it; `notes` says by how much. It has no place for a
-    face: its own head is shown.
+    face: its own head is shown, which FAPs move where it has shapes with known names (`shape_faps.csv`), or
+    expressions of VRM.
 
     Raises FormatError where the file cannot be read, ModelError for a file that shows no person, or one that
     lacks a limb, LimitError where it takes more memory than the limits allow.
@@ -124,11 +127,13 @@ def _import_person(gltf: Gltf, path: Path, joints: Mapping[str, str] | None) -> 
             "expected a person with a head, arms and legs"
         )
     fit = _fit(standing, skeleton)
-    parts = _read_parts(gltf, found, _carriers(gltf, found, mapped, skeleton), fit)
+    meshes = _read_parts(gltf, found, _carriers(gltf, found, mapped, skeleton), fit)
+    parts = [mesh.part for mesh in meshes]
     if not parts:
         raise ModelError(f"{gltf.file}: no mesh hangs on its skeleton; there is nothing to show")
     name = FilePath(os.fspath(path)).stem
-    return _stand(BodyModel(tuple(parts), *_bound(fit, fit.places), name=name), name)
+    head = read_head(gltf, found.humanoid, meshes, fit.turn)
+    return _stand(BodyModel(tuple(parts), *_bound(fit, fit.places), name=name, own_head=head), name)
 
 
 def _fit(rest: Rest, skeleton: Skeleton) -> _Fit:
@@ -202,6 +207,7 @@ def _stand(body: BodyModel, name: str) -> BodyModel:
     shift[1] = -size * sole
     bind = np.array(body.bind)
     bind[:, :3, 3] = bind[:, :3, 3] * size + shift
+    head = body.own_head
     return BodyModel(
         tuple(
             replace(part, vertices=(part.vertices * size + shift).astype(np.float32)) for part in body.parts
@@ -209,10 +215,16 @@ def _stand(body: BodyModel, name: str) -> BodyModel:
         replace(own, centres=own.centres * size + shift),
         bind,
         name=name,
-        notes={
-            "size": f"{size:.3f} times that of the file, so that its legs are as long as the default body's"
-        },
+        notes={"size": f"{size:.3f} times the file's, so that its hips are as high as the default body's"},
+        own_head=None if head is None else _resize_head(head, size, shift),
     )
+
+
+def _resize_head(head: OwnHead, size: float, shift: Float64) -> OwnHead:
+    """Return a head scaled and moved with its body."""
+    shapes = [replace(shape, shifts=shape.shifts * np.float32(size)) for shape in head.shapes]
+    eyes = [replace(eye, centre=eye.centre * size + shift) for eye in head.eyes]
+    return replace(head, shapes=shapes, eyes=eyes)
 
 
 def _carriers(gltf: Gltf, found: Joints, mapped: Mapping[str, int], skeleton: Skeleton) -> dict[int, int]:
@@ -255,7 +267,7 @@ def _followers(mapped: Mapping[str, int], skeleton: Skeleton) -> dict[str, str]:
     return result
 
 
-def _read_parts(gltf: Gltf, found: Joints, carriers: dict[int, int], fit: _Fit) -> list[BodyPart]:
+def _read_parts(gltf: Gltf, found: Joints, carriers: dict[int, int], fit: _Fit) -> list[PlacedMesh]:
     """Return the meshes that hang on the person's joints, in the body's axes; warns of others."""
     bound = bind_matrices(gltf, skins=found.humanoid is None)
     budget = gltf.budget.copy()
@@ -281,13 +293,12 @@ def _read_parts(gltf: Gltf, found: Joints, carriers: dict[int, int], fit: _Fit) 
             material = None if primitive.material is None else gltf.materials[primitive.material]
             look, texcoords, colours = _look(primitive, material)
             name = names(node.name if not node.name.startswith("node ") else gltf.meshes[node.mesh].name)
-            parts.append(
-                BodyPart(
-                    name, _kind(name, material), places.astype(np.float32),
-                    primitive.triangles[:, ::-1].copy() if mirrored else primitive.triangles,
-                    joints, weights, normals, texcoords, colours, look,
-                )
+            part = BodyPart(
+                name, _kind(name, material), places.astype(np.float32),
+                primitive.triangles[:, ::-1].copy() if mirrored else primitive.triangles,
+                joints, weights, normals, texcoords, colours, look,
             )  # fmt: skip
+            parts.append(PlacedMesh(part, number, primitive, linear, bound))
     if left_out:
         warnings.warn(
             f"{gltf.file}: meshes that hang on no joint of the person are left out: "

@@ -133,6 +133,14 @@ def amounts_of(name: str) -> Float64 | None:
 
 
 @cache
+def largest_amounts() -> Float64:
+    """Return the largest value (68,) of each FAP that a shape of the table has; read-only."""
+    largest: Float64 = np.abs(list(_table().values())).max(axis=0)
+    largest.flags.writeable = False
+    return largest
+
+
+@cache
 def _table() -> dict[str, Float64]:
     """Return FAPs (68,) at weight 1 by the key of each shape's name."""
     table: dict[str, Float64] = {}
@@ -248,6 +256,11 @@ def _face_bones(gltf: Gltf, clip: Clip) -> list[_Bone]:
             nodes = [node for node in turned if _is_named(gltf.nodes[node].name, kind)]
         result += [_Bone(node, kind) for node in nodes[:1] if node in turned]
     return result
+
+
+def is_eye(name: str, side: str) -> bool:
+    """Whether a bone's name says that it is the eye on side "l" or "r"."""
+    return _is_named(name, side)
 
 
 def _is_named(name: str, kind: str) -> bool:

@@ -70,7 +70,12 @@ class Person:
     def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
         """All parts but the eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
         positions, normals = np.empty_like(self.body.vertices), np.empty_like(self.body.vertices)
-        self.body.skin(joints, positions, normals)
+        own = self.body.own_head if self.head is None else None
+        if own is None:
+            self.body.skin(joints, positions, normals)
+        else:
+            moved = own.move(self.body.vertices, faps)
+            self.body.skinner.skin_vertices(moved, self.body.normals, joints, positions, normals)
         light = self.light.shade(positions, normals, joints)
         meshes = [
             _mesh_in_world(shape, part_rows(self.body, name), positions, normals, light)

@@ -35,7 +35,7 @@ def test_body_and_face_come_from_one_file(tmp_path: Path) -> None:
     jaw = column(animation, "open_jaw")
     np.testing.assert_allclose(jaw, RAMP * jaw[-1], atol=1)
     assert 800 < jaw[-1] <= 1080  # what an I plane of the standard carries, from fap.csv
-    np.testing.assert_allclose(column(animation, "close_t_r_eyelid"), RAMP * 450, atol=1)
+    np.testing.assert_allclose(column(animation, "close_t_r_eyelid"), RAMP * 480, atol=1)
     assert not column(animation, "close_t_l_eyelid").any()
     assert animation.face is not None
     sent = animation.face.mask.all(axis=0)

@@ -1,0 +1,107 @@
+"""The head of a body that brings one with shapes: FAPs mix its shapes and turn its eyes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fba import rotations
+from fba.arrays import Float32, Float64, Intp
+from fba.parameters import FAP_COUNT, fap_numbers
+
+UP, ASIDE = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+SMALL, FEW = 0.1, 0.03
+"""Weights of keeping shapes small, and few, relative to reaching the largest values of a FAP."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeadShape:
+    """A shape of a head.
+
+    faps: float64 (68,), the FAPs that it shows at weight 1. rows: (N,), vertices of the body that it moves,
+    by shifts, float32 (N, 3), metres, in the body's axes as modelled.
+    """
+
+    name: str
+    faps: Float64
+    rows: Intp
+    shifts: Float32
+
+
+@dataclass(frozen=True, eq=False)
+class OwnEye:
+    """An eyeball of a head: side "l" or "r", the vertices that turn with it, (N,), and its centre (3,)."""
+
+    side: str
+    rows: Intp
+    centre: Float64
+
+
+@dataclass(frozen=True, eq=False)
+class OwnHead:
+    """Shapes and eyes of the head that a body brings.
+
+    ranges: (68,), values of FAPs that count as one: those that a face shows at most.
+    """
+
+    ranges: Float64
+    shapes: Sequence[HeadShape] = ()
+    eyes: Sequence[OwnEye] = ()
+    _last: list[tuple[bytes, Float64]] = field(default_factory=list, repr=False)
+
+    @cached_property
+    def _matrix(self) -> tuple[Float64, Float64]:
+        """Scales (68,) of FAPs, and the matrix (68 + K, K) that mixes shapes."""
+        faps = np.array([shape.faps for shape in self.shapes]).reshape(-1, FAP_COUNT).copy()
+        for eye in self.eyes:  # the eyeballs turn; shapes that look aside have nothing to add
+            for what in ("yaw", "pitch"):
+                faps[:, fap_numbers()[f"{what}_{eye.side}_eyeball"] - 1] = 0
+        used = np.abs(faps).max(axis=0, initial=0.0) > 0
+        scales = np.where(used, 1 / np.maximum(self.ranges, 1.0), 0.0)
+        return scales, np.concatenate([(faps * scales).T, SMALL * np.eye(len(faps))])
+
+    def weights(self, faps: npt.ArrayLike) -> Float64:
+        """Return the weights (K,), 0 to 1, of the shapes that together come closest to FAPs (68,)."""
+        from scipy.optimize import nnls
+
+        values = np.asarray(faps, dtype=np.float64)
+        if not self.shapes or not values.any():
+            return np.zeros(len(self.shapes))
+        key = values.tobytes()
+        if self._last and self._last[0][0] == key:
+            return self._last[0][1]
+        scales, matrix = self._matrix
+        count, reached = len(self.shapes), values * scales
+        chosen = nnls(matrix, np.concatenate([reached, np.full(count, -FEW / SMALL)]))[0] > 0
+        result: Float64 = np.zeros(count)
+        matrix = matrix[:FAP_COUNT]
+        while chosen.any():  # a shape that would be overdone stays at 1, and the others make up for it
+            result[chosen] = nnls(matrix[:, chosen], reached - matrix[:, ~chosen] @ result[~chosen])[0]
+            over = result > 1
+            if not over.any():
+                break
+            result[over] = 1.0
+            chosen &= ~over
+        self._last[:] = [(key, result)]
+        return result
+
+    def move(self, vertices: Float32, faps: npt.ArrayLike) -> Float32:
+        """Return the body's vertices (V, 3) as modelled with the head moved by FAPs (68,)."""
+        moved = vertices.astype(np.float32)  # a copy
+        for shape, weight in zip(self.shapes, self.weights(faps), strict=True):
+            if weight > 0:
+                moved[shape.rows] += np.float32(weight) * shape.shifts
+        values = np.asarray(faps, dtype=np.float64) / 1e5
+        for eye in self.eyes:
+            yaw, pitch = (
+                values[fap_numbers()[f"{what}_{eye.side}_eyeball"] - 1] for what in ("yaw", "pitch")
+            )
+            if yaw or pitch:
+                turn = rotations.turn(UP, np.array(yaw)) @ rotations.turn(ASIDE, np.array(pitch))
+                turned = (moved[eye.rows] - eye.centre) @ turn.T + eye.centre
+                moved[eye.rows] = turned.astype(np.float32)
+        return moved

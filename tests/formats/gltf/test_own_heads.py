@@ -1,0 +1,114 @@
+"""Heads of foreign bodies: FAPs mix their shapes, by name or as VRM declares them, and turn their eyes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fba.body.own_head import HeadShape, OwnHead
+from fba.formats.gltf.bodies import read_body
+from fba.formats.gltf.face_motion import amounts_of
+from fba.parameters import FAP_COUNT, fap_numbers
+from gltf_edits import edit
+from small_people import BONES, write_person
+
+HEAD = slice(8 * list(BONES).index("head"), 8 * list(BONES).index("head") + 8)
+RISE = 0.01
+"""Metres by which every morph target of the small person raises its head's box, in the file's size."""
+
+
+def faps(**values: float) -> np.ndarray:
+    result = np.zeros(FAP_COUNT)
+    for name, value in values.items():
+        result[fap_numbers()[name] - 1] = value
+    return result
+
+
+def risen(path: Path, values: np.ndarray) -> np.ndarray:
+    """By how much FAPs raise vertices, in metres of the file."""
+    body = read_body(path)
+    assert body.own_head is not None
+    size = float(body.notes["size"].split()[0])
+    moved: np.ndarray = body.own_head.move(body.vertices, values) - body.vertices
+    return moved / size
+
+
+def test_shapes_with_known_names_move_the_head(tmp_path: Path) -> None:
+    morphs = {"jawOpen": [0.0], "eyeBlink_L": [0.0], "Wobble": [0.0]}
+    path = write_person(tmp_path / "p.glb", morphs=morphs)
+    body = read_body(path)
+    assert body.own_head is not None
+    assert [shape.name for shape in body.own_head.shapes] == ["jawOpen", "eyeBlinkLeft"]
+    moved = risen(path, faps(close_t_l_eyelid=1024))
+    np.testing.assert_allclose(moved[HEAD], np.tile([0, RISE, 0], (8, 1)), atol=2e-5)
+    moved[HEAD] = 0
+    assert not moved.any()
+    assert not risen(path, faps(close_t_r_eyelid=1024)).any()
+    jaw = amounts_of("jawOpen")
+    assert jaw is not None
+    np.testing.assert_allclose(risen(path, jaw / 2)[HEAD, 1], RISE / 2, rtol=0.03)
+
+
+def test_one_shape_that_two_names_mean_moves_once(tmp_path: Path) -> None:
+    path = write_person(tmp_path / "p.glb", morphs={"Fcl_EYE_Close_L": [0.0], "eyeBlinkLeft": [0.0]})
+    np.testing.assert_allclose(risen(path, faps(close_t_l_eyelid=1024))[HEAD, 1], RISE, atol=2e-5)
+
+
+@pytest.mark.parametrize("extension", ["VRM", "VRMC_vrm"])
+def test_expressions_that_vrm_declares(tmp_path: Path, extension: str) -> None:
+    """The target's own name says nothing; the declaration says "open mouth", at 40 %."""
+    path = write_person(tmp_path / "p.vrm", extension=extension, morphs={"n1": [0.0]})
+
+    def declare(document: dict) -> None:  # type: ignore[type-arg]
+        content = document["extensions"][extension]
+        node = next(n for n, entry in enumerate(document["nodes"]) if "mesh" in entry)
+        if extension == "VRM":
+            group = {"presetName": "a", "binds": [{"mesh": 0, "index": 0, "weight": 40}]}
+            content["blendShapeMaster"] = {"blendShapeGroups": [group]}
+        else:
+            binds = [{"node": node, "index": 0, "weight": 0.4}]
+            content["expressions"] = {"preset": {"aa": {"morphTargetBinds": binds}}}
+
+    edit(path, declare)
+    open_mouth = amounts_of("aa")
+    assert open_mouth is not None
+    np.testing.assert_allclose(risen(path, open_mouth)[HEAD, 1], 0.4 * RISE, rtol=0.02)
+
+
+def test_eyes_turn_with_their_bones(tmp_path: Path) -> None:
+    """The bone of the left hand is called an eye here: its box turns about it."""
+    path = write_person(tmp_path / "p.glb", extension="VRMC_vrm")
+
+    def rename(document: dict) -> None:  # type: ignore[type-arg]
+        bones = document["extensions"]["VRMC_vrm"]["humanoid"]["humanBones"]
+        bones["leftEye"] = bones.pop("leftMiddleProximal")
+
+    edit(path, rename)
+    body = read_body(path)
+    assert body.own_head is not None
+    (eye,) = body.own_head.eyes
+    box = 8 * list(BONES).index("leftMiddleProximal")
+    assert eye.rows.tolist() == list(range(box, box + 8))
+    quarter = faps(yaw_l_eyeball=np.pi / 2 * 1e5)
+    before, after = body.vertices[eye.rows] - eye.centre, body.own_head.move(body.vertices, quarter)[eye.rows]
+    # to the subject's left: what points ahead, +z, points to +x then
+    np.testing.assert_allclose(after - eye.centre, before[:, [2, 1, 0]] * [1, 1, -1], atol=1e-5)
+    down = body.own_head.move(body.vertices, faps(pitch_l_eyeball=np.pi / 2 * 1e5))[eye.rows] - eye.centre
+    np.testing.assert_allclose(down, before[:, [0, 2, 1]] * [1, -1, 1], atol=1e-5)
+
+
+def test_few_shapes_are_mixed_and_none_overdone() -> None:
+    rows, shifts = np.zeros(1, dtype=np.intp), np.ones((1, 3), dtype=np.float32)
+    close = HeadShape("close", faps(close_t_l_eyelid=960, close_b_l_eyelid=64), rows, shifts)
+    wide = HeadShape("wide", faps(close_t_l_eyelid=-260, close_b_l_eyelid=-60), rows, shifts)
+    half = HeadShape("half", faps(close_t_l_eyelid=480, close_b_l_eyelid=32), rows, shifts)
+    head = OwnHead(np.full(FAP_COUNT, 960.0), [close, wide, half])
+    np.testing.assert_allclose(head.weights(faps(close_t_l_eyelid=1024)), [1, 0, 0], atol=0.1)
+    np.testing.assert_allclose(head.weights(faps(close_t_l_eyelid=3000))[0], 1)
+    np.testing.assert_allclose(
+        head.weights(faps(close_t_l_eyelid=-260, close_b_l_eyelid=-60)), [0, 1, 0], atol=0.03
+    )
+    assert not head.weights(np.zeros(FAP_COUNT)).any()
+    assert not head.weights(faps(raise_l_ear=500)).any()
