@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -61,7 +61,8 @@ class RetargetReport:
 
     family: that of the joint names, empty if they were given. bones: in the body's order. feet: None if the
     source has no ankles, or its feet are never on the ground. unused: joints of the source that move no joint
-    of the body. missing: joints that BAPs can turn, but the source lacks.
+    of the body. missing: joints that BAPs can turn, but the source lacks. found: how "bones", "up" and "rest"
+    were found, each with its confidence, in words.
     """
 
     family: str
@@ -70,6 +71,7 @@ class RetargetReport:
     feet: FeetError | None
     unused: tuple[str, ...]
     missing: tuple[str, ...]
+    found: dict[str, str] = field(default_factory=dict)
 
     @property
     def mean(self) -> float:
@@ -157,6 +159,10 @@ def retarget_report(
         standing,
         tuple(name for number, name in enumerate(motion.names) if number not in used),
         tuple(joint for joint in solver.convention.joints if joint in skeleton and joint not in mapped),
+        {
+            what: f"{reason} (confidence {ready.confidence[what]:.2f})"
+            for what, reason in ready.reasons.items()
+        },
     )
 
 

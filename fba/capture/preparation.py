@@ -82,7 +82,8 @@ def prepare(
     rest pose, "first" for its first frame, a number for another frame, "motion" to work it out from the
     motion. up: "auto", or the source's axis that points up, such as "+z".
 
-    ModelError for less confidence than `LEAST`, and where no bones are found; ValueError for wrong options.
+    ModelError for less confidence than `LEAST`, where no bones are found, and for a frame that is not there;
+    ValueError for other wrong options.
     """
     if isinstance(rest, str) and rest not in RESTS:
         raise ValueError(f"rest must be one of {', '.join(RESTS)} or the number of a frame, not {rest!r}")
@@ -91,7 +92,7 @@ def prepare(
     if not len(motion):
         raise ModelError("the motion has no frames")
     if not isinstance(rest, str) and not 0 <= rest < len(motion):
-        raise ValueError(f"rest: the motion has {len(motion)} frames, from 0; there is no frame {rest}")
+        raise ModelError(f"rest: the motion has {len(motion)} frames, from 0; there is no frame {rest}")
     matching.check_root(skeleton)
     family, mapped, sure, how = find_bones(motion, joints, skeleton)
     confidence, reasons = {"bones": sure}, {"bones": how}
@@ -354,7 +355,7 @@ def _refuse_doubt(result: Preparation, given_joints: bool, given_rest: bool, giv
             "rest",
             given_rest,
             "the rest pose is not clear",
-            Remedy("rest", "say where it is with {}", "'first'"),
+            Remedy("rest", "if a frame shows a T-pose, or somebody who stands, say which with {}", "0"),
         ),
     ):
         if not given and result.confidence[what] < LEAST:

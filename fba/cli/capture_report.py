@@ -78,13 +78,14 @@ def compare_captures(
     detailed: bool,
     format: str | None = None,
     clip: str | None = None,
-    joints: Mapping[str, str] | None = None,
+    options: Mapping[str, Any] | None = None,
 ) -> list[CaptureReport]:
     """Return reports of captures.
 
     animation, decoded: before coding and after. clamped: what the encoder clamped. ground: the value of
     `--ground`. detailed: compare all frames, and bones before coding. clip: the animation that was read of a
-    file with several, by name or number. joints: the map of joints that was given.
+    file with several, by name or number. options: those with which captures were read, of which joints, rest
+    and up count.
     """
     from fba.body import Skeleton
     from fba.capture import retarget_report
@@ -92,16 +93,17 @@ def compare_captures(
     from fba.capture.preparation import find_bones
     from fba.formats import format_of
 
+    given = {name: value for name, value in (options or {}).items() if name in ("joints", "rest", "up")}
     reports = []
     for path in captures:
         reader = format_of(path, format)
         assert reader.read_motion is not None  # the caller names captures only
         motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": clip}))
-        _, mapped, _, _ = find_bones(motion, joints, Skeleton.default())
+        _, mapped, _, _ = find_bones(motion, given.get("joints"), Skeleton.default())
         level = 0.0 if ground == "floor" else None
         comparison = compare(motion, decoded, mapped, level=level, most=None if detailed else SAMPLE)
         comparison = comparison.with_more(_clamped_differences(clamped))
-        bones = asdict(retarget_report(motion, animation, joints=joints)) if detailed else None
+        bones = asdict(retarget_report(motion, animation, **given)) if detailed else None
         reports.append(CaptureReport(path, motion, mapped, decoded, comparison, bones))
     return reports
 
@@ -132,6 +134,7 @@ def report_lines(report: CaptureReport) -> list[str]:
             f"{_unit(one):8} {one.frame:5}  {_coloured(one.grade, one.grade)}"
         )
     bones = report.bones or {}
+    result += [f"  {what}: {reason}" for what, reason in bones.get("found", {}).items()]
     for what, key in (("unused joints of the source", "unused"), ("joints that the source lacks", "missing")):
         if names := bones.get(key):
             more = f", and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""

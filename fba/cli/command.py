@@ -27,6 +27,8 @@ OPTIONS = {
     "limits": "limit",
     "clip": "clip",
     "joints": "maps",
+    "rest": "rest",
+    "up": "up",
 }
 """Arguments of the library, and the parameters of commands that do the same."""
 OTHER_COMMANDS = (("encode",), ("convert",), ("model", "import"))

@@ -1,4 +1,4 @@
-"""`--map` and `--map-out`: which joint of a capture is which joint of the standard."""
+"""`--map`, `--map-out` and `--rest`: which joint of a capture is which, and how its skeleton rests."""
 
 from __future__ import annotations
 
@@ -37,6 +37,24 @@ class MapType(click.ParamType["Path | Pair"]):
                 f"{text!r} is neither a file nor a pair of joints such as Pelvis=HumanoidRoot", param, ctx
             )
         return source, joint
+
+
+class RestType(click.ParamType["str | int"]):
+    """Which rest pose a capture has: a word, or the number of a frame."""
+
+    name = "rest"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str | int:
+        from fba.capture.preparation import RESTS
+
+        if isinstance(value, int):
+            return value
+        text = str(value)
+        if text in RESTS:
+            return text
+        if not (text.isascii() and text.isdigit() and len(text) < 10):
+            self.fail(f"{text!r} is not one of {', '.join(RESTS)}, nor the number of a frame", param, ctx)
+        return int(text)
 
 
 def map_options(*, out: bool) -> Callable[[Decorated], Decorated]:

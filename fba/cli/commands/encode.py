@@ -22,7 +22,7 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.codec import ClampedParameter
 
-CAPTURE = ("spine", "ground", "plant", "origin")
+CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up")
 """Options that say how motion capture becomes BAPs."""
 
 
@@ -134,6 +134,17 @@ class _EncodeCommand(Command):
     "--origin", "Motion capture: what is placed at the default position.", "source", "start", "middle"
 )
 @joint_options.map_options(out=True)
+@click.option(
+    "--rest",
+    type=joint_options.RestType(),
+    default="auto",
+    show_default=True,
+    metavar="auto|file|first|motion|N",
+    help="Motion capture: the rest pose is the file's own, its first frame, frame N, or found in the motion.",
+)
+@options.choice_option(
+    "--up", "Motion capture: the axis that points up.", "auto", "+x", "-x", "+y", "-y", "+z", "-z"
+)
 @options.choice_option(
     "--limits",
     "Report where joints exceed normal human motion, or clamp them to it.",
@@ -227,7 +238,7 @@ def command(
             decoded = _decode(coded.data, bap_steps=table)
             reports = capture_report.compare_captures(
                 captures, animation, decoded, coded.clamped, ground=str(capture["ground"]), detailed=detailed,
-                format=format, clip=clip, joints=joints,
+                format=format, clip=clip, options=capture,
             )  # fmt: skip
             if page is not None:
                 draw = capture_report.write_page if page.suffix == ".html" else capture_report.draw_report

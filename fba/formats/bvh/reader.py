@@ -72,6 +72,8 @@ def read(
     plant: bool = True,
     spine: str | int = "spread",
     joints: Mapping[str, str] | None = None,
+    rest: str | int = "auto",
+    up: str = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the motion of a BVH file as BAPs; see `fba.capture.from_skeleton` for the options.
@@ -84,7 +86,7 @@ def read(
     try:
         return from_skeleton(
             motion, rate, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine,
-            limits=limits,
+            rest=rest, up=up, limits=limits,
         )  # fmt: skip
     except ModelError as error:
         raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error

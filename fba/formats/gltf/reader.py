@@ -61,6 +61,8 @@ def read(
     spine: str | int = "spread",
     joints: Mapping[str, str] | None = None,
     clip: str | int | None = None,
+    rest: str | int = "auto",
+    up: str = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Read the animation of a glTF skeleton as BAPs, and that of its face as FAPs, see `read_face_motion`.
@@ -74,8 +76,8 @@ def read(
     """
     try:
         gltf = read_gltf(path, limits=limits)
-        plain = (joints, scale, origin, ground, plant, spine) == (
-            None, None, "source", "floor", True, "spread",
+        plain = (joints, scale, origin, ground, plant, spine, rest, up) == (
+            None, None, "source", "floor", True, "spread", "auto", "auto",
         )  # fmt: skip
         if plain and gltf.animations:
             own = gltf.animations[0] if clip is None else choose_clip(gltf, clip, range(len(gltf.nodes)))
@@ -91,7 +93,7 @@ def read(
                 sampled = _sample(gltf, clip, rate, limits)
                 animation = from_skeleton(
                     sampled.motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant,
-                    spine=spine, limits=limits,
+                    spine=spine, rest=rest, up=up, limits=limits,
                 )  # fmt: skip
         except ModelError:
             if joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
