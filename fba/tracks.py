@@ -212,6 +212,33 @@ def compact_track(kind: type[Track], source: CompactFrames, frames: range) -> Tr
     return track
 
 
+@dataclass(frozen=True, eq=False)
+class BodyColumns:
+    """BAPs of frames that all send the same ones, as `CompactFrames`.
+
+    rows: int32 (T, K), the values that are sent. sent: bool (296,), K of them.
+    """
+
+    rows: Int32
+    sent: Bool
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def array(self, name: str, frames: slice) -> Array | None:
+        """Return the values or the mask of these frames."""
+        rows = self.rows[frames]
+        if name == "mask":
+            return np.broadcast_to(self.sent, (len(rows), BAP_COUNT))
+        values = np.zeros((len(rows), BAP_COUNT), dtype=np.int32)
+        values[:, self.sent] = rows
+        return values
+
+    def track(self) -> BodyTrack:
+        """Return the track of all frames."""
+        return compact_track(BodyTrack, self, range(len(self.rows)))
+
+
 def _fill_in(track: FaceTrack | BodyTrack, name: str) -> Array | None:
     """Return a field that a compact track does not hold yet, and store it."""
     if name.startswith("_") or name not in track.__slots__:

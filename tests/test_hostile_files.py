@@ -8,13 +8,17 @@ import json
 import os
 import subprocess
 import sys
+import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import fba
 from fba.errors import LimitError, ModelError
-from hostile_files import bvh, hostile_files, png, skeleton, surface
+from gltf_edits import with_keys
+from hostile_files import bvh, capture, encode_capture, hostile_files, png, skeleton, surface
 
 SMALL, LARGE = (200_000, 800_000) if os.environ.get("FBA_FUZZ") == "long" else (15_000, 60_000)
 HELPERS = Path(__file__).parent / "helpers"
@@ -45,6 +49,43 @@ def test_time_and_memory_grow_no_faster_than_files(tmp_path: Path) -> None:
             findings.append(f"{result['name']}: {large['bytes']} bytes take {large['memory'] / 1e6:.0f} MB")
         findings += [f"{result['name']}: {one['outcome']}" for one in (small, large) if one["outcome"]]
     assert not findings, "\n".join(findings)
+
+
+def _growth(read: Callable[[Path], object], paths: list[Path]) -> float:
+    """Return bytes of memory for each byte that the second file is longer than the first."""
+    peaks = []
+    for path in paths:
+        tracemalloc.start()
+        try:
+            read(path)
+            peaks.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+    lengths = [path.stat().st_size for path in paths]
+    return (peaks[1] - peaks[0]) / (lengths[1] - lengths[0])
+
+
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
+def test_a_capture_of_short_lines_and_many_frames(tmp_path: Path) -> None:
+    """150 bytes a frame become 296 BAPs: 1480 bytes, if those that are not sent were stored as well."""
+    paths = [tmp_path / "short.bvh", tmp_path / "long.bvh"]
+    for path, frames in zip(paths, (600, 2400), strict=True):
+        path.write_bytes(capture(148 * frames))
+    encode_capture(paths[0])
+    assert _growth(encode_capture, paths) < 20
+
+
+def test_many_keys_in_one_channel_of_our_own_file(tmp_path: Path) -> None:
+    """20 bytes a key turn into all BAPs that the file sends."""
+    mask = np.zeros((2, 296), dtype=bool)
+    mask[:, :186] = True
+    body = fba.BodyTrack(np.zeros(mask.shape, dtype=np.int32), mask)
+    fba.write(tmp_path / "a.glb", fba.Animation(25, np.arange(2), None, body))
+    paths = [tmp_path / "short.glb", tmp_path / "long.glb"]
+    for path, keys in zip(paths, (1000, 4000), strict=True):
+        path.write_bytes(with_keys((tmp_path / "a.glb").read_bytes(), keys))
+    assert len(fba.read(paths[0])) == 1000
+    assert _growth(fba.read, paths) < 50  # 37 of them the 186 values of a key
 
 
 def test_two_keys_hours_apart(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ GROUNDS = ("floor", "source", "none")
 SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spines.GROUPS}
 MOST_FRAMES = 500_000
 """More than an hour at 120 frames/s."""
-FRAME_BYTES, JOINT_BYTES = 3500, 110
+FRAME_BYTES, JOINT_BYTES = 2400, 130
 """Memory that retargeting takes for each frame, and for each joint of the source in it."""
 LIMBS = tuple(
     tuple(f"{side}_{joint}" for joint in chain)

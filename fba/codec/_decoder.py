@@ -28,6 +28,8 @@ _END = bytes([*syntax.START_CODE_PREFIX, syntax.END_CODE])
 _NO_END = "the stream ends without the end code 00 00 01 b1: it may have been cut off behind this plane"
 _FRAME_BYTES = 500
 """Memory of a `fba.Frame` without its arrays."""
+_DAMAGE_BYTES = 1000
+"""Memory of a `Damage` with its error."""
 _LARGE_PLANE = 4096
 """Bytes beyond which an incomplete plane is not tried again with every byte that comes."""
 
@@ -41,7 +43,7 @@ class Decoder:
     code before an I plane; `damage` then lists what was lost. Frame numbers increase in any case: where a
     time code shows that misread planes took too many frames, those behind it follow them at once.
 
-    limits: see `fba.Limits`; `bytes` bounds what one call returns.
+    limits: see `fba.Limits`; `bytes` bounds what one call returns, and the list of damage.
 
     `push` and `finish` return frames as soon as their planes are complete. `push` first returns the frames
     before damage; the next call raises the error. `finish` raises at once; frames that it still decoded are
@@ -156,6 +158,7 @@ class Decoder:
                     self._error = error
                 else:
                     self._skip_damage(error)
+                    self._check_damage()
         return blocks
 
     def _find_object(self, final: bool) -> Iterator[Block] | None:
@@ -412,6 +415,14 @@ class Decoder:
         else:
             self._scanned = max((self._lost_from >> 3) + 1, 0) if self._objects else self._bit >> 3
         self._step = self._resynchronise
+
+    def _check_damage(self) -> None:
+        """Stop with a LimitError where the list of damage takes more memory than allowed."""
+        memory, read = len(self.damage) * _DAMAGE_BYTES, self._buffer.offset + self._buffer.length
+        try:
+            self._limits.check_bytes(memory, f"a list of {len(self.damage)} damages", source=read)
+        except LimitError as error:
+            self._error = error
 
     def _outside(self, position: int, code: int) -> BitstreamError:
         """Return the error for a plane start code, at a byte of the buffer, outside of an object."""

@@ -23,7 +23,16 @@ from codec_streams import (
     packed,
     segment,
 )
-from fba import BitstreamError, Decoder, FbaError, FbaWarning, UnsupportedError, decode
+from fba import (
+    BitstreamError,
+    Decoder,
+    FbaError,
+    FbaWarning,
+    LimitError,
+    Limits,
+    UnsupportedError,
+    decode,
+)
 from fba.codec import probe_stream
 from fba.parameters import bap_groups
 from fba_conformance._textbook import FrequencyTable, encode_segment
@@ -160,6 +169,21 @@ def test_a_skip_of_a_thousand_million_frames(intra: bool, mode: str) -> None:
     assert "number_of_frames_to_skip exceeds 15728640" in str(reason)
     assert peak < 10_000_000
     assert time.process_time() - begin < 10
+
+
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
+def test_a_list_of_damage_that_fills_the_memory() -> None:
+    """A byte of damage behind each start code: 5 bytes of stream for some 900 of memory."""
+    data = OBJECT + (PLANE + b"\x80") * 1000
+    with pytest.raises(LimitError, match="a list of 401 damages takes 401000 bytes of memory") as caught:
+        decode(data, on_error="salvage", limits=Limits(bytes=300_000))
+    assert caught.value.limit == "bytes"
+    decoder = Decoder(on_error="salvage", limits=Limits(bytes=300_000))
+    with pytest.raises(LimitError, match="damages"):
+        list(map(decoder.push_blocks, (data[start : start + 64] for start in range(0, len(data), 64))))
+    assert 1000 * len(decoder.damage) < 300_000 + 20 * 5 * len(decoder.damage) + 3000
+    with pytest.raises(BitstreamError, match="no plane that can be decoded"):
+        decode(data, on_error="salvage")
 
 
 def flood(name: str, size: int) -> bytes:

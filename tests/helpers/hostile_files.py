@@ -103,6 +103,16 @@ def bvh(*, joints: str = "", channels: int = 3, motion: str = "", ends: str = ""
     return f"{root}{nested}{ends}}}\nMOTION\n{motion}"
 
 
+def capture(size: int) -> bytes:
+    """A capture of ten joints whose root turns: short lines of many frames."""
+    words = " ".join(["0.12"] * (3 * len(JOINTS)))
+    lines = [f"0 9 0 {n % 40}.5 0 0 {words}\n" for n in range(size // 148)]
+    joints = joint_lines().replace("CHANNELS 0", "CHANNELS 3 Zrotation Xrotation Yrotation")
+    names = "Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+    head = f"HIERARCHY\nROOT Hips\n{{\nOFFSET 0 0 0\nCHANNELS 6 {names}\n{joints}}}\nMOTION\n"
+    return f"{head}Frames: {len(lines)}\nFrame Time: 0.04\n{''.join(lines)}".encode()
+
+
 def nested_joints(size: int) -> bytes:
     """Joints, each in the one before."""
     count = min(size // 60, 4000)
@@ -257,6 +267,13 @@ def read_motion(path: Path) -> object:
     assert read is not None
     motion = read(path)
     return matching.match(motion.names)
+
+
+def encode_capture(path: Path) -> object:
+    """Encode a capture."""
+    import fba
+
+    return fba.encode(fba.read(path), fba.EncoderOptions(clamp=True))
 
 
 def read_epf(path: Path) -> object:
@@ -423,6 +440,7 @@ def _captures() -> dict[str, HostileFile]:
     names = bvh(joints="JOINT |" + joint, motion=motion).split("|")
     return {
         "bvh nested": HostileFile(read_motion, "a.bvh", nested_joints),
+        "bvh capture": HostileFile(encode_capture, "a.bvh", capture),
         "bvh spaces": HostileFile(read_motion, "a.bvh", repeat(bvh() + "Frames", " ", "x\n")),
         "bvh short lines": HostileFile(read_motion, "a.bvh", repeat(bvh(channels=1) + FRAMES, "11\n")),
         "bvh frames": HostileFile(read_any, "a.bvh", repeat(bvh(channels=1) + FRAMES, "1\n", most=10_000)),

@@ -15,10 +15,10 @@ from fba.body.solve.conventions import NO_BAP, Convention, convention
 from fba.body.solve.limits import widest_limits
 from fba.errors import ModelError
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, baps
-from fba.tracks import BodyTrack
+from fba.tracks import BodyColumns, BodyTrack
 
 VALUE_LIMIT = 2**31 - 1
-BLOCK = 2048
+BLOCK = 512
 """Frames of a track solved at once: joint matrices of a long capture would not fit into memory."""
 HALF_TURN = 314159
 """pi in 1e-5 rad."""
@@ -198,17 +198,17 @@ def solve_track(
 
     matrices: returns the joint matrices (F, J, 4, 4) of a slice of frames, as `BapSolver.solve` takes them.
     """
-    values = np.zeros((count, BAP_COUNT), dtype=np.int32)
+    sent = np.zeros(BAP_COUNT, dtype=bool)
+    sent[[bap.number - 1 for bap in baps() if bap.joint in joints]] = True
+    rows = np.empty((count, int(sent.sum())), dtype=np.int32)  # every block is written below
     previous = None
     for begin in range(0, count, BLOCK):
         block = slice(begin, min(begin + BLOCK, count))
-        values[block] = solver.solve(matrices(block), joints, previous)
-        previous = values[block][-1]
-    sent = np.zeros(BAP_COUNT, dtype=bool)
-    sent[[bap.number - 1 for bap in baps() if bap.joint in joints]] = True
-    values = wrapped(values)
-    values.flags.writeable = False  # so that the track need not copy it
-    return BodyTrack(values, np.broadcast_to(sent, values.shape))
+        values = solver.solve(matrices(block), joints, previous)
+        previous = values[-1]
+        rows[block] = values[:, sent]
+    _wrap(rows, [place for place, bap in enumerate(np.flatnonzero(sent).tolist()) if _is_angle(bap)])
+    return BodyColumns(rows, sent).track()
 
 
 def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> Int32:
@@ -220,14 +220,25 @@ def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> Int32:
     1e-5 rad. limit must be at least pi. ValueError for other shapes.
     """
     array = np.asarray(values)
-    columns = [b.number - 1 for b in baps() if b.unit == "1e-5 rad"]
+    columns = [column for column in range(BAP_COUNT) if _is_angle(column)]
     if array.ndim != 2 or array.shape[1] <= max(columns):
         raise ValueError(f"wrapped: needs BAPs of shape (T, 296), not {array.shape}")
     if limit < HALF_TURN:
         raise ValueError(f"wrapped: limit must be at least {HALF_TURN} (half a turn), not {limit}")
     result = array.astype(np.int32)
+    _wrap(result, columns, limit)
+    return result
+
+
+def _is_angle(column: int) -> bool:
+    """Whether the BAP of a column is an angle."""
+    return baps()[column].unit == "1e-5 rad"
+
+
+def _wrap(rows: Int32, columns: list[int], limit: int = HALF_TURN) -> None:
+    """Do the same as `wrapped` with these columns of rows (T, K), in place."""
     for column in columns:
-        angles = array[:, column].astype(np.int64)
+        angles = rows[:, column].astype(np.int64)
         low, high = int(angles.min(initial=0)), int(angles.max(initial=0))
         if -limit <= low and high <= limit:
             continue
@@ -235,8 +246,7 @@ def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> Int32:
         angles = angles - _full_turns((low + high) / 2)
         if int(np.abs(angles).max()) > limit:
             angles = angles - _full_turns(angles.astype(np.float64))
-        result[:, column] = angles
-    return result
+        rows[:, column] = angles
 
 
 def _full_turns(angle: float | Float64) -> Int64:
