@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, NoReturn
@@ -138,7 +138,7 @@ def main(arguments: list[str] | None = None) -> None:
         arguments = sys.argv[1:]
     debug = "--debug" in arguments or bool(os.environ.get("FBA_DEBUG"))
     warnings.simplefilter("always", FbaWarning)
-    warnings.showwarning = _show_warning
+    warnings.showwarning = _warning_display()
     interruptions = Interruptions()
     notice = CompileNotice(next((one for one in arguments if one in _COMMANDS), "")) if own else None
     try:
@@ -187,10 +187,21 @@ def _one_line(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _show_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
-    if issubclass(category, FbaWarning):
-        text = describe(message) if isinstance(message, FbaWarning) else str(message)
-        click.echo(f"fba: warning: {text}", err=True)
+def _warning_display() -> Callable[..., None]:
+    """Return a function that prints each warning of one command, once however often it is given.
+
+    Commands that read a file twice would otherwise say everything twice.
+    """
+    shown: set[str] = set()
+
+    def show(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
+        if issubclass(category, FbaWarning):
+            text = describe(message) if isinstance(message, FbaWarning) else str(message)
+            if text not in shown:
+                shown.add(text)
+                click.echo(f"fba: warning: {text}", err=True)
+
+    return show
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
 from fba.errors import ModelError
-from fba.mesh.polygons import Polygons
+from fba.mesh.polygons import Polygons, strip_triangles
 from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, read_bytes
 
 TYPES = {
@@ -143,6 +143,11 @@ class _Reader:
                 if not lists_of_faces:
                     raise ModelError(f"{self.path}: element face has no list vertex_indices")
                 starts, corners = lists_of_faces[0]
+            elif element.name == "tristrips":
+                for strip_starts, strips in lists.values():
+                    strip_corners = strip_triangles(strip_starts, strips)
+                    corners = np.concatenate([corners, strip_corners])
+                    starts = np.append(starts, starts[-1] + 3 * np.arange(1, len(strip_corners) // 3 + 1))
         if not {"x", "y", "z"} <= set(columns):
             raise ModelError(f"{self.path}: element vertex with properties x, y and z is expected")
         vertices = np.stack([columns[axis] for axis in "xyz"], axis=1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Bool, Float32, Float64, Int32
+from fba.arrays import Bool, Float32, Float64, Int32, Int64
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,3 +68,25 @@ def triangulate(polygons: Polygons, faces: Bool) -> Triangles:
     return Triangles(
         polygons.corners[corner_rows], polygons.corner_texcoords[corner_rows], polygon.astype(np.int32)
     )
+
+
+def strip_triangles(starts: Int64, corners: Int64) -> Int64:
+    """Return the corners (3 T,) of the triangles in strips, which lists of vertices give.
+
+    starts: (S + 1,), where each list begins and the last ends. corners: (C,), vertices; -1 ends a strip
+    within a list, and the next one begins. Every second triangle of a strip is turned, so that all face the
+    same way; those with two corners in one vertex, which join strips, are left out.
+    """
+    places = np.arange(len(corners))
+    begins = np.zeros(len(corners) + 1, dtype=np.int64)
+    begins[starts] = starts
+    begins[:-1] = np.where(corners == -1, places + 1, begins[:-1])
+    begin = np.maximum.accumulate(begins[:-1])  # of the strip that each corner belongs to
+    third = np.flatnonzero((corners != -1) & (places - begin >= 2))
+    triangles = np.stack([corners[third - 2], corners[third - 1], corners[third]], axis=1)
+    turned = (third - begin[third]) % 2 == 1
+    triangles[turned] = triangles[turned][:, [1, 0, 2]]
+    first, second, last = triangles.T
+    kept = (first != second) & (second != last) & (first != last)
+    result: Int64 = triangles[kept].reshape(-1)
+    return result

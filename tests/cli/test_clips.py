@@ -71,3 +71,9 @@ def test_a_clip_that_is_not_there(run: Run, people: Path, bvh: Path, tmp_path: P
     code, _, err = run("encode", bvh, "-o", tmp_path / "out.fba", "--clip", "Wave")
     assert code == 2
     assert "--clip is for glTF, which may hold several animations, not for BVH" in err
+
+
+def test_a_warning_is_printed_once(run: Run, people: Path, tmp_path: Path) -> None:
+    """`--report` reads the file a second time."""
+    code, _, err = run("encode", people, "-o", tmp_path / "out.fba", "--report")
+    assert (code, err.count("'Idle' is read; choose with --clip Wave")) == (0, 1)

@@ -8,7 +8,7 @@ import sys
 import time
 import wave
 from collections.abc import Callable
-from importlib.resources import files
+from importlib.resources import as_file, files
 from pathlib import Path
 
 import click
@@ -18,6 +18,7 @@ from PIL import Image
 
 import fba
 from fba import Animation
+from fba.body import gait
 from fba.cli.pose_options import still_animation
 
 Run = Callable[..., tuple[int, str, str]]
@@ -401,3 +402,27 @@ def test_ctrl_c_and_kill_leave_nothing_half_written(
     assert (process.returncode, err.strip()) == end
     assert output.read_bytes() == b"old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["clip.fba", output.name]
+
+
+@pytest.mark.usefixtures("opengl")
+def test_a_model_alone_is_shown_at_rest(run: Run, tmp_path: Path) -> None:
+    with as_file(files("fba") / "face" / "builtin" / "head.glb") as head:
+        for name, rest in (("model", ("--model", head)), ("neutral", ("--fap", "open_jaw=0"))):
+            assert run("render", *rest, "-o", tmp_path / f"{name}.png", "--size", "80x60")[0] == 0
+        assert run("render", "--model", head, "--frame", 1, "-o", tmp_path / "a.png")[0] == 2
+    np.testing.assert_array_equal(pixels(tmp_path / "model.png"), pixels(tmp_path / "neutral.png"))
+
+
+@pytest.mark.usefixtures("opengl")
+def test_a_camera_at_the_face_goes_along_with_it(run: Run, tmp_path: Path) -> None:
+    """Somebody who has walked 2 metres is where the camera looks, not out of the picture."""
+    walk = tmp_path / "walk.bap"
+    fba.write(walk, gait.walk(cycles=1.5))
+    for frame in (0, -1):
+        done = run("render", walk, "--frame", frame, "--camera", "front", "-o", tmp_path / f"{frame}.png",
+                   "--size", "80x60")  # fmt: skip
+        assert done[0] == 0
+    first, last = (pixels(tmp_path / f"{frame}.png").astype(int) for frame in (0, -1))
+    face = slice(20, 40), slice(30, 50)
+    assert np.abs(first[face] - last[face]).mean() < 12
+    assert np.abs(last[face] - last[2, 2]).mean() > 20

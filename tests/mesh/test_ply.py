@@ -76,3 +76,35 @@ def test_damage_is_named(tmp_path: Path, data: bytes, words: str) -> None:
         read_ply(file)
     assert "mesh.ply" in str(caught.value)
     assert words in str(caught.value)
+
+
+STRIPS = b"""ply
+format ascii 1.0
+element vertex 6
+property float x
+property float y
+property float z
+element tristrips 2
+property list int int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+1 1 0
+0 2 0
+1 2 0
+8 0 1 2 3 -1 2 3 4
+6 3 4 4 5 5 0
+"""
+
+
+def test_triangle_strips(tmp_path: Path) -> None:
+    """As files of the Stanford repository have them: -1 between strips, corners given twice to join them."""
+    file = tmp_path / "strip.ply"
+    file.write_bytes(STRIPS)
+    mesh = read_ply(file)
+    assert mesh.corners.reshape(-1, 3).tolist() == [[0, 1, 2], [2, 1, 3], [2, 3, 4]]
+    assert mesh.starts.tolist() == [0, 3, 6, 9]
+    file.write_bytes(STRIPS.replace(b"-1 2 3 4", b"-2 2 3 4"))
+    with pytest.raises(ModelError, match="names vertex -2"):
+        read_ply(file)

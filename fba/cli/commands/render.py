@@ -141,12 +141,18 @@ def command(
         raise click.UsageError(f"{what} makes a picture without a file; leave out {files[0]}")
     if not files and isinstance(sheet, int):
         raise click.UsageError(f"--contact-sheet {sheet} shows frames of a file: give one")
-    if not files and not given:
-        raise click.UsageError("give a file, or a face by --fap, --viseme, --expression or --contact-sheet")
+    if not files and how.body is not None and how.model is None and not given:
+        raise click.UsageError("--body goes with a file, which says how the body moves")
+    if not files and not given and how.model is None:
+        raise click.UsageError(
+            "give a file, or a face by --fap, --viseme, --expression or --contact-sheet; a --model alone "
+            "is shown at rest"
+        )
     moments = {"--frame": frame, "--time": time, "--start": start, "--end": end, "--fps": how.fps}
     for name, value in (*moments.items(), ("--audio", sound.audio)):
         if not files and value is not None:
-            raise click.UsageError(f"{name} goes with a file; {given[0]} makes a single picture")
+            shown = given[0] if given else "--model alone"
+            raise click.UsageError(f"{name} goes with a file; {shown} makes a single picture")
     check_files(files, how, sound, "picture")
     target = _Target.parse(output, to)
     film, mp4 = target.film, target.suffix == ".mp4"

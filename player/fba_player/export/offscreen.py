@@ -51,6 +51,7 @@ class Offscreen:
         self.size = (width, height)
         aspect = width / height
         self.camera = camera if isinstance(camera, Camera) else self.scene.camera(camera, aspect)
+        self._of_head = looks_at_head(camera)
         self._gl: Any = offscreen_context()
         self._target: Target | None = None
         self._renderer: Renderer | None = None
@@ -79,7 +80,8 @@ class Offscreen:
         """The picture at a time, as `frame` returns it, in memory that the next call overwrites."""
         if self._target is None:
             raise ValueError("this Offscreen is closed")
-        return self._draw_view(self.scene.view_at(time), follow_camera(self.camera, self.scene, time))
+        camera = follow_camera(self.camera, self.scene, time, of_head=self._of_head)
+        return self._draw_view(self.scene.view_at(time), camera)
 
     def still(self, faps: npt.ArrayLike) -> UInt8:
         """A picture of the face for FAPs (68,) as `fba.face.resolve` returns them: uint8 (H, W, 4).
@@ -148,9 +150,14 @@ def cut_out(black: UInt8, white: UInt8) -> UInt8:
     return foreground
 
 
-def follow_camera(camera: Camera, scene: Scene, time: float) -> Camera:
-    """The camera, moved along with a figure that walks away."""
-    moved = scene.travel(time)
+def looks_at_head(camera: Camera | str | None) -> bool:
+    """Whether this is the name of a camera that looks at the face alone."""
+    return isinstance(camera, str) and camera != "body"
+
+
+def follow_camera(camera: Camera, scene: Scene, time: float, *, of_head: bool = False) -> Camera:
+    """The camera, moved along with a figure that walks away. of_head: with its head, wherever that goes."""
+    moved = scene.head_travel(time) if of_head else scene.travel(time)
     if not any(moved):
         return camera
     x, y, z = (a + b for a, b in zip(camera.target, moved, strict=True))

@@ -19,7 +19,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import DisplayError
-from fba_player.export.offscreen import follow_camera
+from fba_player.export.offscreen import follow_camera, looks_at_head
 from fba_player.gl.context import missing_libraries, missing_text
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.scene.scene import Scene
@@ -78,7 +78,7 @@ def to_pyrender(
             _add(pyrender, scene, "mesh", *_mesh_primitive(pyrender, mesh))
         for number, ball in enumerate(view.eyes):
             _add(pyrender, scene, ("left eye", "right eye")[number % 2], *_eye_primitive(pyrender, ball))
-        _add_camera(pyrender, scene, follow_camera(eye, shown, t), aspect)
+        _add_camera(pyrender, scene, follow_camera(eye, shown, t, of_head=looks_at_head(camera)), aspect)
         _add_lights(pyrender, scene)
         return scene
 

@@ -147,6 +147,10 @@ class CompareScene(Timed[CompareTimeline]):
         """Offset of a following camera at a time, metres: the first scene's."""
         return self.scenes[0].travel(self.timeline.own_time(0, time))
 
+    def head_travel(self, time: float) -> tuple[float, float, float]:
+        """Way of the first scene's head from the start to a time, metres."""
+        return self.scenes[0].head_travel(self.timeline.own_time(0, time))
+
     def view_at(self, time: float) -> View:
         """Everything to be drawn at a time in seconds; ValueError if it is not finite."""
         times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]

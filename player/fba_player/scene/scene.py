@@ -144,10 +144,14 @@ class Scene(Timed[Timeline]):
     @property
     def face_subject(self) -> Subject:
         """The head alone, at the start of the performance."""
+        return self._face_at(float(self.start))
+
+    def _face_at(self, time: float) -> Subject:
+        """The head alone at a time."""
         face = self.figure.subject
         if not self.has_body:
             return face
-        faps, joints = self._pose_at(float(self.start))
+        faps, joints = self._pose_at(time)
         matrix = self._face_matrix(joints) @ self.figure.pose(faps).turn
         x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3]
         return Subject((float(x), float(y), float(z)), face.half_height, face.half_width)
@@ -230,6 +234,11 @@ class Scene(Timed[Timeline]):
         assert joints is not None
         centre = self.subject.centre
         return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
+
+    def head_travel(self, time: float) -> tuple[float, float, float]:
+        """Way (x, y, z) of the head from the start to a time, metres; zeros without a body."""
+        x, y, z = np.subtract(self._face_at(time).centre, self.face_subject.centre).tolist()
+        return (x, y, z)
 
     def _pose_at(self, time: float) -> tuple[Float32, Float64 | None]:
         faps = self.timeline.faps(time)

@@ -108,3 +108,6 @@ class Showable(Protocol):
 
     def travel(self, time: float) -> tuple[float, float, float]:
         """Offset of a following camera at a time, metres; zeros if it does not follow."""
+
+    def head_travel(self, time: float) -> tuple[float, float, float]:
+        """Way of the head from the start to a time, metres, for a camera that looks at it."""
