@@ -218,12 +218,17 @@ class _Reader:
                         f"have {MAX_CORNERS}"
                     )
                 count = int(given)
+                if count != given:
+                    raise ModelError(
+                        f"{self.path}: {element.name[:20]} {number}: a list of {given:g}; "
+                        "expected a whole number"
+                    )
                 total += count
                 lists_of[name].append(self._take(kind, count, element, number))
         lists = {}
         for name, rows in lists_of.items():
             starts, values = rows.joined()
-            if name in FACE_LISTS and not (np.abs(values) < 2**53).all():
+            if name in FACE_LISTS and not ((np.abs(values) < 2**53) & (values == np.rint(values))).all():
                 raise ModelError(f"{self.path}: {element.name[:20]}: an index is not a whole number")
             lists[name] = (starts, np.nan_to_num(values).astype(np.int64))
         return {}, lists

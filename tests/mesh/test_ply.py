@@ -58,6 +58,8 @@ def damaged(old: bytes, new: bytes, order: str = "ascii") -> bytes:
         (damaged(b"3 0 1 2\n", b"3 0 1 -2\n"), "names vertex -2"),
         (damaged(b"3 0 1 2\n", b"200 0 1 2\n"), "is it whole?"),
         (damaged(b"3 0 1 2\n", b"-3 0 1 2\n"), "a list of -3"),
+        (damaged(b"3 0 1 2\n", b"3.5 0 1 2\n"), "face 0: a list of 3.5; expected a whole number"),
+        (damaged(b"3 0 1 2\n", b"3 0 1 1.5\n"), "face: an index is not a whole number"),
         (damaged(b"3 0 1 2\n", b"3 0 1 x\n"), "could not convert"),
         (damaged(b"3 0 1 2\n", b"inf 0 1 2\n"), "a list of inf"),
         (damaged(b"3 0 1 2\n", b"1e400 0 1 2\n"), "a list of inf"),

@@ -82,7 +82,7 @@ def read_body(
     except ModelError as error:
         call = f"{__name__}.read_body"
         remedies = [replace(each, call=call) for each in error.remedies]
-        finding = error.finding.removeprefix(f"{path}: ")
+        finding = error.finding.removeprefix(f"{os.path.basename(path)}: ")
         raise FormatError(finding, path=path).with_remedies(*remedies) from error
 
 

@@ -6,6 +6,7 @@ rotations are the identity. So rotations are taken relative to the bind pose, in
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -104,9 +105,8 @@ def read(
         times = sampled.start + np.arange(len(animation)) / float(animation.rate)
         return replace(animation, face=read_face_motion(gltf, sampled.clip, times))
     except ModelError as error:
-        raise FormatError(error.finding.removeprefix(f"{path}: "), path=path).with_remedies(
-            *error.remedies
-        ) from error
+        finding = error.finding.removeprefix(f"{os.path.basename(path)}: ")
+        raise FormatError(finding, path=path).with_remedies(*error.remedies) from error
 
 
 def read_motion(

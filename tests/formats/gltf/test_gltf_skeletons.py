@@ -330,3 +330,12 @@ def test_damaged_files_raise_only_our_errors(tmp_path: Path) -> None:
             warnings.simplefilter("ignore", FbaWarning)
             with contextlib.suppress(fba.FbaError):
                 fba.read(path, format="gltf")
+
+
+def test_a_message_names_the_file_once(tmp_path: Path) -> None:
+    path = tmp_path / "bad.glb"
+    path.write_bytes(b"glTF\2\0\0\0bad")
+    with pytest.raises(FormatError) as caught:
+        fba.read(path)
+    assert str(caught.value).count("bad.glb") == 1
+    assert str(caught.value).startswith(f"{path}: header: the file ends after 11 bytes")
