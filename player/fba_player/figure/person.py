@@ -19,6 +19,8 @@ from fba_player.view.view import Eye, FaceMesh, FaceShape
 SCATTER = {"skin": 1.0, "neck": 1.0}
 SEEN_WEIGHTS, BEND = 6, 0.02
 """Simplification preserves skin weights in this many random projections, scaled to this many metres."""
+HEAD_SHARE = 0.3
+"""A part of a body with its own head is drawn in full detail if more than this share of it is on the head."""
 WORLD, NOWHERE = np.eye(4), np.zeros(3)
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
@@ -104,7 +106,11 @@ def build_person(body: BodyModel, figure: FaceFigure) -> Person:
     """
     model = figure.model
     if body.eyes is None:
+        rows = head_rows(body)
         shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts}
+        for name, shape in shapes.items():  # a coarser face would let its teeth and eyes through
+            if rows[part_rows(body, name)].mean() > HEAD_SHARE:
+                shapes[name] = replace(shape, coarser=None)
         light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
         return Person(body, figure, None, shapes, {}, light)
     skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])

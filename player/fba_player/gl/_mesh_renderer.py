@@ -103,6 +103,8 @@ class FaceRenderer:
 
     def _draw(self, mesh: FaceMesh) -> None:
         shape = mesh.shape
+        if not len(shape.triangles):  # a part so small that no level of detail is left of it from afar
+            return
         parts = self._shapes.get(shape, lambda: self._upload(mesh))
         _upload_vertices(mesh, parts)
         away = distance(mesh, self._camera[0]) if mesh.away is None else mesh.away
