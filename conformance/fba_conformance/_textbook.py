@@ -95,9 +95,10 @@ class _GuardedBits:
 
     def __init__(self, data: bytes, start: int) -> None:
         self.data = data
+        self.size = len(data) * 8
         self.position = start
         self.zeros = 0
-        self.ends: list[int] = []  # position after each bit returned
+        self.count = 0  # bits returned
         self.insertions: list[int] = []  # number of bits returned before each inserted one
         self.violation: tuple[int, int] | None = (
             None  # the same for the first 0 in place of an inserted 1, and its position
@@ -105,20 +106,20 @@ class _GuardedBits:
 
     def _raw(self) -> int:
         """Return the next bit of the stream."""
-        byte, shift = self.position >> 3, 7 - (self.position & 7)
-        self.position += 1
-        return self.data[byte] >> shift & 1 if byte < len(self.data) else 0
+        position = self.position
+        self.position = position + 1
+        return self.data[position >> 3] >> (7 - (position & 7)) & 1 if position < self.size else 0
 
     def next(self) -> int:
         """Return the next bit that was not inserted."""
         if self.zeros == ZERO_RUN:
-            self.insertions.append(len(self.ends))
+            self.insertions.append(self.count)
             if not self._raw() and self.violation is None:
-                self.violation = len(self.ends), self.position - 1
+                self.violation = self.count, self.position - 1
             self.zeros = 0
         bit = self._raw()
         self.zeros = 0 if bit else self.zeros + 1
-        self.ends.append(self.position)
+        self.count += 1
         return bit
 
 
@@ -162,8 +163,9 @@ def decode_segment(
         if learn:
             table.learn(symbol)
         symbols.append(symbol)
-    used = len(source.ends) - REGISTER_BITS + FLUSH_BITS
-    end = source.ends[used - 1]
+    used = source.count - REGISTER_BITS + FLUSH_BITS
+    inserted = sum(1 for before in source.insertions if before < used)
+    end = start + used + inserted
     if source.violation is not None and source.violation[0] < used and source.violation[1] < len(data) * 8:
         raise BitstreamError(
             f"{name}: {ZERO_RUN} zero bits are followed by another 0, where an inserted 1 was expected; "
@@ -185,7 +187,6 @@ def decode_segment(
             plane=plane,
             bit=end - FLUSH_BITS,
         )
-    inserted = sum(1 for before in source.insertions if before < used)
     return Segment(tuple(symbols), end - start, inserted)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -21,9 +20,9 @@ main()
 """
 
 
-def bare(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def bare(programs: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", BARE, *arguments], cwd=folder, capture_output=True, text=True, check=False
+        [programs / "python", "-c", BARE, *arguments], cwd=folder, capture_output=True, text=True, check=False
     )
 
 
@@ -46,8 +45,8 @@ def stream(tmp_path: Path, face: Animation) -> Path:
         "render --help",
     ],
 )
-def test_what_does_not_draw_works(line: str, stream: Path) -> None:
-    done = bare(stream.parent, *line.split())
+def test_what_does_not_draw_works(line: str, stream: Path, programs: Path) -> None:
+    done = bare(programs, stream.parent, *line.split())
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout or line.startswith(("decode", "convert"))
 
@@ -62,9 +61,9 @@ def test_what_does_not_draw_works(line: str, stream: Path) -> None:
         "render --contact-sheet faps -o a.png",
     ],
 )
-def test_what_draws_says_what_is_missing(line: str, stream: Path) -> None:
+def test_what_draws_says_what_is_missing(line: str, stream: Path, programs: Path) -> None:
     head = fba.__path__[0] + "/face/builtin/head.glb"
-    done = bare(stream.parent, *line.replace("NONE", head).split())
+    done = bare(programs, stream.parent, *line.replace("NONE", head).split())
     assert done.returncode == 1
     (said,) = done.stderr.splitlines()
     assert said.startswith("fba: error: ")
@@ -72,7 +71,7 @@ def test_what_draws_says_what_is_missing(line: str, stream: Path) -> None:
     assert sorted(path.name for path in stream.parent.iterdir()) == ["face.fba"]
 
 
-def test_the_player_can_be_imported_and_its_figures_move(tmp_path: Path) -> None:
+def test_the_player_can_be_imported_and_its_figures_move(tmp_path: Path, programs: Path) -> None:
     code = (
         BARE.replace("from fba.cli.main import main\nmain()", "")
         + """
@@ -88,7 +87,7 @@ except fba.DisplayError as error:
 """
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+        [programs / "python", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[-3:] == ["play", "render", "DisplayError"]
