@@ -241,6 +241,13 @@ def test_no_room_is_too_full(package: str) -> None:
     assert {name: count for name, count in rooms.items() if count > MOST_FILES} == {}
 
 
+def test_no_folder_of_tests_is_too_full() -> None:
+    files: dict[str, int] = defaultdict(int)
+    for path in (ROOT / "tests").rglob("*.py"):
+        files[path.parent.relative_to(ROOT).as_posix()] += 1
+    assert {name: count for name, count in files.items() if count > MOST_FILES} == {}
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_room_says_what_it_holds(package: str) -> None:
     for module in modules():

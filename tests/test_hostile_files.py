@@ -21,7 +21,7 @@ from gltf_edits import with_keys
 from hostile_files import bvh, capture, encode_capture, hostile_files, png, skeleton, surface
 
 SMALL, LARGE = (200_000, 800_000) if os.environ.get("FBA_FUZZ") == "long" else (15_000, 60_000)
-HELPERS = Path(__file__).parent / "helpers"
+HELPERS = Path(__file__).parent / "helpers" / "files"
 
 
 @pytest.mark.slow

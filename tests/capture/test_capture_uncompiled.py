@@ -15,7 +15,7 @@ from capture_bodies import swinging_limbs
 from fba.capture import from_skeleton
 from fba.capture.limbs._coupled_paths import chain
 
-HELPERS = Path(__file__).parents[1] / "helpers"
+HELPERS = Path(__file__).parents[1] / "helpers" / "figures"
 SCRIPT = """
 import json
 from capture_bodies import swinging_limbs
