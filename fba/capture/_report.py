@@ -118,7 +118,9 @@ def retarget_report(
     angles = np.zeros((count, len(aims)))
     heights = np.zeros((2, count))
     has_feet = True
-    toes = "l_metatarsal" in mapped
+    metres = rest_alignment.scale(motion, mapped, skeleton) if scale is None else scale
+    source = soles.source_soles(motion, mapped, turned, positions, metres) if metres else None
+    toes = source is not None and source.tips
     for begin in range(0, count, CHUNK):
         end = min(begin + CHUNK, count)
         matrices = solver.pose(animation.body.values[begin:end])
@@ -146,11 +148,7 @@ def retarget_report(
         )
         for column, (joint, aim) in enumerate(aims)
     )
-    metres = rest_alignment.scale(motion, mapped, skeleton) if scale is None else scale
-    standing = None
-    if has_feet and metres:
-        source = soles.source_soles(motion, mapped, turned, positions, metres)
-        standing = _feet(source, heights, float(motion.rate)) if source is not None else None
+    standing = _feet(source, heights, float(motion.rate)) if has_feet and source is not None else None
     used = set(mapped.values())
     return RetargetReport(
         family,

@@ -59,11 +59,11 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
     height 0, else it is that of the source. plant: also move the legs, which changes the targets.
     """
     root = root.copy()
-    toes = "l_metatarsal" in targets.mapped
     rate = float(targets.motion.rate)
     source = soles.source_soles(
         targets.motion, targets.mapped, targets.source_rotations, targets.source_positions, scale
     )
+    toes = source is not None and source.tips
     body = soles.body_soles(targets.skeleton, targets.rotations, root, toes)
     if source is None or body is None:
         return root

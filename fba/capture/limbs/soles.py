@@ -18,6 +18,7 @@ from fba import rotations
 from fba.arrays import Float64
 from fba.body.footing import OUTLINE, TIP
 from fba.body.skeleton import Skeleton
+from fba.capture import _standing as standing
 from fba.capture.limbs._coupled_paths import chain
 from fba.capture.motion import SkeletonMotion
 
@@ -29,6 +30,12 @@ SUPPORT = 0.08
 """Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
 LEVEL_SECONDS = 0.2
 """Seconds over which the height of the ground under feet that stand is averaged."""
+TOES = 0.07
+"""Metres from the ball to the tip of the shown person's shoes."""
+FRONT = 0.05
+"""Metres from an ankle ahead up to which a source's foot has no front."""
+ANKLE_HEIGHT, BALL = 0.076, 0.15
+"""Metres from the default skeleton's ankle down to the ground, and ahead to the ball."""
 HEEL = 0.045
 """Metres from an ankle back to the heel."""
 ON_GROUND = 0.015
@@ -65,11 +72,12 @@ class Soles:
     """Soles of the left and the right foot, in metres.
 
     lowest: (2, T), height of the lowest point. points: (2, 2, T, 3), heel, and ball or tip, whichever the
-    source has.
+    source has. tips: whether the tips of the toes count, too.
     """
 
     lowest: Float64
     points: Float64
+    tips: bool
 
 
 def source_soles(
@@ -85,6 +93,7 @@ def source_soles(
     if "l_ankle" not in mapped or "r_ankle" not in mapped:
         return None
     rest = motion.rest()
+    estimated = False
     lows, points = [], []
     for side in "lr":
         ankle = mapped[f"{side}_ankle"]
@@ -102,18 +111,32 @@ def source_soles(
         ahead = max(at_rest, key=lambda point: float(np.hypot(point[0], point[2]))) * [1.0, 0.0, 1.0]
         ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
         along = [float(point @ ahead) * metres for point in at_rest]
+        depth = min(float(point[1]) for point in at_rest)
+        if max(along) < FRONT:  # a foot that ends at the ankle: the front is where the body's is
+            estimated = True
+            depth = min(depth, -ANKLE_HEIGHT / metres)
+            turn = rotations.matrices(turned[:, ankle])
+            facing = standing.measure(rest[None], mapped)
+            ahead = np.cross(facing.left[0], [0.0, 1.0, 0.0])
+            for far in (BALL, BALL + TOES):
+                point = np.array([0.0, depth, 0.0]) + ahead * (far / metres)
+                at_rest.append(point)
+                along.append(far)
+                moving.append(positions[:, ankle] + turn @ point)
         if min(along) < -HEEL / 2:
             heel = moving[int(np.argmin(along))]
         else:
-            behind = [0.0, min(float(point[1]) for point in at_rest), 0.0] - ahead * (HEEL / metres)
+            behind = np.array([0.0, depth, 0.0]) - ahead * (HEEL / metres)
             turn = rotations.matrices(turned[:, ankle])
             heel = positions[:, ankle] + turn @ behind
             moving.append(heel)
         ball = mapped.get(f"{side}_metatarsal")
-        front = moving[int(np.argmax(along))] if ball is None else positions[:, ball]
+        front = moving[along.index(BALL) if BALL in along else int(np.argmax(along))]
+        front = front if ball is None else positions[:, ball]
         lows.append(np.min([point[:, 1] for point in moving], axis=0))
         points.append([heel, front])
-    return Soles(np.array(lows) * metres, np.array(points) * metres)
+    tips = "l_metatarsal" in mapped or estimated
+    return Soles(np.array(lows) * metres, np.array(points) * metres, tips)
 
 
 def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64, toes: bool) -> Soles | None:
@@ -149,7 +172,7 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64,
                 lowest.append(position[:, 1] + heights.min(axis=-1))
         lows.append(np.min(lowest, axis=0))
         points.append(own)
-    return Soles(np.array(lows), np.array(points))
+    return Soles(np.array(lows), np.array(points), toes)
 
 
 def joint_frames(
