@@ -60,6 +60,13 @@ TAKES = "player/fba_player/session/takes.py"
 SOLES = "fba/capture/limbs/soles.py"
 RENDER = "player/fba_player/export/render.py"
 GLTF_READER = "fba/formats/gltf/reader.py"
+BODIES, OWN_HEADS = "fba/formats/gltf/bodies.py", "fba/formats/gltf/_own_heads.py"
+OWN_HEAD = "fba/body/own_head.py"
+FACE_MOTION, HUMANOID = "fba/formats/gltf/face_motion.py", "fba/formats/gltf/humanoid.py"
+BODIES_TEST = "tests/formats/gltf/test_foreign_bodies.py"
+HEADS_TEST = "tests/formats/gltf/test_own_heads.py"
+FACES_TEST = "tests/formats/gltf/test_face_motion.py"
+DECLARED_TEST = "tests/formats/gltf/test_declared_bones.py"
 REPORT = "fba/capture/_report.py"
 STANDARD = "fba/capture/_standard_skeleton.py"
 FAP_JOINTS = "fba/formats/gltf/_fap_joints.py"
@@ -233,6 +240,17 @@ MUTANTS = (
     Mutant(TAKES, "STILL = 0.2", "STILL = 0.3", TAKES_TEST),
     Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.0", RENDER_TEST),
     Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.1", RENDER_TEST),
+    Mutant(BODIES, "shift[1] = -size * sole", "shift[1] = 0.0", BODIES_TEST),
+    Mutant(BODIES, '    result[ROOT] = "sacroiliac"\n', "", BODIES_TEST),
+    Mutant(BODIES, '] = f"{side}_midtarsal"', '] = f"{side}_ankle"', BODIES_TEST),
+    Mutant(OWN_HEAD, "-FEW / SMALL", "0.0", HEADS_TEST),
+    Mutant(OWN_HEAD, "over = result > 1", "over = result > 9", HEADS_TEST),
+    Mutant(OWN_HEADS, " or name == shape", "", HEADS_TEST),
+    Mutant(OWN_HEADS, "_target(bind, 100.0)", "_target(bind, 1.0)", HEADS_TEST),
+    Mutant(FACE_MOTION, "np.where(turned, 0.0, amounts)", "amounts", FACES_TEST),
+    Mutant(FACE_MOTION, "            sent[fap.number - 1] = True", "            pass", FACES_TEST),
+    Mutant(HUMANOID, '"ThumbProximal": "ThumbMetacarpal"', '"ThumbProximal": "ThumbProximal"', DECLARED_TEST),
+    Mutant(GLTF_READER, "HALF_TURN = (-1, 1, -1)", "HALF_TURN = (1, 1, 1)", DECLARED_TEST),
     Mutant(FAP_JOINTS, "SQUARE = 1e-6", "SQUARE = 1.0", "tests/formats/gltf/test_gltf_faces.py"),
     Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.0", CAPTURE_RULES_TEST),
     Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.4", CAPTURE_RULES_TEST),

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from fba.body.model import BodyModel
     from fba.codec.stream_info import StreamInfo
     from fba.face.model import FaceModel
+    from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
     from fba.formats.registry import Format
 
@@ -163,6 +164,12 @@ def list_clips(path: Path, format: str | None, limits: Limits) -> tuple[ClipInfo
     """Return the animations of a file in a format that holds several; none for other formats."""
     reader = _find_format(path, format)
     return () if reader.list_clips is None else reader.list_clips(path, limits=limits)
+
+
+def describe_person(path: Path, format: str | None, limits: Limits) -> PersonInfo | None:
+    """Return what a file without an animation shows; None for a file with one, or without a person."""
+    reader = _find_format(path, format)
+    return None if reader.describe_person is None else reader.describe_person(path, limits=limits)
 
 
 def check_clip(clip: str | None, files: Iterable[Path], format: str | None) -> None:

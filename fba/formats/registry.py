@@ -24,6 +24,7 @@ from fba.source import Path, read_head
 if TYPE_CHECKING:
     from fba.capture.motion import SkeletonMotion
     from fba.codec import StreamInfo
+    from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
 
 
@@ -61,7 +62,8 @@ class Format:
     Animation and back; write is None if there is no writer. carries: the parts that a file can hold.
     read_motion: reads the motion of a skeleton, for formats of motion capture; `read` retargets it.
     list_clips: describes the animations of a file, for formats that hold several; `read` takes one as `clip`.
-    written: description of a written file, if `description` says more than the writer can do.
+    describe_person: describes the person in a file without an animation. written: description of a written
+    file, if `description` says more than the writer can do.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Format:
     carries: tuple[str, ...] = ("face", "body")
     read_motion: Callable[..., SkeletonMotion] | None = None
     list_clips: Callable[..., tuple[ClipInfo, ...]] | None = None
+    describe_person: Callable[..., PersonInfo | None] | None = None
     written: str = ""
 
     @property
@@ -123,7 +126,7 @@ def formats() -> tuple[Format, ...]:
             "gltf", (".glb", ".gltf"), "glTF 2.0: read, an animated skeleton; written, a skinned person",
             lazy("gltf.reader", "sniff"), lazy("gltf.reader", "read"), lazy("gltf.writer", "write"),
             read_motion=lazy("gltf.reader", "read_motion"), list_clips=lazy("gltf.clips", "list_clips"),
-            written="glTF 2.0, a skinned person",
+            describe_person=lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
         ),
     )  # fmt: skip
 

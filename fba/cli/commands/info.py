@@ -11,12 +11,13 @@ import click
 
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import EXISTING, check_clip, input_file, list_clips, probe_input
+from fba.cli.inputs import EXISTING, check_clip, describe_person, input_file, list_clips, probe_input
 from fba.cli.printing import print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
 from fba.limits import Limits
 
 if TYPE_CHECKING:
+    from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
 
 
@@ -68,6 +69,12 @@ def command(
     for path in files:
         with each.file(path), input_file(path) as file:
             steps = ""
+            if (person := describe_person(file, format, limit)) is not None:
+                size = file.stat().st_size
+                reports.append({"file": str(path), "format": "gltf", "size": size, "person": asdict(person)})
+                if not as_json:
+                    _print_person(path, size, person)
+                continue
             info = probe_input(file, fps=fps, format=format, salvage=salvage, clip=clip, limits=limit)
             clips = list_clips(file, info.format, limit)
             if info.format == "fba" and info.body is not None:
@@ -99,6 +106,14 @@ def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:
         return
     for line in format_trace(elements, values=values):
         click.echo(line)
+
+
+def _print_person(path: Path, size: int, person: PersonInfo) -> None:
+    declared = f", as {person.declared} declares them" if person.declared else ""
+    click.echo(f"{path}: GLTF, {size} bytes")
+    click.echo(f"  person   {person.matched} of {person.joints} joints are the standard's{declared}")
+    click.echo(f"  meshes   {person.meshes}; {person.shapes} shapes of a face with known names")
+    click.echo(f"  motion   none; show one on it: fba play MOTION --body {path}")
 
 
 def _print(path: Path, info: StreamInfo, clips: tuple[ClipInfo, ...], steps: str) -> None:

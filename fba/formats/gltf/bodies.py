@@ -28,6 +28,7 @@ from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
 from fba.formats.gltf._pose import bind_matrices
 from fba.formats.gltf._skeletons import Joints, find_joints
+from fba.formats.gltf.face_motion import amounts_of
 from fba.gltf import Gltf, Node, Primitive, read_gltf
 from fba.gltf import Material as GltfMaterial
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -84,6 +85,41 @@ def read_body(
         remedies = [replace(each, call=call) for each in error.remedies]
         finding = error.finding.removeprefix(f"{os.path.basename(path)}: ")
         raise FormatError(finding, path=path).with_remedies(*remedies) from error
+
+
+@dataclass(frozen=True)
+class PersonInfo:
+    """What a file without an animation shows.
+
+    declared: "VRM 0" or "VRM 1" where the file says which bone is which, else "". joints: those from the hips
+    down; matched: how many are joints of the standard. meshes: all in the scene. shapes: morph targets whose
+    names are known.
+    """
+
+    declared: str
+    joints: int
+    matched: int
+    meshes: int
+    shapes: int
+
+
+def describe_person(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> PersonInfo | None:
+    """Return what a glTF file without an animation shows; None with an animation, or without a person.
+
+    Raises FormatError, ModelError, and LimitError for more than the limits allow.
+    """
+    gltf = read_gltf(path, limits=limits)
+    if gltf.animations:
+        return None
+    try:
+        found = find_joints(gltf)
+        rest = find_rest(found.resting(gltf), Skeleton.default())
+    except ModelError:
+        return None
+    meshes = [gltf.nodes[node].mesh for node in gltf.shown() if gltf.nodes[node].mesh is not None]
+    names = {name for mesh in gltf.meshes for name in mesh.morph_names if amounts_of(name) is not None}
+    declared = "" if found.humanoid is None else found.humanoid.kind
+    return PersonInfo(declared, len(found.used), len(rest.mapped), len(meshes), len(names))
 
 
 @dataclass(frozen=True, eq=False)

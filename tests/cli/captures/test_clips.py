@@ -77,3 +77,14 @@ def test_a_warning_is_printed_once(run: Run, people: Path, tmp_path: Path) -> No
     """`--report` reads the file a second time."""
     code, _, err = run("encode", people, "-o", tmp_path / "out.fba", "--report")
     assert (code, err.count("'Idle' is read; choose with --clip Wave")) == (0, 1)
+
+
+def test_info_of_a_person_without_motion(run: Run, tmp_path: Path) -> None:
+    path = write_person(tmp_path / "avatar.vrm", extension="VRM", morphs={"jawOpen": [0.0], "Wobble": [0.0]})
+    code, out, err = run("info", path)
+    assert (code, err) == (0, "")
+    assert "23 of 23 joints are the standard's, as VRM 0 declares them" in out
+    assert "1; 1 shapes of a face" in out
+    assert f"fba play MOTION --body {path}" in out
+    listed = json.loads(run("info", path, "--json").out)["person"]  # type: ignore[attr-defined]
+    assert listed == {"declared": "VRM 0", "joints": 23, "matched": 23, "meshes": 1, "shapes": 1}
