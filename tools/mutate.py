@@ -113,6 +113,8 @@ PLAUSIBLE_TEST = "tests/body/test_plausibility.py -k 'limits or twenty or carry 
 MOMENT_TEST = "tests/body/test_plausibility.py -k moment"
 JUMP_TEST = "tests/body/test_plausibility.py -k jump"
 STEP_CHOICE_TEST = "tests/formats/test_step_choice.py -k 'round or coarse'"
+MEASURED_TEST = "tests/body/gait/test_measured.py"
+STRIPS_TEST = "tests/mesh/test_ply.py -k strips"
 MARK_TEST = "tests/codec/test_mark.py"
 LONG_TEST = "tests/body/test_plausibility.py -k long_motion"
 GAIT_TEST = "tests/body/gait/test_gait_rules.py"
@@ -296,9 +298,12 @@ MUTANTS = (
     ),
     Mutant(PLAUSIBILITY, "axis=None) != 1", "axis=None) < 1", STEP_CHOICE_TEST),
     Mutant(MARK, "position = start\n", "position = start + 99\n", MARK_TEST),
-    Mutant(MARK, "begin = end\n", "begin = 0\n", MARK_TEST),
     Mutant(DECODER, "mark.begin <= byte < mark.end", "byte < mark.end", MARK_TEST),
     Mutant(DECODER, "code == USER_DATA and directly and self.ended", "code == USER_DATA", MARK_TEST),
+    Mutant("fba/body/gait/_plan.py", "_SOFT = 0.85", "_SOFT = 0.7", MEASURED_TEST),
+    Mutant(
+        "fba/mesh/polygons.py", "turned = (third - begin[third]) % 2 == 1", "turned = third < 0", STRIPS_TEST
+    ),
     Mutant(PLAUSIBILITY, "LEAST = 1.0", "LEAST = 0.9", MOMENT_TEST),
     Mutant(PLAUSIBILITY, "LEAST = 1.0", "LEAST = 1.1", MOMENT_TEST),
     Mutant(PLAUSIBILITY, "SAMPLES = 32", "SAMPLES = 31", LONG_TEST),

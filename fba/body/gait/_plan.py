@@ -36,6 +36,9 @@ _STRAIN = 0.03
 """Largest lowering of the body, as a share of the legs' length, by a stride that is long for them."""
 _RELEASE_RATE = 4.0
 """Metres per cycle at which the height limit of a leg rises once it has left the ground."""
+_SOFT = 0.85
+"""How far a leg takes on, before its foot lands, the speed that it has once the foot stands: 1 is a landing
+without a jolt, 0 one at the speed of the swing."""
 _CLEAR = 0.012
 """Smallest height of a swinging foot above the ground, metres."""
 _TINY = 1e-4
@@ -60,7 +63,7 @@ class Plan:
     def _foot(self) -> Float64:
         """(8,) pitch of the foot in the poses, radians."""
         ratio = np.clip(self.stride_ratio, 0.0, 1.3)
-        foot = np.array(self.character.curve("foot"))
+        foot = np.array(self.character.curve("foot"), dtype=np.float64)
         foot[0] *= ratio
         foot[4:6] *= 0.3 + 0.7 * ratio
         foot[6:] *= 0.6 + 0.4 * ratio
@@ -70,7 +73,7 @@ class Plan:
     @cached_property
     def _knee(self) -> Float64:
         """(8,) bend of the knee in the poses, radians."""
-        knee = np.array(self.character.curve("knee"))
+        knee = np.array(self.character.curve("knee"), dtype=np.float64)
         knee[5:7] *= 0.55 + 0.45 * np.clip(self.stride_ratio, 0.0, 1.3)
         result: Float64 = np.radians(knee)
         return result
@@ -261,7 +264,7 @@ class Plan:
         values.append(solved[2])
         slope = 1.5 * (values[3] - values[2]) / (knots[3] - knots[2])
         slope -= 0.5 * (values[3] - values[1]) / (knots[3] - knots[1])
-        return knots, np.stack(values), off, 0.5 * (slope + on)
+        return knots, np.stack(values), off, (1.0 - _SOFT) * slope + _SOFT * on
 
     def _usual_landing(self, side: Side) -> float:
         """Return degrees of the thigh at the contact of the foot, in the character's own stride."""
