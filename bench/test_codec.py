@@ -107,9 +107,9 @@ def test_decode(
     rows that blocks are joined in. In the loop over planes, 14 million symbols/s are decoded where the
     coder alone does 20: that is the price of what a plane has besides symbols (header, skip, flags, look-
     ahead for start codes) and of values, which are checked against their limits before anything is
-    stored. Holding the tables of the models in local variables changed nothing. A coder that reads words
-    instead of bits was not tried: the 1s inserted after 22 zeros, and the end of a segment, which is
-    found by counting bits, would be hard to follow.
+    stored. Holding the tables of the models in local variables changed nothing, nor did divisions of
+    unsigned numbers. A coder that reads words instead of bits was not tried: the 1s inserted after 22
+    zeros, and the end of a segment, which is found by counting bits, would be hard to follow.
     """
     animation, bap_steps, source = head_motion
     symbols = textbook_symbols(animation)

@@ -8,7 +8,10 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable
+from functools import partial
+from operator import attrgetter
 from pathlib import Path
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -44,41 +47,39 @@ _CACHED = np.arange(24, dtype=np.float32).reshape(4, 6), np.arange(5, dtype=np.f
 
 def check_fap(data: bytes, folder: Path) -> Outcome:
     """Read ASCII FAPs, strictly or with what can be saved of them, write them, and read them again."""
-
-    def read(path: Path) -> None:
-        animation = read_fap(path, salvage=bool(crc32(data) & 1))
-        again = folder / "again.fap"
-        write_fap(again, animation)
-        if read_fap(again).face != animation.face:
-            raise ContractError("other FAPs after writing and reading again")
-
-    return _check_file(data, folder / "input.fap", read)
+    read = partial(read_fap, salvage=bool(crc32(data) & 1))
+    return _check_written(data, folder / "input.fap", read, write_fap, read_fap, attrgetter("face"))
 
 
 def check_bap(data: bytes, folder: Path) -> Outcome:
     """Read ASCII BAPs, strictly or with what can be saved of them, write them, and read them again."""
-
-    def read(path: Path) -> None:
-        animation = read_bap(path, salvage=bool(crc32(data) & 1))
-        again = folder / "again.bap"
-        write_bap(again, animation)
-        if read_bap(again).body != animation.body:
-            raise ContractError("other BAPs after writing and reading again")
-
-    return _check_file(data, folder / "input.bap", read)
+    read = partial(read_bap, salvage=bool(crc32(data) & 1))
+    return _check_written(data, folder / "input.bap", read, write_bap, read_bap, attrgetter("body"))
 
 
 def check_epf(data: bytes, folder: Path) -> Outcome:
-    """Read encoder parameters, write them, and read them again."""
+    """Read encoder parameters, write them, and read them again: as many planes."""
+    return _check_written(data, folder / "input.epf", read_epf, write_epf, read_epf, len)
 
-    def read(path: Path) -> None:
-        planes = read_epf(path)
-        again = folder / "again.epf"
-        write_epf(again, planes)
-        if len(read_epf(again)) != len(planes):
-            raise ContractError("another number of planes after writing and reading again")
 
-    return _check_file(data, folder / "input.epf", read)
+def _check_written(
+    data: bytes,
+    path: Path,
+    read: Callable[[Path], Any],
+    write: Callable[[Path, Any], object],
+    read_again: Callable[[Path], Any],
+    content: Callable[[Any], object],
+) -> Outcome:
+    """Read a file, write what it holds, and read that again. content: what must then be the same."""
+
+    def copy(path: Path) -> None:
+        found = read(path)
+        written = path.with_stem("again")
+        write(written, found)
+        if content(read_again(written)) != content(found):
+            raise ContractError("another content after writing and reading again")
+
+    return _check_file(data, path, copy)
 
 
 def check_bvh(data: bytes, folder: Path) -> Outcome:
