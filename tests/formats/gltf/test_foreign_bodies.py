@@ -13,6 +13,7 @@ from fba.body import BapSolver, Skeleton
 from fba.body.model import BodyModel
 from fba.errors import FbaWarning, FormatError
 from fba.formats.gltf.bodies import read_body
+from fba.parameters import baps
 from gltf_edits import edit
 from small_bodies import rod
 from small_people import BONES, write_person
@@ -104,6 +105,19 @@ def test_a_motion_moves_its_own_person_as_in_the_file(tmp_path: Path) -> None:
         ours = middles(body, shown[frame]) / size
         lengths = np.linalg.norm(ours - np.array([wanted[bone] for bone in SHARED_BONES]), axis=1)
         assert lengths.max() < 0.01, (frame, dict(zip(SHARED_BONES, lengths.round(3), strict=True)))
+
+
+@pytest.mark.parametrize(
+    ("joint", "bone"), [("sacroiliac", "hips"), ("l_subtalar", "leftFoot"), ("l_midtarsal", "leftFoot")]
+)
+def test_hips_and_feet_follow_all_joints_that_turn_them(tmp_path: Path, joint: str, bone: str) -> None:
+    body = read_body(write_person(tmp_path / "p.glb"))
+    solver = BapSolver(body.skeleton)
+    values = np.zeros(296)
+    values[[bap.number - 1 for bap in baps() if bap.joint == joint]] = 30_000
+    box = slice(8 * list(BONES).index(bone), 8 * list(BONES).index(bone) + 8)
+    moved = body.skin(solver.pose(values))[box] - body.skin(solver.pose(np.zeros(296)))[box]
+    assert np.linalg.norm(moved, axis=1).max() > 0.01
 
 
 def test_meshes_without_a_skin_hang_on_their_joint(tmp_path: Path) -> None:

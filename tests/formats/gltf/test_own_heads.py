@@ -54,6 +54,8 @@ def test_shapes_with_known_names_move_the_head(tmp_path: Path) -> None:
 def test_one_shape_that_two_names_mean_moves_once(tmp_path: Path) -> None:
     path = write_person(tmp_path / "p.glb", morphs={"Fcl_EYE_Close_L": [0.0], "eyeBlinkLeft": [0.0]})
     np.testing.assert_allclose(risen(path, faps(close_t_l_eyelid=1024))[HEAD, 1], RISE, atol=2e-5)
+    edit(path, lambda document: document["meshes"][0]["primitives"][0]["targets"][0].clear())
+    np.testing.assert_allclose(risen(path, faps(close_t_l_eyelid=1024))[HEAD, 1], RISE, atol=2e-5)
 
 
 @pytest.mark.parametrize("extension", ["VRM", "VRMC_vrm"])
