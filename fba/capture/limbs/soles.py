@@ -18,7 +18,6 @@ from fba import rotations
 from fba.arrays import Float64
 from fba.body.footing import OUTLINE, TIP
 from fba.body.skeleton import Skeleton
-from fba.capture import _standing as standing
 from fba.capture.limbs._coupled_paths import chain
 from fba.capture.motion import SkeletonMotion
 
@@ -116,8 +115,9 @@ def source_soles(
             estimated = True
             depth = min(depth, -ANKLE_HEIGHT / metres)
             turn = rotations.matrices(turned[:, ankle])
-            facing = standing.measure(rest[None], mapped)
-            ahead = np.cross(facing.left[0], [0.0, 1.0, 0.0])
+            left = rest[mapped["l_ankle"]] - rest[mapped["r_ankle"]]
+            ahead = np.cross(left, [0.0, 1.0, 0.0])
+            ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
             for far in (BALL, BALL + TOES):
                 point = np.array([0.0, depth, 0.0]) + ahead * (far / metres)
                 at_rest.append(point)
