@@ -67,6 +67,11 @@ BODIES_TEST = "tests/formats/gltf/test_foreign_bodies.py"
 HEADS_TEST = "tests/formats/gltf/test_own_heads.py"
 FACES_TEST = "tests/formats/gltf/test_face_motion.py"
 DECLARED_TEST = "tests/formats/gltf/test_declared_bones.py"
+FIGURE = "fba/capture/comparison/figure.py"
+MEASURES = "fba/capture/comparison/measures.py"
+MEASUREMENT = "fba/capture/comparison/measurement.py"
+VERDICT = "fba/capture/comparison/verdict.py"
+BOUNDS = "fba/capture/comparison/thresholds.csv"
 REPORT = "fba/capture/_report.py"
 STANDARD = "fba/capture/_standard_skeleton.py"
 FAP_JOINTS = "fba/formats/gltf/_fap_joints.py"
@@ -90,6 +95,7 @@ LOSS_TEST = "tests/codec/test_loss.py"
 DAMAGE_TEST = "tests/codec/test_damage.py"
 TIMES_TEST = "tests/codec/test_codec_rules.py"
 FULL_TURNS_TEST = "tests/codec/test_full_turns.py"
+COMPARISON_TEST = "tests/capture/test_comparison.py"
 RANGES_TEST = "tests/codec/test_codec_rules.py tests/codec/test_limits.py"
 BVH_TEST = "tests/formats/bvh/test_bvh_rates.py"
 TEXT_TEST = "tests/formats/text/test_frame_rates.py"
@@ -151,6 +157,16 @@ MUTANTS = (
         RANGES_TEST,
     ),
     Mutant(RANGES, "np.maximum(held, wanted)", "wanted", RANGES_TEST),
+    Mutant(FIGURE, "(positions, rest)", "(rest, positions)", COMPARISON_TEST),
+    Mutant(MEASURES, "between @ mean_rotation(between).T", "between", COMPARISON_TEST),
+    Mutant(MEASURES, "np.maximum(ours - most, 0.0)", "np.maximum(ours - 9 * most, 0.0) * 0", COMPARISON_TEST),
+    Mutant(MEASURES, "np.median(own)) if level is None else level", "np.median(own))", COMPARISON_TEST),
+    Mutant(MEASURES, "frames @ level, result", "frames @ -level, result", COMPARISON_TEST),
+    Mutant(MEASUREMENT, "turned[number] > MOVES", "turned[number] > 9 * MOVES", COMPARISON_TEST),
+    Mutant(MEASUREMENT, "bounds()[row.name].hold * rate", "0 * rate", COMPARISON_TEST),
+    Mutant(VERDICT, ">= limit.poor", "> 2 * limit.poor", COMPARISON_TEST),
+    Mutant(VERDICT, ">= apart and one.part", ">= 0 and one.part", COMPARISON_TEST),
+    Mutant(BOUNDS, "clavicle,degrees,0.2,20,25", "clavicle,degrees,0.2,20,35", COMPARISON_TEST),
     Mutant(FULL_TURNS, "np.cumsum(-np.rint", "np.cumsum(0 * np.rint", FULL_TURNS_TEST),
     Mutant(
         FULL_TURNS, "angles = misfits & angle_slots()", "angles = misfits & ~angle_slots()", FULL_TURNS_TEST

@@ -14,6 +14,7 @@ from fba.animation import Animation
 from fba.parameters import baps
 
 if TYPE_CHECKING:
+    from fba.arrays import UInt8
     from fba.capture import SkeletonMotion
     from fba.capture.comparison import Comparison, Difference
     from fba.codec import ClampedParameter
@@ -173,18 +174,25 @@ def draw_report(report: CaptureReport) -> bytes:
 
     from PIL import Image
 
+    file = BytesIO()
+    Image.fromarray(draw_sights(report, PICTURES)).save(file, "png", optimize=True)
+    return file.getvalue()
+
+
+def draw_sights(report: CaptureReport, count: int) -> UInt8:
+    """Return a picture, uint8 (H, W, 3), of the source and the result in at most `count` frames."""
     from fba.capture.comparison import bounds, find_sticks
     from fba_player.export.capture_sheet import Sight, draw_sheet
 
     rate = float(report.animation.rate)
-    worst = report.comparison.worst_frames(PICTURES, max(1, round(APART * rate)))
+    worst = report.comparison.worst_frames(count, max(1, round(APART * rate)))
     sticks = find_sticks(report.motion, report.animation, report.mapped, [one.frame for one in worst])
     sights = [
         Sight(
             one.frame,
             one.sentence,
             f"frame {one.frame}, {one.frame / rate:.2f} s: {one.grade} (fair from "
-            f"{bounds()[one.measure].fair:g}, poor from {bounds()[one.measure].poor:g})",
+            f"{bounds()[one.measure].fair:g}, poor from {bounds()[one.measure].poor:g} {_unit(one)})",
             one.grade,
             "right" if one.part.startswith("right") else "left",
             stick,
@@ -192,10 +200,7 @@ def draw_report(report: CaptureReport) -> bytes:
         for one, stick in zip(worst, sticks, strict=True)
     ]
     headline = f"{report.path.name}: {report.comparison.verdict}"
-    pixels = draw_sheet(report.animation, sights, headline, report.comparison.verdict)
-    file = BytesIO()
-    Image.fromarray(pixels).save(file, "png", optimize=True)
-    return file.getvalue()
+    return draw_sheet(report.animation, sights, headline, report.comparison.verdict)
 
 
 def write_page(report: CaptureReport) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -173,12 +174,34 @@ def test_worst_frames_lie_apart() -> None:
         Difference("direction", "left forearm", 0.0, 90.0, 10),
         Difference("direction", "right forearm", 0.0, 80.0, 12),
         Difference("direction", "left thigh", 0.0, 30.0, 40),
+        Difference("jump", "left forearm", 0.0, 46.0, 60),
         Difference("head", "head", 0.0, 1.0, 80),
     )
     comparison = Comparison(100, ()).with_more(ones)
     assert [one.frame for one in comparison.worst_frames(3, 10)] == [10, 40, 80]
     assert comparison.verdict == "poor"
-    assert [one.part for one in comparison.reasons] == ["left forearm", "right forearm", "left thigh"]
+    assert [one.part for one in comparison.reasons] == [
+        "left forearm",
+        "right forearm",
+        "left thigh",
+        "left forearm",
+    ]
+
+
+def test_the_bounds_are_those_of_the_documentation() -> None:
+    """Which holds them because people must know what "poor" means."""
+    page = (Path(__file__).parents[2] / "docs" / "motion-capture.md").read_text(encoding="utf-8")
+    table = page.split("| fair from | poor from |")[1].split("\n\n")[0]
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]
+    told = {}
+    for names, _, fair, poor in rows:
+        measures = ["clamped", "clamped root"] if names == "clamped" else names.split(", ")
+        for name, *limits in zip(measures, fair.split(", "), poor.split(", "), strict=True):
+            told[name] = [limit for limit in limits if limit != "any"]
+    for name, limit in bounds().items():
+        wanted = [f"{value:g} {limit.unit}" for value in (limit.fair, limit.poor)]
+        assert told.pop(name) == (wanted if name != "unmatched" else [""])
+    assert told == {}
 
 
 def test_a_source_with_nothing_in_common(source: SkeletonMotion, mapped: dict[str, int]) -> None:

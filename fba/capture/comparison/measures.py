@@ -69,21 +69,22 @@ def directions(source: Figure, result: Figure) -> Iterator[Row]:
             yield from _angle(
                 "direction", f"{WORDS[side]} {what}", source, result, f"{side}_{start}", f"{side}_{end}"
             )
-        both = source.knuckles(side).keys() & result.knuckles(side).keys()
+        both = [f for f in source.knuckles(side) if f in result.knuckles(side)]
         if len(both) > 1 and f"{side}_wrist" in source.points:
             ways = [
                 unit(np.mean([one.knuckles(side)[f] for f in both], axis=0) - one.points[f"{side}_wrist"])
                 for one in (source, result)
             ]
             yield Row("direction", f"{WORDS[side]} hand", degrees_between(*ways))
+        hands = [_hand_axes(one, side, tuple(both)) for one in (source, result)]
         for digit in DIGITS:
-            rows = [
-                row.values
-                for n in (1, 2)
-                for row in _angle(
-                    "finger", "", source, result, f"{side}_{digit}{n}", f"{side}_{digit}{n + 1}"
-                )
-            ]
+            rows = []
+            for n in (1, 2):
+                ends = f"{side}_{digit}{n}", f"{side}_{digit}{n + 1}"
+                theirs, ours = source.direction(*ends), result.direction(*ends)
+                if theirs is not None and ours is not None:
+                    ways = [rotations.inside(axes, w) for axes, w in zip(hands, (theirs, ours), strict=True)]
+                    rows.append(degrees_between(*ways))
             if rows:
                 yield Row("finger", f"{WORDS[side]} {digit}", np.max(rows, axis=0))
     for what in ("hip", "shoulder"):
@@ -329,6 +330,16 @@ def _standing_axes(rest: Figure) -> Float64 | None:
     up = np.array([0.0, 1.0, 0.0])
     side = _along(left, up[None])[0]
     return np.stack([side, up, np.cross(side, up)], axis=-1)
+
+
+def _hand_axes(figure: Figure, side: str, fingers: tuple[str, ...]) -> Float64:
+    """Return (T, 3, 3), the axes of a hand with these knuckles; of the world if there are not two."""
+    wrist = figure.points.get(f"{side}_wrist")
+    if wrist is None or len(fingers) < 2:
+        return np.broadcast_to(np.eye(3), (1, 3, 3))
+    palm = figure.palm(side, (fingers[0], fingers[-1]))
+    ahead = _along(figure.points[f"{side}_{fingers[0]}1"] - wrist, palm)
+    return np.stack([np.cross(palm, ahead), palm, ahead], axis=-1)
 
 
 def _along(vectors: Float64, normal: Float64) -> Float64:

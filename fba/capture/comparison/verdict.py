@@ -96,10 +96,10 @@ class Comparison:
         return Comparison(self.frames, in_order((*self.differences, *more)))
 
     def worst_frames(self, count: int, apart: int) -> tuple[Difference, ...]:
-        """Return at most `count` differences, the worst first, whose frames lie apart."""
+        """Return at most `count` differences, the worst first, of parts and frames that lie apart."""
         chosen: list[Difference] = []
         for one in self.differences:
-            if all(abs(one.frame - other.frame) >= apart for other in chosen):
+            if all(abs(one.frame - other.frame) >= apart and one.part != other.part for other in chosen):
                 chosen.append(one)
             if len(chosen) == count:
                 break
