@@ -46,6 +46,7 @@ ARRIVING = "waits for a stream that arrives over a network"
 SYSTEM = "installs system packages"
 CHECKOUT = "sets up or tests the checkout, which .ci/run does"
 MISMATCH = "fba: walk.fba: BAP steps visage: the stream says so"
+POOR = "fba: poor: walk.bvh: right hand faces 129 degrees off in frame 407, and 3 more; --report FILE.html shows it"
 ILLUSTRATIONS = {
     ("README.md", "./dev demo --out demo"): CHECKOUT,
     ("README.md", ". .venv/bin/activate"): "chooses an environment",
@@ -60,6 +61,7 @@ ILLUSTRATIONS = {
     ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
     ("docs/face-models.md", "npm install gltf-validator"): "needs node.js and a network",
     ("docs/measure.md", "./dev bench --summary > results.md"): "takes ten minutes",
+    ("docs/motion-capture.md", POOR): "what is said of another file",
     ("docs/motion-capture.md", MISMATCH): "a warning, with figures of another file",
     ("docs/play.md", "fba play face.fba"): WINDOW,
     ("docs/play.md", "fba play face.fba --paused"): WINDOW,
