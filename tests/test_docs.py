@@ -46,7 +46,7 @@ ARRIVING = "waits for a stream that arrives over a network"
 SYSTEM = "installs system packages"
 CHECKOUT = "sets up or tests the checkout, which .ci/run does"
 MISMATCH = "fba: walk.fba: BAP steps visage: the stream says so"
-POOR = "fba: poor: walk.bvh: right hand faces 129 degrees off in frame 407, and 3 more; --report FILE.html shows it"
+POOR = "fba: poor: walk.bvh: right hand faces 129 degrees off in frame 407; --report FILE.html shows it"
 ILLUSTRATIONS = {
     ("README.md", "./dev demo --out demo"): CHECKOUT,
     ("README.md", ". .venv/bin/activate"): "chooses an environment",
