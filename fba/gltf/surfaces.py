@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,14 +16,21 @@ from fba.mesh.names import UniqueNames
 
 SURFACE_BYTES = 2500
 """Memory of a surface, whatever its number of vertices."""
+GENERIC = re.compile(
+    r"(?:(?:mesh|node|object|primitive|polysurface|geometry)[ _.:-]*)?[\d_.]*", re.IGNORECASE
+)
+"""Names that programs give by themselves."""
+MOST_ABOVE = 8
+"""Most names that are tried."""
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
     """One primitive of one node, at rest: morph targets at 0, joints as in the file.
 
-    name: the node's, else the mesh's, made unique. positions: float32 (V, 3), in the scene's frame.
-    triangles: int32 (F, 3), counter-clockwise from outside. normals: float32 (V, 3) unit, or None.
+    name: the node's, else the mesh's, else that of the nearest node above; made unique. positions: float32
+    (V, 3), in the scene's frame. triangles: int32 (F, 3), counter-clockwise from outside. normals: float32
+    (V, 3) unit, or None.
     texcoords: float32 (V, 2) of the set that the material uses, or None. colours: float32 (V, 4) or None.
     morphs: float32 (V, 3) displacements at weight 1, in the scene's frame, by name. node: its index.
     primitive: what it was made from (joints and weights of a skin).
@@ -60,10 +68,24 @@ def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
             # float64 positions and normals; with a skin, a matrix for each vertex
             each = 200 + 12 * moving + (0 if node.skin is None else 600)
             budget.charge(SURFACE_BYTES + len(primitive.positions) * each, gltf.document)
-            name = names(node.name if not node.name.startswith("node ") else mesh.name)
+            name = names(_telling_name(gltf, number, mesh.name))
             with np.errstate(all="ignore"):  # overflow is detected at the end
                 result.append(_surface(gltf, number, primitive, mesh.morph_names, name, of_skins))
     return tuple(result)
+
+
+def _telling_name(gltf: Gltf, number: int, mesh: str) -> str:
+    """The name of a node, of its mesh, or of the nearest node above it: the first that a person gave.
+
+    Exporters that split or compress meshes leave the person's names to the nodes above.
+    """
+    own = gltf.nodes[number].name
+    above = gltf.nodes[number].parent
+    candidates = [own, mesh]
+    while above is not None and len(candidates) < MOST_ABOVE:
+        candidates.append(gltf.nodes[above].name)
+        above = gltf.nodes[above].parent
+    return next((name for name in candidates if not GENERIC.fullmatch(name)), own)
 
 
 def _surface(

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float64
+from fba.arrays import Float64, Int32
 from fba.errors import ModelError
 from fba.face.authoring.regions.brows_cheeks_nose import brow_cheek_nose_motions
 from fba.face.authoring.regions.ears import ear_motions
-from fba.face.authoring.regions.eye_opening import LIDS
+from fba.face.authoring.regions.eye_opening import LIDS, measure_opening
 from fba.face.authoring.regions.eyes import Eye, eye_transforms, find_eyes, pupil_motions
 from fba.face.authoring.regions.jaw import (
     CHIN,
@@ -23,7 +23,7 @@ from fba.face.authoring.regions.jaw import (
     opening_angles,
     opening_shifts,
 )
-from fba.face.authoring.regions.lids import lash_motion, lid_motion
+from fba.face.authoring.regions.lids import lash_motion, lid_motion, sculpted_share
 from fba.face.authoring.regions.lips import HANDLES, lip_motions
 from fba.face.authoring.regions.tongue import FAPS as TONGUE_FAPS
 from fba.face.authoring.regions.tongue import tongue_motion
@@ -33,13 +33,14 @@ from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.motion import Motion, build_tables, split_by_part
 from fba.face.authoring.surface.motion_limits import eased_linear_motion, stop_at_folds
+from fba.face.authoring.surface.surface import Surface
 from fba.face.authoring.surface.unfold import unfold
 from fba.face.expressions import Definitions
 from fba.face.eyeball import PUPIL_FAP
 from fba.face.feature_points import names
 from fba.face.model import FaceModel, Part
 from fba.face.points import OPEN_JAW, SHIFT_JAW, THRUST_JAW
-from fba.face.tables import HEAD, FaceDefTransform
+from fba.face.tables import HEAD, FaceDefTables, FaceDefTransform
 from fba.parameters import FIRST_LOW_LEVEL_FAP, faps
 
 if TYPE_CHECKING:
@@ -89,9 +90,8 @@ def author(
     surface = weld_skin(parts, binding.bound)
     if bound is None:
         binding = separate_lips(surface, parts, given, binding, face_size(given))
-    marks = find_landmarks(surface, binding.points, binding.bound)
-    limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
-    work = _Authoring(parts, marks, limiter, find_eyes(marks, parts), _attach_parts(marks, parts))
+    work = _start(parts, surface, binding.points, binding.bound)
+    marks = work.marks
     work.add_all()
     _explain_far_points(work.lost, binding)
     return FaceModel(
@@ -110,6 +110,38 @@ def author(
         lost=work.lost,
         notes=dict(notes or {}),
     )
+
+
+def author_lids(model: FaceModel, sculpted: Mapping[int, Sequence[Float64]]) -> dict[int, FaceDefTables]:
+    """Tables by FAP (19..22) of lids that move as shapes do; FAPs whose lid no shape moves are left out.
+
+    sculpted: by FAP, displacements (V, 3) of the model's vertices, metres: of several shapes, the first that
+    moves the lid.
+    """
+    surface = weld_skin(model.parts, model.bound)
+    work = _start(model.parts, surface, model.points, model.bound)
+    made = {}
+    for fap, shapes in sculpted.items():
+        side, lid = LIDS[fap]
+        opening = measure_opening(work.marks, work.eyes[side])
+        for shape in shapes if opening is not None else ():
+            assert opening is not None
+            shift = np.zeros((len(surface), 3))
+            shift[surface.number] = shape[surface.pool]
+            if sculpted_share(work.marks, opening, work.eyes[side], lid, shift) is not None:
+                work.add_lid(fap, shift)
+                break
+        if fap in work.moves:
+            unit = model.fapu[faps()[fap - 1].unit]
+            made[fap] = build_tables(fap, unit, work.moves[fap])
+    return made
+
+
+def _start(parts: tuple[Part, ...], surface: Surface, points: Float64, bound: Int32) -> _Authoring:
+    """The authoring of a face, without any motion yet."""
+    marks = find_landmarks(surface, points, bound)
+    limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
+    return _Authoring(parts, marks, limiter, find_eyes(marks, parts), _attach_parts(marks, parts))
 
 
 def _check_size(parts: tuple[Part, ...]) -> None:
@@ -175,7 +207,8 @@ class _Authoring:
             for fap, motion in motions.items():
                 self._add_to_surface(fap, motion)
             self.lost |= lost
-        self._add_lids()
+        for fap in LIDS:
+            self.add_lid(fap)
         self._add_eyeballs()
         self._add_tongue()
         self._add_head()
@@ -232,16 +265,17 @@ class _Authoring:
         """Add the shifts (K, V, 3) of a part in the mouth to a FAP."""
         self.moves[fap][part.name] = Motion(values, np.arange(len(part.vertices)), shifts)
 
-    def _add_lids(self) -> None:
-        for fap, (side, _) in LIDS.items():
-            motion = lid_motion(self.marks, self.limiter, self.eyes[side], fap, self.parts)
-            if isinstance(motion, str):
-                self.lost[fap] = motion
-                continue
-            self._add_to_surface(fap, motion)
-            for part in self.parts:
-                if part.kind == "lash" and part.name in self.anchors:
-                    self.moves[fap][part.name] = lash_motion(self.marks, self.eyes[side], fap, part, motion)
+    def add_lid(self, fap: int, sculpted: Float64 | None = None) -> None:
+        """Make the motion of a lid. sculpted: (N, 3) displacements of the surface that show how it moves."""
+        eye = self.eyes[LIDS[fap][0]]
+        motion = lid_motion(self.marks, self.limiter, eye, fap, self.parts, sculpted)
+        if isinstance(motion, str):
+            self.lost[fap] = motion
+            return
+        self._add_to_surface(fap, motion)
+        for part in self.parts:
+            if part.kind == "lash" and part.name in self.anchors:
+                self.moves[fap][part.name] = lash_motion(self.marks, eye, fap, part, motion)
 
     def _add_eyeballs(self) -> None:
         for side, eye in self.eyes.items():

@@ -52,7 +52,11 @@ def check_lids(poser: Poser, side: str) -> Iterator[Finding]:
 
 
 def lid_gap(poser: Poser, side: str, split: float) -> float:
-    """The widest distance between the margins of closed lids, as a share of IRISD0; nan without margins."""
+    """The widest distance between the margins of closed lids, as a share of IRISD0; nan without margins.
+
+    What margins of few edges cannot avoid is not counted: where one has a corner between two vertices of the
+    other, the other's edge cuts it off.
+    """
     upper, lower = SIDES[side]
     moved = poser.pose({upper: split, lower: CLOSED - split})
     lines = [poser.contour(f"{side} {lid} lid", moved) for lid in ("upper", "lower")]
@@ -64,8 +68,20 @@ def lid_gap(poser: Poser, side: str, split: float) -> float:
     widest = 0.0
     for line, other in (lines, lines[::-1]):
         between = (line[:, 0] > ends[0] + margin) & (line[:, 0] < ends[1] - margin)
-        widest = max(widest, float(_distances_to_line(line[between], other).max(initial=0.0)))
+        distances = _distances_to_line(line, other) - _cut_corners(line, other)
+        widest = max(widest, float(distances[between].max(initial=0.0)))
     return widest / (poser.model.fapu.IRISD * 1024)
+
+
+def _cut_corners(line: Float64, other: Float64) -> Float64:
+    """(N,) distances of the vertices of a line (N, 3) from itself, as the other's vertices (M, 3) sample it.
+
+    The samples are the line's points at the x of the other's vertices.
+    """
+    order = np.argsort(line[:, 0], kind="stable")
+    x = np.clip(np.sort(other[:, 0]), line[order[0], 0], line[order[-1], 0])
+    sampled = np.stack([np.interp(x, line[order, 0], line[order, axis]) for axis in range(3)], axis=1)
+    return _distances_to_line(line, sampled)
 
 
 def lid_cut(poser: Poser, side: str, split: float) -> float:

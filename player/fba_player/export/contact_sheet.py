@@ -1,4 +1,4 @@
-"""Contact sheets: every FAP, viseme and expression of a face, each with its name."""
+"""Contact sheets: every FAP, viseme and expression of a face, or the main ones, each with its name."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.font import label_font, shortened
 
-SHEETS = ("faps", "visemes", "expressions", "all")
+SHEETS = ("faps", "visemes", "expressions", "all", "review")
 """Names of the sheets."""
-COLUMNS = {"faps": 11, "visemes": 7, "expressions": 3}
-TILE = {"faps": (160, 160), "visemes": (220, 220), "expressions": (360, 360)}
+COLUMNS = {"faps": 11, "visemes": 7, "expressions": 3, "review": 8}
+TILE = {"faps": (160, 160), "visemes": (220, 220), "expressions": (360, 360), "review": (200, 200)}
 """Columns, and width and height of a picture in pixels."""
 TEXT, FAINT, PAPER = (232, 235, 240), (158, 165, 175), (34, 37, 43)
 SPACE = 4
@@ -52,7 +52,8 @@ def contact_sheet(
     """Draw a sheet of labelled pictures: uint8 (H, W, 3), sRGB.
 
     what: "faps", each of the 66 at a value and from a side that show it well; "visemes", the 14;
-    "expressions", the 6 at full intensity; "all", one sheet below the other. model: the face, by default
+    "expressions", the 6 at full intensity; "all", one sheet below the other; "review", what shows whether a
+    head was imported well: at rest, the main motions, visemes and expressions. model: the face, by default
     the built-in head. tile: width and height of one picture in pixels.
 
     Raises ValueError for another name or a size below 16, DisplayError where there is no OpenGL.
@@ -61,7 +62,7 @@ def contact_sheet(
         raise ValueError(f"no contact sheet {what!r}; there are {', '.join(SHEETS)}")
     if tile is not None and min(tile) < 16:
         raise ValueError(f"a picture of a contact sheet must have at least 16x16 pixels, not {tile}")
-    kinds = COLUMNS if what == "all" else (what,)
+    kinds = SHEETS[:3] if what == "all" else (what,)
     scene = Scene(Animation(Fraction(25), np.arange(1), FaceTrack.empty(1)), model or FaceModel.default())
     sheets = [_sheet(scene, kind, tile or TILE[kind]) for kind in kinds]
     widest = max(sheet.shape[1] for sheet in sheets)
@@ -76,9 +77,11 @@ def contact_sheet(
 
 
 def tiles(kind: str, scene: Scene) -> list[Tile]:
-    """The pictures of a sheet: "faps", "visemes" or "expressions"."""
+    """The pictures of a sheet: "faps", "visemes", "expressions" or "review"."""
     if kind == "faps":
         return list(_fap_tiles())
+    if kind == "review":
+        return [*_review_tiles(), *tiles("visemes", scene), *tiles("expressions", scene)]
     definitions = scene.model.definitions
     if kind == "visemes":
         rows = zip(VISEMES[1:], definitions.visemes[1:], strict=True)
@@ -102,6 +105,20 @@ def _fap_tiles() -> tuple[Tile, ...]:
             label = f"{number} {faps()[number - 1].name}"
             yaw, pitch = float(row["yaw"]), float(row["pitch"])
             tiles.append(Tile(label, f"{value:+d}", vector, row["view"], yaw, pitch))
+    return tuple(tiles)
+
+
+@cache
+def _review_tiles() -> tuple[Tile, ...]:
+    tiles = []
+    with (files(__package__) / "review_sheet.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            vector = np.zeros(FAP_COUNT, dtype=np.float32)
+            for pair in row["faps"].split():
+                number, _, amount = pair.partition("=")
+                vector[int(number) - 1] = float(amount)
+            vector.flags.writeable = False
+            tiles.append(Tile(row["label"], row["faps"], vector, row["view"], float(row["yaw"])))
     return tuple(tiles)
 
 

@@ -61,10 +61,13 @@ class Profile:
         reach = np.linalg.norm(points - self.centre, axis=1)
         return np.asarray(reach >= share * self.radius(points, around=False))
 
-    def lift(self, points: Float64, shifts: Float64, *, edges: bool = True) -> Float64:
+    def lift(
+        self, points: Float64, shifts: Float64, *, edges: bool = True, always: Bool | None = None
+    ) -> Float64:
         """(N, 3) forward shifts to add so that points that were outside the eyeball stay outside.
 
-        edges: leave room for the edges between vertices, whose middles dip.
+        edges: leave room for the edges between vertices, whose middles dip. always: (N,) mask of points that
+        count as outside.
         """
         shifted = points + shifts
         needed = self.radius(shifted, around=True) + self.clearance + (self.dip if edges else 0.0)
@@ -72,7 +75,8 @@ class Profile:
         level = (arms[:, :2] ** 2).sum(axis=1)
         front = np.sqrt(np.maximum(needed**2 - level, 0.0))
         moved = np.linalg.norm(shifts, axis=1) > 1e-9
-        pushed = self.is_outside(points, OUTSIDE) & moved & (arms[:, 2] > 0)
+        outside = self.is_outside(points, OUTSIDE)
+        pushed = (outside if always is None else outside | always) & moved & (arms[:, 2] > 0)
         result = np.zeros_like(shifted)
         result[:, 2] = np.where(pushed, np.maximum(front - arms[:, 2], 0.0), 0.0)
         return result
@@ -110,11 +114,24 @@ def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
     return float(np.percentile(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1), 80)) if len(edges) else 0.0
 
 
-def push_vertices_outside(profile: Profile, points: Float64, shifts: Float64, values: Float64) -> Float64:
-    """Shifts (K, N, 3) corrected so that no vertex cuts the eyeball, increasingly along the way."""
+def push_vertices_outside(
+    profile: Profile, points: Float64, shifts: Float64, values: Float64, margins: Bool | None = None
+) -> Float64:
+    """Shifts (K, N, 3) corrected so that no vertex cuts the eyeball, increasingly along the way.
+
+    margins: (N,) mask of the vertices of both lids' margins where these must meet also if the eyeball is so
+    large that some lie in it. They are kept outside on the way, and end on the other margin where it is.
+    """
     result = shifts.copy()
-    for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FULL_CLEARANCE)):
-        result[k] += profile.lift(points, shifts[k]) * share
+    ways = np.abs(values) / CLOSED
+    for k, share in enumerate(smoothstep(ways / FULL_CLEARANCE)):
+        push = profile.lift(points, shifts[k], always=margins)
+        if margins is not None:
+            push[margins] *= smoothstep(max(min(ways[k], 1 - ways[k]), 0.0) / FULL_CLEARANCE)
+            push[~margins] *= share
+        else:
+            push *= share
+        result[k] += push
     return result
 
 

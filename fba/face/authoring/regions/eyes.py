@@ -19,8 +19,8 @@ from fba.face.tables import FaceDefTransform
 
 PUPIL_OF_IRIS = 1 / 3
 """Diameter of the pupil relative to the iris on a neutral face."""
-PUPIL_REACH = 1.5
-"""An eyeball without vertices this close to its axis, in radii of the pupil, has no pupil to move."""
+PUPIL_RIM = (0.4, 1.5)
+"""An eyeball without vertices this far from its axis, in radii of the pupil, has no pupil to move."""
 SMALLEST_PUPIL, LARGEST_PUPIL = 0.3, 0.9
 """Radii at which the pupil stops: shares of its neutral radius, and of that of the iris."""
 
@@ -107,7 +107,8 @@ def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -
         across = points - eye.centre - along[:, None] * eye.gaze
         distance = np.linalg.norm(across, axis=1)
         moving = np.flatnonzero((distance < iris) & (along > 0) & (distance > 1e-9))
-        if not (distance[moving] < PUPIL_REACH * pupil).any():
+        rim = distance[moving] / pupil
+        if not ((rim > PUPIL_RIM[0]) & (rim < PUPIL_RIM[1])).any():
             continue
         outward = across[moving] / distance[moving, None]
         before = distance[moving]

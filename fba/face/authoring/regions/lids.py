@@ -62,14 +62,31 @@ STILL = {
     "left": ("4.1", "4.3", "4.5", "9.7", "9.13", "5.3", "9.12"),
     "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
 }
+WIDE = 0.35
+"""Columns of the eye's opening this high, as a share of the highest, show how far a shape moves a margin."""
+LEAST_SCULPTED = 0.08
+"""Least share of the opening by which a shape moves a margin that it shows how to move."""
+LEAST_TURN = 0.3
+"""Least motion of a margin, as a share of its largest, against which that of other vertices is measured."""
 HEM = 0.006
 """Shares of a motion below this are set to 0."""
 CORNER = 0.12
 """Distance from the corners, as a share of the eye's width, within which folds do not stop a lid."""
 
 
-def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Sequence[Part]) -> Motion | str:
-    """The motion of the surface for a lid's FAP, or the reason why there is none."""
+def lid_motion(
+    marks: Landmarks,
+    limiter: Limiter,
+    eye: Eye,
+    fap: int,
+    parts: Sequence[Part],
+    sculpted: Float64 | None = None,
+) -> Motion | str:
+    """The motion of the surface for a lid's FAP, or the reason why there is none.
+
+    sculpted: (N, 3) displacements of the surface by which somebody closed this eye, metres: then each vertex
+    makes the share of the margin's way that it makes there, and folds that are in it are no reason to stop.
+    """
     side, lid = LIDS[fap]
     own, other = marks.contour(f"{side} {lid} lid"), marks.contour(f"{side} {_other(lid)} lid")
     if not len(own) or not len(other):
@@ -77,25 +94,81 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
     opening = measure_opening(marks, eye)
     if opening is None:
         return f"the lids of the {side} eye are not one above the other"
-    share = _share(marks, opening, eye, lid, own, other)
+    share = None if sculpted is None else sculpted_share(marks, opening, eye, lid, sculpted)
+    follows = share is not None
+    sculptors = limiter
+    if sculpted is not None and follows:
+        sculptors = limiter.without(_folded_vertices(limiter, sculpted))
+    if share is None:
+        share = _share(marks, opening, eye, lid, own, other)
     vertices = np.flatnonzero(share > 0)
     points = marks.surface.vertices[vertices]
     values = lid_values(fap)
     shifts = slide_lid(points, share[vertices], opening, eye, lid, values / CLOSED)
     profile = measure_profile(eye, parts, edge_length(marks, own, other))
-    shifts = push_vertices_outside(profile, points, shifts, values)
     margins = np.concatenate([own, other])
     pinned = marks.surface.mask(margins)
-    motion = unfold(marks.surface, limiter, Motion(values, vertices, shifts), pinned, True)
+    shifts = push_vertices_outside(profile, points, shifts, values, pinned[vertices] if follows else None)
+    motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
     points = marks.surface.vertices[motion.vertices]
-    shifts = push_vertices_outside(profile, points, motion.shifts, values)
+    shifts = push_vertices_outside(
+        profile, points, motion.shifts, values, pinned[motion.vertices] if follows else None
+    )
     shifts = push_edges_outside(profile, marks.surface, motion.vertices, shifts, pinned, values)
     motion = Motion(values, motion.vertices, shifts)
     # in the corners of the eye, skin closes on itself
     ends = marks.surface.vertices[own[[0, -1]]]
     near = np.linalg.norm(marks.surface.vertices[margins][:, None] - ends, axis=2).min(axis=1)
     corners = margins[near < CORNER * np.linalg.norm(ends[1] - ends[0])]
-    return stop_at_folds(limiter.without(corners), motion, turning=True)
+    limited = stop_at_folds(limiter.without(corners), motion, turning=True)
+    if not follows:
+        return limited
+    # the way to the other lid is the sculptor's; the way up is not
+    closing = stop_at_folds(sculptors.without(margins), motion, turning=True)
+    up, down = limited.values < 0, closing.values >= 0
+    return Motion(
+        np.concatenate([limited.values[up], closing.values[down]]),
+        motion.vertices,
+        np.concatenate([limited.shifts[up], closing.shifts[down]]),
+    )
+
+
+def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift: Float64) -> Float64 | None:
+    """(N,) share of the margin's motion at each vertex in a shape; None where that moves this lid little.
+
+    shift: (N, 3) displacements of the surface by the shape, metres.
+    """
+    side, sign = eye.side, (-1.0 if lid == "upper" else 1.0)
+    own, other = marks.contour(f"{side} {lid} lid"), marks.contour(f"{side} {_other(lid)} lid")
+    arms = marks.surface.vertices - eye.centre
+    moved = arms + shift
+    turn = sign * (np.arctan2(moved[:, 1], moved[:, 2]) - np.arctan2(arms[:, 1], arms[:, 2]))
+    turn[(arms[:, 2] < -0.2 * eye.radius) | (moved[:, 2] < -0.2 * eye.radius)] = 0.0
+    line = own[np.argsort(arms[own, 0], kind="stable")]
+    gap = np.interp(arms[line, 0] + eye.centre[0], opening.x, opening.upper[:, 0] - opening.lower[:, 0])
+    most = float(gap.max())
+    # towards the corners, where both margins are close together, shares of little are no measure
+    wide = gap > WIDE * most
+    if wide.sum() < 2 or np.median(turn[line][wide] * eye.radius / gap[wide]) < LEAST_SCULPTED:
+        return None
+    at_margin = np.interp(arms[:, 0], arms[line, 0][wide], turn[line][wide])
+    at_margin = np.maximum(at_margin, LEAST_TURN * float(turn[line].max()))
+    out = np.interp(arms[:, 0], arms[line, 0], np.hypot(arms[line, 1], arms[line, 2]))
+    away = np.hypot(arms[:, 1], arms[:, 2]) / np.maximum(out, 1e-12)
+    share = np.clip(turn * np.maximum(away, 1.0) / at_margin, 0.0, 1 + FURTHER)
+    reach = REACH * marks.fapu.ES * 1024
+    share *= smoothstep(2 - 2 * np.minimum(marks.surface.distances(own, reach), reach) / reach)
+    share[own] = 1.0
+    share[np.setdiff1d(other, own)] = 0.0
+    return trim_small(share, HEM)
+
+
+def _folded_vertices(limiter: Limiter, shift: Float64) -> Intp:
+    """Vertices of the triangles that a shape folds. shift: (N, 3)."""
+    triangles = limiter.triangles_touching(np.flatnonzero(np.abs(shift).max(axis=1) > 0))
+    if not len(triangles):
+        return np.zeros(0, dtype=np.intp)
+    return np.unique(triangles[~limiter.soundness(shift, triangles, turning=True)])
 
 
 def lid_values(fap: int) -> Float64:

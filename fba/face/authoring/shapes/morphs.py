@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy.typing as npt
 
 from fba.errors import FbaWarning
-from fba.face.authoring.author import author
+from fba.face.authoring.author import author, author_lids
 from fba.face.authoring.shapes._mixing import GROUPS, Mixer, fold_limited_tables
 from fba.face.authoring.shapes._shapes import Morphs, Shapes, check_shapes
 from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
@@ -34,6 +34,13 @@ FEWEST_FAPS = 5
 ARCS = frozenset((3, *range(19, 31), *range(43, 51)))
 """FAPs whose points move on arcs: jaw, lids, eyeballs, tongue, head. A shape is straight, and is used for
 these only where the mesh alone gives no table."""
+LID_SHAPES = {
+    19: ("eyeBlinkLeft",),
+    20: ("eyeBlinkRight",),
+    21: ("eyeBlinkLeft", "eyeSquintLeft"),
+    22: ("eyeBlinkRight", "eyeSquintRight"),
+}
+"""Shapes that show how the skin of a lid moves with its margin; the first that moves it is used."""
 REPLACEMENT_SHAPES = {
     3: ("jawOpen", "mouthClose"),
     19: ("eyeBlinkLeft",),
@@ -93,6 +100,14 @@ def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
         tables |= made
         used |= names
     lost = dict(base.lost)
+    closing = {
+        fap: [shapes.displacements(name) for name in names if name in shapes.morphs]
+        for fap, names in LID_SHAPES.items()
+    }
+    for fap, table in author_lids(base, closing).items():
+        tables[fap] = table
+        lost.pop(fap, None)
+        used.add(next(name for name in LID_SHAPES[fap] if name in shapes.morphs))
     for fap, wanted in REPLACEMENT_SHAPES.items():
         if fap in lost and wanted[0] in shapes.morphs:
             table = mixer.replacement_tables(fap, [shape for shape in wanted if shape in shapes.morphs])

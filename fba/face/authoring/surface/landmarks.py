@@ -31,6 +31,10 @@ CONTOURS = {
 }
 """The feature points that each contour runs through."""
 LIP_CONTOURS = tuple(name for name in CONTOURS if name.endswith("lip"))
+LIP_ROOM = 0.03
+"""Distance from the inner contour of the lips, in ES0, that the outer contour keeps where it can."""
+CLOSE_COST = 4.0
+"""Factor of lengths within that distance."""
 OPENINGS = {name for name in CONTOURS if name.endswith(" lid") or "inner" in name}
 """Contours around an opening of the face, which in many meshes is a hole."""
 
@@ -76,17 +80,25 @@ class Landmarks:
     def contour(self, name: str) -> Intp:
         """Vertices along a contour, corner to corner; empty unless both ends and one point between exist."""
         if name not in self._contours:
-            self._contours[name] = self._walk(CONTOURS[name], rim=name in OPENINGS)
+            around = None
+            if "outer lip" in name:
+                around = np.concatenate([self.contour(f"{half} inner lip") for half in ("upper", "lower")])
+            self._contours[name] = self._walk(CONTOURS[name], rim=name in OPENINGS, around=around)
         return self._contours[name]
 
-    def _walk(self, through: tuple[str, ...], *, rim: bool) -> Intp:
+    def _walk(self, through: tuple[str, ...], *, rim: bool, around: Intp | None = None) -> Intp:
+        """around: vertices that the walk keeps away from where it can."""
         known = [self.vertex[name] for name in through if name in self.vertex]
         if len(known) < 3 or not self.has(through[0], through[-1]):
             return np.zeros(0, dtype=np.intp)
+        costs = None
+        if around is not None and len(around):
+            far = self.surface.distances(around, LIP_ROOM * self.fapu.ES * 1024)
+            costs = np.where(np.isfinite(far), CLOSE_COST, 1.0)
         walk: list[int] = [known[0]]
         for start, end in pairwise(known):
             on_rim = bool(self.surface.open_edge[[start, end]].all())
-            step = self.surface.path(start, end, rim=rim and on_rim)
+            step = self.surface.path(start, end, rim=rim and on_rim, costs=costs)
             if not len(step):
                 return np.zeros(0, dtype=np.intp)
             walk += step[1:].tolist()

@@ -115,17 +115,24 @@ class Surface:
         away: Float64 = dijkstra(self.graph, directed=False, indices=start, limit=limit, min_only=True)
         return away
 
-    def path(self, start: int, end: int, *, rim: bool = False) -> Intp:
+    def path(self, start: int, end: int, *, rim: bool = False, costs: Float64 | None = None) -> Intp:
         """The vertices of the shortest path along edges, both ends included; empty where there is none.
 
-        rim: prefer open edges, as of a mouth that is a slit or eyes that are holes.
+        rim: prefer open edges, as of a mouth that is a slit or eyes that are holes. costs: (N,), factors of
+        the lengths of edges at each vertex, 1 or more; the larger one of both ends counts.
         """
+        from scipy.sparse import csr_array
         from scipy.sparse.csgraph import dijkstra
 
         away = float(np.linalg.norm(self.vertices[start] - self.vertices[end]))
+        graph = self.rim_graph if rim else self.graph
+        if costs is not None and (costs > 1).any():
+            graph = graph.tocoo()
+            a, b = graph.coords
+            graph = csr_array((graph.data * np.maximum(costs[a], costs[b]), (a, b)), shape=graph.shape)
         for limit in (3 * away + 1e-9, np.inf):
             length, before = dijkstra(
-                self.rim_graph if rim else self.graph,
+                graph,
                 directed=False,
                 indices=start,
                 limit=limit,

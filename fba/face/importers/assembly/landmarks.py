@@ -15,7 +15,10 @@ import numpy as np
 from fba.arrays import Bool, Float32, Float64
 from fba.errors import ModelError, Remedy
 from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
+from fba.face.authoring.surface.binding import SURFACE_KINDS
+from fba.face.authoring.surface.surface import weld_parts
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, sphere
+from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
 from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._warping import warp_points
 from fba.face.importers.assembly.polygon_parts import Piece
@@ -29,6 +32,10 @@ MOST_IN_COLUMN = 3000
 """Most vertices of one column of the face that are compared with each other."""
 PARTED = 0.25
 """Share of the jaw's way by which lips part at least."""
+FEWEST_IN_LOOP = 6
+"""Fewest vertices around the opening of an eye."""
+CORNER_WIDTH = 0.055
+"""Distance of the outer corner of the lips from the inner one, as a share of that of the pupils."""
 FEWEST_FAPS = 20
 """With at least this many shapes named after FAPs, points are where these move most."""
 
@@ -48,6 +55,7 @@ def find_points(pieces: Sequence[Piece], path: str) -> Float64:
         points = _from_faps(vertices, by_fap)
     else:
         points = _from_arkit(skin[0], vertices, eyes, path)
+    points |= _lids_by_loops(pieces, eyes)
     for side, name in PUPIL_POINT.items():
         points[name] = eyes[side][2]
     points |= profile_points(skin[0].part, points)
@@ -176,6 +184,25 @@ def _lids(
     return points
 
 
+def _lids_by_loops(
+    pieces: Sequence[Piece], eyes: Mapping[str, tuple[Float64, float, Float64]]
+) -> dict[str, Float64]:
+    """Middles of the lids and corners of the eyes, on the loops of edges around their openings."""
+    surface = weld_parts([piece.part for piece in pieces], SURFACE_KINDS)
+    points: dict[str, Float64] = {}
+    for side, (centre, radius, pupil) in eyes.items():
+        loop = find_eye_loop(surface, centre, radius)
+        found = (
+            lid_points_of_loop(surface.vertices, loop, float(pupil[0])) if len(loop) >= FEWEST_IN_LOOP else {}
+        )
+        if found:
+            upper, lower = LID_POINTS[side]
+            left, right = ("3.7", "3.11") if side == "left" else ("3.8", "3.12")
+            names = {"upper": upper, "lower": lower, "left": left, "right": right}
+            points |= {names[where]: surface.vertices[vertex] for where, vertex in found.items()}
+    return points
+
+
 def _mouth(
     vertices: Float64,
     facing: Bool,
@@ -215,8 +242,11 @@ def _mouth(
         corner = vertices[int(score.argmax())]
         within = (corner[0] - vertices[:, 0]) * sign > 0.015 * apart
         away = np.linalg.norm(vertices - corner + (0.035 * apart * sign, 0, 0), axis=1)
-        points[outer] = corner
         points[inner] = vertices[int(np.where(within & front, away, np.inf).argmin())]
+        # the contours need skin between them: next to each other, one could not move without the other
+        beyond = points[inner] + (CORNER_WIDTH * apart * sign, 0.0, 0.25 * CORNER_WIDTH * apart)
+        away = np.linalg.norm(vertices - beyond, axis=1)
+        points[outer] = vertices[int(np.where(candidates, away, np.inf).argmin())]
         line = ahead & (np.abs(vertices[:, 1] - vertices[upper, 1]) < 0.1 * apart)
         half = _lip_pair(vertices, drop, line, float(middle[0] + points[inner][0]) / 2, apart)
         if half is not None and np.linalg.norm(vertices[half[0]] - vertices[half[1]]) < 0.08 * apart:
