@@ -164,6 +164,10 @@ class FaceModel(Meshes[Part]):
         """The same face with other tables."""
         return replace(self, tables=tables, lost=lost)
 
+    def with_notes(self, notes: Mapping[str, str]) -> FaceModel:
+        """The same face with more notes."""
+        return replace(self, notes={**self.notes, **notes})
+
     def _check_points(self) -> None:
         points = np.array(self.points, dtype=np.float64)
         if points.shape != (len(names()), 3):

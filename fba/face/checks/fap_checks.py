@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 MODERATE = 300.0
 """Value at which regions are checked; for FAPs in units of angle, 100 times it."""
+EYE_FAPS = range(23, 31)
+"""FAPs that move eyeballs."""
 SHARE = 0.03
 """Vertices that move less than this share of the largest motion count as still."""
 
@@ -48,10 +50,15 @@ def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Find
     return check_posed(Poser(model), wanted)
 
 
-def check_posed(poser: Poser, wanted: Iterable[int]) -> list[Finding]:
-    """`check_faps` for a model that already has a `Poser`, which makes repeated checks faster."""
+def check_posed(poser: Poser, wanted: Iterable[int], *, combined: bool = True) -> list[Finding]:
+    """`check_faps` for a model that already has a `Poser`, which makes repeated checks faster.
+
+    combined: also what several FAPs do together.
+    """
     wanted = list(wanted)
     findings = [finding for fap in wanted for finding in _findings_of_one(poser, fap)]
+    if not combined:
+        return findings
     return [*findings, *_check_combinations(poser, set(wanted))]
 
 
@@ -113,6 +120,13 @@ def _check_region(poser: Poser, fap: int) -> Iterator[Finding]:
     if not moved.max() > 0:
         return
     moving = np.flatnonzero(moved > SHARE * moved.max())
+    eyes = np.zeros(len(moved), dtype=np.bool_)
+    for part in poser.model.of_kind("eye"):  # an eyeball belongs to its eye, however big it is
+        start = poser.model.starts[part.name]
+        eyes[start : start + len(part.vertices)] = fap in EYE_FAPS
+    moving = moving[~eyes[moving]]
+    if not len(moving):
+        return
     away = np.min(np.linalg.norm(poser.neutral[moving][:, None] - points, axis=2), axis=1)
     es = poser.model.fapu.ES * 1024
     if away.max() > reach * es:

@@ -14,6 +14,7 @@ from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
 from fba.face.importers.assembly.pieces import assemble, part_names
 from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly.symmetry import ALIKE, EXACT, asymmetry, mirror_tables, stand_upright
 from fba.face.importers.points.points_file import given_points, points_beside
 from fba.face.model import FaceModel, Material, Part
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -36,12 +37,7 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
         return FaceModel.load(path, limits=options.limits)
     given = given_points(points) if points is not None else points_beside(Path(path), POINT_FILES)
     if given is None:
-        from fba.face.importers.assembly.landmarks import find_points
-
-        upright, _ = turn_upright(pieces, np.full((len(names()), 3), np.nan), options.up)
-        located = find_points(assemble(upright, options.kinds), os.fspath(path))
-        notes = {"feature points": "found by the shapes of the head, not given"}
-        return finish_import(upright, located, {}, replace(options, up="y"), notes)
+        return _import_without_points(pieces, options)
     vertices = np.concatenate([piece.part.vertices for piece in pieces])
     positions = given.points.copy()
     for name, vertex in given.vertices.items():
@@ -51,6 +47,26 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
             )
         positions[row_of()[name]] = vertices[vertex]
     return finish_import(pieces, positions, given.vertices, options)
+
+
+def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceModel:
+    """A face from pieces whose feature points are to be found."""
+    from fba.face.importers.assembly.landmarks import find_eyes, find_points
+
+    path = os.fspath(options.path)
+    upright, _ = turn_upright(pieces, np.full((len(names()), 3), np.nan), options.up)
+    assembled = assemble(upright, options.kinds)
+    eyes = find_eyes(assembled, path)
+    notes = {"feature points": "found by the shapes of the head, not given"}
+    upright, angle = stand_upright(upright, eyes["left"][0], eyes["right"][0], assembled)
+    if angle:
+        notes["position"] = f"turned by {np.degrees(angle):.1f} degrees, so that both sides are level"
+        assembled = assemble(upright, options.kinds)
+        eyes = find_eyes(assembled, path)
+    uneven = asymmetry(assembled, eyes["left"][0], eyes["right"][0])
+    located = find_points(assembled, path, symmetric=uneven < ALIKE)
+    model = finish_import(upright, located, {}, replace(options, up="y"), notes)
+    return mirror_tables(model) if uneven < EXACT else model
 
 
 def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -> tuple[list[Piece], bool]:

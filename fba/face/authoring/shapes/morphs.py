@@ -71,11 +71,15 @@ def from_morphs(
     not fit their part.
     """
     base = author(parts, points, bound=bound, name=name, definitions=definitions, fit=fit, notes=notes)
+    return add_shapes(base, morphs)
+
+
+def add_shapes(base: FaceModel, morphs: Morphs) -> FaceModel:
+    """A face that `author` made, with tables from named shapes where they suffice; as `from_morphs`."""
     by_fap = {number: shape for shape in morphs if (number := fap_of(shape)) is not None}
     if len(by_fap) >= FEWEST_FAPS:
-        return _from_faps(
-            base, check_shapes(base, {shape: morphs[shape] for shape in by_fap.values()}), by_fap
-        )
+        shapes = check_shapes(base, {shape: morphs[shape] for shape in by_fap.values()})
+        return _from_faps(base, shapes, by_fap)
     known = canonical_names(morphs)
     shapes = check_shapes(base, {shape: morphs[written] for shape, written in known.items()})
     if not shapes.halves:
@@ -104,8 +108,8 @@ def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
         fap: [shapes.displacements(name) for name in names if name in shapes.morphs]
         for fap, names in LID_SHAPES.items()
     }
-    for fap, table in author_lids(base, closing).items():
-        tables[fap] = table
+    for fap, lid in author_lids(base, closing).items():
+        tables[fap] = lid
         lost.pop(fap, None)
         used.add(next(name for name in LID_SHAPES[fap] if name in shapes.morphs))
     for fap, wanted in REPLACEMENT_SHAPES.items():

@@ -19,8 +19,13 @@ SMOOTHING = 0.1
 """Smoothing of the warp: points that coincide on the adult head may be apart on another."""
 
 
-def warp_points(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> Float64:
-    """(84, 3) the adult head's points, warped to those located and moved onto parts of their kind."""
+def warp_points(
+    pieces: Sequence[Piece], located: Mapping[str, Float64], *, symmetric: bool = False
+) -> Float64:
+    """(84, 3) the adult head's points, warped to those located and moved onto parts of their kind.
+
+    symmetric: points of the right side stand on the vertices that mirror those of the left.
+    """
     from scipy.interpolate import RBFInterpolator
     from scipy.spatial import cKDTree
 
@@ -28,7 +33,7 @@ def warp_points(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> Floa
 
     row, adult = row_of(), neutral_points()
     known = dict(located)
-    middle = (known["3.5"] + known["3.6"])[0] / 2
+    middle = float((known["3.5"] + known["3.6"])[0]) / 2
     for left, right in MIRRORED.items():
         if (left in known) != (right in known):
             present, absent = (left, right) if left in known else (right, left)
@@ -42,9 +47,13 @@ def warp_points(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> Floa
     points: Float64 = warp(adult) * scale
     centre = points[[row["3.5"], row["3.6"], row["7.1"]]].mean(axis=0)
     trees = {}
-    for name in names():
+    mirrored = {right: left for left, right in MIRRORED.items()} if symmetric else {}
+    for name in sorted(names(), key=lambda name: name in mirrored):
         if name in known:
             points[row[name]] = known[name]
+        if name in mirrored and np.isfinite(points[row[mirrored[name]]]).all():
+            # left points come first and stand on their vertices by now
+            points[row[name]] = points[row[mirrored[name]]] * (-1, 1, 1) + (2 * middle, 0, 0)
         if name in FREE:
             continue
         # located points are vertices, or lie on the profile between some

@@ -22,6 +22,7 @@ from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_l
 from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._warping import warp_points
 from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly.symmetry import mirror_points
 from fba.parameters import faps
 
 NEEDED = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen")
@@ -34,18 +35,22 @@ PARTED = 0.25
 """Share of the jaw's way by which lips part at least."""
 FEWEST_IN_LOOP = 6
 """Fewest vertices around the opening of an eye."""
+FRONT_TEETH = 0.12
+"""Distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils."""
 CORNER_WIDTH = 0.055
 """Distance of the outer corner of the lips from the inner one, as a share of that of the pupils."""
 FEWEST_FAPS = 20
 """With at least this many shapes named after FAPs, points are where these move most."""
 
 
-def find_points(pieces: Sequence[Piece], path: str) -> Float64:
+def find_points(pieces: Sequence[Piece], path: str, *, symmetric: bool = False) -> Float64:
     """Feature points (84, 3) of a head, in its own unit; +y up, looking to +z.
+
+    symmetric: the points of the right side are the mirror images of those of the left.
 
     Raises ModelError that says which eyes or shapes are missing, and how to give the points instead.
     """
-    eyes = _eyes(pieces, path)
+    eyes = find_eyes(pieces, path)
     skin = [piece for piece in pieces if piece.part.kind == "skin"]
     if not skin:
         raise ModelError(f"{path}: no part is skin; give the kinds of the parts").with_remedies(POINTS)
@@ -59,7 +64,11 @@ def find_points(pieces: Sequence[Piece], path: str) -> Float64:
     for side, name in PUPIL_POINT.items():
         points[name] = eyes[side][2]
     points |= profile_points(skin[0].part, points)
-    return warp_points(pieces, points | _tongue(pieces, points))
+    points |= _tongue(pieces, points) | _teeth(pieces, points)
+    if not symmetric:
+        return warp_points(pieces, points)
+    middle = float(eyes["left"][0][0] + eyes["right"][0][0]) / 2
+    return warp_points(pieces, mirror_points(points, middle), symmetric=True)
 
 
 def _tongue(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str, Float64]:
@@ -81,7 +90,23 @@ def _tongue(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str
     return points
 
 
-def _eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, float, Float64]]:
+def _teeth(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str, Float64]:
+    """Edges of the upper and the lower front teeth, in the middle of the row."""
+    left, right = float(located["3.5"][0]), float(located["3.6"][0])
+    apart, middle = left - right, (left + right) / 2
+    points = {}
+    for row, name, way in (("upper teeth", "9.10", -1.0), ("lower teeth", "9.11", 1.0)):
+        for piece in pieces:
+            if piece.part.name == row:
+                vertices = piece.part.vertices.astype(np.float64)
+                front = vertices[:, 2] > vertices[:, 2].max() - FRONT_TEETH * apart
+                aside = np.abs(vertices[:, 0] - middle)
+                front &= aside < max(FRONT_TEETH * apart, float(aside[front].min()) * 1.001)
+                points[name] = vertices[int(np.where(front, way * vertices[:, 1], -np.inf).argmax())]
+    return points
+
+
+def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, float, Float64]]:
     """Centre, radius and pupil of the left and right eyeball."""
     eyes = {}
     for piece in pieces:

@@ -12,6 +12,7 @@ import numpy as np
 from fba.arrays import Float64, Int32
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
+from fba.face.importers.assembly._repair import repair_tables
 from fba.face.importers.assembly._winding import turn_outward
 from fba.face.importers.assembly.default_materials import apply_default_materials
 from fba.face.importers.assembly.pieces import FREE, assemble, shift_piece
@@ -101,18 +102,20 @@ def author_pieces(
     parts = tuple(piece.part for piece in pieces)
     # without any vertex, `author` binds points to the nearest, and separates upper and lower lip
     known = bound if (bound >= 0).any() else None
-    shapes = sorted({shape for piece in pieces for shape in piece.morphs})
-    if shapes:
-        from fba.face.authoring.shapes.morphs import from_morphs
-
-        morphs = {
-            shape: {piece.part.name: piece.morphs[shape] for piece in pieces if shape in piece.morphs}
-            for shape in shapes
-        }
-        return from_morphs(parts, points, morphs, bound=known, name=name, notes=notes)
     from fba.face.authoring import author
 
-    return author(parts, points, bound=known, name=name, notes=notes)
+    face = author(parts, points, bound=known, name=name, notes=notes)
+    shapes = sorted({shape for piece in pieces for shape in piece.morphs})
+    if not shapes:
+        return face
+    from fba.face.authoring.shapes.morphs import add_shapes
+
+    morphs = {
+        shape: {piece.part.name: piece.morphs[shape] for piece in pieces if shape in piece.morphs}
+        for shape in shapes
+    }
+    made = add_shapes(face, morphs)
+    return made if made is face else repair_tables(made, face)
 
 
 def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:

@@ -24,6 +24,11 @@ FREE = ("7.1", "11.5")
 """Feature points that stand on no surface."""
 EYE_ROUND = 0.1
 """Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
+FEWEST_TEETH = 6
+"""Fewest pieces that are single teeth rather than rows."""
+FRONT, SAME_HEIGHT = 0.25, 0.6
+"""Front teeth: share of the depth of a row in which they lie; and the most by which the middles of those of
+one jaw differ, as a share of their height."""
 EYE_SIZES = (0.02, 0.12)
 """Radius of an eyeball by the height of the mesh, head alone to head and shoulders."""
 
@@ -127,7 +132,9 @@ def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[P
         add(kind, left, _side(of_kind(kind), lambda centres: centres[:, 0] > middle))
         add(kind, right, _side(of_kind(kind), lambda centres: centres[:, 0] <= middle))
     teeth = of_kind("teeth")
-    if teeth:
+    if teeth and _are_one_row(teeth):
+        add("teeth", "upper teeth", teeth)
+    elif teeth:
         levels = np.concatenate([piece.part.vertices[:, 1] for piece in teeth])
         between = float(levels.min() + levels.max()) / 2
         add("teeth", "upper teeth", _side(teeth, lambda centres: centres[:, 1] > between))
@@ -140,6 +147,25 @@ def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[P
             name = unused(piece.part.name)
             result.append(replace(piece, part=replace(piece.part, name=name, kind=kind)))
     return tuple(result)
+
+
+def _are_one_row(teeth: Sequence[Piece]) -> bool:
+    """Whether teeth are of one jaw only: then those in front lie at one height."""
+    lows, highs, fronts = [], [], []
+    for piece in teeth:
+        vertices = piece.part.vertices.astype(np.float64)
+        label = vertex_components(piece.part.triangles, len(vertices), vertices)
+        for shell in range(int(label.max()) + 1):
+            own = vertices[label == shell]
+            lows.append(float(own[:, 1].min()))
+            highs.append(float(own[:, 1].max()))
+            fronts.append(float(own[:, 2].max()))
+    if len(lows) < FEWEST_TEETH:
+        return False
+    low, high, front = np.array(lows), np.array(highs), np.array(fronts)
+    foremost = front > front.max() - FRONT * (front.max() - front.min())
+    middles = (low + high)[foremost] / 2
+    return bool(np.ptp(middles) < np.median((high - low)[foremost]) * SAME_HEIGHT)
 
 
 def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], Bool]) -> list[Piece]:

@@ -1,0 +1,85 @@
+"""Replaces tables of FAPs, made from a sculptor's shapes, that break the standard's rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fba.face.checks.fap_checks import check_posed
+from fba.face.checks.posing import Poser
+from fba.face.model import FaceModel
+from fba.face.points import DILATE_PUPIL
+from fba.face.tables import FaceDefMesh, FaceDefTables
+from fba.parameters import faps
+
+STOPS = (0.85, 0.7, 0.55, 0.4)
+"""Shares of the range of a motion at which it is made to stop, until its triangles are sound."""
+
+
+def repair_tables(model: FaceModel, plain: FaceModel) -> FaceModel:
+    """The model with sound tables for FAPs whose own break the rules of `check_faps`.
+
+    Tried are the same motion with an earlier stop, and the table of `plain`, the face made from the mesh
+    alone; the one with the fewest errors is taken. A pupil that cannot move correctly is lost.
+    """
+    poser = Poser(model)
+    tables, lost = dict(model.table_of), dict(model.lost)
+    replaced: list[int] = []
+    for fap, table in model.table_of.items():
+        least = _count_errors(poser, fap)
+        if not least:
+            continue
+        for candidate in _candidates(table, plain.table_of.get(fap)):
+            trial = Poser(model.with_tables((candidate,), {}), like=poser)
+            errors = _count_errors(trial, fap)
+            if errors < least:
+                least, tables[fap] = errors, candidate
+        if least and fap in DILATE_PUPIL:
+            del tables[fap]
+            lost[fap] = "the eyeball has too few vertices around its pupil"
+        elif tables[fap] is plain.table_of.get(fap):
+            replaced.append(fap)
+    repaired = model.with_tables(tuple(tables.values()), lost)
+    if not replaced:
+        return repaired
+    names = ", ".join(faps()[fap - 1].name for fap in sorted(replaced))
+    return repaired.with_notes({"mesh": f"shapes break the standard's rules for {names}: made from the mesh"})
+
+
+def _count_errors(poser: Poser, fap: int) -> int:
+    return sum(finding.severity == "error" for finding in check_posed(poser, [fap], combined=False))
+
+
+def _candidates(table: FaceDefTables, plain: FaceDefTables | None) -> Iterator[FaceDefTables]:
+    for share in STOPS:
+        for sides in ((-1,), (1,), (-1, 1)):
+            yield FaceDefTables(
+                table.fap, tuple(_stopped(mesh, share, sides) for mesh in table.meshes), table.transforms
+            )
+    if plain is not None:
+        yield plain
+
+
+def _stopped(mesh: FaceDefMesh, share: float, sides: tuple[int, ...]) -> FaceDefMesh:
+    """The motion of a mesh with a stop at a share of its range. sides: -1 below 0, 1 above."""
+    borders, moves = mesh.borders.astype(np.int64), mesh.displacements
+    moving = np.flatnonzero(np.abs(moves).max(axis=(0, 2), initial=0.0) > 0)
+    if not len(moving):
+        return mesh
+    for sign in sides:
+        end = int(borders[moving[-1] + 1]) if sign > 0 else int(borders[moving[0]])
+        stop = round(end * share)
+        if not stop or (stop > 0) != (sign > 0):
+            continue
+        place = int(np.searchsorted(borders, stop))
+        if borders[place] != stop:
+            # the interval around the stop is cut in two
+            borders = np.insert(borders, place, stop)
+            moves = np.insert(moves, place - 1, moves[:, place - 1], axis=1)
+        outside = borders[:-1] >= stop if sign > 0 else borders[1:] <= stop
+        moves = np.where(outside[None, :, None], 0.0, moves)
+        moving = np.flatnonzero(np.abs(moves).max(axis=(0, 2), initial=0.0) > 0)
+        if not len(moving):
+            break
+    return FaceDefMesh(mesh.part, borders.astype(np.int32), mesh.vertices, moves.astype(np.float32))
