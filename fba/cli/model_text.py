@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from fba.face.checks import Finding
     from fba.face.model import FaceModel
 
+MOST_ERRORS = 8
+"""Most errors that are listed after an import."""
+FAIR = 10
+"""Most errors of a face on which streams still look right on the whole."""
 UNITS = {
     "IRISD": "height of the lid opening",
     "ES": "between the pupils",
@@ -139,6 +143,26 @@ def findings_as_json(findings: Sequence[Finding]) -> dict[str, Any]:
             for finding in findings
         ],
     }
+
+
+def error_lines(findings: Sequence[Finding]) -> list[str]:
+    """Return a line for each of the first errors."""
+    errors = [finding for finding in findings if finding.severity == "error"]
+    lines = [
+        f"error    {one.subject}: {one.rule}: {one.found}, not {one.expected}" for one in errors[:MOST_ERRORS]
+    ]
+    return [*lines, f"         and {len(errors) - MOST_ERRORS} more"] if len(errors) > MOST_ERRORS else lines
+
+
+def judge_import(findings: Sequence[Finding]) -> str:
+    """Return the verdict on an imported face in a sentence that begins with good, fair or poor."""
+    errors = sum(finding.severity == "error" for finding in findings)
+    counts = f"{_count(errors, 'error')}, {_count(len(findings) - errors, 'warning')}"
+    if not errors:
+        return f"good: it meets the standard ({counts}; fba model validate lists them)"
+    if errors <= FAIR:
+        return f"fair: it plays, but not all FAPs are right ({counts}; fba model validate lists them)"
+    return f"poor: streams will look wrong on this face ({counts}); give its feature points or kinds of parts"
 
 
 def print_findings(name: str, findings: Sequence[Finding]) -> None:

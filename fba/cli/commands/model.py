@@ -125,6 +125,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     short_help="Make a face model from a mesh.",
     epilog=examples(
         "fba model import makehuman/base.obj -o head.glb",
+        "fba model import avatar.glb -o head.glb --sheet head.png",
         "fba model import scan.ply --points scan.points.csv --unit 0.001 -o scan.glb",
         "fba model import face.obj --points face.fdp --part eyeL=eye --part cap=none -o face.glb",
     ),
@@ -155,10 +156,17 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     "repeatable.",
 )
 @click.option("--name", help="Name of the model. Default: the name of the file.")
+@click.option(
+    "--sheet",
+    metavar="FILE.png|.jpg",
+    type=OutputType(),
+    help="Picture that shows the face at rest and in its main motions, visemes and expressions.",
+)
 def import_(
     source: Path,
     output: Path,
     no_clobber: bool,
+    sheet: Path | None,
     points: Path | None,
     kind: str | None,
     unit: float | None,
@@ -170,15 +178,42 @@ def import_(
 
     Reads MakeHuman's base mesh (its folder, or base.obj), glTF heads with ARKit's shapes, OBJ, PLY and
     Candide meshes with feature points, and FDP files with their mesh. FAPs that the mesh
-    cannot show are listed with the reasons.
+    cannot show are listed with the reasons, and the errors that `fba model validate` finds, with a verdict:
+    good without errors, fair with up to ten, else poor. After a poor one the exit code is 1; the model is
+    written all the same. Look at the --sheet.
     """
+    from fba.cli import model_text
+    from fba.face import checks
     from fba.face.importers import import_model
 
-    outputs = _outputs(output, [source, points], no_clobber=no_clobber)
+    outputs = _outputs(output, [source, points], no_clobber=no_clobber, sheet=sheet)
     part_kinds = _parse_kinds(kinds) or None
     with Progress("importing", None):
         model = import_model(source, kind=kind, points=points, unit=unit, up=up, kinds=part_kinds, name=name)
+    with Progress("checking", None):
+        findings = [*checks.check_neutral(model), *checks.check_faps(model)]
     _write(model, output, outputs)
+    if sheet is not None:
+        with Progress("rendering", None), outputs.file(sheet) as file:
+            _draw_sheet(model, file)
+        outputs.say(f"{display_name(sheet)}: the face at rest and in its main motions")
+    for line in model_text.error_lines(findings):
+        outputs.say(f"  {line}")
+    verdict = model_text.judge_import(findings)
+    outputs.say(click.style(verdict, fg="red") if verdict.startswith("poor") else verdict)
+    if verdict.startswith("poor"):
+        raise click.exceptions.Exit(1)
+
+
+def _draw_sheet(model: FaceModel, file: Path) -> None:
+    """Write a picture of a face in its main motions."""
+    from fba_player.export.contact_sheet import contact_sheet
+    from fba_player.export.image_files import write_picture
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)  # what the face lacks is in its findings
+        pixels = contact_sheet("review", model)
+    write_picture(file, pixels)
 
 
 @command.command(
@@ -285,9 +320,16 @@ def _parse_kinds(texts: tuple[str, ...]) -> Mapping[str, str]:
     return kinds
 
 
-def _outputs(output: Path, inputs: list[Path | None], *, no_clobber: bool) -> Outputs:
-    """Return the outputs; click.UsageError also for a suffix other than .glb."""
-    outputs = Outputs([Output("--output", output)], inputs, no_clobber=no_clobber)
+def _outputs(
+    output: Path, inputs: list[Path | None], *, no_clobber: bool, sheet: Path | None = None
+) -> Outputs:
+    """Return the outputs; click.UsageError also for a suffix other than .glb, or of no picture."""
+    written = [Output("--output", output)]
+    if sheet is not None:
+        if sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+            raise click.UsageError(f"--sheet {sheet}: a sheet is a picture, .png or .jpg")
+        written.append(Output("--sheet", sheet))
+    outputs = Outputs(written, inputs, no_clobber=no_clobber)
     if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
         name = output.with_suffix(".glb").name
         raise click.UsageError(f"--output {output}: face models are written as glTF; name it {name}")

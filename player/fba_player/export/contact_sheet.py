@@ -118,7 +118,7 @@ def _review_tiles() -> tuple[Tile, ...]:
                 number, _, amount = pair.partition("=")
                 vector[int(number) - 1] = float(amount)
             vector.flags.writeable = False
-            tiles.append(Tile(row["label"], row["faps"], vector, row["view"], float(row["yaw"])))
+            tiles.append(Tile(row["label"], "", vector, row["view"], float(row["yaw"])))
     return tuple(tiles)
 
 

@@ -151,13 +151,21 @@ def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
     return result
 
 
+ROWS = {0.0: "upper", 1.0: "lower"}
+"""Beginnings of the names of rows of teeth, by their share of the jaw's turn."""
+
+
 def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
     """1 for the lower teeth, 0 for the upper, where the feature points of only one row are on a part."""
-    close = {}
+    close: dict[float, bool] = {}
     for row, names in ((0.0, ("9.8", "9.10")), (1.0, ("9.9", "9.11"))):
         known = [point for name in names if np.isfinite(point := marks.point(name)).all()]
         if not known:
-            return None
+            # with points of one row only, a part could still be both rows, unless its name says one
+            if not part.name.startswith(ROWS[1.0 - row]):
+                return None
+            close[row] = False
+            continue
         away = [float(np.linalg.norm(part.vertices - point, axis=1).min()) for point in known]
         close[row] = max(away) < 0.05 * marks.fapu.MNS * 1024
     if close[0.0] == close[1.0]:

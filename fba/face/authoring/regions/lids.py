@@ -165,10 +165,10 @@ def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift
 
 def _folded_vertices(limiter: Limiter, shift: Float64) -> Intp:
     """Vertices of the triangles that a shape folds. shift: (N, 3)."""
-    triangles = limiter.triangles_touching(np.flatnonzero(np.abs(shift).max(axis=1) > 0))
-    if not len(triangles):
+    patch = limiter.patch(np.flatnonzero(np.abs(shift).max(axis=1) > 0))
+    if not len(patch.triangles):
         return np.zeros(0, dtype=np.intp)
-    return np.unique(triangles[~limiter.soundness(shift, triangles, turning=True)])
+    return np.unique(patch.triangles[~patch.soundness(shift, turning=True)])
 
 
 def lid_values(fap: int) -> Float64:

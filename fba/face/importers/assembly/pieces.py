@@ -153,7 +153,7 @@ def _are_one_row(teeth: Sequence[Piece]) -> bool:
     """Whether teeth are of one jaw only: then those in front lie at one height."""
     lows, highs, fronts = [], [], []
     for piece in teeth:
-        vertices = piece.part.vertices.astype(np.float64)
+        vertices = piece.part.vertices
         label = vertex_components(piece.part.triangles, len(vertices), vertices)
         for shell in range(int(label.max()) + 1):
             own = vertices[label == shell]
