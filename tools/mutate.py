@@ -124,8 +124,27 @@ STRIPS_TEST = "tests/mesh/test_ply.py -k strips"
 MARK_TEST = "tests/codec/test_mark.py"
 LONG_TEST = "tests/body/test_plausibility.py -k long_motion"
 GAIT_TEST = "tests/body/gait/test_gait_rules.py"
+FOREIGN_HEADS_TEST = "tests/face/importers/test_foreign_heads.py"
+PACKED_TEST = "tests/gltf/test_gltf_packed.py"
+VERDICT_TEST = "tests/cli/test_model.py -k verdicts"
 
 MUTANTS = (
+    Mutant("fba/cli/model_text.py", "if errors <= FAIR:", "if errors < FAIR:", VERDICT_TEST),
+    Mutant("fba/gltf/_meshopt_loops.py", "return 0 if position == tail else -1", "return 0", PACKED_TEST),
+    Mutant("fba/gltf/surfaces.py", "MOST_ABOVE = 8", "MOST_ABOVE = 2", FOREIGN_HEADS_TEST),
+    Mutant("fba/face/importers/assembly/symmetry.py", "BETTER = 0.5", "BETTER = 1e-9", FOREIGN_HEADS_TEST),
+    Mutant(
+        "fba/face/importers/assembly/pieces.py",
+        "SAME_HEIGHT = 0.25, 0.6",
+        "SAME_HEIGHT = 0.25, 9.0",
+        FOREIGN_HEADS_TEST,
+    ),
+    Mutant(
+        "fba/face/authoring/regions/lids.py",
+        "LEAST_SCULPTED = 0.08",
+        "LEAST_SCULPTED = 8.0",
+        FOREIGN_HEADS_TEST,
+    ),
     Mutant(CLOCK, "DEFAULT_RATE = Fraction(25)", "DEFAULT_RATE = Fraction(30)", TIMES_TEST),
     Mutant(CLOCK, "math.ceil(now * rate)", "math.floor(now * rate)", TIMES_TEST),
     Mutant(CLOCK, "total_seconds < now", "total_seconds <= now", TIMES_TEST),

@@ -8,8 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from fba.cli.model_text import error_lines, judge_import
 from fba.face import FaceModel, feature_point_names
+from fba.face.checks import Finding
+from fba_player.export.contact_sheet import TILE
+from small_head import small_head
 
 TEETH = ("9.8", "9.9", "9.10", "9.11")
 """Teeth stay rigid: a head of another width does not stretch them."""
@@ -149,6 +154,32 @@ def test_import_of_a_mesh(run: Run, shared: Path, tmp_path: Path) -> None:
     assert code == 0
     assert out.startswith(f"{target}: ")
     assert {part.kind for part in FaceModel.load(target).parts} >= {"skin", "eye", "teeth", "tongue"}
+
+
+@pytest.mark.usefixtures("opengl")
+def test_import_ends_with_a_verdict_and_a_sheet(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small_head().with_tables((), dict.fromkeys(range(3, 69), "left out")).save(tmp_path / "head.glb")
+    monkeypatch.setitem(TILE, "review", (24, 24))  # big ones take long
+    arguments = ("model", "import", str(tmp_path / "head.glb"), "-o", str(tmp_path / "out.glb"))
+    code, out, err = run(*arguments, "--sheet", str(tmp_path / "sheet.png"))
+    assert code == 0, err
+    assert "good: it meets the standard (0 errors" in out + err
+    with Image.open(tmp_path / "sheet.png") as picture:
+        assert picture.width > 8 * 24
+        assert len(set(picture.convert("L").resize((64, 64)).tobytes())) > 50
+    code, _, err = run(*arguments, "--sheet", str(tmp_path / "sheet.txt"))
+    assert (code, "--sheet" in err) == (2, True)
+
+
+def test_verdicts_by_the_number_of_errors() -> None:
+    bad, odd = Finding("FAP 3", "rule", "1 mm", "2 mm"), Finding("FAP 3", "rule", "1", "2", "warning")
+    assert judge_import([odd] * 30).startswith("good")
+    assert judge_import([bad] * 10).startswith("fair")
+    assert judge_import([bad] * 11).startswith("poor")
+    assert error_lines([odd, bad]) == ["error    FAP 3: rule: 1 mm, not 2 mm"]
+    assert error_lines([bad] * 20)[-1].endswith("and 12 more")
 
 
 def test_import_of_something_else(run: Run, tmp_path: Path) -> None:

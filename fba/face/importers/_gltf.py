@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from fba.arrays import Float32
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
-from fba.face.importers.assembly.pieces import assemble, part_names
+from fba.face.importers.assembly.pieces import assemble, guess_kind, part_names
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.symmetry import ALIKE, EXACT, asymmetry, mirror_tables, stand_upright
 from fba.face.importers.points.points_file import given_points, points_beside
@@ -85,7 +86,9 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
     pieces: list[Piece] = []
     start = 0
     names_of_parts = part_names()
-    for surface in surfaces(gltf):
+    shown = surfaces(gltf)
+    primitives = Counter(surface.node for surface in shown)
+    for surface in shown:
         count = len(surface.positions)
         if start + count > MAX_VERTICES:
             raise ModelError(f"{path}: more than {MAX_VERTICES} vertices; reduce the mesh to its head")
@@ -93,7 +96,10 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
         if (own := surface.material) is not None:
             texture = None if surface.texcoords is None else own.texture
             material = Material(own.name, own.colour[:3], own.roughness, texture)
-        name = names_of_parts(surface.name or "mesh")
+        name = surface.name or "mesh"
+        if primitives[surface.node] > 1 and guess_kind(material.name) is not None:
+            name = material.name  # of several surfaces of one node, the material says which this is
+        name = names_of_parts(name)
         part = Part(
             name,
             "other",

@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
 import numpy.typing as npt
 
 from fba.errors import FbaWarning
@@ -29,6 +30,8 @@ from fba.parameters import faps
 if TYPE_CHECKING:
     from fba.face.interpolation.table import InterpolationTable
 
+STILL = 1e-7
+"""Metres: shapes that move no vertex further are empty."""
 FEWEST_FAPS = 5
 """With at least this many shapes named after FAPs, only these are used."""
 ARCS = frozenset((3, *range(19, 31), *range(43, 51)))
@@ -76,6 +79,13 @@ def from_morphs(
 
 def add_shapes(base: FaceModel, morphs: Morphs) -> FaceModel:
     """A face that `author` made, with tables from named shapes where they suffice; as `from_morphs`."""
+    moving = {
+        shape: moved
+        for shape, moved in morphs.items()
+        if any(np.abs(np.asarray(part, dtype=np.float64)).max(initial=0.0) > STILL for part in moved.values())
+    }
+    if moving:  # shapes that a converter left empty show nothing
+        morphs = moving
     by_fap = {number: shape for shape in morphs if (number := fap_of(shape)) is not None}
     if len(by_fap) >= FEWEST_FAPS:
         shapes = check_shapes(base, {shape: morphs[shape] for shape in by_fap.values()})

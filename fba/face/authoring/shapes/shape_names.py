@@ -37,12 +37,12 @@ def arkit_of(name: str) -> str | None:
 
 
 def canonical_names(names: Iterable[str]) -> dict[str, str]:
-    """ARKit's name -> the name that a file uses for it; the first of several."""
+    """ARKit's name -> the name that a file uses for it; of several ARKit's own, else the first."""
     used: dict[str, str] = {}
     for name in names:
         shape = arkit_of(name)
-        if shape is not None:
-            used.setdefault(shape, name)
+        if shape is not None and (shape not in used or _words(name) == _words(shape)):
+            used[shape] = name
     return used
 
 

@@ -25,8 +25,6 @@ from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.symmetry import mirror_points
 from fba.parameters import faps
 
-NEEDED = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen")
-"""Shapes without which the points of the FAPU cannot be located."""
 OUTSIDE = 0.2
 """Skin whose normal has a smaller z than this is the inside of the mouth, or an ear."""
 MOST_IN_COLUMN = 3000
@@ -57,10 +55,9 @@ def find_points(pieces: Sequence[Piece], path: str, *, symmetric: bool = False) 
     by_fap = {fap: morph for name, morph in skin[0].morphs.items() if (fap := fap_of(name)) is not None}
     vertices = skin[0].part.vertices.astype(np.float64)
     if len(by_fap) >= FEWEST_FAPS:
-        points = _from_faps(vertices, by_fap)
+        points = _from_faps(vertices, by_fap) | _lids_by_loops(pieces, eyes)
     else:
-        points = _from_arkit(skin[0], vertices, eyes, path)
-    points |= _lids_by_loops(pieces, eyes)
+        points = _from_arkit(pieces, skin[0], vertices, eyes, path)
     for side, name in PUPIL_POINT.items():
         points[name] = eyes[side][2]
     points |= profile_points(skin[0].part, points)
@@ -151,22 +148,28 @@ def _from_faps(vertices: Float64, by_fap: Mapping[int, Float32]) -> dict[str, Fl
 
 
 def _from_arkit(
-    skin: Piece, vertices: Float64, eyes: Mapping[str, tuple[Float64, float, Float64]], path: str
+    pieces: Sequence[Piece],
+    skin: Piece,
+    vertices: Float64,
+    eyes: Mapping[str, tuple[Float64, float, Float64]],
+    path: str,
 ) -> dict[str, Float64]:
     """Points of the lids and the mouth, by shapes named as ARKit's."""
-    shapes = {
-        shape: skin.morphs[name].astype(np.float64) for shape, name in canonical_names(skin.morphs).items()
-    }
-    missing = [shape for shape in NEEDED if shape not in shapes]
+    moving = [name for name, morph in skin.morphs.items() if np.abs(morph).max(initial=0.0) > 0]
+    shapes = {shape: skin.morphs[name].astype(np.float64) for shape, name in canonical_names(moving).items()}
+    points = _lids_by_loops(pieces, eyes)
+    lidless = [side for side, names in LID_POINTS.items() if names[0] not in points]
+    needed = ("jawOpen", *(f"eyeBlink{side.title()}" for side in lidless))
+    missing = [shape for shape in needed if shape not in shapes]
     if missing:
+        has = f"; of its {len(skin.morphs)} shapes, {len(shapes)} are known" if skin.morphs else ""
         raise ModelError(
             f"{path}: the shapes {', '.join(missing)} are missing, by which the lids (3.1 to 3.4) and lips "
-            f"(2.2, 2.3, 8.3, 8.4) would be found"
+            f"(2.2, 2.3, 8.3, 8.4) would be found{has}"
         ).with_remedies(POINTS)
     assert skin.part.normals is not None
     facing = skin.part.normals[:, 2].astype(np.float64) > OUTSIDE
-    points: dict[str, Float64] = {}
-    for side in ("left", "right"):
+    for side in lidless:
         points |= _lids(vertices, shapes[f"eyeBlink{side.title()}"], eyes[side], side)
     return points | _mouth(vertices, facing, shapes, eyes, path)
 
