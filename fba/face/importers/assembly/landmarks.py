@@ -159,7 +159,7 @@ def _from_arkit(
     shapes = {shape: skin.morphs[name].astype(np.float64) for shape, name in canonical_names(moving).items()}
     points = _lids_by_loops(pieces, eyes)
     lidless = [side for side, names in LID_POINTS.items() if names[0] not in points]
-    needed = ("jawOpen", *(f"eyeBlink{side.title()}" for side in lidless))
+    needed = (*(f"eyeBlink{side.title()}" for side in lidless), "jawOpen")
     missing = [shape for shape in needed if shape not in shapes]
     if missing:
         has = f"; of its {len(skin.morphs)} shapes, {len(shapes)} are known" if skin.morphs else ""
