@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -30,10 +31,10 @@ class _EncodeCommand(Command):
     """`fba encode`, whose --report takes the next word only if that names a page or a picture."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        following = [*args[1:], ""]
+        pairs = pairwise([*args, ""])
         words = [
             "--report=" if word == "--report" and Path(after).suffix not in capture_report.SUFFIXES else word
-            for word, after in zip(args, following, strict=True)
+            for word, after in pairs
         ]
         return super().parse_args(ctx, words)
 
