@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
 from fba.animation import Animation
+from fba.errors import FbaError
 from fba.parameters import baps
 
 if TYPE_CHECKING:
-    from fba.arrays import UInt8
+    from fba.arrays import Float64, UInt8
     from fba.capture import SkeletonMotion
     from fba.capture.comparison import Comparison, Difference
     from fba.codec import ClampedParameter
@@ -37,7 +39,8 @@ class CaptureReport:
 
     path: of the capture. motion: what was read of it. mapped: joint of the standard -> number of the
     source's. animation: what a decoder returns. comparison: how they differ. bones: what `retarget_report`
-    says of the motion before coding; None where no report was asked for.
+    says of the motion before coding; None where no report was asked for. up: what brings the source's axis up
+    that the user named; None if that was found.
     """
 
     path: Path
@@ -46,6 +49,7 @@ class CaptureReport:
     animation: Animation
     comparison: Comparison
     bones: dict[str, Any] | None = None
+    up: Float64 | None = None
 
 
 def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str, Any]]:
@@ -99,13 +103,20 @@ def compare_captures(
     for path in captures:
         reader = format_of(path, format)
         assert reader.read_motion is not None  # the caller names captures only
-        motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": clip}))
-        _, mapped, _, _ = find_bones(motion, given.get("joints"), Skeleton.default())
+        try:
+            motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": clip}))
+            _, mapped, _, _ = find_bones(motion, given.get("joints"), Skeleton.default())
+        except FbaError:  # the file has a face alone, and the body comes from another
+            if detailed:
+                raise
+            continue
         level = 0.0 if ground == "floor" else None
-        comparison = compare(motion, decoded, mapped, level=level, most=None if detailed else SAMPLE)
+        up = _rotation_up(str(given.get("up", "auto")))
+        most = None if detailed else SAMPLE
+        comparison = compare(motion, decoded, mapped, up=up, level=level, most=most)
         comparison = comparison.with_more(_clamped_differences(clamped))
         bones = asdict(retarget_report(motion, animation, **given)) if detailed else None
-        reports.append(CaptureReport(path, motion, mapped, decoded, comparison, bones))
+        reports.append(CaptureReport(path, motion, mapped, decoded, comparison, bones, up))
     return reports
 
 
@@ -186,7 +197,8 @@ def draw_sights(report: CaptureReport, count: int) -> UInt8:
 
     rate = float(report.animation.rate)
     worst = report.comparison.worst_frames(count, max(1, round(APART * rate)))
-    sticks = find_sticks(report.motion, report.animation, report.mapped, [one.frame for one in worst])
+    frames = [one.frame for one in worst]
+    sticks = find_sticks(report.motion, report.animation, report.mapped, frames, up=report.up)
     sights = [
         Sight(
             one.frame,
@@ -248,6 +260,16 @@ source's bones. Blue is left, red is right; palms are light, backs of hands dark
 {measures}</dl>
 </html>
 """
+
+
+def _rotation_up(axis: str) -> Float64 | None:
+    """Return (3, 3), what brings an axis such as "+z" to +y; None for "auto"."""
+    if axis == "auto":
+        return None
+    from fba import rotations
+
+    named = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
+    return rotations.between(named, np.array([0.0, 1.0, 0.0]))
 
 
 def _clamped_differences(clamped: Mapping[str, ClampedParameter]) -> tuple[Difference, ...]:

@@ -39,6 +39,7 @@ def compare(
     mapped: Mapping[str, int],
     *,
     scale: float | None = None,
+    up: Float64 | None = None,
     level: float | None = 0.0,
     solver: BapSolver | None = None,
     most: int | None = None,
@@ -46,9 +47,10 @@ def compare(
     """Return how an animation, best a decoded one, differs from the motion that it was made from.
 
     mapped: joint of the standard -> number of the source's. scale: metres of the body in one unit of the
-    source; None for the ratio of legs, or else arms. level: height of the floor in metres; None where there
-    is none, then soles may be at any height, but the same everywhere. solver: as for `from_skeleton`. most:
-    frames that are compared, in four runs evenly spread, of a motion that has more; None for all.
+    source; None for the ratio of legs, or else arms. up: (3, 3), what brings up the source's axis; None for
+    what `find_up` returns. level: height of the floor in metres; None where there is none, then soles may be
+    at any height, but the same everywhere. solver: as for `from_skeleton`. most: frames that are compared, in
+    four runs evenly spread, of a motion that has more; None for all.
 
     If rates differ, the motion is resampled; frames that only one of the two has are left out. ModelError if
     the animation has no body or no frame in common with the motion.
@@ -61,7 +63,7 @@ def compare(
     if not count:
         raise ModelError("the motion and the animation have no frame in common")
     first = rows_of(motion, slice(0, min(count, PIECE)))
-    up = figure.find_up(first, mapped)
+    up = figure.find_up(first, mapped) if up is None else up
     neutral = figure.result_figure(solver, np.zeros((1, BAP_COUNT), dtype=np.int32))
     metres = source_scale(motion, mapped, neutral, up) if scale is None else scale
     rest = rest_figure(motion, mapped, up, metres)

@@ -46,13 +46,14 @@ def find_sticks(
     frames: Sequence[int],
     *,
     scale: float | None = None,
+    up: Float64 | None = None,
 ) -> list[Stick]:
     """Return the source at some frames, moved to where the result stands; see `measurement.compare`."""
     solver = BapSolver(BodyModel.default().skeleton)  # of the person that is drawn
     assert animation.body is not None
     motion = motion.resample(animation.rate)
     begin = measurement.rows_of(motion, slice(0, measurement.PIECE))
-    up = figure.find_up(begin, mapped)
+    up = figure.find_up(begin, mapped) if up is None else up
     neutral = figure.result_figure(solver, np.zeros((1, BAP_COUNT), dtype=np.int32))
     metres = measurement.source_scale(motion, mapped, neutral, up) if scale is None else scale
     usual = figure.source_figure(begin, mapped, up, metres)

@@ -6,13 +6,17 @@ import json
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 import fba
+from fba import Animation, BodyTrack, FaceTrack
 from fba.body import Limits
+from fba.capture.comparison import Comparison, Difference
+from fba.cli.capture_report import CaptureReport, poor_line
 from fba.parameters import baps
 
 BVH = """HIERARCHY
@@ -115,6 +119,33 @@ def test_a_poor_result_is_said_in_one_line_and_shown(run: Run, tmp_path: Path) -
     wrong = run("encode", path, "-o", tmp_path / "out.fba", "--report=table.txt")
     assert wrong.code == 2
     assert "a page, .html, or a picture, .png" in wrong.err
+
+
+@pytest.mark.parametrize(("variable", "red"), [("", True), ("1", False)])
+def test_poor_is_red_unless_colours_are_refused(
+    monkeypatch: pytest.MonkeyPatch, variable: str, red: bool
+) -> None:
+    """NO_COLOR counts where it is not empty (no-color.org)."""
+    monkeypatch.setenv("NO_COLOR", variable)
+    monkeypatch.setenv("TERM", "xterm")
+    comparison = Comparison(9, (Difference("palm", "left hand", 1.0, 90.0, 4),))
+    report = cast(CaptureReport, SimpleNamespace(path=Path("walk.bvh"), comparison=comparison))
+    line = poor_line(report, detailed=True)
+    assert ("\x1b[31m" in line) == red
+    assert "fba: poor: walk.bvh: left hand faces 90 degrees off in frame 4" in line
+
+
+def test_a_body_beside_a_face_of_a_capture_file(run: Run, tmp_path: Path) -> None:
+    """glTF files may hold a face alone: then there is nothing to compare, and no error."""
+    face, body, out = tmp_path / "face.glb", tmp_path / "body.bap", tmp_path / "out.fba"
+    track = FaceTrack(
+        np.full((3, 68), 40, np.int32) * (np.arange(68) == 2), np.tile(np.arange(68) == 2, (3, 1))
+    )
+    fba.write(face, Animation(30, np.arange(3), track))
+    fba.write(body, Animation(30, np.arange(3), body=BodyTrack.empty(3)))
+    result = run("encode", face, body, "-o", out)
+    assert result.code == 0, result.err
+    assert fba.read(out).face is not None
 
 
 def test_limits_clamp(encode: Encode, tmp_path: Path) -> None:
