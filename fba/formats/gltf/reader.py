@@ -199,7 +199,8 @@ def _sample(
     times = key_times(channels)
     frames, count = _count_frames(gltf, chosen, times, rate, limits)
     first = float(times[0])
-    what = f"{gltf.file}: animation {chosen.name!r} at {float(frames):g} frames/s"
+    seconds = float(times[-1]) - first
+    what = f"{gltf.file}: animation {chosen.name!r}, {seconds:.0f} s at {float(frames):g} frames/s,"
     keys = sum(channel.times.nbytes + channel.values.nbytes for channel in channels)
     check_memory(limits, count, len(nodes), what, keys)
     motion = replace(joints.resting(gltf), rate=frames, name=chosen.name)
