@@ -11,7 +11,9 @@ import numpy as np
 
 from fba.arrays import Float32
 from fba.errors import FormatError, ModelError
+from fba.face.authoring.shapes.shape_names import arkit_of
 from fba.face.feature_points import names, row_of
+from fba.face.importers._vrm import looks_backwards, name_shapes
 from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
 from fba.face.importers.assembly.pieces import assemble, guess_kind, part_names
 from fba.face.importers.assembly.polygon_parts import Piece
@@ -30,7 +32,8 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
     """A face from a .glb or .gltf head; one that `FaceModel.save` wrote is simply loaded.
 
     points: as `import_model`. Morph targets named as ARKit's blendshapes, or as FAPs, give tables; feature
-    points that are not given are located by them. Raises ModelError as `import_model`.
+    points that are not given are located by them. Avatars of VRM 0, which look to -z, are turned to +z
+    first: positions of points are those after that. Raises ModelError as `import_model`.
     """
     path = options.path
     pieces, has_extension = gltf_pieces(path, options.limits)
@@ -73,7 +76,7 @@ def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceM
 def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -> tuple[list[Piece], bool]:
     """(every surface of a glTF file as a piece, whether the file is a face model of this project).
 
-    Origins of vertices are counted through the pieces.
+    Origins of vertices are counted through the pieces. Avatars of VRM 0 are turned to look to +z.
     """
     from fba.gltf import read_gltf, surfaces
 
@@ -88,6 +91,8 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
     names_of_parts = part_names()
     shown = surfaces(gltf)
     primitives = Counter(surface.node for surface in shown)
+    shapes = name_shapes(gltf)
+    facing = np.array((-1.0, 1.0, -1.0) if looks_backwards(gltf) else (1.0, 1.0, 1.0), dtype=np.float32)
     for surface in shown:
         count = len(surface.positions)
         if start + count > MAX_VERTICES:
@@ -103,15 +108,23 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
         part = Part(
             name,
             "other",
-            surface.positions,
+            surface.positions * facing,
             surface.triangles,
-            surface.normals,
+            None if surface.normals is None else surface.normals * facing,
             surface.texcoords,
             None if surface.colours is None else _with_gloss(surface.colours, material),
             material,
         )
         origin = np.arange(start, start + count, dtype=np.int32)
-        pieces.append(Piece(part, material.name, origin, dict(surface.morphs)))
+        mesh = gltf.nodes[surface.node].mesh
+        assert mesh is not None  # a surface is of a mesh
+        known = {
+            name: shapes[mesh, number]
+            for number, name in enumerate(gltf.meshes[mesh].morph_names)
+            if (mesh, number) in shapes and arkit_of(name) is None
+        }
+        morphs = {known.get(name, name): morph * facing for name, morph in surface.morphs.items()}
+        pieces.append(Piece(part, material.name, origin, morphs))
         start += count
     if not pieces:
         raise ModelError(f"{path}: the scene contains no triangles; export the head as a mesh")

@@ -18,6 +18,7 @@ from fba.face.deform.deformer import Deformer
 from fba.face.eyeball import eyeballs
 from fba.face.feature_points import row_of
 from fba.face.importers import import_model
+from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
 from fba.face.importers.assembly._repair import repair_tables
 from fba.face.importers.assembly.pieces import assemble
@@ -235,3 +236,40 @@ def test_a_head_without_shapes_is_refused_with_what_it_lacks(base: FaceModel, tm
     write_glb(tmp_path / "a.glb", base.parts, {})
     with pytest.raises(ModelError, match=r"jawOpen.*missing.*points"):
         import_model(tmp_path / "a.glb")
+
+
+VRM_0 = {
+    "VRM": {
+        "blendShapeMaster": {
+            "blendShapeGroups": [
+                {"presetName": "blink_l", "binds": [{"mesh": 0, "index": 0, "weight": 100}]},
+                {"presetName": "a", "binds": [{"mesh": 0, "index": 1, "weight": 100}]},
+                {"presetName": "joy", "binds": [{"mesh": 0, "index": 2, "weight": 100}]},
+            ]
+        }
+    }
+}
+VRM_1 = {
+    "VRMC_vrm": {
+        "expressions": {
+            "preset": {
+                "blinkLeft": {"morphTargetBinds": [{"node": 0, "index": 0, "weight": 1}]},
+                "aa": {"morphTargetBinds": [{"node": 0, "index": 1, "weight": 1}]},
+            }
+        }
+    }
+}
+
+
+@pytest.mark.parametrize(("extension", "way"), [(VRM_0, -1.0), (VRM_1, 1.0)])
+def test_expressions_of_vrm_name_the_shapes(extension: dict[str, object], way: float, tmp_path: Path) -> None:
+    sheet = Sheet()
+    targets = [{"POSITION": sheet.array([(0, 0, 1 + k)] * 3)} for k in range(3)]
+    sheet.show(sheet.triangle(targets=targets))
+    sheet.json["extensions"] = extension
+    (piece,), own = gltf_pieces(sheet.save(tmp_path / "a.vrm"))
+    assert not own
+    assert list(piece.morphs) == ["eyeBlinkLeft", "jawOpen", "target 2"]
+    assert piece.morphs["jawOpen"][0].tolist() == [0, 0, 2 * way]
+    # avatars of VRM 0 look to -z: turned half around, they look to +z
+    assert piece.part.vertices[1].tolist() == [way, 0, 0]
