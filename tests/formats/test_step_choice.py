@@ -74,13 +74,14 @@ def test_round_angles_tell_the_table() -> None:
 
 
 def test_coarse_quantisers_make_round_angles_of_their_own() -> None:
-    """Every seventh step of the standard's, 64 units: with the other table some are round by chance alone."""
-    rng = np.random.default_rng(3)
-    values = np.zeros((200, 296), dtype=np.int32)
-    values[:, 31:36] = 64 * 9 * rng.integers(-40, 40, (200, 5))
-    unit = np.rint(np.radians(5) * 1e5 / 170 / 9)
-    values[:, 37] = 64 * 9 * unit * rng.integers(0, 12, 200)
-    assert find_doubt(BodyTrack(values, values != 0), np.arange(200), Fraction(25), "iso") is None
+    """Multiples of 154 steps are whole fifteens of degrees with the other table, by the quantiser alone."""
+    values = np.zeros((40, 296), dtype=np.int32)
+    values[:, 31:35] = 64 * 154 * np.random.default_rng(3).integers(0, 5, (40, 4))
+    assert find_doubt(BodyTrack(values, values != 0), np.arange(40), Fraction(50), "iso") is None
+    values[5, 31] += 64  # not that of the quantiser
+    found = find_doubt(BodyTrack(values, values != 0), np.arange(40), Fraction(50), "iso")
+    assert found is not None
+    assert found.likely == "visage"
 
 
 def test_nothing_is_said_where_the_table_makes_no_difference() -> None:
