@@ -73,6 +73,10 @@ MEASUREMENT = "fba/capture/comparison/measurement.py"
 VERDICT = "fba/capture/comparison/verdict.py"
 BOUNDS = "fba/capture/comparison/thresholds.csv"
 REPORT = "fba/capture/_report.py"
+FOOTING = "fba/body/footing.py"
+PREPARATION = "fba/capture/preparation.py"
+FOUND_REST = "fba/capture/_rest_from_motion.py"
+REST_CORRECTION = "fba/capture/_rest_correction.py"
 STANDARD = "fba/capture/_standard_skeleton.py"
 FAP_JOINTS = "fba/formats/gltf/_fap_joints.py"
 HINGES = "fba/capture/limbs/hinges.py"
@@ -103,6 +107,8 @@ RECOGNITION_TEST = "tests/test_recognition.py"
 CAPTURE_TEST = (
     "tests/capture/test_capture_rules.py tests/capture/test_planting.py tests/capture/test_retargeting.py"
 )
+PREPARATION_TEST = "tests/capture/test_rest_poses.py"
+ZOO_TEST = "tests/capture/zoo"
 WEIGHTS_TEST = "tests/body/skin/test_skin_weights.py"
 TRANSPORT_TEST = "tests/player/playback/test_transport.py"
 NOTICES_TEST = "tests/player/session/test_notices.py"
@@ -259,7 +265,14 @@ MUTANTS = (
     Mutant(GROUND, "LONG = 1.0", "LONG = 1.2", CAPTURE_TEST),
     Mutant(GROUND, "SLIGHT = 0.015", "SLIGHT = 0.008", CAPTURE_TEST),
     Mutant(GROUND, "SLIGHT = 0.015", "SLIGHT = 0.02", CAPTURE_TEST),
-    Mutant(SOLES, "TOES = 0.06", "TOES = 0.05", CAPTURE_TEST),
+    Mutant(FOOTING, "0.008, 0.0745", "0.008, 0.06", CAPTURE_TEST),
+    Mutant(GROUND, "Ground(level if level <= FAR", "Ground(level if abs(level) <= FAR", CAPTURE_TEST),
+    Mutant(PREPARATION, "LEAST = 0.5", "LEAST = 0.0", PREPARATION_TEST),
+    Mutant(PREPARATION, "CLEAR_UP = 0.75", "CLEAR_UP = 1.1", PREPARATION_TEST),
+    Mutant(FOUND_REST, "CLOSE_AXIS = 20.0", "CLOSE_AXIS = 0.0", ZOO_TEST),
+    Mutant(FOUND_REST, "LOW_ARM = 0.6", "LOW_ARM = 2.0", PREPARATION_TEST),
+    Mutant(REST_CORRECTION, "OWN_CLAVICLE = 5.0", "OWN_CLAVICLE = 90.0", PREPARATION_TEST),
+    Mutant(BVH, "MOST_OF_BODY = 0.75", "MOST_OF_BODY = 2.0", ZOO_TEST),
     Mutant(SOLES, "HEEL = 0.045", "HEEL = 0.05", CAPTURE_TEST),
     Mutant(SOLES, "WITHIN = 0.012", "WITHIN = 0.01", CAPTURE_TEST),
     Mutant(SOLES, "TOLERATED = 0.005", "TOLERATED = 0.006", CAPTURE_TEST),

@@ -34,6 +34,8 @@ EXACT_AXIS = 5.0
 """The same for directions that are known from positions of joints."""
 ON_AXES = 0.65
 """Share of directions close to axes, of which random ones would be almost half, that is evidence enough."""
+MOST_BEND = 0.5
+"""Share of elbows and knees that have to bend for that."""
 LEAST_BEND = 0.15
 """Sine of the bend of an elbow or a knee from which on it shows the axis."""
 LOW_ARM = 0.6
@@ -86,8 +88,11 @@ class _Finder:
         away = float(self.distance[self.standing].mean())
         bend = float(np.mean(self.evidence)) if self.evidence else 0.0
         exact = float(np.mean(self.on_axes)) if self.on_axes else 0.0
-        # directions that are axes show that they are right, however little somebody stands
-        confidence = max(1.3 - away / 60.0, 0.5 + 1.25 * (exact - ON_AXES))
+        confidence = 1.3 - away / 60.0
+        if (
+            bend >= MOST_BEND
+        ):  # directions that are axes show that they are right, however little people stand
+            confidence = max(confidence, 0.5 + 1.25 * (exact - ON_AXES))
         reason = (
             f"{100 * exact:.0f} % of directions are axes of joints, {100 * bend:.0f} % of elbows and knees "
             f"bend, people stand to within {away:.0f} degrees"
@@ -272,7 +277,10 @@ class _Finder:
             return
         number, x = self.mapped[ankle], np.array([1.0, 0.0, 0.0])
         height = self.positions[:, number, 1]
-        low = np.argsort(height, kind="stable")[: max(1, len(height) // 3)].astype(np.intp)
+        low = np.argsort(height, kind="stable")[: max(1, len(height) // 2)].astype(np.intp)
+        if len(height) > 1:  # of low feet, those that turn least are flat, not on heel or toes
+            swing = np.linalg.norm(np.gradient(self.turned[:, number], axis=0), axis=(1, 2))
+            low = low[np.argsort(swing[low], kind="stable")][: max(1, len(low) // 3)]
         upright = np.broadcast_to([0.0, 1.0, 0.0], self.left.shape)
         up = self._local(number, upright, low)
         bone = self._bone(ankle, toe)

@@ -1,0 +1,83 @@
+"""What is found out about a capture before it is retargeted: bones, the way up, the rest pose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from capture_bodies import motion
+from fba.body import BapSolver, Skeleton
+from fba.capture import from_skeleton
+from fba.capture._bone_words import read
+from fba.capture.preparation import prepare
+from fba.errors import ModelError
+
+SKELETON = Skeleton.default()
+
+
+@pytest.mark.parametrize(
+    ("name", "side", "part"),
+    [
+        ("mixamorig:LeftUpLeg", "l", "thigh"), ("thigh_r", "r", "thigh"), ("rshldr", "r", "upperarm"),
+        ("Bip01 R Calf", "r", "shank"), ("J_Bip_L_LowerArm", "l", "forearm"), ("rcollar", "r", "clavicle"),
+        ("DEF-upper_arm.L", "l", "upperarm"), ("leftforearm", "l", "forearm"),
+        ("Unterarm_links", "l", "forearm"),
+        ("LEFT_HAND", "l", "hand"), ("RightForeFoot", "r", "toe"), ("左足首", "l", "foot"),
+    ],
+)  # fmt: skip
+def test_names_say_side_and_part(name: str, side: str, part: str) -> None:
+    found = read(name)
+    assert (found.side, found.parts.get(part)) == (side, 2)
+    assert not found.helper
+
+
+@pytest.mark.parametrize("name", ["upperarm_twist_01_l", "LeftHandEnd", "ik_hand_gun", "eye.l"])
+def test_helpers_are_no_bones(name: str) -> None:
+    assert read(name).helper
+
+
+def test_the_motion_says_which_way_is_up() -> None:
+    """A file whose offsets rest y up, but whose root turns everybody z up, as Blender writes them."""
+    turn = Rotation.from_euler("x", 90, degrees=True)
+    captured = motion("T", 8, turns={"Hips": turn})
+    captured = replace(captured, positions=np.tile([0.0, 0.0, 1.0], (8, 1)))
+    ready = prepare(captured, SKELETON)
+    assert ready.up == "+z"
+    assert ready.motion.positions[0] == pytest.approx([0, 1, 0])
+    assert prepare(captured, SKELETON, up="+y").up == "+y"
+
+
+def test_shoulders_rest_where_arms_hang() -> None:
+    """Clavicles that the file turns up by 30 degrees all the time are as in the default posture."""
+    shrug = {"LeftShoulder": Rotation.from_euler("z", 30, degrees=True),
+             "RightShoulder": Rotation.from_euler("z", -30, degrees=True),
+             "LeftArm": Rotation.from_euler("z", -30, degrees=True),
+             "RightArm": Rotation.from_euler("z", 30, degrees=True)}  # fmt: skip
+    matrices = [
+        BapSolver().pose(from_skeleton(motion("standing", 6, turns=turns)).body.values)
+        for turns in ({}, shrug)
+    ]
+    for side in "lr":
+        ends = [SKELETON.number(f"{side}_{joint}") for joint in ("sternoclavicular", "shoulder")]
+        lines = [m[0, ends[1], :3, 3] - m[0, ends[0], :3, 3] for m in matrices]
+        lines = [line / np.linalg.norm(line) for line in lines]
+        assert np.degrees(np.arccos(lines[0] @ lines[1])) == pytest.approx(5.0, abs=0.7)  # a posture may be
+
+
+def test_a_motion_that_says_nothing_is_refused() -> None:
+    """All bones along +x, and somebody who stands still with straight limbs on their side."""
+    captured = motion("T", 4)
+    offsets = np.array(captured.offsets)
+    lengths = np.linalg.norm(offsets, axis=1)
+    heap = replace(captured, offsets=np.stack([lengths, 0 * lengths, 0 * lengths], axis=1))
+    with pytest.raises(ModelError, match=r"not clear \(confidence 0\.\d\d, at least 0\.5 is needed\)"):
+        prepare(heap, SKELETON)
+
+
+def test_a_frame_that_is_not_there() -> None:
+    with pytest.raises(ModelError, match="has 4 frames, from 0; there is no frame 9"):
+        prepare(motion("T", 4), SKELETON, rest=9)
+    assert prepare(motion("T", 4), SKELETON, rest=2).rest == "frame 2"
