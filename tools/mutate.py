@@ -269,7 +269,6 @@ MUTANTS = (
     Mutant(GROUND, "Ground(level if level <= FAR", "Ground(level if abs(level) <= FAR", CAPTURE_TEST),
     Mutant(PREPARATION, "LEAST = 0.5", "LEAST = 0.0", PREPARATION_TEST),
     Mutant(PREPARATION, "CLEAR_UP = 0.75", "CLEAR_UP = 1.1", PREPARATION_TEST),
-    Mutant(FOUND_REST, "CLOSE_AXIS = 20.0", "CLOSE_AXIS = 0.0", ZOO_TEST),
     Mutant(FOUND_REST, "LOW_ARM = 0.6", "LOW_ARM = 2.0", PREPARATION_TEST),
     Mutant(REST_CORRECTION, "OWN_CLAVICLE = 5.0", "OWN_CLAVICLE = 90.0", PREPARATION_TEST),
     Mutant(BVH, "MOST_OF_BODY = 0.75", "MOST_OF_BODY = 2.0", ZOO_TEST),
