@@ -164,7 +164,7 @@ class Decoder:
     def _find_object(self, final: bool) -> Iterator[Block] | None:
         """Look for the object start code; headers of other layers may come before it."""
         buffer = self._buffer
-        if self._objects == 0 and self._scanned == 0 and self._start_error is None:
+        if self._objects == 0 and buffer.offset + self._scanned == 0 and self._start_error is None:
             head = buffer.data[: min(buffer.length, 3)].tobytes()
             if head != syntax.START_CODE_PREFIX[: len(head)] or (final and buffer.length < 4):
                 self._kind = recognition_hint(buffer.data[: min(buffer.length, HEAD_BYTES)].tobytes())
@@ -189,6 +189,7 @@ class Decoder:
                     break  # the first bit of the plane is not here yet
                 if position + 4 < buffer.length and buffer.data[position + 4] & 0x80:
                     return self._join(position)
+                self._start_error = self._start_error or self._outside(position, code)
             if code == USER_DATA and position + LONGEST > buffer.length and not final:
                 break  # a mark may not be complete
             directly = self._objects > 0 and buffer.offset + position == self._object_end

@@ -283,6 +283,27 @@ def test_a_plane_before_the_first_object() -> None:
     assert (caught.value.plane, caught.value.bit) == (0, 8 * len(LAYERS))
 
 
+def test_a_p_plane_before_the_first_object() -> None:
+    """No decoding can begin there; salvaging tells of it, and goes on with the object."""
+    data, frames = stream("body"), truth("body")
+    junk = LAYERS + b"\0\0\1\xbb" + b"\x20\x7f"
+    got, error, decoder = decoded(junk + data, mode="salvage")
+    assert error is None
+    assert [content(f) for f in got] == [content(f) for f in frames]
+    (damage,) = decoder.damage
+    assert (damage.start, damage.stop) == (0, len(junk))
+    assert "no object has begun" in str(damage.error)
+
+
+@pytest.mark.parametrize("chunk", [None, 5000, 5003, 64])
+def test_many_bytes_of_headers_before_the_object(chunk: int | None) -> None:
+    """Bytes of the buffer that are done with are dropped: what is left is not the beginning."""
+    data, frames = stream("body"), truth("body")
+    got, error, _ = decoded(LAYERS + b"\xff" * 20_000 + data, chunk=chunk)
+    assert error is None
+    assert [content(f) for f in got] == [content(f) for f in frames]
+
+
 def sections(count: int) -> Iterator[bytes]:
     face = motion.face(count, faps_sent=(3,))
     data = encode(motion.animation(face), EncoderOptions(intra_period=Fraction(1, 25), start_codes=True))
