@@ -149,6 +149,16 @@ def measure(positions: Float64, mapped: Mapping[str, int]) -> Stance:
     return Stance(up, left, angles)
 
 
+def row_turn(frames: Float64, row: Float64, at_rest: Float64) -> float:
+    """Return degrees between a row as a joint sees it, on average, and the same row in the rest pose.
+
+    frames: (T, 3, 3), rotations of the joint against the rest pose. row: (T, 3), in the world, from the right
+    hip to the left one, or the same of shoulders. at_rest: (3,). 0 if the row has no length.
+    """
+    mean = np.einsum("tij,ti->j", frames, unit(row))
+    return float(between(mean, at_rest))
+
+
 def unit(vectors: Float64) -> Float64:
     """Return vectors (..., 3) of length 1; zero stays zero."""
     result: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

@@ -45,6 +45,9 @@ FIRST_DISTANCE = 4.0
 """The same for a first frame that is taken as the rest pose of a file that has none."""
 SAME_POSE = 0.01
 """Share of the size within which a rest pose is a frame of the motion."""
+MOST_ROW_TURN = {"hip": 25.0, "shoulder": 45.0}
+"""Degrees by which the rows of hips and shoulders may differ, on average, from the rest pose, as the joint
+sees them that they hang on. In real files hips differ by up to 6, shoulders by up to 8."""
 FLOOR_NEAR = 0.12
 """Share of the size within which the lowest joints are at height 0."""
 
@@ -100,12 +103,14 @@ def prepare(
     if size <= 0:
         raise ModelError("the source's joints all coincide in its rest pose; it has no bones")
     few = _few(motion)
-    positions = few.world()[1]
+    quaternions, positions = few.world()
     at_rest = standing.measure(motion.rest()[None], mapped)
     axis, confidence["up"], reasons["up"] = _find_up(positions, mapped, at_rest, up, motion.up)
     turn = rotations.between(_axis(axis), np.array([0.0, 1.0, 0.0]))
     level = motion if axis == "+y" else turn_axes(motion, turn)
-    chosen, confidence["rest"], reasons["rest"] = _choose_rest(motion, positions, mapped, at_rest, rest)
+    chosen, confidence["rest"], reasons["rest"] = _choose_rest(
+        motion, quaternions, positions, mapped, at_rest, rest
+    )
     if chosen == "motion":
         found = rest_from_motion(level, mapped, skeleton)
         level, confidence["rest"] = found.motion, found.confidence
@@ -266,12 +271,16 @@ def _stands_on_zero(positions: Float64, axis: Float64) -> bool:
 
 def _choose_rest(
     motion: SkeletonMotion,
+    quaternions: Float64,
     positions: Float64,
     mapped: Mapping[str, int],
     at_rest: standing.Stance,
     rest: str | int,
 ) -> tuple[str, float, str]:
-    """Return which rest pose to take, the confidence, and a reason."""
+    """Return which rest pose to take, the confidence, and a reason.
+
+    quaternions, positions: (T, J, 4), (T, J, 3), of the source in the world.
+    """
     if rest != "auto":
         return str(rest), 1.0, "as given"
     distance = float(at_rest.distance[0])
@@ -286,7 +295,10 @@ def _choose_rest(
     else:
         why = f"nobody can stand as in the file's rest pose ({at_rest.worst(0)})"
     if possible:
-        return "file", max(0.6, 1.0 - distance / 50.0), "the file's own rest pose is a person's"
+        turned = _find_turned_row(motion, quaternions, positions, mapped)
+        if turned is None:
+            return "file", max(0.6, 1.0 - distance / 50.0), "the file's own rest pose is a person's"
+        why = f"the {turned[0]} are {turned[1]:.0f} degrees from the file's rest pose on average"
     first = standing.measure(positions[:1], mapped)
     if (
         bool(first.possible[0])
@@ -295,6 +307,34 @@ def _choose_rest(
     ):
         return "first", 0.9, f"{why}; the first frame is a T-pose"
     return "motion", 1.0, why
+
+
+def _find_turned_row(
+    motion: SkeletonMotion, quaternions: Float64, positions: Float64, mapped: Mapping[str, int]
+) -> tuple[str, float] | None:
+    """Return which row, of hips or shoulders, lies otherwise than in the rest pose, and by how many degrees.
+
+    Turns that were fitted to positions of joints may leave the pelvis turned aside, whose hips then are
+    turned back: such a rest pose says nothing.
+    """
+    at_rest = motion.rest()
+    for joint, most in MOST_ROW_TURN.items():
+        ends = [mapped[name] for name in (f"l_{joint}", f"r_{joint}") if name in mapped]
+        if len(ends) < 2 or (above := _common(motion, *ends)) < 0:
+            continue
+        row = at_rest[ends[0]] - at_rest[ends[1]]
+        frames = rotations.matrices(quaternions[:, above])
+        turn = standing.row_turn(frames, positions[:, ends[0]] - positions[:, ends[1]], row)
+        if turn > most:
+            return f"{joint}s", turn
+    return None
+
+
+def _common(motion: SkeletonMotion, one: int, other: int) -> int:
+    """Return the number of the joint that two joints hang on, -1 if there is none."""
+    while one != other:
+        one, other = int(motion.parents[max(one, other)]), min(one, other)
+    return one
 
 
 def _arms_out(positions: Float64, mapped: Mapping[str, int], stance: standing.Stance) -> bool:

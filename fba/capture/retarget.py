@@ -10,6 +10,7 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 from fba.body import BapSolver
+from fba.body.skeleton import ROOT
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _spine as spine
 from fba.capture.limbs import bone_ik, hinges
@@ -29,6 +30,8 @@ thumbs is larger: each source bends them in another plane, and to point exactly 
 need angles that thumbs do not reach and the standard's I planes do not carry."""
 FOREARM_SHARE = 0.5
 """Share of the hand's twist that the forearm takes, whose radius and ulna turn about each other."""
+APART = 1e-4
+"""Share of the distance between the hips by which they may be beside where the pelvis has them."""
 CLAVICLE_SHARE = 0.5
 """Share of the clavicle's turn at the breastbone's joint; the joint at the shoulder blade takes the rest."""
 
@@ -58,6 +61,7 @@ def find_targets(
     for joint, correction in alignment.corrections.items():
         source = mapped.get(joint, mapped["HumanoidRoot"])
         turned[joint] = rotations.matrices(source_rotations[:, source]) @ correction
+    _turn_pelvis(motion, mapped, source_rotations, source_positions, turned)
     anchors = [joint for joint in spine.joints(skeleton) if joint in mapped]
     if groups and len(anchors) > 1:
         positions = {joint: source_positions[:, mapped[joint]] for joint in anchors}
@@ -83,6 +87,29 @@ def find_targets(
     if ground != "none":
         root = plant_feet(targets, root, metres, ground, plant)
     return targets.rotations, root
+
+
+def _turn_pelvis(
+    motion: SkeletonMotion, mapped: dict[str, int], quaternions: Float64, positions: Float64,
+    turned: dict[str, Float64],
+) -> None:  # fmt: skip
+    """Turn the pelvis to where the hips are, in files in which joints between the two turn as well.
+
+    quaternions, positions: (T, J, 4), (T, J, 3), of the source in the world.
+    """
+    hips = [mapped[joint] for joint in ("l_hip", "r_hip") if joint in mapped]
+    if len(hips) < 2:
+        return
+    at_rest = motion.rest()
+    row = at_rest[hips[0]] - at_rest[hips[1]]
+    frames = rotations.matrices(quaternions[:, mapped[ROOT]])
+    expected, found = frames @ row, positions[:, hips[0]] - positions[:, hips[1]]
+    if np.abs(found - expected).max() <= APART * np.linalg.norm(row):
+        return
+    turn = rotations.between_all(expected, found)
+    for joint in (ROOT, "sacroiliac"):
+        if joint in turned:
+            turned[joint] = turn @ turned[joint]
 
 
 def _metres_per_unit(targets: Targets) -> float:

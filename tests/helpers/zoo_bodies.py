@@ -46,6 +46,7 @@ class Maker:
     axis. unit: in metres. order: of the channels. finger: name of a finger's joint with {side}, {finger} and
     {number}, "" for none. twist: name of a joint in the middle of upper arm and thigh. extra: names of joints
     that hang on the hips. above: name of a joint above the hips; the path is in the hips' own channels.
+    aside: degrees by which the hips are turned in motion, but not at rest; what hangs on them is turned back.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Maker:
     twist: str = ""
     extra: tuple[str, ...] = ()
     above: str = ""
+    aside: float = 0.0
 
 
 @cache
@@ -102,7 +104,9 @@ def _joints(maker: Maker) -> list[tuple[str, str, str]]:
     rows = [(hips, "HumanoidRoot", "")]
     if maker.above:
         rows = [(maker.above, "+floor", ""), (hips, "HumanoidRoot", maker.above)]
-    last = hips
+    if maker.aside:
+        rows += [(f"{word}HipJoint", "+back", hips) for word in ("Mid", *maker.sides)]
+    last = "MidHipJoint" if maker.aside else hips
     for name, joint in zip(spine.split(), SPINES[len(spine.split())], strict=True):
         rows.append((name, joint, last))
         last = name
@@ -115,7 +119,8 @@ def _joints(maker: Maker) -> list[tuple[str, str, str]]:
     for word, side in zip(maker.sides, "lr", strict=True):
         last = chest
         for name, part in zip(sided, bodies, strict=True):
-            last = hips if part == "hip" else last
+            if part == "hip":
+                last = f"{word}HipJoint" if maker.aside else hips
             if not name:
                 continue
             rows.append((name.format(word), f"{side}_{part}", last))
@@ -179,6 +184,11 @@ def write(maker: Maker) -> tuple[str, dict[str, str]]:
             turned.append(turned[row_of[parent]])
             axes.append(axes[row_of[parent]])
             continue
+        if joint == "+back":
+            centres.append(centres[0])
+            turned.append(matrices[:, 0, :3, :3])
+            axes.append(axes[0])
+            continue
         centre = skeleton.centres[number[plain]]
         if joint.startswith("+"):  # a twist bone: in the middle, it turns with the bone
             below = {"shoulder": "elbow", "hip": "knee"}[plain[2:]]
@@ -194,7 +204,8 @@ def write(maker: Maker) -> tuple[str, dict[str, str]]:
         if aim is None and "_" in joint and parent:  # the last bone of a finger, or a hand
             aim = axes[row_of[parent]][:, 0] if maker.rest in "XM" else np.array([0.0, -1.0, 0.0])
         centres.append(centre)
-        turned.append(matrices[:, number[plain], :3, :3])
+        aside = np.radians(maker.aside) if joint == "HumanoidRoot" else 0.0
+        turned.append(matrices[:, number[plain], :3, :3] @ Rotation.from_euler("y", aside).as_matrix())
         axes.append(_axes(maker, joint, aim))
     text = ["HIERARCHY"]
     columns: list[Float64] = []

@@ -12,6 +12,8 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64
+from fba.body.skeleton import ROOT
+from fba.capture._standing import row_turn
 from fba.capture.comparison.figure import (
     SIDES,
     Figure,
@@ -46,6 +48,9 @@ CHEST = ("vt1", "vt4", "vt6", "vt8", "vt9", "vt10", "vt12", "vl1", "vl2", "vl3",
 """Where a source may have the joint of its chest, from the top."""
 HANGS = 0.5
 """Cosine of the angle to straight down up to which an arm hangs."""
+MOST_ROW_TURN = 25.0
+"""Degrees by which hips may differ from the rest pose, as the pelvis sees them, for that pose to say where a
+head looks."""
 STEEP = 0.85
 """Cosine of the angle between a foot's bone and straight down beyond which it points nowhere."""
 STILL = 0.25
@@ -166,10 +171,11 @@ def _foot(source: Figure, result: Figure, side: str, level: Float64, toe: Float6
 def heads(source: Figure, result: Figure, rest: Figure) -> Iterator[Row]:
     """Angle in degrees between the heads, where the source's rest pose shows where its head looks.
 
-    rest: the source's, which shows that if it stands as a mirror would show it.
+    rest: the source's, which shows that if it stands as a mirror would show it, and the pelvis of the motion
+    has its hips where the rest pose has them.
     """
     ahead = _standing_axes(rest)
-    if ahead is None or "skullbase" not in source.frames:
+    if ahead is None or "skullbase" not in source.frames or not _moves_from(rest, source):
         return
     looks = source.frames["skullbase"] @ rest.frames["skullbase"][0].T @ ahead, result.frames["skullbase"]
     yield Row("head", "head", degrees_turned(np.swapaxes(looks[0], 1, 2) @ looks[1]))
@@ -330,6 +336,15 @@ def _standing_axes(rest: Figure) -> Float64 | None:
     up = np.array([0.0, 1.0, 0.0])
     side = _along(left, up[None])[0]
     return np.stack([side, up, np.cross(side, up)], axis=-1)
+
+
+def _moves_from(rest: Figure, source: Figure) -> bool:
+    """Whether the hips of a motion lie on average as in a rest pose, as the pelvis sees them."""
+    rows = [one.direction("r_hip", "l_hip") for one in (rest, source)]
+    if rows[0] is None or rows[1] is None or ROOT not in source.frames:
+        return True
+    turns = source.frames[ROOT] @ rest.frames[ROOT][0].T
+    return row_turn(turns, rows[1], rows[0][0]) < MOST_ROW_TURN
 
 
 def _hand_axes(figure: Figure, side: str, fingers: tuple[str, ...]) -> Float64:

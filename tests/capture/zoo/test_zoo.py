@@ -124,6 +124,7 @@ MAKERS = (
     Maker("extra joints everywhere", MIXAMO, rest="T", extra=("Tail", "Sword", "Backpack"),
           twist="{}Twist"),
     Maker("mirrored, fingers, y up", MIXAMO, rest="M", finger=FINGERS),
+    Maker("fitted to positions: hips turned aside, thighs turned back", MIXAMO, aside=-70.0),
 )  # fmt: skip
 BONES = (
     ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"),
