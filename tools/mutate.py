@@ -268,6 +268,7 @@ MUTANTS = (
     Mutant(FOOTING, "0.008, 0.0745", "0.008, 0.06", CAPTURE_TEST),
     Mutant(GROUND, "Ground(level if level <= FAR", "Ground(level if abs(level) <= FAR", CAPTURE_TEST),
     Mutant(PREPARATION, "LEAST = 0.5", "LEAST = 0.0", PREPARATION_TEST),
+    Mutant(PREPARATION, "if turn > most:", "if turn > 9 * most:", ZOO_TEST),
     Mutant(PREPARATION, "CLEAR_UP = 0.75", "CLEAR_UP = 1.1", PREPARATION_TEST),
     Mutant(FOUND_REST, "LOW_ARM = 0.6", "LOW_ARM = 2.0", PREPARATION_TEST),
     Mutant(REST_CORRECTION, "OWN_CLAVICLE = 5.0", "OWN_CLAVICLE = 90.0", PREPARATION_TEST),

@@ -46,7 +46,8 @@ class Maker:
     axis. unit: in metres. order: of the channels. finger: name of a finger's joint with {side}, {finger} and
     {number}, "" for none. twist: name of a joint in the middle of upper arm and thigh. extra: names of joints
     that hang on the hips. above: name of a joint above the hips; the path is in the hips' own channels.
-    aside: degrees by which the hips are turned in motion, but not at rest; what hangs on them is turned back.
+    aside: degrees by which hips and chest are turned in motion, but not at rest; what hangs there is turned
+    back.
     """
 
     name: str
@@ -110,6 +111,9 @@ def _joints(maker: Maker) -> list[tuple[str, str, str]]:
     for name, joint in zip(spine.split(), SPINES[len(spine.split())], strict=True):
         rows.append((name, joint, last))
         last = name
+    if maker.aside:
+        rows.append(("ChestJoint", "+back", last))
+        last = "ChestJoint"
     chest = last
     for name, joint in ((neck, "vc7"), (head, "skullbase")):
         if name:
@@ -185,9 +189,10 @@ def write(maker: Maker) -> tuple[str, dict[str, str]]:
             axes.append(axes[row_of[parent]])
             continue
         if joint == "+back":
-            centres.append(centres[0])
-            turned.append(matrices[:, 0, :3, :3])
-            axes.append(axes[0])
+            above = row_of[parent]
+            centres.append(centres[above])
+            turned.append(matrices[:, number[rows[above][1]], :3, :3])
+            axes.append(axes[above])
             continue
         centre = skeleton.centres[number[plain]]
         if joint.startswith("+"):  # a twist bone: in the middle, it turns with the bone
@@ -204,7 +209,8 @@ def write(maker: Maker) -> tuple[str, dict[str, str]]:
         if aim is None and "_" in joint and parent:  # the last bone of a finger, or a hand
             aim = axes[row_of[parent]][:, 0] if maker.rest in "XM" else np.array([0.0, -1.0, 0.0])
         centres.append(centre)
-        aside = np.radians(maker.aside) if joint == "HumanoidRoot" else 0.0
+        backed = any(above == name and other == "+back" for _, other, above in rows)
+        aside = np.radians(maker.aside) if backed else 0.0
         turned.append(matrices[:, number[plain], :3, :3] @ Rotation.from_euler("y", aside).as_matrix())
         axes.append(_axes(maker, joint, aim))
     text = ["HIERARCHY"]

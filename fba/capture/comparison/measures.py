@@ -13,7 +13,6 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Bool, Float64
 from fba.body.skeleton import ROOT
-from fba.capture._standing import row_turn
 from fba.capture.comparison.figure import (
     SIDES,
     Figure,
@@ -344,7 +343,8 @@ def _moves_from(rest: Figure, source: Figure) -> bool:
     if rows[0] is None or rows[1] is None or ROOT not in source.frames:
         return True
     turns = source.frames[ROOT] @ rest.frames[ROOT][0].T
-    return row_turn(turns, rows[1], rows[0][0]) < MOST_ROW_TURN
+    usual = np.einsum("tij,ti->j", turns, rows[1])
+    return bool(degrees_between(usual, rows[0][0]) < MOST_ROW_TURN)
 
 
 def _hand_axes(figure: Figure, side: str, fingers: tuple[str, ...]) -> Float64:
