@@ -175,6 +175,10 @@ def test_a_person_comes_back_as_it_was(maker: Maker) -> None:
         errors[f"place {side}_ankle"] = (
             np.linalg.norm(wanted[:, n, :3, 3] - found[:, n, :3, 3], axis=1).max() / 0.01
         )
+    for joint in ("hip", "shoulder"):
+        ends = [number[f"{side}_{joint}"] for side in "lr"]
+        rows = [matrices[:, ends[0], :3, 3] - matrices[:, ends[1], :3, 3] for matrices in (wanted, found)]
+        errors[f"row of {joint}s"] = between(*rows) / 3.0
     if "skullbase" in known:
         n = number["skullbase"]
         errors["head"] = turned(wanted[:, n, :3, :3], found[:, n, :3, :3]) / 5.0
