@@ -30,6 +30,9 @@ thumbs is larger: each source bends them in another plane, and to point exactly 
 need angles that thumbs do not reach and the standard's I planes do not carry."""
 FOREARM_SHARE = 0.5
 """Share of the hand's twist that the forearm takes, whose radius and ulna turn about each other."""
+FOREARM_SPEED = 10.0
+"""Radians per second at which a forearm twists at most. Hands that flip faster, as where angles of a capture
+change sides, do so at the wrist."""
 APART = 1e-4
 """Share of the distance between the hips by which they may be beside where the pelvis has them."""
 CLAVICLE_SHARE = 0.5
@@ -190,7 +193,20 @@ def _twist_forearm(targets: Targets, side: str) -> None:
         return
     bone = targets.bone(elbow, wrist)
     twist = hinges.turn_about(np.swapaxes(targets.rotations[elbow], 1, 2) @ targets.rotations[wrist], bone)
-    targets.rotations[elbow] = targets.rotations[elbow] @ rotations.turn(bone, FOREARM_SHARE * twist)
+    share = _slow_down(FOREARM_SHARE * twist, FOREARM_SPEED / float(targets.motion.rate))
+    targets.rotations[elbow] = targets.rotations[elbow] @ rotations.turn(bone, share)
+
+
+def _slow_down(angles: Float64, most: float) -> Float64:
+    """Return angles (T,) that change by no more than `most` from frame to frame, and else are the same."""
+    if len(angles) < 2 or np.abs(np.diff(angles)).max() <= most:
+        return angles
+    forwards, backwards = angles.tolist(), angles[::-1].tolist()
+    for path in (forwards, backwards):
+        for n in range(1, len(path)):
+            path[n] = min(max(path[n], path[n - 1] - most), path[n - 1] + most)
+    result: Float64 = (np.array(forwards) + np.array(backwards[::-1])) / 2
+    return result
 
 
 def _curl_finger(targets: Targets, finger: str) -> None:

@@ -73,6 +73,18 @@ def test_the_forearm_takes_half_of_the_hands_twist() -> None:
     assert turned == pytest.approx(0.4 * bone, abs=1e-9)
 
 
+def test_a_forearm_does_not_flip_with_its_hand() -> None:
+    """The hand turns over within a 25th of a second; the forearm takes its half at 10 rad/s."""
+    body = targets(l_elbow=np.tile(np.eye(3), (40, 1, 1)), l_wrist=np.tile(np.eye(3), (40, 1, 1)))
+    bone = body.bone("l_elbow", "l_wrist")
+    twist = np.where(np.arange(40) < 20, 0.0, 3.0)
+    body.rotations["l_wrist"] = Rotation.from_rotvec(twist[:, None] * bone).as_matrix()
+    retarget._twist_forearm(body, "l")
+    turned = Rotation.from_matrix(body.rotations["l_elbow"]).as_rotvec() @ bone
+    assert np.diff(turned).max() == pytest.approx(0.4, abs=1e-9)
+    assert turned[[0, 15, 24, 39]] == pytest.approx([0.0, 0.0, 1.5, 1.5], abs=1e-9)
+
+
 def test_both_joints_of_the_clavicle_take_half_of_its_turn() -> None:
     turn = Rotation.from_euler("Z", [[0.2]]).as_matrix()
     body = targets(l_sternoclavicular=turn)
