@@ -131,6 +131,7 @@ MARK_TEST = "tests/codec/test_mark.py"
 LONG_TEST = "tests/body/test_plausibility.py -k long_motion"
 GAIT_TEST = "tests/body/gait/test_gait_rules.py"
 FOREIGN_HEADS_TEST = "tests/face/importers/test_foreign_heads.py"
+HEAD_ZOO_TEST = "tests/face/importers/test_head_zoo.py -k 'same or surfaces'"
 PACKED_TEST = "tests/gltf/test_gltf_packed.py"
 VERDICT_TEST = "tests/cli/test_model.py -k verdicts"
 
@@ -138,6 +139,12 @@ MUTANTS = (
     Mutant("fba/cli/model_text.py", "if errors <= FAIR:", "if errors < FAIR:", VERDICT_TEST),
     Mutant("fba/gltf/_meshopt_loops.py", "return 0 if position == tail else -1", "return 0", PACKED_TEST),
     Mutant("fba/gltf/surfaces.py", "MOST_ABOVE = 8", "MOST_ABOVE = 2", FOREIGN_HEADS_TEST),
+    Mutant("fba/face/importers/assembly/symmetry.py", "TOUCHING = 0.1", "TOUCHING = 0.0", HEAD_ZOO_TEST),
+    Mutant("fba/face/importers/assembly/_profile.py", "CHIN = 0.3", "CHIN = 0.15", HEAD_ZOO_TEST),
+    Mutant(
+        "fba/face/importers/assembly/pieces.py", "middle = _middle(guessed)", "middle = 0.0", HEAD_ZOO_TEST
+    ),
+    Mutant("fba/face/importers/assembly/landmarks.py", "0.7, 0.02, 0.2", "0.7, 0.02, 0.9", HEAD_ZOO_TEST),
     Mutant("fba/face/importers/assembly/symmetry.py", "BETTER = 0.5", "BETTER = 1e-9", FOREIGN_HEADS_TEST),
     Mutant(
         "fba/face/importers/assembly/pieces.py",

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fba.arrays import Float32
+from fba.arrays import Float32, Float64
 from fba.errors import FormatError, ModelError
-from fba.face.authoring.shapes.shape_names import arkit_of
 from fba.face.feature_points import names, row_of
-from fba.face.importers._vrm import looks_backwards, name_shapes
+from fba.face.importers._vrm import expression_targets, looks_backwards, name_shapes
 from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
 from fba.face.importers.assembly.pieces import assemble, guess_kind, part_names
 from fba.face.importers.assembly.polygon_parts import Piece
@@ -55,6 +54,16 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
 
 def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceModel:
     """A face from pieces whose feature points are to be found."""
+    upright, points, uneven, notes = locate(pieces, options)
+    model = finish_import(upright, points, {}, replace(options, up="y"), notes)
+    return mirror_tables(model) if uneven < EXACT else model
+
+
+def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Float64, float, dict[str, str]]:
+    """(pieces stood upright, their feature points (84, 3) in their unit, asymmetry, notes) of a head.
+
+    Raises ModelError as `find_points`.
+    """
     from fba.face.importers.assembly.landmarks import find_eyes, find_points
 
     path = os.fspath(options.path)
@@ -68,9 +77,7 @@ def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceM
         assembled = assemble(upright, options.kinds)
         eyes = find_eyes(assembled, path)
     uneven = asymmetry(assembled, eyes["left"][0], eyes["right"][0])
-    located = find_points(assembled, path, symmetric=uneven < ALIKE)
-    model = finish_import(upright, located, {}, replace(options, up="y"), notes)
-    return mirror_tables(model) if uneven < EXACT else model
+    return upright, find_points(assembled, path, symmetric=uneven < ALIKE), uneven, notes
 
 
 def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -> tuple[list[Piece], bool]:
@@ -91,7 +98,7 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
     names_of_parts = part_names()
     shown = surfaces(gltf)
     primitives = Counter(surface.node for surface in shown)
-    shapes = name_shapes(gltf)
+    targets = expression_targets(gltf)
     facing = np.array((-1.0, 1.0, -1.0) if looks_backwards(gltf) else (1.0, 1.0, 1.0), dtype=np.float32)
     for surface in shown:
         count = len(surface.positions)
@@ -118,12 +125,8 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
         origin = np.arange(start, start + count, dtype=np.int32)
         mesh = gltf.nodes[surface.node].mesh
         assert mesh is not None  # a surface is of a mesh
-        known = {
-            name: shapes[mesh, number]
-            for number, name in enumerate(gltf.meshes[mesh].morph_names)
-            if (mesh, number) in shapes and arkit_of(name) is None
-        }
-        morphs = {known.get(name, name): morph * facing for name, morph in surface.morphs.items()}
+        named = name_shapes(surface.morphs, gltf.meshes[mesh].morph_names, targets.get(mesh, {}))
+        morphs = {name: morph * facing for name, morph in named.items()}
         pieces.append(Piece(part, material.name, origin, morphs))
         start += count
     if not pieces:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
+import numpy as np
+
+from fba.arrays import Float32
+from fba.face.authoring.shapes.shape_names import canonical_names
 from fba.gltf.scene import Gltf
 from fba.gltf.values import Value
 
@@ -26,29 +30,53 @@ def looks_backwards(gltf: Gltf) -> bool:
     return extensions is not None and extensions.get("VRM") is not None
 
 
-def name_shapes(gltf: Gltf) -> dict[tuple[int, int], str]:
-    """ARKit's names of morph targets, by (mesh, number of the target), where one target is an expression.
+def expression_targets(gltf: Gltf) -> dict[int, dict[str, list[tuple[int, float]]]]:
+    """Morph targets of each mesh that show one of ARKit's shapes together: mesh -> name -> (number, weight).
 
     Raises ModelError where an expression names what does not exist.
     """
-    result: dict[tuple[int, int], str] = {}
-    for preset, binds in _expressions(gltf):
-        if preset.lower() not in NAMES or len(binds) != 1:
+    result: dict[int, dict[str, list[tuple[int, float]]]] = {}
+    for preset, binds, full in _expressions(gltf):
+        if preset.lower() not in NAMES:
             continue
-        (bind,) = binds
-        number = bind.member("index").integer(0, MOST)
-        mesh: int | None
-        if bind.get("node") is not None:
-            mesh = gltf.nodes[bind.member("node").index(len(gltf.nodes), "node")].mesh
-        else:
-            mesh = bind.member("mesh").index(len(gltf.meshes), "mesh")
-        if mesh is not None and number < len(gltf.meshes[mesh].morph_names):
-            result.setdefault((mesh, number), NAMES[preset.lower()])
+        for bind in binds:
+            number = bind.member("index").integer(0, MOST)
+            weight = 1.0 if (share := bind.get("weight")) is None else share.number() / full
+            mesh: int | None
+            if bind.get("node") is not None:
+                mesh = gltf.nodes[bind.member("node").index(len(gltf.nodes), "node")].mesh
+            else:
+                mesh = bind.member("mesh").index(len(gltf.meshes), "mesh")
+            if mesh is not None and number < len(gltf.meshes[mesh].morph_names):
+                result.setdefault(mesh, {}).setdefault(NAMES[preset.lower()], []).append((number, weight))
     return result
 
 
-def _expressions(gltf: Gltf) -> Iterator[tuple[str, list[Value]]]:
-    """The preset and the binds to morph targets of each expression, of VRM 0 and VRM 1."""
+def name_shapes(
+    morphs: Mapping[str, Float32], names: tuple[str, ...], targets: Mapping[str, list[tuple[int, float]]]
+) -> dict[str, Float32]:
+    """Morph targets of a surface with ARKit's names for the expressions of its mesh.
+
+    morphs: displacements (V, 3) by name. names: those of all targets of the mesh. targets: of
+    `expression_targets`. One target that is an expression is renamed, several are added up; shapes that
+    the file itself names as ARKit's stay.
+    """
+    own = canonical_names(names)
+    result = dict(morphs)
+    for shape, parts in targets.items():
+        moving = [(names[number], weight) for number, weight in parts if names[number] in morphs]
+        if shape in own or not moving:
+            continue
+        if len(parts) == 1 and parts[0][1] == 1.0 and moving[0][0] not in own.values():
+            name = moving[0][0]
+            result = {shape if each == name else each: morph for each, morph in result.items()}
+        else:
+            result[shape] = np.sum([morphs[name] * np.float32(weight) for name, weight in moving], axis=0)
+    return result
+
+
+def _expressions(gltf: Gltf) -> Iterator[tuple[str, list[Value], float]]:
+    """Of each expression of VRM 0 and VRM 1 the preset, the binds to morph targets, and their full weight."""
     extensions = gltf.document.get("extensions")
     if extensions is None:
         return
@@ -56,8 +84,8 @@ def _expressions(gltf: Gltf) -> Iterator[tuple[str, list[Value]]]:
     for group in [] if master is None else master.elements(MOST, "blendShapeGroups"):
         preset = group.get("presetName")
         if preset is not None:
-            yield preset.text(200), group.elements(MOST, "binds")
+            yield preset.text(200), group.elements(MOST, "binds"), 100.0
     expressions = None if (vrm := extensions.get("VRMC_vrm")) is None else vrm.get("expressions")
     presets = None if expressions is None else expressions.get("preset")
     for name, expression in [] if presets is None else presets.members():
-        yield name, expression.elements(MOST, "morphTargetBinds")
+        yield name, expression.elements(MOST, "morphTargetBinds"), 1.0

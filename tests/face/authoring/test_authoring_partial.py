@@ -10,6 +10,7 @@ import pytest
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.face.authoring import author
+from fba.face.checks import check_faps
 from fba.face.feature_points import row_of
 from fba.face.model import Part
 from grid_head import grid_head
@@ -229,3 +230,19 @@ def test_a_face_without_height_of_the_eye_opening_has_no_unit(
         bound[row_of()[lower]] = bound[row_of()[upper]]
     with pytest.raises(ModelError, match="IRISD0 is 0"):
         author(parts, points, bound=bound)
+
+
+def test_a_point_of_a_lip_on_the_vertex_of_another_is_lost_alone(
+    parts: list[Part], points: np.ndarray, bound: np.ndarray
+) -> None:
+    for point, other in (("2.6", "2.2"), ("8.8", "8.4")):
+        points[row_of()[point]], bound[row_of()[point]] = points[row_of()[other]], bound[row_of()[other]]
+    model = author(parts, points, bound=bound)
+    assert model.lost == {
+        8: "feature point 2.6 stands on the same vertex as 2.2, which has a FAP of its own",
+        58: "feature point 8.8 stands on the same vertex as 8.4, which has a FAP of its own",
+    }
+    errors = [
+        finding for finding in check_faps(model, [4, 6, 7, 51, 53, 54, 60]) if finding.severity == "error"
+    ]
+    assert not errors

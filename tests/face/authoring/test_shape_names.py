@@ -44,3 +44,11 @@ def test_faps_by_name() -> None:
 
 def test_the_first_of_several_counts() -> None:
     assert canonical_names(["x", "eyeBlink_L", "blink_L"]) == {"eyeBlinkLeft": "eyeBlink_L"}
+
+
+def test_words_before_all_names_are_left_out() -> None:
+    names = ["A14_Eye_Blink_Left", "A25_Jaw_Open", "A30_Mouth_Left", "T01_Tongue_Up"]
+    assert canonical_names(names) == {"eyeBlinkLeft": names[0], "jawOpen": names[1], "mouthLeft": names[2]}
+    assert canonical_names(["low_mouthOpen", "half_jawOpen", "x", "y"]) == {}
+    # where a name is known as it stands, none is shortened
+    assert list(canonical_names(["jawOpen", "far_jawLeft", "far_jawRight", "far_x"])) == ["jawOpen"]

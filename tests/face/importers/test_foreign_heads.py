@@ -273,3 +273,15 @@ def test_expressions_of_vrm_name_the_shapes(extension: dict[str, object], way: f
     assert piece.morphs["jawOpen"][0].tolist() == [0, 0, 2 * way]
     # avatars of VRM 0 look to -z: turned half around, they look to +z
     assert piece.part.vertices[1].tolist() == [way, 0, 0]
+
+
+def test_an_expression_of_several_targets_is_their_sum(tmp_path: Path) -> None:
+    sheet = Sheet()
+    targets = [{"POSITION": sheet.array([(0, 0, 1 + k)] * 3)} for k in range(3)]
+    sheet.show(sheet.triangle(targets=targets))
+    binds = [{"mesh": 0, "index": 1, "weight": 100}, {"mesh": 0, "index": 2, "weight": 50}]
+    groups = [{"presetName": "a", "binds": binds}]
+    sheet.json["extensions"] = {"VRM": {"blendShapeMaster": {"blendShapeGroups": groups}}}
+    (piece,), _ = gltf_pieces(sheet.save(tmp_path / "a.vrm"))
+    assert list(piece.morphs) == ["target 0", "target 1", "target 2", "jawOpen"]
+    assert piece.morphs["jawOpen"][0].tolist() == [0, 0, -(2 + 3 / 2)]

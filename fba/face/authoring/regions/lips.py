@@ -41,6 +41,11 @@ HANDLES = {
     "lower right": ("2.9", "8.8"),
 }
 """The inner and the outer feature point of each handle."""
+ENDS = {
+    "2.6": ("2.4", "2.2"), "2.7": ("2.5", "2.2"), "2.8": ("2.4", "2.3"), "2.9": ("2.5", "2.3"),
+    "8.5": ("8.3", "8.1"), "8.6": ("8.4", "8.1"), "8.7": ("8.3", "8.2"), "8.8": ("8.4", "8.2"),
+}  # fmt: skip
+"""The corner and the middle of a lip that a point lies between."""
 UPPER = ("left corner", "upper left", "upper middle", "upper right", "right corner")
 LOWER = ("left corner", "lower left", "lower middle", "lower right", "right corner")
 ALONG = {
@@ -121,9 +126,19 @@ def _missing_reason(marks: Landmarks, number: int) -> str:
     own = next(pair for pair in HANDLES.values() if point in pair)
     if not inner and marks.vertex.get(own[0]) == marks.vertex[point]:
         return f"feature point {point} stands on the same vertex as {own[0]}, which the inner lip's FAP moves"
+    if twin := _twin(marks, point):
+        return f"feature point {point} stands on the same vertex as {twin}, which has a FAP of its own"
     if inner and marks.vertex.get("2.2") == marks.vertex.get("2.3") and marks.has("2.2"):
         return "the mouth has no opening: upper and lower lip are one"
     return ""
+
+
+def _twin(marks: Landmarks, point: str) -> str:
+    """The corner or middle of a lip on whose vertex a point between them stands; empty where none is."""
+    ends = ENDS.get(point, ())
+    return next(
+        (end for end in ends if marks.has(end, point) and marks.vertex[end] == marks.vertex[point]), ""
+    )
 
 
 def _fap_field(lips: _Lips, number: int) -> Float64:
@@ -146,14 +161,15 @@ def _fields(marks: Landmarks) -> _Lips:
         for half, handles in (("upper", UPPER), ("lower", LOWER)):
             walk = marks.contour(f"{half} {side} lip")
             if len(walk):
-                nodes = [marks.vertex.get(HANDLES[name][number]) for name in handles]
+                points = [HANDLES[name][number] for name in handles]
+                nodes = [None if _twin(marks, point) else marks.vertex.get(point) for point in points]
                 values[walk] = 0.0
                 values[walk[:, None], [names.index(name) for name in handles]] = _contour_shares(
                     marks.surface.vertices, walk, nodes
                 )
     for name, pair in HANDLES.items():
         for point in pair:
-            if marks.has(point) and not np.isnan(values[marks.vertex[point], 0]):
+            if marks.has(point) and not _twin(marks, point) and not np.isnan(values[marks.vertex[point], 0]):
                 # where one contour runs through a point of the other, the point decides
                 values[marks.vertex[point]] = np.array(names) == name
     fixed = np.flatnonzero(~np.isnan(values[:, 0]))
@@ -231,7 +247,17 @@ def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) 
     steps = np.linalg.norm(np.diff(vertices[walk], axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-12))])
     step = {int(vertex): k for k, vertex in enumerate(walk)}
-    known = [(length[step[node]], float(k)) for k, node in enumerate(nodes) if node is not None]
+    known: list[tuple[float, float]] = []
+    end = step[nodes[-1]] if nodes[-1] is not None else len(walk)
+    for k, node in enumerate(nodes):
+        # of points that share a vertex, or stand in the wrong order, those nearer to the first node count
+        last = k == len(nodes) - 1
+        if (
+            node is not None
+            and (not known or length[step[node]] > known[-1][0])
+            and (last or step[node] < end)
+        ):
+            known.append((float(length[step[node]]), float(k)))
     if len(known) == len(walk):
         number = np.array([k for _, k in known])
     else:

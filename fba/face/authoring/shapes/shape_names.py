@@ -9,13 +9,18 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib.resources import files
 
 from fba.parameters import FIRST_LOW_LEVEL_FAP, faps
 
 SIDES = {"l": "left", "r": "right", "lft": "left", "rgt": "right"}
+MOST_COMMON_WORDS = 3
+"""Most words before all names of a file that are left out."""
+FEWEST_ALIKE = 4
+"""Fewest names of which it is said that they begin alike."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 
@@ -37,13 +42,30 @@ def arkit_of(name: str) -> str | None:
 
 
 def canonical_names(names: Iterable[str]) -> dict[str, str]:
-    """ARKit's name -> the name that a file uses for it; of several ARKit's own, else the first."""
+    """ARKit's name -> the name that a file uses for it; of several ARKit's own, else the first.
+
+    Where no name is known, words with which most begin are left out: "head_eyeBlink_L", "A14_Eye_Blink_Left".
+    """
+    written = list(names)
+    known = {name: shape for name in written if (shape := arkit_of(name)) is not None}
+    for count in range(1, MOST_COMMON_WORDS + 1):
+        if known or not _begin_alike(written, count):
+            break
+        for name in written:
+            rest = " ".join(WORD.findall(name)[count:])
+            if (shape := arkit_of(rest)) is not None:
+                known[name] = shape
     used: dict[str, str] = {}
-    for name in names:
-        shape = arkit_of(name)
-        if shape is not None and (shape not in used or _words(name) == _words(shape)):
+    for name, shape in known.items():
+        if shape not in used or _words(name) == _words(shape):
             used[shape] = name
     return used
+
+
+def _begin_alike(names: Sequence[str], count: int) -> bool:
+    """Whether more than half of several names begin with the same words, as many as `count`."""
+    starts = Counter(tuple(WORD.findall(name.lower())[:count]) for name in names)
+    return len(names) >= FEWEST_ALIKE and 2 * max(starts.values()) > len(names)
 
 
 @cache

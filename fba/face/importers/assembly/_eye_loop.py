@@ -26,7 +26,7 @@ def find_eye_loop(surface: Surface, centre: Float64, radius: float) -> Intp:
     arms = surface.vertices - centre
     across = np.hypot(arms[:, 0], arms[:, 1])
     front = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
-    visible = (across < REACH * radius) & (arms[:, 2] > front - HIDDEN * radius) & (arms[:, 2] > 0)
+    visible = (across < REACH * radius) & (arms[:, 2] > front - HIDDEN * radius)
     edges = surface.edges[visible[surface.edges].all(axis=1)]
     if not len(edges):
         return np.zeros(0, dtype=np.intp)

@@ -12,6 +12,8 @@ from fba.face.model import Part
 
 STEPS = 400
 """Number of heights at which the profile is sampled."""
+CHIN = 0.3
+"""Distance of the chin from the lower lip at least, by that of the lips from the eyes; nearer is the lip."""
 
 
 def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Float64]:
@@ -50,7 +52,7 @@ def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Floa
             result["8.1"] = point(upper)
             result["9.15"] = point(int(np.where(between, behind, -np.inf).argmax()))
     chin = _hill(
-        front, (heights > located["2.3"][1] - 0.8 * tall) & (heights < located["2.3"][1] - 0.2 * tall)
+        front, (heights > located["2.3"][1] - 0.8 * tall) & (heights < located["2.3"][1] - CHIN * tall)
     )
     if chin is None:
         return result

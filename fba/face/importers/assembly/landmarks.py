@@ -31,6 +31,9 @@ MOST_IN_COLUMN = 3000
 """Most vertices of one column of the face that are compared with each other."""
 PARTED = 0.25
 """Share of the jaw's way by which lips part at least."""
+WIDEST, SLIT_STEP, SLIT_END = 0.7, 0.02, 0.2
+"""Half a mouth at most and the steps along it, in distances of the eyes; and the share of what parts in the
+middle that still parts at the corner."""
 FEWEST_IN_LOOP = 6
 """Fewest vertices around the opening of an eye."""
 FRONT_TEETH = 0.12
@@ -254,23 +257,27 @@ def _mouth(
     upper, lower = pair
     points = {"2.2": vertices[upper], "2.3": vertices[lower]}
     for side, sign, inner, outer in (("Left", 1, "2.4", "8.3"), ("Right", -1, "2.5", "8.4")):
-        shape = next((s for s in (f"mouthSmile{side}", f"mouthStretch{side}") if s in shapes), None)
-        if shape is None:
-            continue
         level = np.abs(vertices[:, 1] - vertices[upper, 1]) < 0.25 * apart
         beside = (vertices[:, 0] - middle[0]) * sign > 0.15 * apart
         front = vertices[:, 2] > middle[2] - 0.6 * apart
-        size = np.linalg.norm(shapes[shape], axis=1)
-        # what moves furthest is the corner of the mouth, or the cheek behind it; only the outside counts
-        off = np.abs(vertices[:, 1] - vertices[upper, 1]) / apart
         candidates = level & beside & front & facing
         if not candidates.any():
             continue
-        score = np.where(candidates, size / max(float(size[candidates].max()), 1e-12) - 2 * off, -np.inf)
-        corner = vertices[int(score.argmax())]
-        within = (corner[0] - vertices[:, 0]) * sign > 0.015 * apart
-        away = np.linalg.norm(vertices - corner + (0.035 * apart * sign, 0, 0), axis=1)
-        points[inner] = vertices[int(np.where(within & front, away, np.inf).argmin())]
+        shape = next((s for s in (f"mouthSmile{side}", f"mouthStretch{side}") if s in shapes), None)
+        if shape is None:
+            end = _end_of_slit(vertices, drop, level & front, float(middle[0]), sign, apart)
+            if end is None:
+                continue
+            points[inner] = vertices[end]
+        else:
+            size = np.linalg.norm(shapes[shape], axis=1)
+            # what moves furthest is the corner of the mouth, or the cheek behind it; only the outside counts
+            off = np.abs(vertices[:, 1] - vertices[upper, 1]) / apart
+            most = max(float(size[candidates].max()), 1e-12)
+            corner = vertices[int(np.where(candidates, size / most - 2 * off, -np.inf).argmax())]
+            within = (corner[0] - vertices[:, 0]) * sign > 0.015 * apart
+            away = np.linalg.norm(vertices - corner + (0.035 * apart * sign, 0, 0), axis=1)
+            points[inner] = vertices[int(np.where(within & front, away, np.inf).argmin())]
         # the contours need skin between them: next to each other, one could not move without the other
         beyond = points[inner] + (CORNER_WIDTH * apart * sign, 0.0, 0.25 * CORNER_WIDTH * apart)
         away = np.linalg.norm(vertices - beyond, axis=1)
@@ -281,6 +288,36 @@ def _mouth(
             points[{"2.4": "2.6", "2.5": "2.7"}[inner]] = vertices[half[0]]
             points[{"2.4": "2.8", "2.5": "2.9"}[inner]] = vertices[half[1]]
     return points
+
+
+def _end_of_slit(
+    vertices: Float64, drop: Float64, near: Bool, middle: float, sign: int, apart: float
+) -> int | None:
+    """The vertex at a corner of the mouth: beyond the last at which an opening jaw parts the lips.
+
+    near: vertices that may be of the lips. middle: the x of the midline. sign: +1 for the left corner. None
+    where the lips lie too far apart at rest for that.
+    """
+    first = 0.0
+    last: int | None = None
+    for step in np.arange(0.0, WIDEST, SLIT_STEP) * apart:
+        column = np.flatnonzero((np.abs(vertices[:, 0] - middle - sign * step) < 0.04 * apart) & near)
+        if not 0 < len(column) <= MOST_IN_COLUMN:
+            continue
+        between = np.linalg.norm(vertices[column][:, None] - vertices[column][None], axis=2)
+        parted = np.where(between < 0.04 * apart, drop[column][None] - drop[column][:, None], 0.0)
+        above = np.unravel_index(int(parted.argmax()), parted.shape)[0]
+        first = max(first, float(parted.max()))
+        if not first > PARTED * float(drop.max()):
+            return None
+        if parted.max() > SLIT_END * first:
+            last = int(column[above])
+    if last is None:
+        return None
+    # the corner itself does not part: it is the next vertex outwards
+    beyond = near & ((vertices[:, 0] - vertices[last, 0]) * sign > 0.015 * apart)
+    away = np.where(beyond, np.linalg.norm(vertices - vertices[last], axis=1), np.inf)
+    return int(away.argmin()) if away.min() < 0.1 * apart else last
 
 
 def _lip_pair(

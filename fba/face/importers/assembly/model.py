@@ -76,7 +76,7 @@ def finish_import(
     pieces, points = turn_upright(pieces, points, options.up)
     size, how = metres_per_unit(points, options.unit)
     pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
-    middle = float(np.nanmean(pupils[:, 0])) if np.isfinite(pupils[:, 0]).any() else 0.0
+    middle = float(np.nanmean(pupils[:, 0])) if np.isfinite(pupils[:, 0]).any() else None
     origin = pupils.mean(axis=0) if np.isfinite(pupils).all() else np.zeros(3)
     parts = [
         shift_piece(piece, size, -origin * size) for piece in assemble(pieces, options.kinds, middle=middle)

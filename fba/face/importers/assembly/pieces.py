@@ -29,18 +29,20 @@ FEWEST_TEETH = 6
 FRONT, SAME_HEIGHT = 0.25, 0.6
 """Front teeth: share of the depth of a row in which they lie; and the most by which the middles of those of
 one jaw differ, as a share of their height."""
+PAIR = 1.7
+"""Two eyes are together at least this many times as wide as tall; one eye is round."""
 EYE_SIZES = (0.02, 0.12)
 """Radius of an eyeball by the height of the mesh, head alone to head and shoulders."""
 
 
 def assemble(
-    pieces: Sequence[Piece], kinds: Mapping[str, str] | None = None, *, middle: float = 0.0
+    pieces: Sequence[Piece], kinds: Mapping[str, str] | None = None, *, middle: float | None = None
 ) -> tuple[Piece, ...]:
     """Parts of a face: kinds from names, all skin in one, each eyeball in one, teeth upper and lower.
 
     kinds: what the user says, by the name of a group, object, mesh or material. middle: the x of the
-    plane between left and right. Where names do not say, round shells in pairs are eyes and the largest
-    piece is skin. Raises ModelError where nothing is left.
+    plane between left and right, by default between the eyes. Where names do not say, round shells in pairs
+    are eyes and the largest piece is skin. Raises ModelError where nothing is left.
     """
     given = check_kinds(kinds)
     guessed: list[tuple[Piece, str | None]] = []
@@ -62,7 +64,26 @@ def assemble(
         guessed = [
             (p, "skin" if kind is None and len(p.part.vertices) == largest else kind) for p, kind in guessed
         ]
+    if middle is None:
+        middle = _middle(guessed)
     return _join_by_kind([(p, kind or "other") for p, kind in guessed], middle)
+
+
+def _middle(pieces: Sequence[tuple[Piece, str | None]]) -> float:
+    """The x between the eyes; where there are not two, of the middle of the skin."""
+    eyes = [piece.part.vertices for piece, kind in pieces if kind == "eye"]
+    if eyes:
+        size = np.ptp(np.concatenate(eyes), axis=0)
+        if size[0] > PAIR * size[1]:
+            return _centre(eyes)
+    skin = [piece.part.vertices for piece, kind in pieces if kind == "skin"]
+    return _centre(skin) if skin else 0.0
+
+
+def _centre(vertices: Sequence[Float32]) -> float:
+    """The x of the middle between the outermost of some vertices, arrays (V, 3)."""
+    across = np.concatenate(vertices)[:, 0]
+    return float(across.min() + across.max()) / 2
 
 
 def shift_piece(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
@@ -73,9 +94,12 @@ def shift_piece(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
 
 
 def _with_eyes(
-    pieces: Sequence[Piece], kinds: Mapping[int, str | None], middle: float
+    pieces: Sequence[Piece], kinds: Mapping[int, str | None], middle: float | None
 ) -> list[tuple[Piece, str | None]]:
-    """The pieces, with mirrored pairs of round components split off as eyes."""
+    """The pieces, with mirrored pairs of round components split off as eyes.
+
+    middle: the x of the mirror; without it, that of x = 0 and that in the middle of the pieces are tried.
+    """
     from fba.face.eyeball import sphere
 
     if not pieces:
@@ -97,10 +121,11 @@ def _with_eyes(
             if error < EYE_ROUND * radius and share > 0.5 and EYE_SIZES[0] < radius / tall < EYE_SIZES[1]:
                 spheres.append((number, int(shell), centre, radius))
     eyes: set[tuple[int, int]] = set()
-    for a in spheres:
-        mirror = a[2] * (-1, 1, 1) + (2 * middle, 0, 0)
-        if any(b[:2] != a[:2] and np.linalg.norm(b[2] - mirror) < 0.5 * a[3] for b in spheres):
-            eyes.add(a[:2])
+    for plane in (0.0, _centre([piece.part.vertices for piece in pieces])) if middle is None else (middle,):
+        for a in spheres if not eyes else ():
+            mirror = a[2] * (-1, 1, 1) + (2 * plane, 0, 0)
+            if any(b[:2] != a[:2] and np.linalg.norm(b[2] - mirror) < 0.5 * a[3] for b in spheres):
+                eyes.add(a[:2])
     result: list[tuple[Piece, str | None]] = []
     for number, (piece, label) in enumerate(zip(pieces, labels, strict=True)):
         mask = np.isin(label, [shell for index, shell in eyes if index == number])

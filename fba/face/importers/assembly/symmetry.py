@@ -24,6 +24,8 @@ ANGLES = np.radians((0.2, 15.0))
 """Angles between the plane of symmetry and the upright one within which a head is turned."""
 AROUND = 1.6
 """Distance from the middle of the eyes, in those of the eyes, within which vertices belong to the face."""
+TOUCHING = 0.1
+"""Share of the way to the neighbours that counts, beside the position, when mirror images are sought."""
 CENTRAL = (3, 4, 5, 14, 16, 17, 18, 51, 52, 63)
 """FAPs that move both sides alike."""
 
@@ -142,8 +144,10 @@ def _counterparts(model: FaceModel) -> Intp:
 
     pupils = model.points[[row_of()["3.5"], row_of()["3.6"]], 0]
     middle = float(pupils.mean()) if np.isfinite(pupils).all() else 0.0
-    vertices = model.vertices.astype(np.float64)
-    mirrored = vertices * (-1.0, 1.0, 1.0) + (2 * middle, 0.0, 0.0)
+    # lips that touch have vertices at one place: the way to their neighbours tells which is of which lip
+    arms = TOUCHING * _neighbour_arms(model)
+    vertices = np.hstack([model.vertices.astype(np.float64) - (middle, 0.0, 0.0), arms])
+    mirrored = vertices * (-1.0, 1.0, 1.0, -1.0, 1.0, 1.0)
     kinds = np.concatenate([[part.kind] * len(part.vertices) for part in model.parts])
     result = np.zeros(len(vertices), dtype=np.intp)
     for kind in np.unique(kinds):
@@ -154,6 +158,19 @@ def _counterparts(model: FaceModel) -> Intp:
         if bound[left] >= 0 and bound[right] >= 0:
             result[bound[left]], result[bound[right]] = bound[right], bound[left]
     return result
+
+
+def _neighbour_arms(model: FaceModel) -> Float64:
+    """(V, 3) from each vertex to the middle of its triangles."""
+    arms = []
+    for part in model.parts:
+        vertices = part.vertices.astype(np.float64)
+        sums, counts = np.zeros_like(vertices), np.zeros(len(vertices))
+        corners = part.triangles.ravel()
+        np.add.at(sums, corners, np.repeat(vertices[part.triangles].mean(axis=1), 3, axis=0))
+        np.add.at(counts, corners, 1)
+        arms.append(np.where(counts[:, None] > 0, sums / np.maximum(counts, 1)[:, None] - vertices, 0.0))
+    return np.concatenate(arms)
 
 
 def _fields(model: FaceModel, table: FaceDefTables) -> dict[tuple[int, ...], Float64]:
