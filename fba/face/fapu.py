@@ -12,6 +12,8 @@ from fba.face.feature_points import row_of
 
 PER_DISTANCE = 1024
 """Each unit of length is a distance of the face divided by this."""
+FAPU_POINTS = ("3.5", "3.6", "3.1", "3.3", "3.2", "3.4", "9.15", "2.2", "8.3", "8.4")
+"""The feature points between which the units are measured: no face can do without them."""
 AU = 1e-5
 """The angle unit, in radians."""
 

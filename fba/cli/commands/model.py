@@ -31,6 +31,7 @@ POINT_FILES = "FDP, CSV or JSON file"
     epilog=examples(
         "fba model info --default",
         "fba model validate head.glb",
+        "fba model points scan.obj -o scan.points.csv",
         "fba model import scan.obj --points scan.points.csv -o head.glb",
         "fba model fit person.fdp -o person.glb",
     ),
@@ -203,6 +204,76 @@ def import_(
     outputs.say(click.style(verdict, fg="red") if verdict.startswith("poor") else verdict)
     if verdict.startswith("poor"):
         raise click.exceptions.Exit(1)
+
+
+@command.command(
+    "points",
+    short_help="Place feature points by hand.",
+    epilog=examples(
+        "fba model points scan.obj -o scan.points.csv",
+        "fba model points scan.obj --points scan.points.csv -o scan.points.csv",
+        "fba model points avatar.glb -o avatar.points.csv",
+    ),
+)
+@click.argument("head", metavar="HEAD", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option(
+    "-o", "--output", metavar="POINTS.csv", required=True, type=OutputType(), help="File of points to write."
+)
+@options.no_clobber_option
+@click.option(
+    "--points",
+    metavar="FILE",
+    type=SOURCE,
+    help=f"{POINT_FILES} to begin from. Default: a file beside HEAD with the same name, else the points that "
+    "`fba model import` finds.",
+)
+@click.option("--kind", type=click.Choice(KINDS), help="Kind of HEAD. Default: recognised from its content.")
+@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis.")
+@click.option("--size", type=options.SizeType(), default="1280x800", show_default=True, metavar="WxH")
+def points_(
+    head: Path,
+    output: Path,
+    no_clobber: bool,
+    points: Path | None,
+    kind: str | None,
+    up: str,
+    size: tuple[int, int],
+) -> None:
+    """Open a window in which you place the feature points of a head, for `fba model import --points`.
+
+    HEAD is a mesh that lacks shapes, or whose points are not found: OBJ, PLY, Candide or glTF. The list
+    begins with the points that are not known, those that every face needs first. Click on the head to place
+    the current one, M mirrors it to the other side, Ctrl+S saves; the window lists all keys. Each point is
+    put on the nearest vertex of the mesh. If nothing is saved, the exit code is 1.
+    """
+    from fba_player.window.place_points import check_window, place_points
+
+    outputs = _points_outputs(output, head, no_clobber=no_clobber)
+    check_window()
+    from fba.face.importers.head_surface import read_head_surface
+
+    with Progress("reading", None):
+        surface = read_head_surface(head, kind=kind, points=points, up=up)
+    placement = place_points(surface, output, size=size)
+    if not placement.written:
+        outputs.say(f"{output}: not written, as the window was closed without saving")
+        raise click.exceptions.Exit(1)
+    outputs.say(f"{output}: {len(placement.places)} feature points placed, {len(placement.missing)} not")
+    if placement.missing_units:
+        outputs.say(f"  no face can be made without {', '.join(placement.missing_units)}")
+    else:
+        outputs.say(f"  next: fba model import {head} --points {output} -o {head.stem}.fba.glb")
+
+
+def _points_outputs(output: Path, head: Path, *, no_clobber: bool) -> Outputs:
+    """Return the output of points; click.UsageError for a name that is not read as CSV."""
+    if output == STANDARD:
+        raise click.UsageError("--output -: points are saved from the window; give the name of a file")
+    if output.suffix.lower() in (".json", ".fdp", ".xml", ".obj", ".ply", ".wfm", ".glb", ".gltf"):
+        raise click.UsageError(
+            f"--output {output}: points are written as CSV; name it {output.with_suffix('.csv').name}"
+        )
+    return Outputs([Output("--output", output)], [head], no_clobber=no_clobber)
 
 
 def _draw_sheet(model: FaceModel, file: Path) -> None:

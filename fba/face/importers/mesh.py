@@ -52,7 +52,7 @@ def import_mesh(options: ImportOptions, form: str, points: object = None) -> Fac
             f"{path.stem}.points.csv with lines 'name,x,y,z' or 'name,vertex' (vertices count from 0), for "
             "instance '9.3,297' for the tip of the nose"
         ).with_remedies(Remedy("points", "or name their file with {}", "FILE"))
-    pieces = polygon_pieces(polygons, _materials(path) if form == "obj" else {}, path)
+    pieces = polygon_pieces(polygons, read_materials(path) if form == "obj" else {}, path)
     positions, vertices = _point_positions(polygons, given, os.fspath(path))
     return finish_import(pieces, positions, vertices, options)
 
@@ -146,7 +146,7 @@ def _in_unit_of_mesh(given: Float64, positions: Float64, bound: list[str], path:
     return positions
 
 
-def _materials(path: str | os.PathLike[str]) -> dict[str, Material]:
+def read_materials(path: str | os.PathLike[str]) -> dict[str, Material]:
     """The materials of the .mtl files that an OBJ file names, by name."""
     libraries: dict[str, None] = {}
     for line, text in read_lines(path):

@@ -5,8 +5,11 @@ Positions are in pixels from the upper left corner of the picture.
 
 from __future__ import annotations
 
+import math
+
 from fba_player.session.actions import act
 from fba_player.session.keys import by_name
+from fba_player.session.placing import KEPT_ACTIONS, click_on_head, placement_of, press_key
 from fba_player.session.session import Session
 
 BAR_HEIGHT = 52
@@ -15,6 +18,8 @@ BAR_MARGIN = 16
 ORBIT_SPEED = 0.35
 """Degrees per pixel."""
 ZOOM_STEP = 0.9
+CLICK = 4.0
+"""Pixels, at a display scale of 1, by which the mouse may move in a click where points are placed."""
 
 
 class Controls:
@@ -28,6 +33,7 @@ class Controls:
         self.plain = plain
         self._held: str | None = None
         self._last = (0.0, 0.0)
+        self._dragged = False
 
     def key(self, name: str, *, held: bool = False) -> bool:
         """Handle a key that was pressed, or is still held. name: as in the table of keys, in lower case.
@@ -36,6 +42,11 @@ class Controls:
         """
         session = self.session
         row = by_name().get(name)
+        if placement_of(session) is not None:
+            if press_key(session, name):
+                return True
+            if row is None or row.action.split()[0] not in KEPT_ACTIONS:
+                return False
         if row is not None:
             session.touched()
             return (not held or row.held) and act(session, row.action)
@@ -43,7 +54,7 @@ class Controls:
 
     def press(self, button: str, x: float, y: float) -> None:
         """Handle a mouse button, "left", "right" or "middle", that goes down."""
-        self._last = (x, y)
+        self._last, self._dragged = (x, y), False
         bottom = self.session.size[1] - BAR_HEIGHT * self.session.scale
         if self.plain and button == "left" and y >= bottom:
             self._held = "timeline"
@@ -54,6 +65,10 @@ class Controls:
     def move(self, x: float, y: float) -> None:
         """Handle a move of the mouse."""
         right, down = x - self._last[0], y - self._last[1]
+        if not self._dragged and placement_of(self.session) is not None:
+            self._dragged = math.hypot(right, down) > CLICK * self.session.scale
+            if not self._dragged:
+                return
         self._last = (x, y)
         viewpoint = self.session.viewpoint
         if self._held == "timeline":
@@ -66,8 +81,11 @@ class Controls:
             viewpoint.camera = viewpoint.camera.pan(-right / height, down / height)
 
     def release(self) -> None:
-        """Handle the mouse button going up."""
+        """Handle the mouse button going up: a click places a point, where points are placed."""
+        clicked = self._held == "orbit" and not self._dragged
         self._held = None
+        if clicked and placement_of(self.session) is not None:
+            click_on_head(self.session, *self._last)
 
     @property
     def holding(self) -> bool:

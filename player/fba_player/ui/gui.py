@@ -7,6 +7,7 @@ from typing import Any
 from imgui_bundle import imgui, implot
 
 from fba_player.session.controls import Controls
+from fba_player.session.placing import placement_of
 from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui._bar import Bar
@@ -40,7 +41,8 @@ class Gui:
         theme.apply_theme()
         self._renderer = ImguiRenderer(context)
         self.bar = Bar(self._renderer)
-        self.panels = make_panels()
+        self._placing = placement_of(session) is not None
+        self.panels = make_panels(placing=self._placing)
         self._panel_windows = PanelWindows()
         self._open: set[str] = set()
         self._cover()
@@ -86,7 +88,7 @@ class Gui:
         if session.recording is None:  # opening a panel must not move the picture of a film
             sides = (0.0, 0.0) if session.bare else self._panel_windows.sides
             session.viewpoint.uncover(*sides, smoothly=self.hides)
-        draw_notices(session, display, self.bar.height(display) * self.shown if not session.bare else 0.0)
+        draw_notices(session, display, self._bar_height(display) * self.shown if not session.bare else 0.0)
         self._popups()
         imgui.render()
         self._renderer.draw(imgui.get_draw_data())
@@ -116,14 +118,14 @@ class Gui:
         """Tell the camera how much of the picture the bar covers."""
         session = self.session
         wide, high = (pixels / session.scale for pixels in session.size)
-        session.viewpoint.covered = 0.0 if session.bare else self.bar.height((wide, high)) / max(high, 1.0)
+        session.viewpoint.covered = 0.0 if session.bare else self._bar_height((wide, high)) / max(high, 1.0)
 
     def _draw_all(self, display: tuple[float, float], io: imgui.IO) -> None:
         session = self.session
         self._hide(io)
-        below = self.bar.height(display)
+        below = self._bar_height(display)
         taken = draw_recording(session)
-        if self.shown > 0:
+        if self.shown > 0 and not self._placing:
             imgui.push_style_var(imgui.StyleVar_.alpha, self.shown)
             self.bar.draw(session, display)
             available = [panel for panel in self.panels if panel.available(session)]
@@ -140,6 +142,10 @@ class Gui:
         shown = [panel for panel in self.panels if panel.name in session.open and panel.available(session)]
         self._panel_windows.draw(shown, session, display, below)
         self._open = set(session.open)
+
+    def _bar_height(self, display: tuple[float, float]) -> float:
+        """Height of the bar in points; a window in which points are placed has none."""
+        return 0.0 if self._placing else self.bar.height(display)
 
     def _hide(self, io: imgui.IO) -> None:
         session = self.session
@@ -162,7 +168,7 @@ class Gui:
                     self._button = button
                     controls.press(name, x, y)
                     break
-            if imgui.is_mouse_double_clicked(0):
+            if imgui.is_mouse_double_clicked(0) and not self._placing:
                 self.session.viewpoint.reset()
             if io.mouse_wheel:
                 controls.scroll(io.mouse_wheel)

@@ -1,11 +1,14 @@
-"""Vertices of face meshes in the world, as the shader `face.vert` computes them; rotations and shifts."""
+"""Vertices of face meshes in the world, as the shader `face.vert` computes them; rotations, shifts, rays."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Floating
+from fba_player.view.camera import Camera
 from fba_player.view.view import FaceMesh
 
 
@@ -80,3 +83,38 @@ def translation(offset: npt.ArrayLike) -> Float64:
     matrix = np.eye(4)
     matrix[:3, 3] = offset
     return matrix
+
+
+def ray_through(camera: Camera, x: float, y: float, size: tuple[int, int]) -> tuple[Float64, Float64]:
+    """(origin (3,), unit direction (3,)) of the ray through a pixel, in the world.
+
+    x, y: in pixels from the upper left corner of a picture of this size.
+    """
+    tall = math.tan(math.radians(camera.field_of_view) / 2)
+    right = (2 * x / size[0] - 1) * tall * size[0] / size[1]
+    up = (1 - 2 * y / size[1]) * tall
+    direction = np.array([right, up, -1.0]) @ camera.view_matrix()[:3, :3]
+    return camera.eye, direction / np.linalg.norm(direction)
+
+
+def first_hit(origin: Float64, direction: Float64, corners: Float64) -> tuple[int, Float64] | None:
+    """(number of the first triangle that a ray meets, the shares (3,) of its corners there), or None.
+
+    corners: float64 (F, 3, 3). Both sides of a triangle count. After Moeller and Trumbore (1997).
+    """
+    start = corners[:, 0]
+    first, second = corners[:, 1] - start, corners[:, 2] - start
+    across = np.cross(direction, second)
+    volume = np.einsum("ij,ij->i", first, across)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1.0 / volume
+        arm = origin - start
+        u = np.einsum("ij,ij->i", arm, across) * inverse
+        aside = np.cross(arm, first)
+        v = (aside @ direction) * inverse
+        away = np.einsum("ij,ij->i", second, aside) * inverse
+        met = (u >= 0) & (v >= 0) & (u + v <= 1) & (away > 0) & np.isfinite(away)
+    if not met.any():
+        return None
+    hit = int(np.where(met, away, np.inf).argmin())
+    return hit, np.array([1.0 - u[hit] - v[hit], u[hit], v[hit]])

@@ -18,6 +18,7 @@ from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, sphere
+from fba.face.feature_points import row_of
 from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
 from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._warping import warp_points
@@ -69,6 +70,19 @@ def find_points(pieces: Sequence[Piece], path: str, *, symmetric: bool = False) 
         return warp_points(pieces, points)
     middle = float(eyes["left"][0][0] + eyes["right"][0][0]) / 2
     return warp_points(pieces, mirror_points(points, middle), symmetric=True)
+
+
+def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
+    """The pupils and lids (84, 3) of a head whose eyes can be found, NaN for all other points."""
+    points = np.full((len(row_of()), 3), np.nan)
+    try:
+        eyes = find_eyes(pieces, path)
+    except ModelError:
+        return points
+    found = {PUPIL_POINT[side]: pupil for side, (_, _, pupil) in eyes.items()} | _lids_by_loops(pieces, eyes)
+    for name, position in found.items():
+        points[row_of()[name]] = position
+    return points
 
 
 def _tongue(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str, Float64]:

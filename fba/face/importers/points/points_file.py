@@ -1,4 +1,4 @@
-"""Positions of the feature points of a mesh, from CSV, JSON and FDP files."""
+"""Positions of the feature points of a mesh, from CSV, JSON and FDP files; written as CSV."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64
+from fba.atomic import atomic
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.points.fdp import load_fdp
@@ -93,6 +94,23 @@ def read_points(path: str | os.PathLike[str]) -> GivenPoints:
     if suffix in (".fdp", ".xml"):
         return _from_fdp(name)
     return _from_csv(name)
+
+
+def write_points(path: str | os.PathLike[str], given: GivenPoints, comment: str = "") -> None:
+    """Write feature points as CSV, atomically: `name,vertex` where a vertex is known, else `name,x,y,z`.
+
+    comment: a line at the top. Raises ModelError without any point, FormatError where the file cannot be
+    written.
+    """
+    _check_given(given, os.fspath(path))
+    lines = [f"# {' '.join(comment.split())}"] if comment else []
+    for name, position in zip(names(), given.points, strict=True):
+        if name in given.vertices:
+            lines.append(f"{name},{given.vertices[name]}")
+        elif np.isfinite(position).all():
+            lines.append(",".join([name, *(f"{float(number):.9g}" for number in position)]))
+    with atomic(path) as file:
+        file.write(("\n".join(lines) + "\n").encode())
 
 
 def _from_csv(path: str) -> GivenPoints:

@@ -7,6 +7,7 @@ from fba_player.ui.panels._curves_panel import CurvesPanel
 from fba_player.ui.panels._differences_panel import DifferencesPanel
 from fba_player.ui.panels._file_panel import FilePanel
 from fba_player.ui.panels._help_panel import HelpPanel
+from fba_player.ui.panels._points_panel import PointsPanel
 from fba_player.ui.panels._rate_panel import RatePanel
 from fba_player.ui.panels._view_panel import ViewPanel
 from fba_player.ui.panels.panel import Panel
@@ -24,6 +25,6 @@ PANELS: tuple[type[Panel], ...] = (
 )
 
 
-def make_panels() -> list[Panel]:
-    """Make one object of each panel."""
-    return [kind() for kind in PANELS]
+def make_panels(*, placing: bool = False) -> list[Panel]:
+    """Make one object of each panel. placing: the one for a window in which points are placed by hand."""
+    return [PointsPanel()] if placing else [kind() for kind in PANELS]

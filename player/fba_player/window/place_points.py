@@ -1,0 +1,57 @@
+"""`place_points`: a window in which the feature points of a head are placed by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fba.atomic import PathLike
+from fba.errors import DisplayError
+from fba.face.importers.head_surface import HeadSurface
+from fba_player.gl.context import cure
+from fba_player.scene.placement_scene import PlacementScene
+from fba_player.scene.point_placement import PointPlacement
+from fba_player.window._window import Window
+
+BY_HAND = (
+    "Without a window, write the file by hand: lines 'name,vertex' (vertices of the mesh, counted from 0) "
+    "or 'name,x,y,z' (in its unit), for instance '9.3,297' for the tip of the nose"
+)
+"""What to do where no window can be opened."""
+
+
+def check_window() -> None:
+    """Raise DisplayError, which says how to write the points by hand, if the page cannot be shown."""
+    from fba_player.window.display import check_display
+
+    try:
+        import imgui_bundle  # noqa: F401 - the page is made with it
+    except ImportError as error:
+        raise DisplayError(
+            f"the page for points needs imgui: {error}. {cure(error, 'imgui-bundle')}. {BY_HAND}"
+        ) from error
+    try:
+        check_display()
+    except DisplayError as error:
+        raise DisplayError(f"{error}. {BY_HAND}") from error
+
+
+def place_points(
+    surface: HeadSurface, path: PathLike, *, size: tuple[int, int] = (1280, 800)
+) -> PointPlacement:
+    """Show a head in a window until it is closed; the user places its points and saves them as `path`.
+
+    Returns the points; `written` says whether they were saved. Raises DisplayError without a display, OpenGL
+    or imgui.
+    """
+    placement = PointPlacement(surface, Path(path))
+    with open_placement(placement, size=size) as window:
+        window.run()
+    return placement
+
+
+def open_placement(placement: PointPlacement, *, size: tuple[int, int] = (1280, 800)) -> Window:
+    """The window for placing points, opened but not yet shown: `run` shows it until it is closed."""
+    scene = PlacementScene(placement)
+    window = Window(scene, title=f"{scene.title}: feature points", size=size)
+    window.session.open.add("points")
+    return window
