@@ -9,9 +9,13 @@ from pathlib import Path
 
 import fba
 from fba.animation import Animation
+from fba.face import FaceModel, feature_point_names
+from fba.face.importers.head_surface import read_head_surface
 from fba.formats import merge
 from fba_player.export.image_files import write_picture
 from fba_player.scene.compare import CompareScene
+from fba_player.scene.placement_scene import PlacementScene
+from fba_player.scene.point_placement import PointPlacement
 from fba_player.scene.scene import Scene
 from fba_player.session.puppet import Expression
 from fba_player.session.session import Session
@@ -69,6 +73,23 @@ def compare() -> None:
         write_picture(IMAGES / "compare.jpg", studio.draw(2 * SETTLES))
 
 
+def points() -> None:
+    """The built-in head as if only its eyes were known."""
+    head = FaceModel.default()
+    known = {
+        name: int(vertex)
+        for name, vertex in zip(feature_point_names(), head.bound, strict=True)
+        if vertex >= 0 and name.startswith("3.")
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scan.glb"
+        head.save(path)
+        placement = PointPlacement(read_head_surface(path, points=known), "scan.points.csv")
+    placement.choose("9.3")
+    session = Session(PlacementScene(placement), size=SIZE)
+    write_picture(IMAGES / "points.jpg", picture(session, ("points",)))
+
+
 @contextlib.contextmanager
 def _played(animation: Animation) -> Iterator[Session]:
     """A session that plays the animation from a stream with an I plane every two seconds."""
@@ -85,3 +106,4 @@ if __name__ == "__main__":
     window()
     panels()
     compare()
+    points()

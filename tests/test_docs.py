@@ -60,6 +60,7 @@ ILLUSTRATIONS = {
     ): "a file found there",
     ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
     ("docs/face-models.md", "npm install gltf-validator"): "needs node.js and a network",
+    ("docs/import-faces.md", "$ fba model points scan.obj -o scan.points.csv"): WINDOW,
     ("docs/measure.md", "./dev bench --summary > results.md"): "takes ten minutes",
     ("docs/motion-capture.md", POOR): "what is said of another file",
     ("docs/motion-capture.md", MISMATCH): "a warning, with figures of another file",

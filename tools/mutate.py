@@ -55,6 +55,7 @@ LIVE = "player/fba_player/playback/live.py"
 MIXER = "player/fba_player/sound/_mixer.py"
 DEVICE_CLOCK = "player/fba_player/sound/_device_clock.py"
 GROUND = "fba/capture/limbs/ground.py"
+PLACEMENT = "player/fba_player/scene/point_placement.py"
 SESSION = "player/fba_player/session/session.py"
 TAKES = "player/fba_player/session/takes.py"
 SOLES = "fba/capture/limbs/soles.py"
@@ -133,9 +134,14 @@ GAIT_TEST = "tests/body/gait/test_gait_rules.py"
 FOREIGN_HEADS_TEST = "tests/face/importers/test_foreign_heads.py"
 HEAD_ZOO_TEST = "tests/face/importers/test_head_zoo.py -k 'same or surfaces'"
 PACKED_TEST = "tests/gltf/test_gltf_packed.py"
+PLACEMENT_TEST = "tests/player/scene/test_point_placement.py"
 VERDICT_TEST = "tests/cli/test_model.py -k verdicts"
 
 MUTANTS = (
+    Mutant(PLACEMENT, "FEWEST_FOR_GUESS = 4", "FEWEST_FOR_GUESS = 3", PLACEMENT_TEST),
+    Mutant(PLACEMENT, "facing >= facing.max() - 0.2", "facing <= 9.0", PLACEMENT_TEST),
+    Mutant(PLACEMENT, "else 100 if point.faps else 101", "else 100", PLACEMENT_TEST),
+    Mutant("player/fba_player/view/geometry.py", "(away > 0)", "(away < 9e9)", PLACEMENT_TEST),
     Mutant("fba/cli/model_text.py", "if errors <= FAIR:", "if errors < FAIR:", VERDICT_TEST),
     Mutant("fba/gltf/_meshopt_loops.py", "return 0 if position == tail else -1", "return 0", PACKED_TEST),
     Mutant("fba/gltf/surfaces.py", "MOST_ABOVE = 8", "MOST_ABOVE = 2", FOREIGN_HEADS_TEST),

@@ -71,12 +71,12 @@ def test_info_needs_one_model(run: Run, tmp_path: Path) -> None:
 
 def test_no_subcommand_shows_all(run: Run) -> None:
     code, out, err = run("model")
-    for name in ("info", "validate", "import", "fit"):
+    for name in ("info", "validate", "import", "points", "fit"):
         assert name in out + err
     assert code in (0, 2)
 
 
-@pytest.mark.parametrize("name", ["info", "validate", "import", "fit"])
+@pytest.mark.parametrize("name", ["info", "validate", "import", "points", "fit"])
 def test_help_shows_examples_and_debug(run: Run, name: str) -> None:
     code, out, _ = run("model", name, "--help")
     assert code == 0

@@ -50,7 +50,7 @@ def import_mesh(options: ImportOptions, form: str, points: object = None) -> Fac
         raise ModelError(
             f"{path}: a mesh needs its feature points; put them beside it as "
             f"{path.stem}.points.csv with lines 'name,x,y,z' or 'name,vertex' (vertices count from 0), for "
-            "instance '9.3,297' for the tip of the nose"
+            "instance '9.3,297' for the tip of the nose; fba model points lets you place them by hand"
         ).with_remedies(Remedy("points", "or name their file with {}", "FILE"))
     pieces = polygon_pieces(polygons, read_materials(path) if form == "obj" else {}, path)
     positions, vertices = _point_positions(polygons, given, os.fspath(path))

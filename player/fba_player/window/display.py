@@ -13,13 +13,15 @@ HOW_WITHOUT = (
 )
 
 
-def check_display() -> None:
-    """Raise DisplayError, which says what to do, if no window can be opened."""
-    start_glfw([]).terminate()
+def check_display(instead: str = HOW_WITHOUT) -> None:
+    """Raise DisplayError, which ends with what to do instead, if no window can be opened."""
+    start_glfw([], instead).terminate()
 
 
-def start_glfw(problems: list[str]) -> Any:
+def start_glfw(problems: list[str], instead: str = HOW_WITHOUT) -> Any:
     """Start glfw and return the module. problems: gets the messages that glfw reports from now on.
+
+    instead: what to do without a window, the end of errors.
 
     Raises DisplayError if it is not installed or finds no display.
     """
@@ -28,12 +30,12 @@ def start_glfw(problems: list[str]) -> Any:
     except ImportError as error:
         raise DisplayError(
             f"the window needs the Python package glfw, which cannot be used: {error}. "
-            f"{cure(error, 'glfw')}. {HOW_WITHOUT}"
+            f"{cure(error, 'glfw')}. {instead}"
         ) from error
     glfw.set_error_callback(lambda code, text: problems.append(decode(text)))
     if not glfw.init():
         reason = problems[-1] if problems else "there is no display"
-        raise DisplayError(f"no window can be opened: {reason}. {HOW_WITHOUT}")
+        raise DisplayError(f"no window can be opened: {reason}. {instead}")
     return glfw
 
 

@@ -11,6 +11,7 @@ from fba_player.gl.context import cure
 from fba_player.scene.placement_scene import PlacementScene
 from fba_player.scene.point_placement import PointPlacement
 from fba_player.window._window import Window
+from fba_player.window.display import check_display
 
 BY_HAND = (
     "Without a window, write the file by hand: lines 'name,vertex' (vertices of the mesh, counted from 0) "
@@ -21,18 +22,13 @@ BY_HAND = (
 
 def check_window() -> None:
     """Raise DisplayError, which says how to write the points by hand, if the page cannot be shown."""
-    from fba_player.window.display import check_display
-
     try:
         import imgui_bundle  # noqa: F401 - the page is made with it
     except ImportError as error:
         raise DisplayError(
             f"the page for points needs imgui: {error}. {cure(error, 'imgui-bundle')}. {BY_HAND}"
         ) from error
-    try:
-        check_display()
-    except DisplayError as error:
-        raise DisplayError(f"{error}. {BY_HAND}") from error
+    check_display(BY_HAND)
 
 
 def place_points(

@@ -12,7 +12,8 @@ from fba.face.feature_points import row_of
 from fba.face.importers import import_model
 from fba.face.importers.head_surface import read_head_surface
 from fba.face.importers.points.points_file import GivenPoints, write_points
-from mesh_files import write_obj, write_points as write_csv
+from mesh_files import write_obj
+from mesh_files import write_points as write_csv
 from small_head import small_head
 
 

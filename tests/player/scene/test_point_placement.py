@@ -34,7 +34,7 @@ g back
 f 6 5 8
 f 6 8 7
 """
-"""A front and a back wall; vertices from 0: lower right, lower left, upper left, upper right of the subject."""
+"""A front and a back wall; the vertices from 0 are lower right, lower left, upper left, upper right."""
 
 
 @pytest.fixture

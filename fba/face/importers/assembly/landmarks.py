@@ -145,7 +145,7 @@ def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, fl
 POINTS = Remedy(
     "points",
     "put a file of its feature points beside the head, with lines 'name,x,y,z' or 'name,vertex', or name one "
-    "with {}",
+    "with {}; fba model points lets you place them by hand",
     "FILE",
 )
 
