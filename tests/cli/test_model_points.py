@@ -48,9 +48,9 @@ def test_saved_points_are_reported_with_the_next_command(
     assert (code, err) == (0, "")
     assert "no face can be made without 3.1, 3.3, 3.2, 3.4, 9.15, 2.2, 8.3, 8.4" in out
     user.insert(0, lambda placement: placement.places.update(dict.fromkeys(placement.missing_units, 5)))
-    code, out, err = run("model", "points", head, "--points", points, "-o", points)
+    code, out, err = run("model", "points", head, "--points", points, "-o", points, "--kind", "obj")
     assert (code, err) == (0, "")
-    assert f"next: fba model import {head} --points {points} -o " in out
+    assert f"next: fba model import {head} --points {points} --kind obj -o head.fba.glb" in out
 
 
 def test_closing_without_saving_fails(

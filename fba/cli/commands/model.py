@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -262,7 +263,15 @@ def points_(
     if placement.missing_units:
         outputs.say(f"  no face can be made without {', '.join(placement.missing_units)}")
     else:
-        outputs.say(f"  next: fba model import {head} --points {output} -o {head.stem}.fba.glb")
+        outputs.say(f"  next: {_import_command(head, output, kind, up)}")
+
+
+def _import_command(head: Path, points: Path, kind: str | None, up: str) -> str:
+    """Return the command that imports a head with its points."""
+    words = ["fba", "model", "import", str(head), "--points", str(points)]
+    words += ["--kind", kind] if kind else []
+    words += ["--up", up] if up != "y" else []
+    return shlex.join([*words, "-o", f"{head.stem}.fba.glb"])
 
 
 def _points_outputs(output: Path, head: Path, *, no_clobber: bool) -> Outputs:

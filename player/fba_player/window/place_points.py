@@ -13,6 +13,8 @@ from fba_player.scene.point_placement import PointPlacement
 from fba_player.window._window import Window
 from fba_player.window.display import check_display
 
+SECONDS = 8.0
+"""For which the window says what was known."""
 BY_HAND = (
     "Without a window, write the file by hand: lines 'name,vertex' (vertices of the mesh, counted from 0) "
     "or 'name,x,y,z' (in its unit), for instance '9.3,297' for the tip of the nose"
@@ -50,4 +52,8 @@ def open_placement(placement: PointPlacement, *, size: tuple[int, int] = (1280, 
     scene = PlacementScene(placement)
     window = Window(scene, title=f"{scene.title}: feature points", size=size)
     window.session.open.add("points")
+    known = len(placement.order) - len(placement.missing)
+    if known:
+        text = f"{known} of {len(placement.order)} points {placement.surface.origin}: check them, too"
+        window.session.say(text, seconds=SECONDS)
     return window

@@ -55,6 +55,7 @@ def test_it_asks_for_what_is_missing_first_and_for_what_every_face_needs_before_
     needed = [name for name in FAPU_POINTS if name != "9.15"]
     assert list(placement.order[:9]) == needed
     assert placement.order[9] == "2.1"  # the first that has FAPs
+    assert placement.order.index("2.11") == placement.order.index("10.4") + 1  # the first that has none
     assert placement.order[-1] == "9.15"  # known already: only to be checked
     assert sorted([*placement.order, "7.1", "11.5"]) == sorted(names())
     assert placement.missing_units == tuple(needed)
