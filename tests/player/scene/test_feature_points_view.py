@@ -10,6 +10,7 @@ import pytest
 
 from fba.animation import Animation
 from fba.body import BapSolver
+from fba.body.footing import GroundedPoser
 from fba.body.model import BodyModel
 from fba.face import feature_point_names, resolve
 from fba.face.deform.deformer import Deformer
@@ -80,7 +81,7 @@ def test_every_bone_and_joint_has_its_capsule(walking: Animation) -> None:
     skeleton = BodyModel.default().skeleton
     assert walking.body is not None
     capsules = Scene(walking, view="points").view_at(0.2).capsules[2:]  # behind the eyeballs
-    places = BapSolver(skeleton).pose(walking.body.values[5])[:, :3, 3]
+    places = GroundedPoser(skeleton).pose(walking.body.values[5])[:, :3, 3]
     bones, joints = capsules[: len(places) - 1], capsules[len(places) - 1 :]
     np.testing.assert_allclose(joints[:, :3], places, atol=1e-6)
     np.testing.assert_allclose(bones[:, 4:7], places[1:], atol=1e-6)
