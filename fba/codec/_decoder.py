@@ -79,7 +79,8 @@ class Decoder:
         self._bit = 0  # next bit to decode, in the buffer
         self._scanned = 0  # byte up to which no start code was found, while looking for one
         self._retry_at = 0  # length of the buffer from which on an incomplete plane is tried again
-        self._step: Callable[[bool], Iterator[Block] | None] = self._find_object
+        # Plain functions: a bound method would hold the decoder, which then waits for the garbage collector.
+        self._step: Callable[[Decoder, bool], Iterator[Block] | None] = Decoder._find_object
         self._error: BitstreamError | LimitError | UnsupportedError | None = None
         self._finished = False
         self._objects = 0
@@ -144,7 +145,7 @@ class Decoder:
         while self._error is None:
             self._lost_from = self._bit
             try:
-                step = self._step(final)
+                step = self._step(self, final)
                 if step is None:
                     break
                 for block in step:
@@ -206,7 +207,7 @@ class Decoder:
                 self._bit = 8 * self._scanned
                 self._scanned = 0
                 self._begin_object(buffer.offset + position)
-                self._step = self._decode_planes
+                self._step = Decoder._decode_planes
                 return iter(())
         else:
             self._scanned = max(self._scanned, buffer.length - 3)
@@ -232,7 +233,7 @@ class Decoder:
         self._log.add(error, 0, self._buffer.offset + position)
         self._bit = 8 * position
         self._scanned = 0
-        self._step = self._decode_planes
+        self._step = Decoder._decode_planes
         return iter(())
 
     def _decode_planes(self, final: bool) -> Iterator[Block] | None:
@@ -248,7 +249,7 @@ class Decoder:
                     self._report_missing_end()
                 self._bit = end
                 self._object_end = buffer.offset + buffer.length
-                self._step = self._find_object
+                self._step = Decoder._find_object
             return None
         if code != loops.NO_START_CODE:
             start, self._bit = self._bit, after
@@ -305,7 +306,7 @@ class Decoder:
             self._log.end(self._buffer.offset + position)
             self._bit = 8 * position
             self._scanned = 0
-            self._step = self._decode_planes
+            self._step = Decoder._decode_planes
             return iter(())
         self._scanned = max(self._scanned, buffer.length - 3)
         self._bit = 8 * self._scanned
@@ -374,7 +375,7 @@ class Decoder:
         self._closing_code = code
         self._scanned = self._bit >> 3
         self._object_end = self._buffer.offset + self._scanned
-        self._step = self._find_object
+        self._step = Decoder._find_object
 
     def _compare_mark(self, content: bytes) -> None:
         """Take user data behind an object; an FbaWarning if they say that it was decoded with wrong steps."""
@@ -415,7 +416,7 @@ class Decoder:
             self._scanned = (doubtful >> 3) - self._buffer.offset
         else:
             self._scanned = max((self._lost_from >> 3) + 1, 0) if self._objects else self._bit >> 3
-        self._step = self._resynchronise
+        self._step = Decoder._resynchronise
 
     def _check_damage(self) -> None:
         """Stop with a LimitError where the list of damage takes more memory than allowed."""

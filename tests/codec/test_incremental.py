@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import tracemalloc
+import weakref
 from fractions import Fraction
 
 import numpy as np
@@ -241,3 +243,17 @@ def test_an_encoder_refuses_what_does_not_go_on() -> None:
         encoder.push(motion.animation(face, index=[0, 1, 2])[1])
     with pytest.raises(ValueError, match="the stream has 25 frames/s, this frame 30"):
         encoder.push(motion.animation(face, rate=30, index=[0, 1, 2])[2])
+
+
+def test_decoders_go_without_the_garbage_collector() -> None:
+    """Each holds megabytes, and a program that reads many short streams makes many."""
+    decoder = Decoder()
+    decoder.push(encode(performance("talking")))
+    decoder.finish()
+    alive = weakref.ref(decoder)
+    gc.disable()
+    try:
+        del decoder
+        assert alive() is None
+    finally:
+        gc.enable()
