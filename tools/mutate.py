@@ -76,6 +76,7 @@ BOUNDS = "fba/capture/comparison/thresholds.csv"
 REPORT = "fba/capture/_report.py"
 FOOTING = "fba/body/footing.py"
 PREPARATION = "fba/capture/preparation.py"
+SPINE = "fba/capture/_spine.py"
 FOUND_REST = "fba/capture/_rest_from_motion.py"
 REST_CORRECTION = "fba/capture/_rest_correction.py"
 STANDARD = "fba/capture/_standard_skeleton.py"
@@ -281,6 +282,7 @@ MUTANTS = (
     Mutant(GROUND, "SLIGHT = 0.015", "SLIGHT = 0.02", CAPTURE_TEST),
     Mutant(FOOTING, "0.008, 0.0745", "0.008, 0.06", CAPTURE_TEST),
     Mutant(GROUND, "Ground(level if level <= FAR", "Ground(level if abs(level) <= FAR", CAPTURE_TEST),
+    Mutant(SPINE, 'TOP = "vt1"', 'TOP = "vt9"', PREPARATION_TEST),
     Mutant(PREPARATION, "LEAST = 0.5", "LEAST = 0.0", PREPARATION_TEST),
     Mutant(PREPARATION, "if turn > most:", "if turn > 9 * most:", ZOO_TEST),
     Mutant(PREPARATION, "CLEAR_UP = 0.75", "CLEAR_UP = 1.1", PREPARATION_TEST),
@@ -316,6 +318,7 @@ MUTANTS = (
     Mutant(HUMANOID, '"ThumbProximal": "ThumbMetacarpal"', '"ThumbProximal": "ThumbProximal"', DECLARED_TEST),
     Mutant(GLTF_READER, "HALF_TURN = (-1, 1, -1)", "HALF_TURN = (1, 1, 1)", DECLARED_TEST),
     Mutant(FAP_JOINTS, "SQUARE = 1e-6", "SQUARE = 1.0", "tests/formats/gltf/test_gltf_faces.py"),
+    Mutant(HINGES, "ABRUPT = 0.4", "ABRUPT = 0.1", CAPTURE_RULES_TEST),
     Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.0", CAPTURE_RULES_TEST),
     Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.4", CAPTURE_RULES_TEST),
     Mutant(LEG_IK, "ROUNDS = 3", "ROUNDS = 1", CAPTURE_RULES_TEST),

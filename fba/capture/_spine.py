@@ -2,8 +2,10 @@
 
 A source has two to six joints between hips and head, the body twenty-four. In the middle of each source
 bone, a vertebra has the bone's rotation; between these, rotations are interpolated spherically, from the
-pelvis up to the skull base. Then all vertebrae of a source bone turn together by a small correction, so that
-the line from the first to the last points exactly in the direction of the source's bone.
+pelvis up to the skull base. The bone below the neck has its rotation up to the first thoracic vertebra, which
+carries the shoulders: these do not turn with the head. Then all vertebrae of a source bone turn together by a
+small correction, so that the line from the first to the last points exactly in the direction of the source's
+bone.
 
 With fewer groups of the standard (from Spine1, the simple spine of four joints, to Spine5, all of them), each
 vertebra that may turn carries the line to the next such one, along the source's spine. Then all turn a little
@@ -21,6 +23,10 @@ from fba.arrays import Float64
 from fba.body.skeleton import Skeleton
 from fba.parameters import baps
 
+TOP = "vt1"
+"""Vertebra that carries the clavicles."""
+HEAD = ("vc", "skullbase")
+"""What joints of neck and head begin with."""
 GROUPS = 5
 """Groups Spine1 to Spine5."""
 CHUNK = 2048
@@ -74,6 +80,16 @@ def spread(
         anchor_heights[-1],
     ]
     turned = [wanted[anchors[0]], *(wanted[joint] for joint in anchors)]
+    chest = next((n for n, joint in reversed(list(enumerate(anchors))) if not joint.startswith(HEAD)), 0)
+    top = chain.index(TOP) if TOP in chain else 0
+    if keys[chest + 1] < height[top] < keys[min(chest + 2, len(keys) - 1)]:
+        keys.insert(chest + 2, float(height[top]))
+        turned.insert(chest + 2, turned[chest + 1])
+
+    def rotation_between(joint: int, end: int) -> Float64:
+        """Return the rotation of a vertebra, and of those above it that do not turn, up to another one."""
+        middle = (height[joint] + height[end]) / 2
+        return rotation_at(min(middle, height[top]) if joint <= top < end else middle)
 
     def rotation_at(level: float) -> Float64:
         upper = int(np.clip(np.searchsorted(keys, level), 1, len(keys) - 1))
@@ -102,7 +118,7 @@ def spread(
         low, high = chain.index(low_joint), chain.index(high_joint)
         inside = [n for n in range(low, high) if n == low or chain[n] in free]
         ends = [*inside[1:], high]
-        bent = {n: rotation_at((height[n] + height[end]) / 2) for n, end in zip(inside, ends, strict=True)}
+        bent = {n: rotation_between(n, end) for n, end in zip(inside, ends, strict=True)}
         line = sum(
             (bent[n] @ (centres[end] - centres[n]) for n, end in zip(inside, ends, strict=True)),
             np.zeros(3),

@@ -181,6 +181,18 @@ def test_a_clear_bend_shows_which_way_a_knee_bends() -> None:
     np.testing.assert_allclose(angles[:, 1], bends, atol=0.03)
 
 
+def test_an_upper_arm_does_not_flip_where_a_straight_arm_is_jerked() -> None:
+    """The forearm is bent by 0.2 rad, in one plane and, a 60th of a second later, in another one."""
+    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    elbow = hinges.Hinge(down, down, across, down, 1.0)
+    plane = np.where(np.arange(120) < 60, 0.0, 1.4)
+    axes = Rotation.from_rotvec(plane[:, None] * down).apply(across)
+    local = Rotation.from_rotvec(0.2 * axes).as_matrix()
+    angles = hinges.solve(elbow, local @ down, local, 60.0)
+    assert np.abs(np.diff(angles[:, 0])).max() < 0.8
+    np.testing.assert_allclose(angles[[0, -1], 0], [0.0, 1.4], atol=0.1)
+
+
 def test_a_leg_makes_its_share_of_a_change_of_length() -> None:
     """To a fifth of a millimetre in 5 cm."""
     bends = np.radians([20.0, 30.0, 60.0, 90.0, 120.0])

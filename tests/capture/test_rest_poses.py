@@ -67,6 +67,15 @@ def test_shoulders_rest_where_arms_hang() -> None:
         assert np.degrees(np.arccos(lines[0] @ lines[1])) == pytest.approx(5.0, abs=0.7)  # a posture may be
 
 
+def test_shoulders_do_not_turn_with_the_head() -> None:
+    """A neck turned by 60 degrees leaves the vertebra that carries the clavicles where it is."""
+    turned = motion("standing", 2, turns={"Neck": Rotation.from_euler("y", 60, degrees=True)})
+    matrices = BapSolver().pose(from_skeleton(turned).body.values)[0, :, :3, :3]
+    angles = np.degrees(Rotation.from_matrix(matrices).as_rotvec()[:, 1])  # to the left
+    assert angles[SKELETON.number("vt1")] == pytest.approx(0, abs=1)
+    assert angles[SKELETON.number("skullbase")] == pytest.approx(60, abs=1)
+
+
 def test_a_motion_that_says_nothing_is_refused() -> None:
     """All bones along +x, and somebody who stands still with straight limbs on their side."""
     captured = motion("T", 4)

@@ -28,8 +28,8 @@ LOOSE = 2e-3
 """The same for flexion."""
 CLEAR_BEND = 0.3
 """Angle in radians from which on a bend shows the hinge's direction; less may be a little beyond straight."""
-ABRUPT = 10.0
-"""Radians per second: if the source turns faster, the result may turn faster, too."""
+ABRUPT = 0.4
+"""Radians from one frame to the next: if the source turns faster, the result may turn faster, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def _turn(hinge: Hinge, direction: Float64, total: Float64, along: float, rate: 
     # the usual turn is the one with which clear bends are natural
     reach = np.hypot(natural[:, 1], natural[:, 2])
     sure = np.where(reach > CLEAR_BEND, natural[:, 1] + 1j * natural[:, 2], 0.0).sum()
-    swing = np.linalg.norm(np.diff(direction, axis=0, prepend=direction[:1]), axis=1) * rate
+    swing = np.linalg.norm(np.diff(direction, axis=0, prepend=direction[:1]), axis=1)
     ease = 1 / (1 + (swing / ABRUPT) ** 2) ** 2
     path = np.zeros(len(direction))
     follow(sideways, natural, ease, float(np.angle(sure + 1e-9)), 1 / rate, path)

@@ -176,6 +176,8 @@ def test_a_person_comes_back_as_it_was(maker: Maker) -> None:
             np.linalg.norm(wanted[:, n, :3, 3] - found[:, n, :3, 3], axis=1).max() / 0.01
         )
     for joint in ("hip", "shoulder"):
+        if joint == "shoulder" and not known & {"vt6", "vt10"}:
+            continue  # the file's shoulders turn with the loins
         ends = [number[f"{side}_{joint}"] for side in "lr"]
         rows = [matrices[:, ends[0], :3, 3] - matrices[:, ends[1], :3, 3] for matrices in (wanted, found)]
         errors[f"row of {joint}s"] = between(*rows) / 3.0
