@@ -135,10 +135,19 @@ GAIT_TEST = "tests/body/gait/test_gait_rules.py"
 FOREIGN_HEADS_TEST = "tests/face/importers/test_foreign_heads.py"
 HEAD_ZOO_TEST = "tests/face/importers/test_head_zoo.py -k 'same or surfaces'"
 PACKED_TEST = "tests/gltf/test_gltf_packed.py"
+SURFACE_TEST = "tests/face/importers/test_head_surface.py"
 PLACEMENT_TEST = "tests/player/scene/test_point_placement.py"
 VERDICT_TEST = "tests/cli/test_model.py -k verdicts"
 
 MUTANTS = (
+    Mutant("fba/face/importers/assembly/landmarks.py", "UNLIKE = 1.3", "UNLIKE = 1.4", SURFACE_TEST),
+    Mutant(
+        "fba/face/importers/assembly/landmarks.py",
+        "< size_left + size_right",
+        "< size_left",
+        SURFACE_TEST,
+    ),
+    Mutant("fba/gltf/nodes.py", "ROUNDED = 1e-6", "ROUNDED = 1e-4", "tests/gltf/test_gltf_reading.py"),
     Mutant(PLACEMENT, "FEWEST_FOR_GUESS = 4", "FEWEST_FOR_GUESS = 3", PLACEMENT_TEST),
     Mutant(PLACEMENT, "facing >= facing.max() - 0.2", "facing <= 9.0", PLACEMENT_TEST),
     Mutant(PLACEMENT, "else 100 if point.faps else 101", "else 100", PLACEMENT_TEST),

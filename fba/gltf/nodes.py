@@ -15,6 +15,9 @@ from fba.gltf.values import Value
 LARGEST = 1e100
 """Numbers of transforms to the scene lie below it: squares of larger ones overflow."""
 
+ROUNDED = 1e-6
+"""Most by which the last row of a matrix may differ from 0 0 0 1, as exporters round it."""
+
 
 def read_nodes(
     document: Document, meshes: tuple[Mesh, ...], skins: tuple[Skin, ...]
@@ -116,8 +119,9 @@ def _transform(entry: Value) -> tuple[Float64 | None, Float64 | None, Float64 | 
     matrix = entry.get("matrix")
     if matrix is not None:
         numbers = np.array(matrix.numbers(16)).reshape(4, 4).T.copy()  # column by column in the file
-        if not np.array_equal(numbers[3], (0, 0, 0, 1)):
+        if not np.allclose(numbers[3], (0, 0, 0, 1), rtol=0, atol=ROUNDED):
             raise matrix.error(f"its last row is {numbers[3].tolist()}, but must be 0 0 0 1")
+        numbers[3] = (0, 0, 0, 1)
         return None, None, None, numbers
     given = {key: entry.get(key) for key in ("translation", "rotation", "scale")}
     translation = np.array(

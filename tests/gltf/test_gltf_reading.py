@@ -175,6 +175,17 @@ def test_transforms_of_nodes(tmp_path: Path) -> None:
     assert (gltf.roots, gltf.shown()) == ((0,), (0, 2))
 
 
+def test_the_last_row_of_a_matrix_may_be_rounded_but_not_wrong(tmp_path: Path) -> None:
+    sheet = Sheet()
+    rows = [1, 0, 0, 1e-7, 0, 1, 0, 0, 0, 0, 1, 0, 7, 8, 9, 0.9999999999999999]
+    sheet.json["nodes"] = [{"matrix": rows}]
+    gltf = read_gltf(sheet.save(tmp_path / "a.glb"))
+    assert gltf.nodes[0].world.tolist() == [[1, 0, 0, 7], [0, 1, 0, 8], [0, 0, 1, 9], [0, 0, 0, 1]]
+    sheet.json["nodes"] = [{"matrix": [*rows[:15], 1.00001]}]
+    with pytest.raises(ModelError, match="last row"):
+        read_gltf(sheet.save(tmp_path / "a.glb"))
+
+
 def test_skins(tmp_path: Path) -> None:
     sheet = Sheet()
     primitive = sheet.triangle()

@@ -42,8 +42,8 @@ class HeadSurface:
 
     path: of its file. parts: its surfaces, in the file's unit and axes. vertices: float64 (N, 3), the file's
     own. triangles: int32 (F, 3), of all parts, in the file's vertex numbers. part_of: int32 (F,), the number
-    of each triangle's part. given: the points known so far. origin: how these were found, in words. up: the
-    file's vertical axis.
+    of each triangle's part. given: the points known so far. origin: how these were found in words, "" if
+    there are none. up: the file's vertical axis.
     """
 
     path: str
@@ -139,7 +139,8 @@ def _find(pieces: Sequence[Piece], options: ImportOptions) -> tuple[GivenPoints,
         upright, _ = turn_upright(pieces, np.full((len(names()), 3), np.nan), options.up)
         assembled = assemble(upright)
         eyes = find_eye_points(assembled, path)
-        return _in_file(pieces, upright, assembled, eyes), "found by the eyeballs"
+        found = bool(np.isfinite(eyes).any())
+        return _in_file(pieces, upright, assembled, eyes), "found by the eyeballs" if found else ""
     return _in_file(pieces, upright, assemble(upright), points), "found by the shapes"
 
 

@@ -12,9 +12,10 @@ from fba.face.feature_points import row_of
 from fba.face.importers import import_model
 from fba.face.importers.head_surface import read_head_surface
 from fba.face.importers.points.points_file import GivenPoints, write_points
+from fba.face.model import Part
 from mesh_files import write_obj
 from mesh_files import write_points as write_csv
-from small_head import small_head
+from small_head import ball, small_head
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +37,28 @@ def test_a_mesh_without_shapes_gives_the_points_of_its_eyes(folder: Path) -> Non
     assert len(surface.triangles) == len(surface.part_of) == sum(len(one.triangles) for one in head.parts)
     third = surface.triangles[surface.part_of == 2]
     np.testing.assert_array_equal(third, head.parts[2].triangles + head.starts[head.parts[2].name])
+
+
+@pytest.mark.parametrize(
+    ("radii", "expected"),
+    [
+        ((0.012, 0.012), {"3.5", "3.6"}),
+        ((0.012, 0.016), set()),  # unlike
+        ((0.032, 0.032), set()),  # they overlap: 62 mm apart
+    ],
+)
+def test_round_shells_that_cannot_be_eyes_give_no_pupils(
+    tmp_path: Path, radii: tuple[float, float], expected: set[str]
+) -> None:
+    head = small_head()
+    parts = [part for part in head.parts if part.kind != "eye"]
+    for side, name, radius in zip(("left", "right"), ("3.5", "3.6"), radii, strict=True):
+        centre = head.points[row_of()[name]] - (0, 0, 0.012)
+        parts.append(Part(f"{side} eye", "eye", *ball(centre, radius)))
+    write_obj(tmp_path / "eyes.obj", parts)
+    surface = read_head_surface(tmp_path / "eyes.obj")
+    assert set(surface.given.vertices) & {"3.5", "3.6"} == expected
+    assert surface.origin == ("found by the eyeballs" if expected else "")
 
 
 def test_positions_become_vertices_of_the_right_lip(folder: Path) -> None:

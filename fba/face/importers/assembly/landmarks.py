@@ -41,6 +41,10 @@ FRONT_TEETH = 0.12
 """Distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils."""
 CORNER_WIDTH = 0.055
 """Distance of the outer corner of the lips from the inner one, as a share of that of the pupils."""
+UNLIKE = 1.3
+"""Ratio of the radii above which two shells are not a pair of eyes."""
+IN_FRONT = 0.7
+"""Least distance of a pupil in front of its eyeball's centre, in radii."""
 FEWEST_FAPS = 20
 """With at least this many shapes named after FAPs, points are where these move most."""
 
@@ -73,13 +77,23 @@ def find_points(pieces: Sequence[Piece], path: str, *, symmetric: bool = False) 
 
 
 def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
-    """The pupils and lids (84, 3) of a head whose eyes can be found, NaN for all other points."""
+    """The pupils and lids (84, 3) of a head whose eyes can be found, NaN for all other points.
+
+    Shells that cannot be two eyes, such as a bun of hair, give nothing: they overlap, or differ in size.
+    """
     points = np.full((len(row_of()), 3), np.nan)
     try:
         eyes = find_eyes(pieces, path)
     except ModelError:
         return points
-    found = {PUPIL_POINT[side]: pupil for side, (_, _, pupil) in eyes.items()} | _lids_by_loops(pieces, eyes)
+    (left, size_left, _), (right, size_right, _) = eyes["left"], eyes["right"]
+    alike = max(size_left, size_right) < UNLIKE * min(size_left, size_right)
+    if not alike or left[0] - right[0] < size_left + size_right:
+        return points
+    found = _lids_by_loops(pieces, eyes)
+    for side, (centre, radius, pupil) in eyes.items():
+        if pupil[2] - centre[2] > IN_FRONT * radius:
+            found[PUPIL_POINT[side]] = pupil
     for name, position in found.items():
         points[row_of()[name]] = position
     return points
