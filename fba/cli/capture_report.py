@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
 import numpy as np
 
 from fba.animation import Animation
+from fba.cli.printing import colour_grade
 from fba.errors import FbaError
 from fba.parameters import baps
 
@@ -143,7 +142,7 @@ def report_lines(report: CaptureReport) -> list[str]:
         shown.add(one.measure)
         result.append(
             f"  {one.measure:{NAME_WIDTH}}{one.part:{PART_WIDTH}}{one.typical:8.1f}{one.worst:8.1f}  "
-            f"{_unit(one):8} {one.frame:5}  {_coloured(one.grade, one.grade)}"
+            f"{_unit(one):8} {one.frame:5}  {colour_grade(one.grade, one.grade)}"
         )
     bones = report.bones or {}
     result += [f"  {what}: {reason}" for what, reason in bones.get("found", {}).items()]
@@ -176,7 +175,7 @@ def poor_line(report: CaptureReport, *, detailed: bool) -> str:
     more = f", and {len(reasons) - 1} more" if len(reasons) > 1 else ""
     ask = "" if detailed else "; --report FILE.html shows it"
     worst = f"{reasons[0].sentence} in frame {reasons[0].frame}"
-    return _coloured(f"fba: poor: {report.path}: {worst}{more}{ask}", "poor")
+    return colour_grade(f"fba: poor: {report.path}: {worst}{more}{ask}", "poor")
 
 
 def draw_report(report: CaptureReport) -> bytes:
@@ -293,10 +292,3 @@ def _unit(one: Difference) -> str:
     from fba.capture.comparison import bounds
 
     return bounds()[one.measure].unit
-
-
-def _coloured(text: str, grade: str) -> str:
-    """Return text in the colour of a grade, where colours are wanted; `click.echo` drops it for files."""
-    if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
-        return text
-    return click.style(text, fg={"good": "green", "fair": "yellow", "poor": "red"}[grade])

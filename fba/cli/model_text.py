@@ -154,15 +154,18 @@ def error_lines(findings: Sequence[Finding]) -> list[str]:
     return [*lines, f"         and {len(errors) - MOST_ERRORS} more"] if len(errors) > MOST_ERRORS else lines
 
 
-def judge_import(findings: Sequence[Finding]) -> str:
-    """Return the verdict on an imported face in a sentence that begins with good, fair or poor."""
+def judge_import(findings: Sequence[Finding]) -> tuple[str, str]:
+    """Return the verdict on an imported face, "good", "fair" or "poor", and a sentence that explains it."""
     errors = sum(finding.severity == "error" for finding in findings)
     counts = f"{_count(errors, 'error')}, {_count(len(findings) - errors, 'warning')}"
     if not errors:
-        return f"good: it meets the standard ({counts}; fba model validate lists them)"
+        return "good", f"it meets the standard ({counts}; fba model validate lists them)"
     if errors <= FAIR:
-        return f"fair: it plays, but not all FAPs are right ({counts}; fba model validate lists them)"
-    return f"poor: streams will look wrong on this face ({counts}); give its feature points or kinds of parts"
+        return "fair", f"it plays, but not all FAPs are right ({counts}; fba model validate lists them)"
+    return (
+        "poor",
+        f"streams will look wrong on this face ({counts}); give its feature points or kinds of parts",
+    )
 
 
 def print_findings(name: str, findings: Sequence[Finding]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Sequence
 from fractions import Fraction
@@ -27,6 +28,16 @@ def seconds_text(value: Fraction | float) -> str:
 def rate_text(rate: Fraction) -> str:
     """Return a frame rate as "25", "30.5", or "29.97" for 30000/1001."""
     return f"{float(rate):.3f}".rstrip("0").rstrip(".")
+
+
+def colour_grade(text: str, grade: str) -> str:
+    """Return text in the colour of a grade, where colours are wanted; `click.echo` drops it for files.
+
+    grade: "good", "fair" or "poor".
+    """
+    if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return text
+    return click.style(text, fg={"good": "green", "fair": "yellow", "poor": "red"}[grade])
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from fba.cli.model_text import error_lines, judge_import
-from fba.face import FaceModel, feature_point_names
+from fba.face import FaceModel, checks, feature_point_names
 from fba.face.checks import Finding
 from fba_player.export.contact_sheet import TILE
 from small_head import small_head
@@ -173,11 +173,28 @@ def test_import_ends_with_a_verdict_and_a_sheet(
     assert (code, "--sheet" in err) == (2, True)
 
 
+def test_a_poor_head_is_said_in_one_line_and_written(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bad = Finding("FAP 3 open_jaw", "rule", "1 mm", "2 mm")
+    monkeypatch.setattr(checks, "check_faps", lambda model: [bad] * 11)
+    small_head().save(tmp_path / "head.glb")
+    code, _, err = run("model", "import", tmp_path / "head.glb", "-o", tmp_path / "out.glb")
+    assert code == 0
+    (line,) = [line for line in err.splitlines() if "poor" in line]
+    assert line.startswith(
+        f"fba: poor: {tmp_path / 'out.glb'}: streams will look wrong on this face (11 errors"
+    )
+    assert FaceModel.load(tmp_path / "out.glb").points.shape == (84, 3)
+
+
 def test_verdicts_by_the_number_of_errors() -> None:
     bad, odd = Finding("FAP 3", "rule", "1 mm", "2 mm"), Finding("FAP 3", "rule", "1", "2", "warning")
-    assert judge_import([odd] * 30).startswith("good")
-    assert judge_import([bad] * 10).startswith("fair")
-    assert judge_import([bad] * 11).startswith("poor")
+    assert [judge_import(some)[0] for some in ([odd] * 30, [bad] * 10, [bad] * 11)] == [
+        "good",
+        "fair",
+        "poor",
+    ]
     assert error_lines([odd, bad]) == ["error    FAP 3: rule: 1 mm, not 2 mm"]
     assert error_lines([bad] * 20)[-1].endswith("and 12 more")
 

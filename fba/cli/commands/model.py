@@ -13,7 +13,7 @@ import click
 from fba.cli import options
 from fba.cli.command import Group, examples
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
-from fba.cli.printing import Progress, print_json
+from fba.cli.printing import Progress, colour_grade, print_json
 from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
@@ -181,8 +181,8 @@ def import_(
     Reads MakeHuman's base mesh (its folder, or base.obj), glTF heads with ARKit's shapes, OBJ, PLY and
     Candide meshes with feature points, and FDP files with their mesh. FAPs that the mesh
     cannot show are listed with the reasons, and the errors that `fba model validate` finds, with a verdict:
-    good without errors, fair with up to ten, else poor. After a poor one the exit code is 1; the model is
-    written all the same. Look at the --sheet.
+    good without errors, fair with up to ten, else poor, in one red line. The exit status is 0 in all
+    cases: `fba model validate` exits with 1 where there are errors. Look at the --sheet.
     """
     from fba.cli import model_text
     from fba.face import checks
@@ -201,10 +201,11 @@ def import_(
         outputs.say(f"{display_name(sheet)}: the face at rest and in its main motions")
     for line in model_text.error_lines(findings):
         outputs.say(f"  {line}")
-    verdict = model_text.judge_import(findings)
-    outputs.say(click.style(verdict, fg="red") if verdict.startswith("poor") else verdict)
-    if verdict.startswith("poor"):
-        raise click.exceptions.Exit(1)
+    verdict, reason = model_text.judge_import(findings)
+    if verdict == "poor":
+        click.echo(colour_grade(f"fba: poor: {display_name(output)}: {reason}", verdict), err=True)
+    else:
+        outputs.say(f"{verdict}: {reason}")
 
 
 @command.command(
