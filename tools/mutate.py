@@ -209,6 +209,7 @@ MUTANTS = (
     Mutant(MEASURES, "between @ mean_rotation(between).T", "between", COMPARISON_TEST),
     Mutant(MEASURES, "np.maximum(ours - most, 0.0)", "np.maximum(ours - 9 * most, 0.0) * 0", COMPARISON_TEST),
     Mutant(MEASURES, "np.median(own)) if level is None else level", "np.median(own))", COMPARISON_TEST),
+    Mutant(MEASURES, "lowest = above if level is None else highest", "lowest = above", COMPARISON_TEST),
     Mutant(MEASURES, "frames @ level, result", "frames @ -level, result", COMPARISON_TEST),
     Mutant(MEASUREMENT, "turned[number] > MOVES", "turned[number] > 9 * MOVES", COMPARISON_TEST),
     Mutant(MEASUREMENT, "bounds()[row.name].hold * rate", "0 * rate", COMPARISON_TEST),

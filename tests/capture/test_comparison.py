@@ -15,6 +15,8 @@ from fba import Animation, FaceTrack
 from fba.body import Skeleton
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.comparison import Comparison, Difference, bounds, compare, find_sticks, find_up
+from fba.capture.comparison.figure import Figure
+from fba.capture.comparison.measures import floors
 from fba.capture.matching import map_joints
 from fba.errors import ModelError
 from fba.parameters import bap_numbers
@@ -127,6 +129,19 @@ def test_a_leap_of_the_root_and_a_floor_out_of_reach(
     assert one.grade == "poor"
     floating = find(compare(source, sunk, mapped, level=None), "floor", "left sole")
     assert floating.worst < 25  # where there is no floor, its height does not matter
+
+
+@pytest.mark.parametrize(
+    ("level", "sole", "off"), [(0.0, 0.0, 0), (0.0, -0.1, 100), (None, -0.1, 0), (None, 0.04, 40)]
+)
+def test_a_capture_that_sinks_under_its_floor(level: float | None, sole: float, off: float) -> None:
+    """Its ground is 10 cm lower in the end: a person stays on the floor, or sinks where there is none."""
+    heights = np.where(np.arange(25) < 20, 0.1, 0.0)
+    feet = np.stack([0 * heights, heights, 0 * heights], axis=1)
+    soles = np.where(np.arange(25) < 20, 0.0, sole)
+    standing = {"l": np.ones(25, dtype=np.bool_)}
+    (row,) = floors(Figure({"l_ankle": feet}, {}), {"l": soles}, standing, level)
+    np.testing.assert_allclose(row.values, np.where(np.arange(25) < 20, 0, off), atol=1e-9)
 
 
 def test_a_limb_that_was_not_matched_is_seen(source: SkeletonMotion, result: Animation) -> None:

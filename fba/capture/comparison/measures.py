@@ -236,7 +236,8 @@ def floors(
     """Heights in mm by which soles miss the floor while the source's foot stands; NaN in other frames.
 
     soles: by side (T,), height in metres of the lowest point of the person's shoe. level: height of the
-    floor, None for that where the feet stand most. The source's foot is level where it usually stands.
+    floor, None for that where the feet stand most. The source's foot is level where it usually stands. Where
+    it is lower, since its ground drifts, the person's is on the floor; or as low, if there is no floor.
     """
     heights = {side: _lowest(source, side) for side in soles}
     known = {side: height for side, height in heights.items() if height is not None and standing[side].any()}
@@ -246,7 +247,10 @@ def floors(
     own = np.concatenate([soles[side][standing[side]] for side in known])
     floor = float(np.median(own)) if level is None else level
     for side, height in known.items():
-        off = np.abs(soles[side] - floor - (height - ground))
+        above, own_sole = height - ground, soles[side] - floor
+        highest = np.maximum(above, 0.0)
+        lowest = above if level is None else highest
+        off = np.maximum(np.maximum(lowest - own_sole, own_sole - highest), 0.0)
         yield Row("floor", f"{WORDS[side]} sole", np.where(standing[side], 1000 * off, np.nan))
 
 
