@@ -97,11 +97,10 @@ def prepare(
     if not isinstance(rest, str) and not 0 <= rest < len(motion):
         raise ModelError(f"rest: the motion has {len(motion)} frames, from 0; there is no frame {rest}")
     matching.check_root(skeleton)
+    if not np.ptp(motion.rest(), axis=0).any():
+        raise ModelError("the source's joints all coincide in its rest pose; it has no bones")
     family, mapped, sure, how = find_bones(motion, joints, skeleton)
     confidence, reasons = {"bones": sure}, {"bones": how}
-    size = float(np.ptp(motion.rest(), axis=0).max())
-    if size <= 0:
-        raise ModelError("the source's joints all coincide in its rest pose; it has no bones")
     few = _few(motion)
     quaternions, positions = few.world()
     at_rest = standing.measure(motion.rest()[None], mapped)
@@ -162,8 +161,11 @@ def find_bones(
     if failure is not None or own < len(CORE):
         by_words = named_bones.find(motion.names, motion.parents, motion.offsets, skeleton)
         if _core(by_words, motion) > own:
-            family, by_family, failure = "words", by_words, None
-            own = _core(by_words, motion)
+            both = _fill_limbs(by_family, by_words)
+            if len(by_family) >= len(by_words) and _core(both, motion) == _core(by_words, motion):
+                by_family = both  # of a family, but for some joints that somebody renamed
+            else:
+                family, by_family, failure = "words", by_words, None
     if failure is not None:
         raise failure
     if count_limbs(by_family, motion) < 2:
@@ -174,6 +176,13 @@ def find_bones(
         "the words in their names" if family == "words" else f"names as of {family!r}"
     )
     return family, by_family, sure, how
+
+
+def _fill_limbs(mapped: Mapping[str, int], others: Mapping[str, int]) -> dict[str, int]:
+    """Return joints with those joints of limbs that are missing, from others."""
+    used = set(mapped.values())
+    missing = {joint: number for joint, number in others.items() if joint in CORE and number not in used}
+    return {**missing, **mapped}
 
 
 def count_limbs(mapped: Mapping[str, int], motion: SkeletonMotion) -> int:
