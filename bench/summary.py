@@ -104,7 +104,7 @@ ROWS = (
         "9 BVH files from elsewhere, before coding, feet planted",
         "within {worst:.1f} degrees, {mean:.2f} on average",
         "test_results.py::test_captures",
-        "fba encode --report",
+        "fba encode --report --json",
     ),
     Row(
         "BVH to BAPs: height of the feet on the ground against the source's, scaled",
@@ -112,7 +112,7 @@ ROWS = (
         "{feet_mean:.1f} mm off on average, {feet_worst:.1f} mm at worst, "
         "within 1 cm in {feet_within:.2f} % of frames",
         "test_results.py::test_captures",
-        "fba encode --report",
+        "fba encode --report --json",
     ),
     Row(
         "BAPs to 87 joint matrices",
