@@ -69,7 +69,8 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
                 writing.add(name)
                 assert "--no-clobber" in options, f"fba {name}"
     assert writing == {
-        "encode", "decode", "convert", "render", "gait", "model import", "model fit", "conformance"
+        "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
+        "conformance",
     }  # fmt: skip
 
 
@@ -95,6 +96,7 @@ OVERWRITING = [
     "model import IN.glb -o OUT",
     "model import both.fba --points IN.json -o OUT",
     "model fit IN.csv -o OUT",
+    "model points IN.csv -o OUT",
     "model fit both.fba --model IN.glb -o OUT",
 ]
 
@@ -385,6 +387,7 @@ CLOBBERING = [
     "render --contact-sheet faps -o there.fba --to png",
     "model import face.fap -o there.glb",
     "model fit face.fap -o there.glb",
+    "model points face.fap -o there.csv",
     "demo --out out",
 ]
 
@@ -392,13 +395,13 @@ CLOBBERING = [
 @pytest.mark.parametrize("line", CLOBBERING)
 def test_existing_files_stay_where_that_is_asked_for(run: Run, here: Path, line: str) -> None:
     (here / "out").mkdir()
-    there = [here / name for name in ("there.fba", "there.glb", "out/both.fap", "out/hello.png")]
+    there = [here / name for name in ("there.fba", "there.glb", "there.csv", "out/both.fap", "out/hello.png")]
     for path in there:
         path.write_bytes(b"precious")
     code, out, err = run(*line.split(), "--no-clobber")
     assert (code, out) == (1, "")
     assert "exists already; choose another name, or leave --no-clobber out" in err
-    assert [path.read_bytes() for path in there] == [b"precious"] * 4
+    assert [path.read_bytes() for path in there] == [b"precious"] * 5
     assert not (here / "new.fap").exists()
     assert not (here / "out" / "there.fap").exists()
 

@@ -301,10 +301,10 @@ def read_obj(path: Path) -> object:
 
 def read_pieces(path: Path) -> object:
     """Read an OBJ mesh with its materials, as an import does."""
-    from fba.face.importers.mesh import _materials, polygon_pieces
+    from fba.face.importers.mesh import polygon_pieces, read_materials
     from fba.mesh.obj import read_obj as read
 
-    return polygon_pieces(read(path), _materials(path))
+    return polygon_pieces(read(path), read_materials(path))
 
 
 def read_ply(path: Path) -> object:
