@@ -143,8 +143,9 @@ def find_bones(
 ) -> tuple[str, dict[str, int], float, str]:
     """Return the family of names, body joint -> source's joint, the confidence, and a reason.
 
-    A family that names all limbs is taken as it is; otherwise names are read word by word, and what finds
-    more of the body counts. ModelError where no bones are found.
+    A family that names all limbs is taken as it is. Otherwise names are read word by word; where that finds
+    more limbs, its joints are added to a family that names at least as many joints, and else replace it.
+    ModelError where no bones are found.
     """
     if joints is None and motion.declared:
         family, mapped = matching.map_joints(motion.names, motion.declared, skeleton)
