@@ -52,6 +52,18 @@ def test_no_large_file_is_tracked() -> None:
     assert {name: size for name, size in sizes.items() if size > LARGEST_FILE} == {}
 
 
+def test_no_two_test_files_have_the_same_name() -> None:
+    """As tests/ is no package, pytest refuses the second of two files with one name."""
+    names = [
+        Path(name).name
+        for name in tracked()
+        if name.startswith(("tests/", "bench/")) and Path(name).name != "conftest.py"
+    ]
+    names = [name for name in names if name.startswith("test_") and name.endswith(".py")]
+    assert len(names) > 100
+    assert sorted(name for name in set(names) if names.count(name) > 1) == []
+
+
 @pytest.mark.parametrize(("script", "shell"), [("dev", "sh"), (".ci/run", "bash")])
 def test_script_runs_as_it_is(script: str, shell: str) -> None:
     path = ROOT / script
