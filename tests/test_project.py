@@ -54,11 +54,7 @@ def test_no_large_file_is_tracked() -> None:
 
 def test_no_two_test_files_have_the_same_name() -> None:
     """As tests/ is no package, pytest refuses the second of two files with one name."""
-    names = [
-        Path(name).name
-        for name in tracked()
-        if name.startswith(("tests/", "bench/")) and Path(name).name != "conftest.py"
-    ]
+    names = [Path(name).name for name in tracked() if name.startswith("tests/")]
     names = [name for name in names if name.startswith("test_") and name.endswith(".py")]
     assert len(names) > 100
     assert sorted(name for name in set(names) if names.count(name) > 1) == []
