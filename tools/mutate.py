@@ -156,6 +156,12 @@ MUTANTS = (
     Mutant("fba/gltf/_meshopt_loops.py", "return 0 if position == tail else -1", "return 0", PACKED_TEST),
     Mutant("fba/gltf/surfaces.py", "MOST_ABOVE = 8", "MOST_ABOVE = 2", FOREIGN_HEADS_TEST),
     Mutant("fba/face/importers/assembly/symmetry.py", "TOUCHING = 0.1", "TOUCHING = 0.0", HEAD_ZOO_TEST),
+    Mutant(
+        "fba/face/authoring/shapes/_mixing.py",
+        "if mate is None or",
+        "if mate or mate is None or",
+        HEAD_ZOO_TEST,
+    ),
     Mutant("fba/face/importers/assembly/_profile.py", "CHIN = 0.3", "CHIN = 0.15", HEAD_ZOO_TEST),
     Mutant(
         "fba/face/importers/assembly/pieces.py", "middle = _middle(guessed)", "middle = 0.0", HEAD_ZOO_TEST

@@ -16,14 +16,10 @@ from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
-from fba.face.authoring.surface.motion import Motion, fap_limits
+from fba.face.authoring.surface.motion import Motion
 from fba.face.authoring.surface.motion_limits import (
+    coupled_motions,
     eased_linear_motion,
-    human_range,
-    knots,
-    soft_limit,
-    stop_at_folds,
-    values_between,
     values_to_reach,
 )
 from fba.face.authoring.surface.unfold import ease_field
@@ -106,7 +102,8 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
         elif number < mate:
             field = ease_field(surface, limiter, field, values_to_reach(number), pinned)
             inward = lips.inward[:, None]
-            pair = _coupled_motions(limiter, field * inward, field * (1 - inward), number)
+            inner, outer = field * inward, field * (1 - inward)
+            pair = coupled_motions(limiter, (inner, inner), (outer, outer), number)
             motions[number], motions[mate] = pair
     return motions, lost
 
@@ -200,38 +197,6 @@ def _inward(marks: Landmarks) -> Float64:
         marks.surface, marks.lips, fixed, inner[fixed][:, None].astype(np.float64), slack=1.0, harmonic=True
     )
     return smoothstep(field[:, 0])
-
-
-def _coupled_motions(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tuple[Motion, Motion]:
-    """(inner, outer) motions of a pair of FAPs whose sum stays linear although each alone is limited.
-
-    A contour that gets as close to the other as the skin between them allows goes on with the other one.
-    """
-    low, high = fap_limits(fap)
-    vertices = np.flatnonzero((np.abs(inner) + np.abs(outer)).max(axis=1) > 0)
-    patch = limiter.patch(vertices)
-    most = {}
-    for sign, end, cap in zip((-1.0, 1.0), (low, high), human_range(fap), strict=True):
-        reach = [patch.least_reach(sign * field) for field in (inner, outer, inner + outer)]
-        together = min(cap, np.inf if 0.98 * reach[2] >= abs(end) else max(reach[2], 1.0))
-        apart = min(reach[0], reach[1])
-        most[sign] = (together, np.inf if 0.98 * apart >= abs(end) else max(apart, 1.0), reach[0] <= reach[1])
-    bends = []
-    for sign, end in ((-1.0, low), (1.0, high)):
-        for limit in most[sign][:2]:
-            bends += [sign * bend for bend in knots(limit, abs(end))]
-    values = values_between(low, high, *bends)
-    moves: list[list[Float64]] = [[], []]
-    for value in values:
-        together, apart, inner_stops = most[1.0 if value > 0 else -1.0]
-        joint = soft_limit(value, together)
-        ahead = soft_limit(joint, apart)
-        stops, goes = (inner, outer) if inner_stops else (outer, inner)
-        alone, taking = ahead * stops, joint * goes + (joint - ahead) * stops
-        for shifts, shift in zip(moves, (alone, taking) if inner_stops else (taking, alone), strict=True):
-            shifts.append(shift[vertices])
-    motions = [stop_at_folds(limiter, Motion(values, vertices, np.array(shifts))) for shifts in moves]
-    return motions[0], motions[1]
 
 
 def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) -> Float64:

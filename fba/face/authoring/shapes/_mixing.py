@@ -13,7 +13,7 @@ from fba.face.authoring.shapes._shapes import Shapes
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion, build_tables, fap_limits, split_by_part
-from fba.face.authoring.surface.motion_limits import EASE, MODERATE, linear_motion
+from fba.face.authoring.surface.motion_limits import EASE, MODERATE, coupled_motions, linear_motion
 from fba.face.authoring.surface.surface import Surface
 from fba.face.authoring.surface.unfold import ease_field
 from fba.face.feature_points import row_of
@@ -120,10 +120,42 @@ class Mixer:
                 first_steps(self.base, fap, sign) + (share * details[sign] if sign in details else 0.0)
                 for sign in (-1.0, 1.0)
             )
-            table = fold_limited_tables(self.shapes, fap, down, up)
-            if table is not None:
-                made[fap] = table
+            mate = faps()[fap - 1].lip_mate
+            if mate is None or mate not in self.base.table_of:
+                table = fold_limited_tables(self.shapes, fap, down, up)
+                made |= {fap: table} if table is not None else {}
+            else:
+                inner = (first_steps(self.base, mate, -1.0), first_steps(self.base, mate, 1.0))
+                made |= self._coupled_tables(mate, fap, inner, (down, up))
         return made, used
+
+    def _coupled_tables(
+        self,
+        inner_fap: int,
+        outer_fap: int,
+        inner: tuple[Float64, Float64],
+        outer: tuple[Float64, Float64],
+    ) -> dict[int, FaceDefTables]:
+        """Tables of both FAPs of a lip, limited where the skin would fold; together they go on.
+
+        inner, outer: (V, 3) metres a step, below and above 0.
+        """
+        surface = self.shapes.surface
+        limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
+        pinned = _pinned(surface, self.base)
+        eased = []
+        for side, end in enumerate(fap_limits(inner_fap)):
+            joint = _on_surface(surface, inner[side]) + _on_surface(surface, outer[side])
+            around = ease_field(surface, limiter, joint, [_goal(end)] if end else [], pinned)
+            eased.append(_on_surface(surface, outer[side]) + around - joint)
+        skin = (_on_surface(surface, inner[0]), _on_surface(surface, inner[1]))
+        pair = coupled_motions(limiter, skin, (eased[0], eased[1]), inner_fap)
+        made: dict[int, FaceDefTables] = {}
+        for fap, motion, (down, up) in zip((inner_fap, outer_fap), pair, (inner, outer), strict=True):
+            share = np.array([_progress(motion, value) for value in motion.values])
+            table = _tables(self.base, surface, fap, motion, share, down, up)
+            made |= {fap: table} if table is not None else {}
+        return made
 
     def _points_moved_together(self, group: tuple[int, ...]) -> dict[str, int]:
         """Points that shapes move together, with their FAPs: those of a group and of its inner lip mates."""
@@ -217,22 +249,37 @@ def fold_limited_tables(shapes: Shapes, fap: int, down: Float64, up: Float64) ->
     down, up: (V, 3), metres a step below and above 0.
     """
     model, surface = shapes.model, shapes.surface
-    bound = surface.find(model.bound)
-    pinned = surface.mask(bound[bound >= 0])
+    pinned = _pinned(surface, model)
     low, high = fap_limits(fap)
     below, above = (
-        _one_way(surface, field[surface.pool], end, pinned) for field, end in ((down, low), (up, high))
+        _one_way(surface, _on_surface(surface, field), end, pinned)
+        for field, end in ((down, low), (up, high))
     )
     values = np.array([*below.values[below.values < 0], 0.0, *above.values[above.values > 0]])
     moving = np.union1d(below.vertices, above.vertices)
     shifts = np.zeros((len(values), len(surface), 3))
-    # teeth, brows and lashes are limited as the skin is
     share = np.zeros(len(values))
     for k, value in enumerate(values):
         side = below if value < 0 else above
         shifts[k, side.vertices] = side.shifts_at(value)
         share[k] = _progress(side, value)
-    motions = split_by_part(surface, Motion(values, moving, shifts[:, moving]))
+    return _tables(model, surface, fap, Motion(values, moving, shifts[:, moving]), share, down, up)
+
+
+def _tables(
+    model: FaceModel,
+    surface: Surface,
+    fap: int,
+    motion: Motion,
+    share: Float64,
+    down: Float64,
+    up: Float64,
+) -> FaceDefTables | None:
+    """Tables of a motion of the skin, which teeth, brows and lashes follow; None where nothing moves.
+
+    share: (K,) steps that the skin has gone at each value of the motion. down, up: (V, 3), metres a step.
+    """
+    motions = split_by_part(surface, motion)
     for part in model.parts:
         if part.kind in SURFACE_KINDS:
             continue
@@ -240,27 +287,42 @@ def fold_limited_tables(shapes: Shapes, fap: int, down: Float64, up: Float64) ->
         moved = np.flatnonzero(np.abs(down[own]).max(axis=1) + np.abs(up[own]).max(axis=1) > 0)
         if len(moved):
             steps = np.where((share < 0)[:, None, None], down[own][moved], up[own][moved])
-            motions[part.name] = Motion(values, moved, steps * share[:, None, None])
+            motions[part.name] = Motion(motion.values, moved, steps * share[:, None, None])
     made = build_tables(fap, model.fapu[faps()[fap - 1].unit], motions)
     return made if made.meshes else None
 
 
-def _one_way(surface: Surface, moves: Float64, end: float, pinned: Bool) -> Motion:
-    """The linear motion from 0 to one end, limited where triangles would fold. moves: (V, 3), of the skin."""
-    limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
+def _pinned(surface: Surface, model: FaceModel) -> Bool:
+    """(N,) mask of the vertices of the surface that feature points stand on."""
+    bound = surface.find(model.bound)
+    return surface.mask(bound[bound >= 0])
+
+
+def _on_surface(surface: Surface, moves: Float64) -> Float64:
+    """(N, 3) displacements of a surface, of those (V, 3) of all vertices of the model."""
     field = np.zeros((len(surface), 3))
-    field[surface.number] = moves
+    field[surface.number] = moves[surface.pool]
+    return field
+
+
+def _goal(end: float) -> float:
+    """The value that a motion with an end of its range there should reach."""
+    return float(np.sign(end)) * min(MODERATE / EASE[0], abs(end))
+
+
+def _one_way(surface: Surface, field: Float64, end: float, pinned: Bool) -> Motion:
+    """The linear motion from 0 to one end, limited where triangles would fold. field: (N, 3)."""
+    limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
     if not field.any() or not end:
         return Motion(np.array(sorted((0.0, end or 1.0))), np.zeros(0, dtype=np.intp), np.zeros((2, 0, 3)))
-    goal = float(np.sign(end)) * min(MODERATE / EASE[0], abs(end))
-    eased = ease_field(surface, limiter, field, [goal], pinned)
+    eased = ease_field(surface, limiter, field, [_goal(end)], pinned)
     vertices = np.flatnonzero(eased.any(axis=1))
     return linear_motion(limiter, vertices, eased[vertices], min(end, 0.0), max(end, 0.0))
 
 
 def _progress(side: Motion, value: float) -> float:
-    """Number of unlimited steps to which a linear motion at a value corresponds."""
-    first = side.values[side.values != 0]
+    """Number of unlimited steps to which a motion at a value corresponds."""
+    first = side.values[side.values * value > 0]
     if not value or not side.shifts.size or not len(first):
         return float(value)
     near = float(first[np.abs(first).argmin()])

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from fba.arrays import Float32, Float64, Floating
 from fba.easing import smoothstep
 from fba.errors import ModelError
-from fba.face.authoring.surface.binding import SURFACE_KINDS
-from fba.face.authoring.surface.surface import Surface, weld_parts
+from fba.face.authoring.surface.landmarks import weld_skin
+from fba.face.authoring.surface.surface import Surface
 from fba.face.model import FaceModel, Part
 
 BLEND = 0.12
@@ -51,8 +51,8 @@ class Shapes:
 
     @cached_property
     def surface(self) -> Surface:
-        """Skin and inner mouth of the model as one surface."""
-        return weld_parts(self.model.parts, SURFACE_KINDS)
+        """Skin and inner mouth of the model as one surface; lips on each other stay apart."""
+        return weld_skin(self.model.parts, self.model.bound)
 
     def _side(self, side: int) -> Float64:
         return self._left if side > 0 else 1.0 - self._left

@@ -104,6 +104,45 @@ def linear_motion(
     return stop_at_folds(limiter, Motion(values, vertices, limited[:, None, None] * field))
 
 
+def coupled_motions(
+    limiter: Limiter, inner: tuple[Float64, Float64], outer: tuple[Float64, Float64], fap: int
+) -> tuple[Motion, Motion]:
+    """(inner, outer) motions of a pair of FAPs whose sum stays linear although each alone is limited.
+
+    A contour that gets as close to the other as the skin between them allows goes on with the other one.
+
+    inner, outer: (N, 3) metres a step, below and above 0, of the contour of `fap` and of the other one.
+    """
+    low, high = fap_limits(fap)
+    vertices = np.flatnonzero(np.sum([np.abs(field) for field in (*inner, *outer)], axis=0).max(axis=1) > 0)
+    patch = limiter.patch(vertices)
+    most = {}
+    for side, (sign, end, cap) in enumerate(zip((-1.0, 1.0), (low, high), human_range(fap), strict=True)):
+        fields = (inner[side], outer[side], inner[side] + outer[side])
+        reach = [patch.least_reach(sign * field) for field in fields]
+        together = min(cap, np.inf if LEAST_REACH * reach[2] >= abs(end) else max(reach[2], 1.0))
+        apart = min(reach[0], reach[1])
+        apart = np.inf if LEAST_REACH * apart >= abs(end) else max(apart, 1.0)
+        most[sign] = (together, apart, reach[0] <= reach[1])
+    bends = []
+    for sign, end in ((-1.0, low), (1.0, high)):
+        for limit in most[sign][:2]:
+            bends += [sign * bend for bend in knots(limit, abs(end))]
+    values = values_between(low, high, *bends)
+    moves: list[list[Float64]] = [[], []]
+    for value in values:
+        side = int(value > 0)
+        together, apart, inner_stops = most[1.0 if side else -1.0]
+        joint = soft_limit(value, together)
+        ahead = soft_limit(joint, apart)
+        stops, goes = (inner[side], outer[side]) if inner_stops else (outer[side], inner[side])
+        alone, taking = ahead * stops, joint * goes + (joint - ahead) * stops
+        for shifts, shift in zip(moves, (alone, taking) if inner_stops else (taking, alone), strict=True):
+            shifts.append(shift[vertices])
+    motions = [stop_at_folds(limiter, Motion(values, vertices, np.array(shifts))) for shifts in moves]
+    return motions[0], motions[1]
+
+
 def _largest_value(patch: Patch, field: Float64, limit: float) -> float:
     """Value that a linear motion (N, 3) reaches without folds, at least 1; inf from `LEAST_REACH` on."""
     reach = patch.least_reach(field)

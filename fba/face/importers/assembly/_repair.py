@@ -40,6 +40,12 @@ def repair_tables(model: FaceModel, plain: FaceModel) -> FaceModel:
             lost[fap] = "the eyeball has too few vertices around its pupil"
         elif tables[fap] is plain.table_of.get(fap):
             replaced.append(fap)
+    for fap in list(replaced):
+        mate = faps()[fap - 1].lip_mate
+        if mate in tables and mate in plain.table_of and mate not in replaced:
+            # both contours of a lip are made to move together
+            tables[mate] = plain.table_of[mate]
+            replaced.append(mate)
     repaired = model.with_tables(tuple(tables.values()), lost)
     if not replaced:
         return repaired
