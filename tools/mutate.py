@@ -85,6 +85,8 @@ HINGES = "fba/capture/limbs/hinges.py"
 LEG_IK = "fba/capture/limbs/_leg_ik.py"
 READ_AHEAD = "player/fba_player/sound/_read_ahead.py"
 PLAUSIBILITY = "fba/body/plausibility.py"
+ROUND_ANGLES = "fba/body/_round_angles.py"
+HEAD_TURNS = "fba/body/_head_turns.py"
 MARK = "fba/codec/_plane/mark.py"
 DECODER = "fba/codec/_decoder.py"
 GAIT_CURVES = "fba/body/gait/_signals.py"
@@ -127,6 +129,7 @@ PLAUSIBLE_TEST = "tests/body/test_plausibility.py -k 'limits or twenty or carry 
 MOMENT_TEST = "tests/body/test_plausibility.py -k moment"
 JUMP_TEST = "tests/body/test_plausibility.py -k jump"
 STEP_CHOICE_TEST = "tests/formats/test_step_choice.py -k 'round or coarse'"
+HEAD_TURN_TEST = "tests/formats/test_step_choice.py -k head"
 MEASURED_TEST = "tests/body/gait/test_measured.py"
 STRIPS_TEST = "tests/mesh/test_ply.py -k strips"
 MARK_TEST = "tests/codec/test_mark.py"
@@ -364,20 +367,16 @@ MUTANTS = (
     Mutant(PLAUSIBILITY, "SUNK = -2.0", "SUNK = -2.2", PLAUSIBLE_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 0.9", JUMP_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 1.1", JUMP_TEST),
-    Mutant(PLAUSIBILITY, "ROUND = 5.0", "ROUND = 6.0", STEP_CHOICE_TEST),
-    Mutant(
-        PLAUSIBILITY,
-        "ROUND_LEAST, ROUND_MORE = 6.0, 2.0",
-        "ROUND_LEAST, ROUND_MORE = 1.0, 2.0",
-        STEP_CHOICE_TEST,
-    ),
-    Mutant(
-        PLAUSIBILITY,
-        "ROUND_LEAST, ROUND_MORE = 6.0, 2.0",
-        "ROUND_LEAST, ROUND_MORE = 30.0, 2.0",
-        STEP_CHOICE_TEST,
-    ),
-    Mutant(PLAUSIBILITY, "axis=None) != 1", "axis=None) < 1", STEP_CHOICE_TEST),
+    Mutant(ROUND_ANGLES, "ROUND_RADIANS = 5.0, 0.1", "ROUND_RADIANS = 6.0, 0.1", STEP_CHOICE_TEST),
+    Mutant(ROUND_ANGLES, "ROUND_RADIANS = 5.0, 0.1", "ROUND_RADIANS = 5.0, 0.5", STEP_CHOICE_TEST),
+    Mutant(ROUND_ANGLES, "ROUND_MORE = 6.0, 2.0", "ROUND_MORE = 1.0, 2.0", STEP_CHOICE_TEST),
+    Mutant(ROUND_ANGLES, "EVERY_LEAST = 1.3", "EVERY_LEAST = 6.0", STEP_CHOICE_TEST),
+    Mutant(HEAD_TURNS, "np.radians(2.0), ", "np.radians(1.0), ", HEAD_TURN_TEST),
+    Mutant(HEAD_TURNS, "np.radians(45.0)", "np.radians(70.0)", HEAD_TURN_TEST),
+    Mutant(HEAD_TURNS, "TOO_FAR = -1.8", "TOO_FAR = -2.0", HEAD_TURN_TEST),
+    Mutant(HEAD_TURNS, "TOO_FAR = -1.8", "TOO_FAR = -1.6", HEAD_TURN_TEST),
+    Mutant(HEAD_TURNS, "TOO_FAR <= then[1] <= ENOUGH", "then[1] <= ENOUGH", HEAD_TURN_TEST),
+    Mutant(ROUND_ANGLES, "axis=None) != 1", "axis=None) < 1", STEP_CHOICE_TEST),
     Mutant(MARK, "position = start\n", "position = start + 99\n", MARK_TEST),
     Mutant(DECODER, "mark.begin <= byte < mark.end", "byte < mark.end", MARK_TEST),
     Mutant(DECODER, "code == USER_DATA and directly and self.ended", "code == USER_DATA", MARK_TEST),

@@ -4,7 +4,9 @@ Two tables of BAP quantiser steps are in use and no bit of a stream says which (
 the wrong one the root's translation comes out 32 times too large or too small, and joint angles up to 2.7
 times. `find_doubt` measures the motion under the table it was decoded with and under the other, and reports
 only where the first looks wrong and the second does not. It also looks at angles: people who animate by hand
-set joints to whole fives of degrees, which come out as such under the right table only. The bounds are set so
+set joints to whole fives of degrees or tenths of a radian, which come out as such under the right table only
+(`_round_angles`). Of a body that stays where it is, the head shows the scale, because it keeps looking ahead
+while the trunk turns (`_head_turns`). The bounds are set so
 that none of the 177 foreign streams and none of our captures, walks and vectors is doubted when it is decoded
 with its own table.
 """
@@ -18,6 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Bool, Float64, Int64
+from fba.body._head_turns import head_turns_too_far
+from fba.body._round_angles import find_rounder_table
 from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
@@ -48,11 +52,6 @@ JUMP = 1.0
 """Metres that the root's height may change by jumping, crouching and lying down, which count as no travel."""
 SUNK = -2.0
 """Height of the root over that of the default posture, metres, at which the whole body is underground."""
-ROUND = 5.0
-"""Degrees of which angles that were set by hand are multiples."""
-ROUND_LEAST, ROUND_MORE = 6.0, 2.0
-"""So improbable must round angles be (see `_roundness`), and so many times as improbable as under the other
-table."""
 _FEET = ("l_ankle", "r_ankle", "l_metatarsal", "r_metatarsal")
 _ROOT = ("vertical", "lateral", "frontal")
 
@@ -120,8 +119,9 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
     levels, rests = np.divmod(values.astype(np.int64), steps)
     if rests.any():
         return None
-    if (rounder := _rounder_table(levels, used)) is not None:
-        return Doubt(used, rounder, (f"angles are odd that {rounder} makes multiples of 5 degrees",))
+    if (rounder := find_rounder_table(levels, used)) is not None:
+        table, unit = rounder
+        return Doubt(used, table, (f"angles are odd that {table} makes multiples of {unit}",))
     if numbers[-1] - numbers[0] < LEAST * rate:
         return None
     now = measure(levels * steps, numbers[sampled], rate)
@@ -130,65 +130,19 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
         if other == used or not changed.any():
             continue
         findings = _new_faults(now, measure(levels * bap_steps(other), numbers[sampled], rate))
+        if not findings and not levels[:, _root_columns()].any():
+            back = head_turns_too_far(levels * steps, levels * bap_steps(other))
+            if back is not None:
+                findings = (f"the head turns back {back:.1f} times as far as the body turns",)
         if findings:
             return Doubt(used, other, findings)
     return None
 
 
-def _rounder_table(levels: Int64, used: str) -> str | None:
-    """Return the table with which angles are round far more often than with `used`; None if there is none.
-
-    levels: (T, 296), in steps.
-    """
-    turning = widest_limits().any(axis=1) & (bap_steps(BAP_STEP_TABLES[0]) != bap_steps(BAP_STEP_TABLES[1]))
-    columns = np.flatnonzero(turning & levels.any(axis=0))
-    if np.gcd.reduce(levels[:, columns], axis=None) != 1:
-        return None  # coarse quantisers make round angles of their own
-    scores = {table: _roundness(levels[:, columns], bap_steps(table)[columns]) for table in BAP_STEP_TABLES}
-    best = max(scores, key=lambda table: scores[table])
-    clear = scores[best] > ROUND_LEAST and scores[best] > ROUND_MORE * scores[used]
-    return best if best != used and clear else None
-
-
-def _roundness(levels: Int64, steps: Int64) -> float:
-    """Return how improbable it is that as many angles as there are round by chance: 6 for one in a million.
-
-    levels: (T, K), in steps (K,). Of each joint, the first and last angle and those where it turns back or
-    rests are counted, each value once, because keys lie there; if all of them are round, every angle is.
-    """
-    changes = np.sign(np.diff(levels, axis=0))
-    keys = np.ones(levels.shape, dtype=bool)
-    keys[1:-1] = changes[1:] != changes[:-1]
-    at_keys, of_all = (_count_round(levels, counted, steps) for counted in (keys, np.ones_like(keys)))
-    scores = [_improbability(at_keys[1], at_keys[2])]
-    if at_keys[0] == at_keys[1]:
-        scores.append(_improbability(of_all[1], of_all[2]))
-    return max(scores)
-
-
-def _count_round(levels: Int64, counted: Bool, steps: Int64) -> tuple[int, int, float]:
-    """Return how many different angles other than 0 there are, how many are round, and how many by chance."""
-    unit = ROUND / DEGREES
-    count, hits, expected = 0, 0, 0.0
-    for column, chosen, step in zip(levels.T, counted.T, steps.tolist(), strict=True):
-        angles = np.unique(np.abs(column[chosen & (column != 0)])) * step
-        count += len(angles)
-        hits += int((np.abs(angles - unit * np.rint(angles / unit)) <= step / 2).sum())
-        expected += len(angles) * step / unit
-    return count, hits, expected
-
-
-def _improbability(hits: int, expected: float) -> float:
-    """Return -log10 of the most (Chernoff's bound) that chance can have for so many hits; 0 for few."""
-    if hits <= expected:
-        return 0.0
-    return float((hits * np.log(hits / expected) - hits + expected) / np.log(10))
-
-
 def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
     """Measurements of BAPs int64 (T, 296) at frame numbers (T,), taken between successive frames."""
     pairs = np.flatnonzero(np.diff(index) == 1)
-    root = values[:, [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in _ROOT]]
+    root = values[:, _root_columns()]
     ways = np.abs(root[pairs + 1] - root[pairs])
     if np.ptp(root[:, 0]) <= JUMP / MILLIMETRE:
         ways[:, 0] = 0
@@ -207,6 +161,11 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
         hops=bool((ways > quantum).any()),
         height=float(np.median(root[:, 0])) * MILLIMETRE,
     )
+
+
+def _root_columns() -> list[int]:
+    """Return the columns of the root's translation: up, sideways, ahead."""
+    return [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in _ROOT]
 
 
 def _new_faults(now: Motion, other: Motion) -> tuple[str, ...]:

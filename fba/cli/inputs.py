@@ -19,6 +19,7 @@ from fba.cli import step_tables
 from fba.cli.command import STANDARD_INPUT
 from fba.errors import FbaError, FbaWarning, FormatError, OptionError
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import BAP_STEPS_AUTO
 from fba.source import read_whole
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def renamed(path: Path, name: str) -> Iterator[None]:
 def read_input(
     path: Path,
     *,
-    bap_steps: str = step_tables.AUTO,
+    bap_steps: str = BAP_STEPS_AUTO,
     fps: Fraction | None = None,
     header_fps: Fraction | None = None,
     name: str | None = None,
@@ -131,7 +132,7 @@ def read_input(
         animation = read(file, format=reader.name, **_taken(reader, options))
     if reader.name == "fba" and animation.body is not None:
         (tables if tables is not None else []).append(str(options["bap_steps"]))
-        if bap_steps != step_tables.AUTO and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
+        if bap_steps != BAP_STEPS_AUTO and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
             (doubts if doubts is not None else []).append(doubt)
     if fps is not None and animation.rate != fps:
         animation = animation.resample(fps, limits=limits)

@@ -13,6 +13,7 @@ import click
 from fba.cli.command import Decorated
 from fba.errors import did_you_mean
 from fba.limits import Limits
+from fba.parameters import BAP_STEP_TABLES, BAP_STEPS_AUTO
 
 RATES = (Fraction(1, 3600), Fraction(10_000))
 """Smallest and largest frame rate that can be asked for, as in BVH files."""
@@ -149,17 +150,15 @@ bap_steps_option = choice_option(
     "--bap-steps",
     "Table of BAP steps of a stream, the standard's or one vendor's; auto: the one that it names, else "
     "the one that looks right.",
-    "auto",
-    "iso",
-    "visage",
+    BAP_STEPS_AUTO,
+    *BAP_STEP_TABLES,
 )
 written_bap_steps_option = choice_option(
     "--bap-steps",
     "Table of BAP steps of a stream, the standard's or one vendor's, which is finer; auto: the finer one for "
     "motion capture and walks, that of a stream for what comes from one, else the standard's.",
-    "auto",
-    "iso",
-    "visage",
+    BAP_STEPS_AUTO,
+    *BAP_STEP_TABLES,
 )
 mark_option = click.option(
     "--mark/--no-mark",

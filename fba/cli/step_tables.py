@@ -12,14 +12,12 @@ import click
 from fba.cli.program import as_typed
 from fba.errors import FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
+from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT, bap_numbers, bap_steps
 from fba.tracks import batches
 
 if TYPE_CHECKING:
     from fba.animation import Animation
 
-AUTO = "auto"
-DEFAULT = BAP_STEP_TABLES[0]
 FINE = "visage"
 
 
@@ -27,7 +25,7 @@ def explain_choice(data: bytes, asked: str, limits: Limits = DEFAULT_LIMITS) -> 
     """Return a stream's table, and why: "visage: the stream says so"; "" if it makes no difference."""
     from fba.formats.step_choice import choose_steps
 
-    if asked != AUTO:
+    if asked != BAP_STEPS_AUTO:
         return f"{asked}: as given"
     choice = choose_steps(data, limits=limits)
     return f"{choice.table}: {choice.reason}" if choice.reason else ""
@@ -43,7 +41,7 @@ def table_to_read(
     """
     from fba.formats.step_choice import choose_steps
 
-    if asked != AUTO:
+    if asked != BAP_STEPS_AUTO:
         return asked
     choice = choose_steps(data, limits=limits)
     if choice.reason and shown:
@@ -57,11 +55,11 @@ def table_to_write(asked: str, *, made: bool, marked: bool, read: str | None = N
     asked: the value of --bap-steps. made: whether the body is motion capture, or was generated. marked:
     whether the stream will say which table it is. read: the table of the stream that the body comes from.
     """
-    if asked != AUTO:
+    if asked != BAP_STEPS_AUTO:
         return asked
     if read is not None:
         return read
-    return FINE if made and marked else DEFAULT
+    return FINE if made and marked else BAP_STEPS_DEFAULT
 
 
 def remind(output: Path, animation: Animation, table: str, quant: int = 1, *, marked: bool = True) -> None:
@@ -69,7 +67,7 @@ def remind(output: Path, animation: Animation, table: str, quant: int = 1, *, ma
 
     Unquantised BAPs (quant 0) are the same under every table.
     """
-    if animation.body is not None and table != DEFAULT and quant > 0 and not marked:
+    if animation.body is not None and table != BAP_STEPS_DEFAULT and quant > 0 and not marked:
         again = as_typed(f"fba play {shlex.quote(str(output))} --bap-steps {table}")
         click.echo(f"Play it with: {again}", err=True)
 
@@ -79,7 +77,7 @@ def warn_of_coarse_steps(animation: Animation, table: str, quant: int = 1, *, ca
 
     captured: the body is motion capture, whose angles these steps may cut as well.
     """
-    if animation.body is None or table != DEFAULT or quant == 0:
+    if animation.body is None or table != BAP_STEPS_DEFAULT or quant == 0:
         return
     root = [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in ("vertical", "lateral", "frontal")]
     steps = bap_steps(table)[root]

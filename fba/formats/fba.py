@@ -12,13 +12,12 @@ from fba.animation import Animation
 from fba.atomic import atomic
 from fba.errors import BitstreamError, LimitError, OptionError, RangeError, UnsupportedError
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import BAP_STEP_TABLES
+from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
 from fba.source import Path, read_whole
 
 if TYPE_CHECKING:
     from fba.codec import EncoderOptions
 
-DEFAULT = BAP_STEP_TABLES[0]
 START_CODES = (b"\0\0\1\xba", b"\0\0\1\x01")
 """fba_object_start_code, and the one of old streams."""
 _BEFORE = (b"\0\0\1\xb0", b"\0\0\1\xb5")
@@ -54,7 +53,7 @@ def read_fba(
     from fba.codec import decode
 
     data = read_whole(path)
-    if bap_steps == "auto":
+    if bap_steps == BAP_STEPS_AUTO:
         from fba.formats.step_choice import choose_steps
 
         bap_steps = choose_steps(data, limits=limits).table
@@ -80,7 +79,8 @@ def write_fba(
     if settings:
         if options is not None:
             raise OptionError(f"give either options or {', '.join(settings)}, not both")
-        options = EncoderOptions(**{"mark": settings.get("bap_steps", DEFAULT) != DEFAULT, **settings})
+        mark = settings.get("bap_steps", BAP_STEPS_DEFAULT) != BAP_STEPS_DEFAULT
+        options = EncoderOptions(**{"mark": mark, **settings})
     with naming_file(path):
         data = encode(animation, options)
     with atomic(path) as file:

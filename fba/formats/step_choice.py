@@ -11,13 +11,11 @@ import numpy as np
 from fba.animation import Animation, BodyTrack
 from fba.codec import Decoder, marked_table
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import BAP_STEP_TABLES
+from fba.parameters import BAP_STEPS_DEFAULT
 
 if TYPE_CHECKING:
     from fba.codec import Block
 
-AUTO = "auto"
-DEFAULT = BAP_STEP_TABLES[0]
 FRAMES_CHECKED = 2048
 """Frames with a body that are decoded to see how they move."""
 FRAMES_SEARCHED = 1 << 14
@@ -45,15 +43,17 @@ def choose_steps(data: bytes | bytearray | memoryview, *, limits: Limits = DEFAU
     marked = marked_table(data)
     if marked is not None:
         return StepChoice(marked, "the stream says so")
-    moving = first_frames(data, DEFAULT, limits)
+    moving = first_frames(data, BAP_STEPS_DEFAULT, limits)
     if moving is None or moving.body is None:
-        return StepChoice(DEFAULT, "")
+        return StepChoice(BAP_STEPS_DEFAULT, "")
     from fba.body.plausibility import find_doubt
 
-    doubt = find_doubt(moving.body, moving.index, moving.rate, DEFAULT)
+    doubt = find_doubt(moving.body, moving.index, moving.rate, BAP_STEPS_DEFAULT)
     if doubt is not None:
-        return StepChoice(doubt.likely, f"the stream does not say, and with {DEFAULT} {doubt.findings[0]}")
-    return StepChoice(DEFAULT, "the stream does not say, and with these nothing looks wrong")
+        return StepChoice(
+            doubt.likely, f"the stream does not say, and with {BAP_STEPS_DEFAULT} {doubt.findings[0]}"
+        )
+    return StepChoice(BAP_STEPS_DEFAULT, "the stream does not say, and with these nothing looks wrong")
 
 
 def first_frames(

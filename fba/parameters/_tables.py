@@ -26,6 +26,9 @@ BAP_GROUP_COUNT = 24
 
 BAP_STEP_TABLES = ("iso", "visage")
 """`iso`: the standard's quantiser steps; `visage`: those of one vendor's tools. No bit tells them apart."""
+BAP_STEPS_DEFAULT = BAP_STEP_TABLES[0]
+BAP_STEPS_AUTO = "auto"
+"""In place of a table's name: the one that a stream's mark names, else the one that its motion shows."""
 
 VISEME_FIELDS = ("viseme_select1", "viseme_select2", "viseme_blend", "viseme_def")
 EXPRESSION_FIELDS = (

@@ -238,7 +238,7 @@ def test_the_projects_own_vectors() -> None:
 def test_foreign_vectors(shared: Path) -> None:
     """None that is read rightly is doubted; of the real ones that are read wrongly, all but one are.
 
-    That one moves no root, and its joints come out three quarters as far: a calmer person, not a broken one.
+    That one moves no root, and its joints come out at least three eighths as far: calmer, not broken.
     """
     folder, missed, real = shared / "vectors", [], 0
     for record in json.loads((folder / "index.json").read_text(encoding="utf-8")):

@@ -24,6 +24,7 @@ from fba.cli.outputs import (
 from fba.cli.printing import Progress
 from fba.cli.program import as_typed
 from fba.limits import Limits
+from fba.parameters import BAP_STEPS_AUTO
 
 if TYPE_CHECKING:
     from fba.codec import PlaneSettings
@@ -209,7 +210,7 @@ def _decode(
     animation, planes = _read(
         data, _name(path), any(t.writing is None for t in targets), table, salvage, limits
     )
-    if bap_steps != step_tables.AUTO:
+    if bap_steps != BAP_STEPS_AUTO:
         step_tables.warn_of_doubt(path, animation, table)
     parts = {"face": "FAPs", "body": "BAPs"}
     for target in targets:

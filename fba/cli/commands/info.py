@@ -15,6 +15,7 @@ from fba.cli.inputs import EXISTING, check_clip, describe_person, input_file, li
 from fba.cli.printing import print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
 from fba.limits import Limits
+from fba.parameters import BAP_STEPS_AUTO
 
 if TYPE_CHECKING:
     from fba.formats.gltf.bodies import PersonInfo
@@ -80,7 +81,7 @@ def command(
             if info.format == "fba" and info.body is not None:
                 data = file.read_bytes()
                 steps = step_tables.explain_choice(data, bap_steps, limit)
-                if bap_steps != step_tables.AUTO:
+                if bap_steps != BAP_STEPS_AUTO:
                     step_tables.warn_of_doubtful_stream(path, data, bap_steps)
             report = {"file": str(path), **info.to_dict(), "bap_steps_choice": steps or None}
             reports.append(report | ({"clips": [asdict(clip) for clip in clips]} if clips else {}))

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.cli import options, scene_options, step_tables
+from fba.cli import options, scene_options
 from fba.cli.command import Command, examples
 from fba.cli.scene_options import MOST, SceneOptions, SoundOptions, check_files
+from fba.parameters import BAP_STEPS_DEFAULT
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
@@ -138,7 +139,7 @@ def _play(
             audio=audio,
             audio_offset=sound.audio_offset,
             file=files[0] if single else None,
-            bap_steps=tables[0] if tables else step_tables.DEFAULT,
+            bap_steps=tables[0] if tables else BAP_STEPS_DEFAULT,
             warnings=tuple(doubts),
             panels=("differences",) if compare else (),
             **window,

@@ -14,6 +14,7 @@ from fba.cli.inputs import EXISTING, input_file
 from fba.cli.printing import print_json, print_table
 from fba.codec.stream_info import StreamInfo
 from fba.limits import Limits
+from fba.parameters import BAP_STEPS_AUTO
 
 
 @click.command(cls=Command, epilog=examples("fba stats talk.fba", "fba stats --json *.fba"))
@@ -31,7 +32,7 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool, limit: Limit
         with each.file(path), input_file(path) as file:
             data = file.read_bytes()
             info = probe_stream(data, limits=limit)
-            if info.body is not None and bap_steps != step_tables.AUTO:
+            if info.body is not None and bap_steps != BAP_STEPS_AUTO:
                 step_tables.warn_of_doubtful_stream(path, data, bap_steps)
             rows.append({"file": str(path), **statistics(info)})
     if as_json:

@@ -18,7 +18,8 @@ from fba.arrays import Int64
 from fba.codec import Decoder, FrameBuffer, StreamInfo
 from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaError, FbaWarning
-from fba.formats.step_choice import AUTO, DEFAULT, choose_steps
+from fba.formats.step_choice import choose_steps
+from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import BUFFER
 
@@ -74,9 +75,10 @@ class LiveAnimation:
         """Bytes that have arrived."""
         self._source = source
         self._at_end = at_end
-        self.bap_steps = DEFAULT if bap_steps == AUTO else bap_steps
+        self.bap_steps = BAP_STEPS_DEFAULT if bap_steps == BAP_STEPS_AUTO else bap_steps
         self.steps_reason = ""
-        self._held: bytearray | None = bytearray() if bap_steps == AUTO else None  # until they are chosen
+        # What came until they are chosen:
+        self._held: bytearray | None = bytearray() if bap_steps == BAP_STEPS_AUTO else None
         self._held_blocks: list[Block] = []
         self._decoder = Decoder(bap_steps=self.bap_steps, on_error="salvage")
         self._buffer = FrameBuffer()
@@ -85,7 +87,7 @@ class LiveAnimation:
         self._closing = False
         self._failure: BaseException | None = None
         self._losses = 0
-        self._checked_bap_steps = bap_steps == AUTO
+        self._checked_bap_steps = bap_steps == BAP_STEPS_AUTO
         self._thread = threading.Thread(target=self._read, args=(head,), name="fba live", daemon=True)
         self._thread.start()
 

@@ -1,0 +1,97 @@
+"""Which table of BAP steps makes angles round, as people set them by hand: `find_rounder_table`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.arrays import Bool, Int64
+from fba.body.solve.limits import DEGREES, widest_limits
+from fba.body.solve.pose_loops import UNIT
+from fba.parameters import BAP_STEP_TABLES, bap_steps
+
+ROUND_DEGREES, ROUND_RADIANS = 5.0, 0.1
+"""Of these, angles that were set by hand are multiples: of degrees, or of what BAPs count in."""
+UNITS = {
+    f"{ROUND_DEGREES:g} degrees": ROUND_DEGREES / DEGREES,
+    f"{ROUND_RADIANS:g} rad": ROUND_RADIANS / UNIT,
+}
+"""Their names, and how many units of BAPs they are."""
+ROUND_LEAST, ROUND_MORE = 6.0, 2.0
+"""So improbable must round angles be (see `_improbability`), and so many times as improbable as under the
+other table."""
+EVERY_LEAST = 1.3
+"""So improbable they must be where every key is round with one table, and not every one with the other."""
+
+
+@dataclass(frozen=True)
+class Roundness:
+    """How round angles are.
+
+    score: how improbable it is that chance made so many of them round. every: whether all keys are round.
+    unit: what they are multiples of.
+    """
+
+    score: float
+    every: bool
+    unit: str
+
+
+def find_rounder_table(levels: Int64, used: str) -> tuple[str, str] | None:
+    """Return the table with which angles are round far more often than with `used`, and the unit; or None.
+
+    levels: (T, 296), in steps.
+    """
+    turning = widest_limits().any(axis=1) & (bap_steps(BAP_STEP_TABLES[0]) != bap_steps(BAP_STEP_TABLES[1]))
+    columns = np.flatnonzero(turning & levels.any(axis=0))
+    if np.gcd.reduce(levels[:, columns], axis=None) != 1:
+        return None  # coarse quantisers make round angles of their own
+    found = {table: _roundness(levels[:, columns], bap_steps(table)[columns]) for table in BAP_STEP_TABLES}
+    best = max(found, key=lambda table: found[table].score)
+    least = EVERY_LEAST if found[best].every and not found[used].every else ROUND_LEAST
+    clear = found[best].score > least and found[best].score > ROUND_MORE * found[used].score
+    return (best, found[best].unit) if best != used and clear else None
+
+
+def _roundness(levels: Int64, steps: Int64) -> Roundness:
+    """Return how round the angles of levels (T, K), in steps (K,), are, by the unit that fits them best.
+
+    Of each joint, the first and last angle and those where it turns back or rests are counted, each value
+    once, because keys lie there; if all of them are round, every angle is.
+    """
+    changes = np.sign(np.diff(levels, axis=0))
+    keys = np.ones(levels.shape, dtype=bool)
+    keys[1:-1] = changes[1:] != changes[:-1]
+    results = []
+    for name, unit in UNITS.items():
+        at_keys, of_all = (
+            _count_round(levels, counted, steps, unit) for counted in (keys, np.ones_like(keys))
+        )
+        every = at_keys[0] == at_keys[1] > 0
+        scores = [_improbability(at_keys[1], at_keys[2])]
+        if every:
+            scores.append(_improbability(of_all[1], of_all[2]))
+        results.append(Roundness(max(scores), every, name))
+    return max(results, key=lambda result: result.score)
+
+
+def _count_round(levels: Int64, counted: Bool, steps: Int64, unit: float) -> tuple[int, int, float]:
+    """Return how many different angles other than 0 there are, how many are round, and how many by chance."""
+    count, hits, expected = 0, 0, 0.0
+    for column, chosen, step in zip(levels.T, counted.T, steps.tolist(), strict=True):
+        angles = np.unique(np.abs(column[chosen & (column != 0)])) * step
+        count += len(angles)
+        hits += int((np.abs(angles - unit * np.rint(angles / unit)) <= step / 2).sum())
+        expected += len(angles) * step / unit
+    return count, hits, expected
+
+
+def _improbability(hits: int, expected: float) -> float:
+    """Return -log10 of the most (Chernoff's bound) that chance can have for so many hits; 0 for few.
+
+    It is 6 for one in a million.
+    """
+    if hits <= expected:
+        return 0.0
+    return float((hits * np.log(hits / expected) - hits + expected) / np.log(10))
