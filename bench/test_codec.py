@@ -297,6 +297,7 @@ def test_byte_by_byte(benchmark: Any, report: Callable[[str], None]) -> None:
 
 
 @pytest.mark.parametrize("kind", ["empty planes", "parts by turns", "I planes", "objects", "start codes"])
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 def test_hostile_streams(benchmark: Any, kind: str, report: Callable[[str], None]) -> None:
     """Streams of planes that hold nothing: time for 100 kB, and growth when a stream is twice as long."""
     face = "00001" + "100" * 10 + "000000" + "01"

@@ -87,8 +87,9 @@ READ_AHEAD = "player/fba_player/sound/_read_ahead.py"
 PLAUSIBILITY = "fba/body/plausibility.py"
 ROUND_ANGLES = "fba/body/_round_angles.py"
 HEAD_TURNS = "fba/body/_head_turns.py"
-MARK = "fba/codec/_plane/mark.py"
-DECODER = "fba/codec/_decoder.py"
+MARK = "fba/codec/_stream/mark.py"
+STREAM_READER = "fba/codec/_stream_reader.py"
+OBJECT_BORDERS = "fba/codec/_stream/object_borders.py"
 GAIT_CURVES = "fba/body/gait/_signals.py"
 GAIT_DETECTION = "fba/body/gait/_detection.py"
 GAIT_MEASURE = "fba/body/gait/_measure.py"
@@ -102,6 +103,7 @@ PROGRAMS_TEST = "tests/conformance/test_programs.py"
 LOSS_TEST = "tests/codec/test_loss.py"
 DAMAGE_TEST = "tests/codec/test_damage.py"
 TIMES_TEST = "tests/codec/test_codec_rules.py"
+CHUNKS_TEST = "tests/codec/test_incremental.py"
 FULL_TURNS_TEST = "tests/codec/test_full_turns.py"
 COMPARISON_TEST = "tests/capture/test_comparison.py"
 RANGES_TEST = "tests/codec/test_codec_rules.py tests/codec/test_limits.py"
@@ -378,8 +380,16 @@ MUTANTS = (
     Mutant(HEAD_TURNS, "TOO_FAR <= then[1] <= ENOUGH", "then[1] <= ENOUGH", HEAD_TURN_TEST),
     Mutant(ROUND_ANGLES, "axis=None) != 1", "axis=None) < 1", STEP_CHOICE_TEST),
     Mutant(MARK, "position = start\n", "position = start + 99\n", MARK_TEST),
-    Mutant(DECODER, "mark.begin <= byte < mark.end", "byte < mark.end", MARK_TEST),
-    Mutant(DECODER, "code == USER_DATA and directly and self.ended", "code == USER_DATA", MARK_TEST),
+    Mutant(OBJECT_BORDERS, "mark.begin <= byte < mark.end", "byte < mark.end", MARK_TEST),
+    Mutant(OBJECT_BORDERS, "        self.mark = None\n", "", MARK_TEST),
+    Mutant(STREAM_READER, "del self._buffer, self._reader ", "pass", f"{CHUNKS_TEST} -k no_bytes"),
+    Mutant(
+        STREAM_READER,
+        "        _forget_frames(error)\n        self",
+        "        self",
+        f"{CHUNKS_TEST} -k no_bytes",
+    ),
+    Mutant(OBJECT_BORDERS, "code == USER_DATA and directly and self.ended", "code == USER_DATA", MARK_TEST),
     Mutant("fba/body/gait/_plan.py", "_SOFT = 0.85", "_SOFT = 0.7", MEASURED_TEST),
     Mutant(
         "fba/mesh/polygons.py", "turned = (third - begin[third]) % 2 == 1", "turned = third < 0", STRIPS_TEST
@@ -417,13 +427,13 @@ MUTANTS = (
     Mutant(DAMAGE, "DOUBTFUL = 8", "DOUBTFUL = 0", DAMAGE_TEST),
     Mutant("fba/codec/_plane/syntax.py", "LAYER_CODES = (0xB0, 0xB5)", "LAYER_CODES = (0xB0,)", DAMAGE_TEST),
     Mutant(
-        "fba/codec/_decoder.py",
-        "                if self._objects or not self._salvage:\n",
+        STREAM_READER,
+        "                if self.objects.count or not self._salvage:\n",
         "                if not self._salvage:\n",
         DAMAGE_TEST,
     ),
     Mutant(
-        "fba/codec/_decoder.py",
+        STREAM_READER,
         "_DAMAGE_BYTES = 1000",
         "_DAMAGE_BYTES = 1",
         "tests/codec/test_hostile.py -k list_of",

@@ -3,7 +3,7 @@
 May use: parameters and the data model.
 """
 
-from fba.codec._decoder import Decoder, decode
+from fba.codec._decoder import Decoder
 from fba.codec._encoder import (
     ClampedParameter,
     Encoder,
@@ -12,9 +12,10 @@ from fba.codec._encoder import (
     encode_with_statistics,
 )
 from fba.codec._options import EncoderOptions
-from fba.codec._plane.mark import marked_table, write_mark
 from fba.codec._script import encode_planes
 from fba.codec._stream.damage import Damage
+from fba.codec._stream.mark import marked_table, write_mark
+from fba.codec._whole_stream import decode
 from fba.codec.block import Block
 from fba.codec.frame_buffer import DecodedFrames, FrameBuffer
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode

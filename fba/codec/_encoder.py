@@ -14,10 +14,10 @@ from fba.codec import _headers as headers
 from fba.codec._options import EncoderOptions
 from fba.codec._plane import full_turns, quantiser, slots
 from fba.codec._plane.loops import SKIP_MAX
-from fba.codec._plane.mark import write_mark
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec._ranges import CLAMP, Ranges, fitting_ranges
 from fba.codec._runs import Run, find_runs
+from fba.codec._stream.mark import write_mark
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
 from fba.errors import FbaWarning, RangeError
 from fba.parameters import INTENSITY_MAX

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -11,15 +10,14 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Int64
-from fba.codec._decoder import Decoder, decoder_for
 from fba.codec._plane import header_loops
 from fba.codec._stream.damage import Damage
+from fba.codec._whole_stream import read_blocks, reader_for
 from fba.codec.block import Block
 from fba.codec.settings import PartSettings
 from fba.errors import BitstreamError
 from fba.limits import DEFAULT_LIMITS, Limits
 
-_CHUNK = 1 << 16
 _MASK_NAMES = {
     header_loops.MASK_NONE: "none",
     header_loops.MASK_KEEP: "keep",
@@ -167,7 +165,8 @@ def probe_stream(
     Decodes it, because only the arithmetic decoder finds the ends of planes, but stores no values. Skips
     damage and lists it. Raises BitstreamError if no plane can be decoded.
     """
-    decoder = decoder_for(memoryview(data), bap_steps=bap_steps, on_error="salvage", limits=limits)
+    view = memoryview(data)
+    reader = reader_for(view, bap_steps=bap_steps, on_error="salvage", limits=limits)
     face, body = _PartCount(), _PartCount()
     bits: list[Int64] = []
     intra: list[Bool] = []
@@ -175,7 +174,7 @@ def probe_stream(
     start_codes = 0
     first: Block | None = None
     block: Block | None = None
-    for block in _blocks(decoder, memoryview(data)):
+    for block in read_blocks(reader, view):
         first = first or block
         count = len(block.index)
         face.add(block.settings.face, count)
@@ -185,8 +184,8 @@ def probe_stream(
         index.append(block.index)
         start_codes += block.settings.start_code
     if first is None or block is None:
-        if decoder.damage:
-            raise decoder.damage[0].error
+        if reader.damage:
+            raise reader.damage[0].error
         raise BitstreamError("the object has no plane", plane=0, bit=32)
     all_index = np.concatenate(index)
     end = block.start + Fraction(int(block.index[-1] - block.index[0]) + 1) / block.rate
@@ -206,13 +205,6 @@ def probe_stream(
         plane_bits=np.concatenate(bits),
         plane_intra=all_intra,
         frame_index=all_index,
-        damage=tuple(decoder.damage),
-        bap_steps=decoder.mark,
+        damage=tuple(reader.damage),
+        bap_steps=reader.objects.mark,
     )
-
-
-def _blocks(decoder: Decoder, data: memoryview) -> Iterator[Block]:
-    """Yield all blocks of a stream."""
-    for start in range(0, len(data), _CHUNK):
-        yield from decoder.push_blocks(data[start : start + _CHUNK])
-    yield from decoder.finish_blocks()

@@ -12,14 +12,12 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.codec._compact_buffer import CompactBuffer
-from fba.codec._decoder import decoder_for
 from fba.codec._stream.damage import Damage
+from fba.codec._whole_stream import read_blocks, reader_for
 from fba.errors import BitstreamError, FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 
-_CHUNK = 1 << 16
-"""Bytes that are decoded at once."""
 _FRAMES = 4096
 """Frames of which the digest is computed at once."""
 
@@ -80,27 +78,25 @@ def verify_stream(
     plane can be decoded, LimitError beyond `limits`.
     """
     view = memoryview(data)
-    decoder = decoder_for(view, bap_steps=bap_steps, on_error="salvage", limits=limits)
+    reader = reader_for(view, bap_steps=bap_steps, on_error="salvage", limits=limits)
     frames = CompactBuffer(limits, len(view))
     doubtful: set[int] = set()
     with warnings.catch_warnings(record=True) as odd:
         warnings.simplefilter("always", FbaWarning)
-        pieces = (view[start : start + _CHUNK] for start in range(0, len(view), _CHUNK))
-        for blocks in (*map(decoder.push_blocks, pieces), decoder.finish_blocks()):
-            for block in blocks:
-                frames.add(block)
-                if block.doubtful:
-                    doubtful.update(range(block.number, block.number + len(block.index)))
-    for damage in decoder.damage:
+        for block in read_blocks(reader, view):
+            frames.add(block)
+            if block.doubtful:
+                doubtful.update(range(block.number, block.number + len(block.index)))
+    for damage in reader.damage:
         doubtful.update(damage.doubtful)
     if not frames.frames:
-        if decoder.damage:
-            raise decoder.damage[0].error
+        if reader.damage:
+            raise reader.damage[0].error
         raise BitstreamError("the object has no plane", plane=0, bit=32)
     animation = frames.animation()
     return Verification(
-        len(view), len(animation), animation.rate, animation.duration, decoder.ended, tuple(decoder.damage),
-        len(doubtful), tuple(str(one.message) for one in odd), digest(animation),
+        len(view), len(animation), animation.rate, animation.duration, reader.objects.ended,
+        tuple(reader.damage), len(doubtful), tuple(str(one.message) for one in odd), digest(animation),
     )  # fmt: skip
 
 

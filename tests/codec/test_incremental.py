@@ -257,3 +257,21 @@ def test_decoders_go_without_the_garbage_collector() -> None:
         assert alive() is None
     finally:
         gc.enable()
+
+
+def test_an_error_holds_no_bytes_and_no_models() -> None:
+    """A program may collect the errors of thousands of streams."""
+    data = encode(performance("walking")) + OBJECT + bytes(2_000_000)
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        decoder = Decoder()
+        decoder.push(data)
+        with pytest.raises(BitstreamError) as caught:
+            decoder.push(b"")
+        del decoder
+        held = tracemalloc.get_traced_memory()[0] - before
+    finally:
+        tracemalloc.stop()
+    assert caught.value.plane
+    assert held < 200_000

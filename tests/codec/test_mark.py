@@ -10,7 +10,7 @@ import pytest
 import fba
 from fba import Animation, BodyTrack, Decoder, EncoderOptions, FaceTrack, FbaWarning
 from fba.codec import marked_table, probe_stream, verify_stream
-from fba.codec._plane.mark import find_marks
+from fba.codec._stream.mark import find_marks
 from fba_conformance.trace import decode_values, trace
 
 MARK = b"\0\0\1\xb2fba bap_steps=visage;"
@@ -80,6 +80,16 @@ def test_streams_one_after_another_each_go_by_their_own() -> None:
         assert shoulder(fba.decode(b"".join(parts))) == wanted
     assert [mark.table for mark in find_marks(stream() + iso)] == ["visage", "iso"]
     assert marked_table(stream() + iso) is None
+
+
+def test_a_mark_says_nothing_of_objects_behind_the_next() -> None:
+    """The second object has user data, but no mark: it is not "visage", as the first."""
+    data = stream() + stream(mark=False) + b"\0\0\1\xb2somebody's words"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = fba.decode(data)
+    assert shoulder(found) == RIGHT + shoulder(fba.decode(stream(mark=False)))
+    assert probe_stream(data).bap_steps is None
 
 
 @pytest.mark.parametrize("size", [1, 7, 100])

@@ -1,4 +1,4 @@
-"""A stream while it is decoded: its bytes, the times of its planes, and its damage.
+"""A stream while it is decoded: its bytes, the times of its planes, its objects and their marks, its damage.
 
-May use: settings and errors. Knows nothing of what planes carry.
+May use: settings, errors, and the names of start codes. Knows nothing of what planes carry.
 """
