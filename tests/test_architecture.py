@@ -59,14 +59,17 @@ fba.body.builtin
 fba.body.gait
 fba.body.importers
 fba.capture.motion
+fba.capture.sampling
 fba.capture.limbs
 fba.capture.comparison
+fba.capture.blendshapes
 fba.capture
 fba.formats
 fba.formats.text
 fba.formats.epf
 fba.formats.bvh
 fba.formats.gltf
+fba.formats.face_tables
 fba_conformance
 fba_conformance.fuzz
 fba_conformance.suite.definitions

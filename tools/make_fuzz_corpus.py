@@ -16,6 +16,7 @@ ROOT = Path(__file__).parents[1]
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files", "figures")]
 
+from face_files import face_weights, livelink_csv  # noqa: E402
 from fba.cache import load_or_make  # noqa: E402
 from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
@@ -257,6 +258,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
             "mesh_text": as_text(textured()),
             "mesh_binary": textured().glb(),
         },
+        "capture": {"livelink": livelink_csv(dict(list(face_weights(6).items())[:20])).encode()},
         "obj": {"triangles": OBJ.encode()},
         "mtl": {"two": MTL.encode()},
         "ply": meshes(),

@@ -64,6 +64,7 @@ GLTF_READER = "fba/formats/gltf/reader.py"
 BODIES, OWN_HEADS = "fba/formats/gltf/bodies.py", "fba/formats/gltf/_own_heads.py"
 OWN_HEAD = "fba/body/own_head.py"
 FACE_MOTION, HUMANOID = "fba/formats/gltf/face_motion.py", "fba/formats/gltf/humanoid.py"
+SHAPE_TABLE = "fba/capture/blendshapes/shape_table.py"
 BODIES_TEST = "tests/formats/gltf/test_foreign_bodies.py"
 HEADS_TEST = "tests/formats/gltf/test_own_heads.py"
 FACES_TEST = "tests/formats/gltf/test_face_motion.py"
@@ -335,7 +336,7 @@ MUTANTS = (
     Mutant(OWN_HEADS, " or name == shape", "", HEADS_TEST),
     Mutant(OWN_HEADS, "_target(bind, 100.0)", "_target(bind, 1.0)", HEADS_TEST),
     Mutant(FACE_MOTION, "np.where(turned, 0.0, amounts)", "amounts", FACES_TEST),
-    Mutant(FACE_MOTION, "            sent[fap.number - 1] = True", "            pass", FACES_TEST),
+    Mutant(SHAPE_TABLE, "            result[fap.number - 1] = True", "            pass", FACES_TEST),
     Mutant(HUMANOID, '"ThumbProximal": "ThumbMetacarpal"', '"ThumbProximal": "ThumbProximal"', DECLARED_TEST),
     Mutant(GLTF_READER, "HALF_TURN = (-1, 1, -1)", "HALF_TURN = (1, 1, 1)", DECLARED_TEST),
     Mutant(FAP_JOINTS, "SQUARE = 1e-6", "SQUARE = 1.0", "tests/formats/gltf/test_gltf_faces.py"),

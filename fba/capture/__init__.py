@@ -1,9 +1,11 @@
 """Motion capture to BAPs: matched joints, aligned rest poses, turned bones, planted feet, measured errors.
+Captured faces to FAPs: blendshapes.
 
-May use: parameters, the body, and the modules of `fba` itself.
+May use: parameters, face and body, and the modules of `fba` itself.
 """
 
 from fba.capture._report import BoneError, FeetError, RetargetReport, retarget_report
+from fba.capture.blendshapes import ShapeMotion, from_blendshapes
 from fba.capture.motion import SkeletonMotion
 from fba.capture.skeleton import from_skeleton
 
@@ -11,7 +13,9 @@ __all__ = [
     "BoneError",
     "FeetError",
     "RetargetReport",
+    "ShapeMotion",
     "SkeletonMotion",
+    "from_blendshapes",
     "from_skeleton",
     "retarget_report",
 ]

@@ -198,8 +198,39 @@ def _find_format(file: Path, format: str | None) -> Format:
 
 
 def is_capture(path: Path, format: str | None) -> bool:
+    """Whether a file holds what was captured of somebody; False for standard input, read only once."""
+    return str(path) != "-" and _find_format(path, format).is_capture
+
+
+def has_skeleton(path: Path, format: str | None) -> bool:
     """Whether a file holds the motion of a skeleton; False for standard input, which is read only once."""
     return str(path) != "-" and _find_format(path, format).read_motion is not None
+
+
+def describe_face(
+    path: Path, fps: Fraction | None, format: str | None, limits: Limits
+) -> dict[str, Any] | None:
+    """Return what is in the capture of a face; None for other files. fps: of a file without times."""
+    reader = _find_format(path, format)
+    if reader.read_face is None:
+        return None
+    options = {"fps": fps} if fps is not None and "fps" in reader.read_options else {}
+    return reader.read_face(path, limits=limits, **options).describe()
+
+
+def check_capture_options(given: Mapping[str, str], files: Iterable[Path], format: str | None) -> None:
+    """Raise click.UsageError for options of captures that no reader of the files takes.
+
+    given: those that were typed, by the readers' name for them.
+    """
+    from fba.formats import formats
+
+    readers = {_find_format(file, format) for file in files if str(file) != "-"}
+    for option, flag in given.items():
+        if readers and not any(option in reader.read_options for reader in readers):
+            takers = " and ".join(one.name.upper() for one in formats() if option in one.read_options)
+            names = " and ".join(sorted(one.name.upper() for one in readers))
+            raise click.UsageError(f"{flag} is for {takers}, not for {names}")
 
 
 def read_model(path: Path | None) -> FaceModel | None:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError, OptionError, Remedy, UnsupportedError, did_you_mean
@@ -29,6 +29,19 @@ if TYPE_CHECKING:
 
 
 UNKNOWN = Remedy("format", "if it is one of them, name it with {}", "'bvh'")
+
+
+COMMON_SUFFIXES = (".csv", ".json", ".txt")
+"""Suffixes that say nothing of the content."""
+
+
+class FaceCapture(Protocol):
+    """A captured face as it is in a file: blendshapes, action units, markers or points."""
+
+    def __len__(self) -> int: ...
+
+    def describe(self) -> dict[str, Any]:
+        """Return what is in it: plain numbers, texts and lists of them."""
 
 
 class Lazy:
@@ -61,6 +74,7 @@ class Format:
     file with this beginning (up to 64 KiB) and this lower-case suffix has this format. read, write: file to
     Animation and back; write is None if there is no writer. carries: the parts that a file can hold.
     read_motion: reads the motion of a skeleton, for formats of motion capture; `read` retargets it.
+    read_face: reads a captured face as it is; `read` makes FAPs of it.
     list_clips: describes the animations of a file, for formats that hold several; `read` takes one as `clip`.
     describe_person: describes the person in a file without an animation. written: description of a written
     file, if `description` says more than the writer can do.
@@ -74,9 +88,15 @@ class Format:
     write: Callable[..., None] | None
     carries: tuple[str, ...] = ("face", "body")
     read_motion: Callable[..., SkeletonMotion] | None = None
+    read_face: Callable[..., FaceCapture] | None = None
     list_clips: Callable[..., tuple[ClipInfo, ...]] | None = None
     describe_person: Callable[..., PersonInfo | None] | None = None
     written: str = ""
+
+    @property
+    def is_capture(self) -> bool:
+        """Whether files hold what was captured of somebody, of which `read` makes FAPs or BAPs."""
+        return self.read_motion is not None or self.read_face is not None
 
     @property
     def read_options(self) -> tuple[str, ...]:
@@ -128,6 +148,12 @@ def formats() -> tuple[Format, ...]:
             read_motion=lazy("gltf.reader", "read_motion"), list_clips=lazy("gltf.clips", "list_clips"),
             describe_person=lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
         ),
+        Format(
+            "livelink", (".csv",), "table of blendshapes: Live Link Face's, or with ARKit's names",
+            lazy("face_tables.livelink_csv", "sniff"), lazy("face_tables.livelink_csv", "read"), None,
+            ("face",),
+            read_face=lazy("face_tables.livelink_csv", "read_face"),
+        ),
     )  # fmt: skip
 
 
@@ -143,7 +169,7 @@ def format_of(path: Path, format: str | None = None) -> Format:
     by_suffix = [entry for entry in formats() if suffix in entry.suffixes]
     others = [entry for entry in formats() if entry not in by_suffix]
     match = next((entry for entry in (*by_suffix, *others) if entry.sniff(head, suffix)), None)
-    if match is None and by_suffix:
+    if match is None and by_suffix and suffix not in COMMON_SUFFIXES:
         return by_suffix[0]  # the error of its reader will say what is wrong
     if match is None:
         kind = recognition_hint(head)

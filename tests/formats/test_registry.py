@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from fractions import Fraction
 from pathlib import Path
@@ -34,7 +35,9 @@ def performance(face: bool = True, body: bool = True, rate: int = 25, first: int
 
 
 def test_the_table() -> None:
-    assert [entry.name for entry in formats()] == ["fba", "fap", "bap", "epf", "bvh", "gltf"]
+    assert [entry.name for entry in formats()] == [
+        "fba", "fap", "bap", "epf", "bvh", "gltf", "livelink",
+    ]  # fmt: skip
     by_name = {entry.name: entry for entry in formats()}
     assert by_name["fap"].read_options == ("fps", "name", "salvage", "angle_scale", "limits")
     assert by_name["fap"].write_options == by_name["epf"].write_options == ()
@@ -181,8 +184,8 @@ def test_real_files_are_recognised_without_their_suffix(shared: Path, tmp_path: 
         suffix = path.suffix.lower()
         if suffix not in (".fba", ".bvh", ".fap", ".bap", ".epf"):
             if suffix in (".fdp", ".wav", ".xml", ".json", ".trace", ".csv", ".md"):
-                with pytest.raises(FormatError):
-                    format_of(path)
+                with contextlib.suppress(FormatError):
+                    assert format_of(path).read_face is not None, path
             continue
         nameless = tmp_path / "nameless"
         nameless.unlink(missing_ok=True)

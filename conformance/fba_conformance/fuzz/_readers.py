@@ -95,6 +95,11 @@ def check_gltf(data: bytes, folder: Path) -> Outcome:
     return _check_file(data, folder / ("input.glb" if data[:4] == b"glTF" else "input.gltf"), read)
 
 
+def check_capture(data: bytes, folder: Path) -> Outcome:
+    """Read the capture of a face as FAPs."""
+    return _check_file(data, folder / "input.csv", fba.read)
+
+
 def check_face(data: bytes, folder: Path) -> Outcome:
     """Load a face model."""
     return _check_file(data, folder / "input.glb", FaceModel.load)

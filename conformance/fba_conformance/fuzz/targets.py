@@ -64,6 +64,10 @@ def targets() -> tuple[Target, ...]:
             b"null",
             b"true", b'"matrix":[', b'"uri":"a.bin"', *_TEXT,
         ),
+        _reader(
+            "capture", "captured faces, as FAPs", b",", b";", b"00:00:00:01.000", b"23:59:59:59.999",
+            b"JawOpen", b"timestamp", *_TEXT,
+        ),
         _reader("face", "face models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),
         _reader("body", "body models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),
         _reader("obj", "OBJ meshes", b"v 1 2 3\n", b"f 1 2 3\n", b"f -1/1/1 -2// 3\n", b"g a\n", b"\\\n",

@@ -10,7 +10,7 @@ import click
 
 from fba.cli import joint_options, options, step_tables, writer_options
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, check_clip, is_capture, read_input
+from fba.cli.inputs import EXISTING, check_clip, has_skeleton, read_input
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
@@ -78,7 +78,7 @@ def command(
     check_clip(clip, [source], format)
     if mark is not None and writing.name != "fba":
         raise click.UsageError(f"--mark is for streams, and {display_name(target)} becomes none")
-    captures = [source] if is_capture(source, format) else []
+    captures = [source] if has_skeleton(source, format) else []
     joints = joint_options.read_joints(maps, captures, format, clip, limit)
     tables: list[str] = []
     animation = read_input(

@@ -1,4 +1,4 @@
-"""`fba encode`: FAP, BAP and motion-capture files to an FBA stream."""
+"""`fba encode`: FAP and BAP files, motion capture and captured faces to an FBA stream."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ from fba.animation import Animation
 from fba.cli import capture_report, joint_options, options, step_tables
 from fba.cli.clamped_values import bring_near, clamped_lines, clamped_values
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, check_clip, input_file, is_capture, read_input
+from fba.cli.inputs import (
+    EXISTING,
+    check_capture_options,
+    check_clip,
+    has_skeleton,
+    input_file,
+    is_capture,
+    read_input,
+)
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, rate_text, seconds_text
 from fba.errors import FormatError
@@ -23,8 +31,8 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.codec import ClampedParameter
 
-CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up")
-"""Options that say how motion capture becomes BAPs."""
+CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "swap")
+"""Options that say how a capture becomes BAPs and FAPs: those that its reader takes count."""
 
 
 class _EncodeCommand(Command):
@@ -43,6 +51,7 @@ class _EncodeCommand(Command):
     cls=_EncodeCommand,
     epilog=examples(
         "fba encode walk.bvh -o walk.fba",
+        "fba encode face.csv -o face.fba",
         "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4 --bap-steps visage",
         "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
         "fba encode talk.fap -o again.fba --epf talk.epf",
@@ -147,6 +156,11 @@ class _EncodeCommand(Command):
     "--up", "Motion capture: the axis that points up.", "auto", "+x", "-x", "+y", "-y", "+z", "-z"
 )
 @options.choice_option(
+    "--swap",
+    "Live Link Face's tables: MouthLeft and MouthRight, JawLeft and JawRight change places.",
+    "auto", "yes", "no",
+)  # fmt: skip
+@options.choice_option(
     "--limits",
     "Report where joints exceed normal human motion, or clamp them to it.",
     "off",
@@ -183,7 +197,7 @@ def command(
     bap_steps: str,
     **settings: Any,
 ) -> None:
-    """Encode FAP, BAP or motion-capture files as an FBA stream.
+    """Encode FAP and BAP files, motion capture or captured faces as an FBA stream.
 
     A face file and a body file together become one stream. Ranges fit the data. A value that no range
     can carry is an error; --clamp limits it to the codable range. With --epf, only what that file says is
@@ -197,7 +211,8 @@ def command(
     saved = [] if map_out is None else [Output("--map-out", map_out, True)]
     read = [*inputs, epf, *(each for each in maps if isinstance(each, Path))]
     outputs = Outputs([*written, *saved], read, no_clobber=no_clobber)
-    captures = [path for path in inputs if is_capture(path, format)]
+    captures = [path for path in inputs if has_skeleton(path, format)]
+    check_capture_options({name: f"--{name}" for name in CAPTURE if not _is_left_open(name)}, inputs, format)
     if map_out is not None and not captures:
         raise click.UsageError("--map-out goes with motion capture: a BVH or glTF file")
     joints = joint_options.read_joints(maps, captures, format, clip, limit)
@@ -214,7 +229,7 @@ def command(
         )
     animation, limit_values = capture_report.apply_limits(animation, limits)
     if settings["clamp"] is None:
-        settings["clamp"] = bool(captures)
+        settings["clamp"] = any(is_capture(path, format) for path in inputs)
     mark = mark if mark is not None else epf is None
     table = step_tables.table_to_write(
         bap_steps, made=bool(captures), marked=mark, read=tables[0] if tables else None

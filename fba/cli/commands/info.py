@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Mapping
 from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import EXISTING, check_clip, describe_person, input_file, list_clips, probe_input
+from fba.cli.inputs import (
+    EXISTING,
+    check_clip,
+    describe_face,
+    describe_person,
+    input_file,
+    list_clips,
+    probe_input,
+)
 from fba.cli.printing import print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
+from fba.errors import FbaWarning
 from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO
 
@@ -56,6 +67,8 @@ def command(
 ) -> None:
     """Show what a file holds: frames, rate, parameters, bits. Any format is recognised by content.
 
+    Of the capture of a face it also says what was recorded, and what is odd about it.
+
     --trace reads the stream a second time, bit by bit, with an independent decoder. It is slow.
     """
     check_clip(clip, files, format)
@@ -76,7 +89,11 @@ def command(
                 if not as_json:
                     _print_person(path, size, person)
                 continue
-            info = probe_input(file, fps=fps, format=format, salvage=salvage, clip=clip, limits=limit)
+            capture = describe_face(file, fps, format, limit)
+            with warnings.catch_warnings():
+                if capture is not None:  # which lists what would be warned of
+                    warnings.simplefilter("ignore", FbaWarning)
+                info = probe_input(file, fps=fps, format=format, salvage=salvage, clip=clip, limits=limit)
             clips = list_clips(file, info.format, limit)
             if info.format == "fba" and info.body is not None:
                 data = file.read_bytes()
@@ -84,9 +101,11 @@ def command(
                 if bap_steps != BAP_STEPS_AUTO:
                     step_tables.warn_of_doubtful_stream(path, data, bap_steps)
             report = {"file": str(path), **info.to_dict(), "bap_steps_choice": steps or None}
-            reports.append(report | ({"clips": [asdict(clip) for clip in clips]} if clips else {}))
+            report |= {"clips": [asdict(clip) for clip in clips]} if clips else {}
+            reports.append(report | ({"capture": capture} if capture is not None else {}))
             if not as_json:
                 _print(path, info, clips, steps)
+                _print_capture(capture)
     if as_json:
         print_json(reports if len(files) > 1 else reports[0])
     each.finish()
@@ -141,6 +160,26 @@ def _print(path: Path, info: StreamInfo, clips: tuple[ClipInfo, ...], steps: str
         click.echo(f"  steps    {steps}")
     for damage in info.damage:
         click.echo(f"  damage   {damage}")
+
+
+def _print_capture(capture: Mapping[str, Any] | None) -> None:
+    """Print what is in the capture of a face, as its reader describes it."""
+    if capture is None:
+        return
+    count, still = len(capture["shapes"]), len(capture["still"])
+    moving = f", {still} of which never move" if still else ""
+    unseen = f", {capture['unseen']} of them without a face" if capture["unseen"] else ""
+    start = f" from {_clock_text(capture['start'])}" if capture["start"] is not None else ""
+    turns = [what for what, turns in capture["angles"].items() if turns]
+    click.echo(f"  capture  {capture['rows']} rows{unseen}, {capture['seconds']:.2f} s{start}")
+    click.echo(f"  {capture['kind']:8} {count}{moving}; angles of {' and '.join(turns) or 'nothing'}")
+    for finding in capture["findings"]:
+        click.echo(f"  found    {finding}")
+
+
+def _clock_text(seconds: float) -> str:
+    minutes, rest = divmod(seconds, 60)
+    return f"{int(minutes) // 60:02}:{int(minutes) % 60:02}:{rest:05.2f}"
 
 
 def _part_text(part: PartInfo, kind: str, frames: int) -> str:

@@ -23,12 +23,12 @@ from fba.body.model import BodyModel, BodyPart
 from fba.body.own_head import OwnHead
 from fba.body.skeleton import ROOT, Skeleton
 from fba.body.skin.skin_weights import strongest_weights
+from fba.capture.blendshapes.shape_table import amounts_of
 from fba.capture.rest import Rest, find_rest
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
 from fba.formats.gltf._pose import bind_matrices
 from fba.formats.gltf._skeletons import Joints, find_joints
-from fba.formats.gltf.face_motion import amounts_of
 from fba.gltf import Gltf, Node, Primitive, read_gltf
 from fba.gltf import Material as GltfMaterial
 from fba.limits import DEFAULT_LIMITS, Limits

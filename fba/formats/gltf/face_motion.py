@@ -1,36 +1,29 @@
 """The motion of a face in a glTF file as FAPs: weights of morph targets, expressions of VRMA, eyes and jaws.
 
-`shape_faps.csv` lists what shapes mean, at weight 1: those of ARKit, the expressions of VRM, the visemes of
-Oculus, and some of VRoid's. The amplitudes are those of an adult's face, in FAPUs, so that the motion fits
-every face. "viseme10" and "expression1" stand for the FAPs of a viseme or an expression at full intensity.
-Shapes that are named after FAPs have the amplitude that this project's own files use.
+`fba.capture.blendshapes.shape_table` says what shapes mean.
 """
 
 from __future__ import annotations
 
-import csv
 import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.animation import FaceTrack
 from fba.arrays import Bool, Float64
+from fba.capture.blendshapes.combination import combine, part_lids
+from fba.capture.blendshapes.shape_table import amounts_of, with_mates
 from fba.errors import FbaWarning
-from fba.face.authoring.shapes.shape_names import arkit_of, fap_of
-from fba.face.expressions import Definitions
-from fba.face.gltf.morphs import morph_values
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
 from fba.formats.gltf.clips import choose_clip
 from fba.formats.gltf.humanoid import find_humanoid
 from fba.gltf import Animation as Clip
 from fba.gltf import Gltf
 from fba.gltf.values import Value, optional_member
-from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
+from fba.parameters import FAP_COUNT, fap_numbers
 
 LARGEST = 1 << 30
 RADIAN = 1e5
@@ -64,30 +57,28 @@ def read_face_motion(gltf: Gltf, clip: Clip, times: Float64) -> FaceTrack | None
     values = np.zeros((len(times), FAP_COUNT))
     sent = np.zeros(FAP_COUNT, dtype=bool)
 
-    def add(weights: Float64, amounts: Float64) -> None:
-        np.add(values, weights[:, None] * amounts, out=values)
-        sent[amounts != 0] = True
-
     turned = np.zeros(FAP_COUNT, dtype=bool)  # where eyes turn, shapes that look aside move their lids
     _turn_eyes(_gaze(gltf, clip, times), "lr", values, turned)
     for bone in _face_bones(gltf, clip):
         forward = _turns(gltf, clip, times, bone.node)[:, :, 2]
         if bone.kind == "jaw":
-            add(np.arctan2(-forward[:, 1], forward[:, 2]) / JAW_OPEN, _table()["jawopen"])
+            opened = np.arctan2(-forward[:, 1], forward[:, 2]) / JAW_OPEN
+            _add(combine({"jawOpen": opened}, len(times)), values, sent)
         else:
             _turn_eyes(forward, bone.kind, values, turned)
     sent |= turned
-    for name, weights in _weights(gltf, clip, times).items():
-        amounts = amounts_of(name)
-        if amounts is not None:
-            add(weights, np.where(turned, 0.0, amounts))
+    _add(combine(_weights(gltf, clip, times), len(times), but=turned), values, sent)
     if not sent.any():
         return None
-    for fap in faps():  # else a decoder would copy the other side
-        if fap.left_right_mate is not None and sent[fap.left_right_mate - 1]:
-            sent[fap.number - 1] = True
+    part_lids(values)
     rounded = np.rint(np.clip(values, -LARGEST, LARGEST)).astype(np.int32)
-    return FaceTrack(rounded, np.broadcast_to(sent, rounded.shape))
+    return FaceTrack(rounded, np.broadcast_to(with_mates(sent), rounded.shape))
+
+
+def _add(motion: tuple[Float64, Bool], values: Float64, sent: Bool) -> None:
+    """Add FAPs (T, 68) and the mask (68,) of those that are sent."""
+    values += motion[0]
+    sent |= motion[1]
 
 
 def find_face_clip(gltf: Gltf, clip: str | int | None) -> Clip | None:
@@ -116,61 +107,6 @@ def nodes_of_faces(gltf: Gltf) -> frozenset[int]:
     look = optional_member(optional_member(_animation_extension(gltf), "lookAt"), "node")
     nodes = [node for _, node in _expressions(gltf)]
     return frozenset([*nodes, *([] if look is None else [look.index(len(gltf.nodes), "node")])])
-
-
-@cache
-def amounts_of(name: str) -> Float64 | None:
-    """Return FAPs (68,) of a shape at weight 1, by its name; None if it is not known."""
-    number = fap_of(name)
-    if number is not None:
-        amounts = np.zeros(FAP_COUNT)
-        amounts[number - 1] = morph_values().get(number, 0)
-        return amounts
-    table = _table()
-    plain = re.split(r"[.:|/]", name)[-1]
-    shape = arkit_of(name) or plain
-    return next((table[_key(word)] for word in (name, plain, shape) if _key(word) in table), None)
-
-
-@cache
-def largest_amounts() -> Float64:
-    """Return the largest value (68,) of each FAP that a shape of the table has; read-only."""
-    largest: Float64 = np.abs(list(_table().values())).max(axis=0)
-    largest.flags.writeable = False
-    return largest
-
-
-@cache
-def _table() -> dict[str, Float64]:
-    """Return FAPs (68,) at weight 1 by the key of each shape's name."""
-    table: dict[str, Float64] = {}
-    text = (files(__package__) / "shape_faps.csv").read_text(encoding="utf-8")
-    for row in csv.DictReader(text.splitlines()):
-        sides = re.search(r"\((\w+)\|(\w+)\)", row["shape"])
-        for side, word in zip("lr", sides.groups(), strict=True) if sides else [("", "")]:
-            name = row["shape"].replace(sides[0], word) if sides else row["shape"]
-            table[_key(name)] = _amounts((row["faps"] or "").replace("?", side))
-    return table
-
-
-def _amounts(text: str) -> Float64:
-    """Return FAPs (68,) from text such as "open_jaw=500 viseme10=1"."""
-    amounts = np.zeros(FAP_COUNT)
-    definitions = Definitions.default()
-    for entry in text.split():
-        name, _, value = entry.partition("=")
-        group = re.fullmatch(r"(viseme|expression)(\d+)", name)
-        if group is None:
-            amounts[fap_numbers()[name] - 1] += float(value)
-            continue
-        rows = definitions.visemes if group[1] == "viseme" else definitions.expressions
-        amounts += float(value) * rows[int(group[2])].astype(np.float64)
-    amounts[: FIRST_LOW_LEVEL_FAP - 1] = 0
-    return amounts
-
-
-def _key(name: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
 def _weights(gltf: Gltf, clip: Clip, times: Float64) -> dict[str, Float64]:

@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import fba
+from fba.capture.blendshapes.shape_table import amounts_of
 from fba.errors import FbaWarning
 from fba.face.expressions import Definitions
-from fba.formats.gltf.face_motion import amounts_of
 from fba.gltf import read_gltf
 from fba.parameters import fap_numbers
 from gltf_edits import edit

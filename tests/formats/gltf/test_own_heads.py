@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fba.body.own_head import HeadShape, OwnHead
+from fba.capture.blendshapes.shape_table import amounts_of
 from fba.formats.gltf.bodies import read_body
-from fba.formats.gltf.face_motion import amounts_of
 from fba.parameters import FAP_COUNT, fap_numbers
 from gltf_edits import edit
 from small_people import BONES, write_person

@@ -411,7 +411,7 @@ FAP = FAP_HEAD + mask(3) + "\n0 1\n"
 
 def hostile_files() -> dict[str, HostileFile]:
     """Return all hostile files, by name."""
-    return {**_texts(), **_captures(), **_gltf(), **_meshes(), **_points(), **_sounds()}
+    return {**_texts(), **_captures(), **_faces(), **_gltf(), **_meshes(), **_points(), **_sounds()}
 
 
 def _texts() -> dict[str, HostileFile]:
@@ -467,6 +467,25 @@ def _captures() -> dict[str, HostileFile]:
         "gltf clips": HostileFile(read_motion, "a.glb", lambda size: skeleton(clips=size // 120)),
         "gltf roots": HostileFile(read_motion, "a.glb", lambda size: skeleton(roots=size // 24)),
         "gltf hours": HostileFile(read_any, "a.glb", lambda size: skeleton(last=16_000.0)),
+    }
+
+
+def _faces() -> dict[str, HostileFile]:
+    from face_files import face_weights, livelink_csv
+
+    table = livelink_csv(face_weights(2))
+    head = table.split("\n", 1)[0]
+    few = ",".join(head.split(",")[:8])
+    rows = lambda size: livelink_csv(face_weights(size // 680)).encode()  # noqa: E731
+    return {
+        "table of a face": HostileFile(encode_capture, "a.csv", rows),
+        "table, short rows": HostileFile(read_any, "a.csv", repeat(few + "\n", "0:0:0:%d" + ",0" * 7 + "\n")),
+        "table, names": HostileFile(read_any, "a.csv", repeat(few, ",a", "\n" + table)),
+        "table, blank lines": HostileFile(read_any, "a.csv", repeat(table, "\n")),
+        "table, one line": HostileFile(read_any, "a.csv", repeat(table, "1,")),
+        "table, empty cells": HostileFile(
+            read_any, "a.csv", repeat(head + "\n", "0:0:0:1" + "," * 53 + "\n")
+        ),
     }
 
 

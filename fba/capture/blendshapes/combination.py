@@ -1,0 +1,47 @@
+"""Weights of several shapes to FAPs: their sum, and what cannot simply be added."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fba.arrays import Bool, Float64
+from fba.capture.blendshapes.shape_table import amounts_of, key_of
+from fba.face.authoring.shapes.shape_names import arkit_of
+from fba.parameters import FAP_COUNT, fap_numbers
+
+LID_GAP = 1024.0
+"""Sum of the closings of both lids of an eye at which they meet."""
+JAW, CLOSED = "jawOpen", "mouthClose"
+
+
+def combine(weights: Mapping[str, Float64], count: int, *, but: Bool | None = None) -> tuple[Float64, Bool]:
+    """Return FAPs (T, 68) of shapes with weights (T,), and which of them (68,) the shapes move at all.
+
+    count: T. Names that mean nothing here are left out. but: FAPs (68,) that something else moves.
+    "mouthClose" brings the lips of an open jaw together: it counts up to the weight of "jawOpen", and not at
+    all without it.
+    """
+    known = {name: amounts for name in weights if (amounts := amounts_of(name)) is not None}
+    if not known:
+        return np.zeros((count, FAP_COUNT)), np.zeros(FAP_COUNT, dtype=bool)
+    columns = [weights[name] for name in known]
+    by_shape = {arkit_of(name) or key_of(name): number for number, name in enumerate(known)}
+    if CLOSED in by_shape:
+        closed = by_shape[CLOSED]
+        opened = columns[by_shape[JAW]] if JAW in by_shape else np.zeros(count)
+        columns[closed] = np.minimum(columns[closed], np.maximum(opened, 0.0))
+    amounts = np.array(list(known.values()))
+    if but is not None:
+        amounts[:, but] = 0.0
+    return np.stack(columns, axis=1) @ amounts, (amounts != 0).any(axis=0)
+
+
+def part_lids(values: Float64) -> None:
+    """Keep lids of FAPs (T, 68) from passing each other, as blinks and squints add up."""
+    for side in "lr":  # lower lids give way
+        upper = fap_numbers()[f"close_t_{side}_eyelid"] - 1
+        lower = fap_numbers()[f"close_b_{side}_eyelid"] - 1
+        np.minimum(values[:, upper], LID_GAP, out=values[:, upper])
+        np.minimum(values[:, lower], LID_GAP - values[:, upper], out=values[:, lower])

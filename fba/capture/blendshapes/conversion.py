@@ -1,0 +1,79 @@
+"""`from_blendshapes`: a captured face as FAPs."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Bool, Float64
+from fba.capture.blendshapes.combination import combine, part_lids
+from fba.capture.blendshapes.motion import ShapeMotion
+from fba.capture.blendshapes.shape_table import with_mates
+from fba.capture.sampling import frame_numbers, interpolate
+from fba.errors import ModelError
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import FAP_COUNT, fap_numbers
+from fba.tracks import FaceTrack
+
+RADIAN = 1e5
+"""Units of the FAPs that are angles."""
+LARGEST = 1 << 30
+FRAME_BYTES = 1500
+"""Memory that a frame takes: its FAPs in several kinds of numbers."""
+HEAD = ("head_pitch", "head_yaw", "head_roll")
+EYES = ("yaw_l_eyeball", "yaw_r_eyeball", "pitch_l_eyeball", "pitch_r_eyeball")
+
+
+def from_blendshapes(
+    motion: ShapeMotion, rate: Fraction | int | str | None = None, *, limits: Limits = DEFAULT_LIMITS
+) -> Animation:
+    """Return the FAPs of a captured face: a face track that sends the FAPs that its shapes can move.
+
+    rate: frames per second; None for the motion's own. Frames lie at whole multiples of its period from the
+    source's first row on; values between two rows are interpolated, so that the animation keeps the times of
+    the source whatever its rate was. Rows without a face are bridged; if the first or the last ones have
+    none, the animation begins later or ends earlier.
+
+    Where the motion has angles of eyes that are not all 0, they turn the eyeballs (FAPs 23 to 26); otherwise
+    the shapes that look aside do. Raises ModelError if no shape is known or no row has a face, LimitError for
+    more than the limits allow.
+    """
+    rate = motion.rate if rate is None else Fraction(rate)
+    if rate <= 0:
+        raise ModelError(f"the frame rate must be positive, not {rate}")
+    seen = motion.seen
+    if not seen.any():
+        raise ModelError(f"no face is seen in any of the {len(motion)} rows; there is nothing to encode")
+    index = frame_numbers(motion.times[seen], rate, limits)
+    limits.check_bytes(FRAME_BYTES * len(index), "the face", source=FRAME_BYTES * len(motion))
+    at = index / float(rate)
+    angles = [one for one in (motion.head, motion.eyes) if one is not None]
+    weights, *turns = interpolate(
+        motion.times[seen], [motion.weights[seen], *(one[seen] for one in angles)], at, limits
+    )
+    head = turns.pop(0) if motion.head is not None else None
+    eyes = turns.pop(0) if motion.eyes is not None else None
+    values = np.zeros((len(index), FAP_COUNT))
+    turned = np.zeros(FAP_COUNT, dtype=bool)
+    _turn(head, HEAD, values, turned)
+    _turn(eyes, EYES, values, turned)
+    amounts, moved = combine(dict(zip(motion.names, weights.T, strict=True)), len(index), but=turned)
+    if not (moved | turned).any():
+        names = ", ".join(map(repr, motion.names[:6]))
+        raise ModelError(f"no name of a shape is known here: {names}; expected ARKit's, such as 'jawOpen'")
+    values += amounts
+    part_lids(values)
+    rounded = np.rint(np.clip(values, -LARGEST, LARGEST)).astype(np.int32)
+    sent = with_mates(moved | turned)
+    return Animation(rate, index, FaceTrack(rounded, np.broadcast_to(sent, rounded.shape)), name=motion.name)
+
+
+def _turn(angles: Float64 | None, faps: tuple[str, ...], values: Float64, turned: Bool) -> None:
+    """Add angles (T, n), radians, to FAPs (T, 68), unless all are 0, as where a source records none."""
+    if angles is None or not angles.any():
+        return
+    columns = [fap_numbers()[fap] - 1 for fap in faps]
+    values[:, columns] += angles * RADIAN
+    turned[columns] = True

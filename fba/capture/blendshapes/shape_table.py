@@ -1,0 +1,87 @@
+"""What shapes mean: FAPs of each at weight 1, from `shape_faps.csv`.
+
+The table has ARKit's 52 shapes, the expressions of VRM, the visemes of Oculus, and some of VRoid's. The
+amplitudes are those of an adult's face, in FAPUs, so that the motion fits every face. "viseme10" and
+"expression1" stand for the FAPs of a viseme or an expression at full intensity. Shapes that are named after
+FAPs have the amplitude that this project's own files use.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from fba.arrays import Bool, Float64
+from fba.face.authoring.shapes.shape_names import arkit_of, fap_of
+from fba.face.expressions import Definitions
+from fba.face.gltf.morphs import morph_values
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
+
+
+@cache
+def amounts_of(name: str) -> Float64 | None:
+    """Return FAPs (68,) of a shape at weight 1, by its name; None if it is not known."""
+    number = fap_of(name)
+    if number is not None:
+        amounts = np.zeros(FAP_COUNT)
+        amounts[number - 1] = morph_values().get(number, 0)
+        return amounts
+    table = _table()
+    plain = re.split(r"[.:|/]", name)[-1]
+    shape = arkit_of(name) or plain
+    return next((table[key_of(word)] for word in (name, plain, shape) if key_of(word) in table), None)
+
+
+@cache
+def largest_amounts() -> Float64:
+    """Return the largest value (68,) of each FAP that a shape of the table has; read-only."""
+    largest: Float64 = np.abs(list(_table().values())).max(axis=0)
+    largest.flags.writeable = False
+    return largest
+
+
+def with_mates(sent: Bool) -> Bool:
+    """Return a mask (68,) with the other side of every FAP in it, or else a decoder would copy this side."""
+    result = np.array(sent)
+    for fap in faps():
+        if fap.left_right_mate is not None and sent[fap.left_right_mate - 1]:
+            result[fap.number - 1] = True
+    return result
+
+
+def key_of(name: str) -> str:
+    """Return a name without case and without all that is no letter or digit."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+@cache
+def _table() -> dict[str, Float64]:
+    """Return FAPs (68,) at weight 1 by the key of each shape's name."""
+    table: dict[str, Float64] = {}
+    text = (files(__package__) / "shape_faps.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        sides = re.search(r"\((\w+)\|(\w+)\)", row["shape"])
+        for side, word in zip("lr", sides.groups(), strict=True) if sides else [("", "")]:
+            name = row["shape"].replace(sides[0], word) if sides else row["shape"]
+            table[key_of(name)] = _amounts((row["faps"] or "").replace("?", side))
+    return table
+
+
+def _amounts(text: str) -> Float64:
+    """Return FAPs (68,) from text such as "open_jaw=500 viseme10=1"."""
+    amounts = np.zeros(FAP_COUNT)
+    definitions = Definitions.default()
+    for entry in text.split():
+        name, _, value = entry.partition("=")
+        group = re.fullmatch(r"(viseme|expression)(\d+)", name)
+        if group is None:
+            amounts[fap_numbers()[name] - 1] += float(value)
+            continue
+        rows = definitions.visemes if group[1] == "viseme" else definitions.expressions
+        amounts += float(value) * rows[int(group[2])].astype(np.float64)
+    amounts[: FIRST_LOW_LEVEL_FAP - 1] = 0
+    return amounts

@@ -1,0 +1,4 @@
+"""Tables and records of captured faces: a row or a record for each moment.
+
+May use: what formats share, and `fba.capture`.
+"""

@@ -1,0 +1,116 @@
+"""What readers of blendshapes share: names of shapes, labels of left and right, and the way to FAPs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Float64
+from fba.capture.blendshapes import ShapeMotion, from_blendshapes
+from fba.capture.blendshapes.shape_table import key_of
+from fba.errors import FbaWarning, FormatError, ModelError, OptionError
+from fba.face.authoring.shapes.shape_names import arkit_names, arkit_of
+from fba.limits import Limits
+from fba.source import Path
+
+LARGEST = 4.0
+"""Largest weight; more is no share of a shape."""
+SWAPS = ("auto", "yes", "no")
+SWAPPED = (("mouthLeft", "mouthRight"), ("jawLeft", "jawRight"))
+"""Labels that Live Link Face's tables have the wrong way round."""
+TELLING = 0.3
+"""Correlation of mouths that go aside with smiles from which on it decides."""
+MOVES = 0.01
+"""Standard deviation from which on a difference of weights says something."""
+
+
+@cache
+def shape_of(name: str) -> str | None:
+    """Return ARKit's name of a shape, from a name in any case; None if it is none of the 52."""
+    return _shapes().get(key_of(name)) or arkit_of(name)
+
+
+@cache
+def _shapes() -> dict[str, str]:
+    return {key_of(name): name for name in arkit_names()}
+
+
+def to_animation(
+    motion: ShapeMotion, rate: Fraction | int | str | None, path: Path, limits: Limits, warn: int = 3
+) -> Animation:
+    """Return the FAPs of a captured face. Warns (FbaWarning) of what its reader found.
+
+    Raises FormatError where it cannot be made. warn: callers between the user and here.
+    """
+    import warnings
+
+    for finding in motion.findings:
+        warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=warn)
+    try:
+        return from_blendshapes(motion, rate, limits=limits)
+    except ModelError as error:
+        raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
+
+
+def check_weights(weights: Float64, names: Sequence[str], lines: Sequence[int], path: Path) -> None:
+    """Raise FormatError for weights (T, N) that are no shares of 1."""
+    far = np.abs(weights) > LARGEST
+    if not far.any():
+        return
+    row, column = np.argwhere(far)[0]
+    value = float(weights[row, column])
+    hint = "; are these percent?" if np.nanmax(np.abs(weights)) <= 100 else ""
+    raise FormatError(
+        f"{names[column]} has the weight {value:g}; expected 0 to 1{hint}", path=path, line=lines[row]
+    )
+
+
+def find_swap(motion: ShapeMotion, swap: str, *, expected: bool) -> ShapeMotion:
+    """Return a capture with the labels of `SWAPPED` the right way round; its findings say what was done.
+
+    swap: "yes", "no", or "auto": they are changed where mouths go to the side on which nobody smiles. Where
+    no lop-sided smile tells, `expected` does: whether the program is known to write them the wrong way round.
+    """
+    if swap not in SWAPS:
+        raise OptionError(f"swap must be one of {', '.join(SWAPS)}, not {swap!r}")
+    present = [pair for pair in SWAPPED if set(pair) <= set(motion.names)]
+    if swap == "no" or not present:
+        return motion
+    why = "as you asked"
+    if swap == "auto":
+        correlation = _smiles_beside(motion)
+        wrong = expected if correlation is None else correlation < 0
+        if not wrong:
+            return motion
+        why = (
+            "Live Link Face's tables have them so, and no lop-sided smile contradicts"
+            if correlation is None
+            else f"mouths go to the side on which nobody smiles (correlation {correlation:.2f})"
+        )
+    order = list(motion.names)
+    for first, second in present:
+        one, two = order.index(first), order.index(second)
+        order[one], order[two] = order[two], order[one]
+    pairs = " and ".join("/".join(pair) for pair in present)
+    finding = f"{pairs} are taken the other way round: {why}"
+    return replace(motion, names=tuple(order), findings=(*motion.findings, finding))
+
+
+def _smiles_beside(motion: ShapeMotion) -> float | None:
+    """Return how mouths that go left correlate with smiles more on the left; None if that is unclear."""
+    wanted = ("mouthLeft", "mouthRight", "mouthSmileLeft", "mouthSmileRight")
+    if not set(wanted) <= set(motion.names):
+        return None
+    left, right, smile_left, smile_right = (
+        motion.weights[motion.seen][:, motion.names.index(name)] for name in wanted
+    )
+    aside, smiles = left - right, smile_left - smile_right
+    if len(aside) < 2 or min(aside.std(), smiles.std()) < MOVES:
+        return None
+    correlation = float(np.corrcoef(aside, smiles)[0, 1])
+    return correlation if abs(correlation) >= TELLING else None

@@ -1,0 +1,57 @@
+"""Captured faces on the command line: what `fba info` lists, and options that their readers take."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fba
+from face_files import ANGLES, UDP_ORDER, livelink_csv
+
+ROWS = 90
+
+
+def table(folder: Path) -> Path:
+    """A smile on the left comes and goes, while the mouth is said to go right; all angles are 0."""
+    wave = 0.5 + 0.5 * np.sin(np.arange(ROWS) / 9)
+    columns = {name: np.zeros(ROWS) for name in [*UDP_ORDER, *ANGLES]}
+    columns |= {"MouthSmileLeft": wave, "MouthRight": 0.4 * wave}
+    path = folder / "face.csv"
+    path.write_text(livelink_csv(columns))
+    return path
+
+
+def test_info_lists_what_was_recorded(run: Callable[..., Any], tmp_path: Path) -> None:
+    path = table(tmp_path)
+    said = run("info", path)
+    assert (said.code, said.err) == (0, "")
+    assert "capture  90 rows, 1.49 s from 18:48:59.66" in said.out
+    assert "52, 50 of which never move; angles of nothing" in said.out
+    assert "found    all angles of head and eyes are 0" in said.out
+    assert "the other way round: mouths go to the side on which nobody smiles" in said.out
+    capture = json.loads(run("info", "--json", path).out)["capture"]
+    assert capture["angles"] == {"head": False, "eyes": False}
+    assert len(capture["still"]) == 50
+
+
+def test_encode(run: Callable[..., Any], tmp_path: Path) -> None:
+    path, target = table(tmp_path), tmp_path / "a.fba"
+    said = run("encode", path, "-o", target)
+    assert said.code == 0
+    assert "a.fba: 90 frames, 1.50 s at 60 frames/s" in said.out
+    assert "warning" in said.err
+    assert "the other way round" in said.err
+    assert len(fba.read(target)) == 90
+    assert "the other way round" not in run("encode", path, "-o", target, "--swap", "no").err
+    assert run("encode", path, "-o", target, "--fps", 25).code == 0
+    assert (fba.read(target).rate, len(fba.read(target))) == (25, 38)
+
+
+def test_an_option_that_no_input_takes(run: Callable[..., Any], tmp_path: Path) -> None:
+    said = run("encode", table(tmp_path), "-o", tmp_path / "a.fba", "--spine", "full")
+    assert said.code == 2
+    assert "--spine is for BVH and GLTF, not for LIVELINK" in said.err
