@@ -65,6 +65,11 @@ BODIES, OWN_HEADS = "fba/formats/gltf/bodies.py", "fba/formats/gltf/_own_heads.p
 OWN_HEAD = "fba/body/own_head.py"
 FACE_MOTION, HUMANOID = "fba/formats/gltf/face_motion.py", "fba/formats/gltf/humanoid.py"
 SHAPE_TABLE = "fba/capture/blendshapes/shape_table.py"
+COMBINATION = "fba/capture/blendshapes/combination.py"
+LIVELINK, TIMES = "fba/formats/face_tables/_shape_rows.py", "fba/formats/face_tables/_times.py"
+SAMPLING = "fba/capture/sampling.py"
+LIVELINK_TEST = "tests/formats/face_tables/test_livelink_csv.py"
+SHAPES_TEST = "tests/capture/faces/test_shapes_to_faps.py"
 BODIES_TEST = "tests/formats/gltf/test_foreign_bodies.py"
 HEADS_TEST = "tests/formats/gltf/test_own_heads.py"
 FACES_TEST = "tests/formats/gltf/test_face_motion.py"
@@ -335,7 +340,14 @@ MUTANTS = (
     Mutant(OWN_HEAD, "over = result > 1", "over = result > 9", HEADS_TEST),
     Mutant(OWN_HEADS, " or name == shape", "", HEADS_TEST),
     Mutant(OWN_HEADS, "_target(bind, 100.0)", "_target(bind, 1.0)", HEADS_TEST),
-    Mutant(FACE_MOTION, "np.where(turned, 0.0, amounts)", "amounts", FACES_TEST),
+    Mutant(COMBINATION, "amounts[:, but] = 0.0", "pass", FACES_TEST),
+    Mutant(COMBINATION, "np.minimum(columns[closed], ", "np.maximum(columns[closed], ", SHAPES_TEST),
+    Mutant(COMBINATION, "LID_GAP - values[:, upper]", "LID_GAP", SHAPES_TEST),
+    Mutant(LIVELINK, "correlation < 0", "correlation > 0", LIVELINK_TEST),
+    Mutant(LIVELINK, "wrong = expected if", "wrong = False if", LIVELINK_TEST),
+    Mutant(TIMES, "np.diff(seconds, prepend=seconds[0]) < -NOON", "seconds < 0", LIVELINK_TEST),
+    Mutant(TIMES, "if largest < rate", "if largest <= rate", LIVELINK_TEST),
+    Mutant(SAMPLING, "np.where(length > BRIDGED, RETURN, length)", "length", LIVELINK_TEST),
     Mutant(SHAPE_TABLE, "            result[fap.number - 1] = True", "            pass", FACES_TEST),
     Mutant(HUMANOID, '"ThumbProximal": "ThumbMetacarpal"', '"ThumbProximal": "ThumbProximal"', DECLARED_TEST),
     Mutant(GLTF_READER, "HALF_TURN = (-1, 1, -1)", "HALF_TURN = (1, 1, 1)", DECLARED_TEST),

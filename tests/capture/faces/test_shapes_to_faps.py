@@ -1,0 +1,85 @@
+"""Blendshapes to FAPs: sums of shapes, lips brought together, lids that meet, times and errors."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from fba.animation import Animation
+from fba.arrays import Float64
+from fba.capture import ShapeMotion, from_blendshapes
+from fba.capture.blendshapes.shape_table import amounts_of
+from fba.errors import ModelError
+from fba.parameters import fap_numbers
+
+
+def motion(times: Float64 | None = None, rate: int = 10, **weights: float | list[float]) -> ShapeMotion:
+    count = max(np.size(one) for one in weights.values())
+    columns = [np.broadcast_to(np.asarray(one, dtype=float), count) for one in weights.values()]
+    rows = np.arange(count) / rate if times is None else times
+    return ShapeMotion(tuple(weights), np.stack(columns, axis=1), rows, Fraction(rate))
+
+
+def shown(animation: Animation, name: str) -> list[int]:
+    assert animation.face is not None
+    found: list[int] = animation.face.values[:, fap_numbers()[name] - 1].tolist()
+    return found
+
+
+def test_shapes_add_up_and_only_their_faps_are_sent() -> None:
+    animation = from_blendshapes(motion(jawForward=[0.0, 0.5, 1.0], noseSneerLeft=0.5))
+    assert shown(animation, "thrust_jaw") == [0, 200, 400]
+    sneer = amounts_of("noseSneerLeft")
+    assert sneer is not None
+    column = fap_numbers()["stretch_l_nose"] - 1
+    assert shown(animation, "stretch_l_nose") == [round(sneer[column] / 2)] * 3
+    assert animation.face is not None
+    sent = {number for name, number in fap_numbers().items() if animation.face.mask[0, number - 1]}
+    assert fap_numbers()["stretch_r_nose"] in sent  # or a decoder would copy the left side
+    assert shown(animation, "stretch_r_nose") == [0, 0, 0]
+    assert fap_numbers()["raise_l_ear"] not in sent
+
+
+def test_mouth_close_is_a_correction_of_jaw_open() -> None:
+    both = from_blendshapes(motion(jawOpen=0.5, mouthClose=[0.0, 0.25, 0.5, 0.9]))
+    lip = shown(both, "raise_b_midlip")
+    jaw, close = amounts_of("jawOpen"), amounts_of("mouthClose")
+    assert jaw is not None
+    assert close is not None
+    column = fap_numbers()["raise_b_midlip"] - 1
+    assert lip == [round(0.5 * jaw[column] + share * close[column]) for share in (0, 0.25, 0.5, 0.5)]
+    assert shown(both, "open_jaw") == [round(0.5 * jaw[2])] * 4
+    assert shown(from_blendshapes(motion(jawOpen=0.0, mouthClose=0.6)), "raise_b_midlip") == [0]
+
+
+def test_lids_meet_and_do_not_pass_each_other() -> None:
+    for blink, squint in ((1.0, 0.0), (1.0, 1.0), (0.9, 0.6)):
+        animation = from_blendshapes(motion(eyeBlinkLeft=blink, eyeSquintLeft=squint))
+        upper, lower = shown(animation, "close_t_l_eyelid")[0], shown(animation, "close_b_l_eyelid")[0]
+        assert 1015 <= upper + lower <= 1024
+
+
+def test_values_between_rows_and_rates() -> None:
+    uneven = motion(np.array([0.0, 0.1, 0.4, 0.5]), jawForward=[0.0, 0.1, 0.4, 0.5])
+    assert shown(from_blendshapes(uneven), "thrust_jaw") == [0, 40, 80, 120, 160, 200]
+    fast = from_blendshapes(uneven, 20)
+    assert shown(fast, "thrust_jaw") == list(range(0, 201, 20))
+    late = motion(np.array([0.0, 0.1, 0.2, 0.3]), jawForward=[np.nan, np.nan, 0.2, 0.3])
+    animation = from_blendshapes(late)
+    assert animation.index.tolist() == [2, 3]
+    assert shown(animation, "thrust_jaw") == [80, 120]
+
+
+def test_what_cannot_be_made() -> None:
+    with pytest.raises(ModelError, match="no face is seen in any of the 2 rows"):
+        from_blendshapes(motion(jawOpen=[np.nan, np.nan]))
+    with pytest.raises(ModelError, match=r"no name of a shape is known here: 'Wobble', 'Wiggle'; expected"):
+        from_blendshapes(motion(Wobble=0.5, Wiggle=0.5))
+    with pytest.raises(ModelError, match="times must be finite, and each later than the one before"):
+        motion(np.array([0.0, 0.2, 0.1]), jawOpen=[0.0, 0.0, 0.0])
+    with pytest.raises(ModelError, match="weights must be finite, or NaN"):
+        motion(jawOpen=[np.inf])
+    with pytest.raises(ModelError, match="the frame rate must be positive, not -5"):
+        from_blendshapes(motion(jawOpen=0.5), -5)
