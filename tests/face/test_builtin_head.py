@@ -125,7 +125,7 @@ def test_lips_and_teeth_touch_and_the_tongue_lies_at_them(head: FaceModel) -> No
 
 @pytest.mark.slow
 @pytest.mark.skipif(not FIGURE.is_dir(), reason="the scripts come with a checkout")
-def test_the_scripts_make_it(tmp_path: Path, head: FaceModel) -> None:
+def test_the_scripts_make_it(tmp_path: Path, head: FaceModel, programs: Path) -> None:
     out = tmp_path / "made.npz"
     code = (
         "import numpy, make_head\n"
@@ -133,7 +133,7 @@ def test_the_scripts_make_it(tmp_path: Path, head: FaceModel) -> None:
         f"numpy.savez({str(out)!r}, points=points, bound=bound, "
         "**{part.name: part.vertices for part in parts})\n"
     )
-    subprocess.run([sys.executable, "-c", code], cwd=FIGURE, check=True, timeout=300)
+    subprocess.run([str(programs / "python"), "-c", code], cwd=FIGURE, check=True, timeout=300)
     made = np.load(out)
     for part in head.parts:
         np.testing.assert_allclose(made[part.name], part.vertices, atol=2e-6, err_msg=part.name)

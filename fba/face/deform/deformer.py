@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +47,23 @@ class _FlatModel(NamedTuple):
     """(84,) part whose transforms move each feature point, -1 for the head alone."""
 
 
+_flat_models: WeakKeyDictionary[FaceModel, _FlatModel] = WeakKeyDictionary()
+"""Cache of flat tables, as long as their models live: models do not change."""
+
+
+def _flat_model(model: FaceModel) -> _FlatModel:
+    """Return the flat tables of a model, with scratch arrays of their own, for several threads."""
+    tables = _flat_models.get(model)
+    if tables is None:
+        tables = _flat_models[model] = _flatten(model)
+    shifts, surface, points = tables.shifts, tables.surface, tables.point_shifts
+    return tables._replace(
+        shifts=shifts._replace(amount=np.zeros_like(shifts.amount)),
+        surface=surface._replace(sums=np.zeros_like(surface.sums), units=np.zeros_like(surface.units)),
+        point_shifts=points._replace(amount=np.zeros_like(points.amount)),
+    )
+
+
 def _flatten(model: FaceModel) -> _FlatModel:
     shifts = flatten_shifts(model, all_vertices(model), np.float32)
     return _FlatModel(
@@ -73,7 +91,8 @@ class Deformer:
     A rotation turns by value x FAPU x amount (radians about each axis), a translation shifts by that
     vector, a scale multiplies each axis by 1 + value x FAPU x amount.
 
-    Making one copies the model's tables into flat arrays; calls allocate nothing but their result.
+    The first one of a model copies its tables into flat arrays, which the next ones share; calls allocate
+    nothing but their result.
     Threads that share a Deformer wait for each other; for speed, give each its own.
     Raises ModelError for displacements too large for 32-bit floats.
     """
@@ -83,7 +102,7 @@ class Deformer:
 
         self.model = model
         self._loops = loops
-        self._tables = _flatten(model)
+        self._tables = _flat_model(model)
         self._scratch = loops.allocate_scratch(len(model.vertices), len(model.parts))
         self._lock = threading.Lock()
 

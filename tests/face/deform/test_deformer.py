@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Callable
 
 import numpy as np
@@ -347,3 +349,18 @@ def test_points_that_the_face_lacks_stay_unknown() -> None:
     model = FaceModel((sheet(),), points, FREE)
     moved = Deformer(model).feature_points(np.zeros(68))
     assert np.flatnonzero(np.isnan(moved).any(axis=1)).tolist() == [ROW["6.1"]]
+
+
+def test_deformers_of_one_model_share_its_tables_but_write_to_arrays_of_their_own() -> None:
+    model = face(sheet(), tables=(FaceDefTables(3, (EXAMPLE,)),))
+    one, other = (Deformer(model)._tables for _ in range(2))
+    assert one.shifts.slopes is other.shifts.slopes
+    assert one.surface.corners is other.surface.corners
+    assert not np.shares_memory(one.shifts.amount, other.shifts.amount)
+    assert not np.shares_memory(one.point_shifts.amount, other.point_shifts.amount)
+    assert not np.shares_memory(one.surface.sums, other.surface.sums)
+    assert not np.shares_memory(one.surface.units, other.surface.units)
+    seen = weakref.ref(model)
+    del model
+    gc.collect()
+    assert seen() is None  # the tables go with their model
