@@ -103,9 +103,11 @@ def prepare() -> None:
     for name in fba.__all__:
         getattr(fba, name)
     samples = ROOT / "fba" / "samples"
+    Deformer(FaceModel.default())(np.zeros(68))
     for sample in (fba.read(samples / "hello.fap"), fba.read(samples / "hello.bvh")):
         fba.decode(fba.encode(sample))
-    Deformer(FaceModel.default())(np.zeros(68))
+        for view in ("figure", "points"):
+            player.Scene(sample, view=view).view_at(0.5)
 
 
 def serve(door: socket.socket, program: str) -> None:
