@@ -182,11 +182,6 @@ class Surface:
         typical = float(np.median(areas[areas > 0])) if (areas > 0).any() else 1.0
         return diags_array(between.sum(axis=1)) - between, np.maximum(areas, 1e-3 * typical)
 
-    @cached_property
-    def laplacian_columns(self) -> Any:
-        """The cotangent Laplacian by columns."""
-        return self.laplacian[0].tocsc()
-
 
 def vertices_of_kinds(parts: Sequence[Part], kinds: Sequence[str]) -> Intp:
     """(V,) vertices of the parts of some kinds, counted through all parts."""

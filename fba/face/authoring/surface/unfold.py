@@ -17,6 +17,8 @@ STAGES = (0.4, 0.7, 1.0)
 """Shares of a goal in the order in which they are tried: early folds are the worst."""
 LEAST_RETAINED = 0.88
 """Least share of what one goal reached that easing towards another must leave."""
+DENSE_MAX = 150
+"""Systems of at most this many vertices are solved faster as dense ones."""
 ROUNDS = 2
 """Number of passes: easing some triangles may fold their neighbours."""
 
@@ -111,44 +113,57 @@ def _ease_around(
         region = surface.neighbours(region)
         patch = limiter.patch(region)
         free_region = region[~pinned[region]]
-        for start, free in ((shifts, free_region), (as_one, np.setdiff1d(free_region, core))):
+        for start in (shifts, as_one):
+            free = free_region if start is shifts else np.setdiff1d(free_region, core, assume_unique=True)
             trial = _solve_harmonic(surface, start, free)
             left = int((~patch.soundness(trial, turning=turning)).sum())
+            if not left:
+                return trial
             if left < fewest:
                 best, fewest = trial, left
-        if not fewest:
-            break
     return best
 
 
 def _solve_harmonic(surface: Surface, shifts: Float64, free: Intp) -> Float64:
     """Shifts (N, 3) with those of `free` vertices replaced by the harmonic interpolation of the others."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
     if not len(free):
         return shifts
     size = len(free)
     position = positions_in(free, len(surface))
     # The entries of scipy's matrices, picked by hand: there are thousands of small systems.
-    rows, columns = surface.laplacian[0], surface.laplacian_columns
+    rows = surface.laplacian[0]
     entries, count = positions_in_rows(rows.indptr, free)
-    known = shifts[rows.indices[entries]]
-    known[position[rows.indices[entries]] >= 0] = 0.0
-    weighted = rows.data[entries, None] * known
-    row = np.repeat(np.arange(size), count)
-    right = np.stack([np.bincount(row, weighted[:, axis], size) for axis in range(3)], axis=1)
-    entries, count = positions_in_rows(columns.indptr, free)
-    local = position[columns.indices[entries]]
+    row, column, weights = np.repeat(np.arange(size), count), rows.indices[entries], rows.data[entries]
+    local = position[column]
     inside = local >= 0
-    starts = np.concatenate(
-        [[0], np.cumsum(np.bincount(np.repeat(np.arange(size), count)[inside], minlength=size))]
-    )
-    system = csc_array((columns.data[entries][inside], local[inside], starts), shape=(size, size))
-    try:
-        solved = splu(system).solve(-right)
-    except RuntimeError:  # a piece without fixed vertices
+    known = weights[~inside, None] * shifts[column[~inside]]
+    sums = [np.bincount(row[~inside], known[:, axis], size) for axis in range(3)]
+    right = np.stack(sums, axis=1, dtype=np.float64)
+    solve = _solve_dense if size <= DENSE_MAX else _solve_sparse
+    solved = solve(row[inside], local[inside], weights[inside], -right)
+    if solved is None:  # a piece without fixed vertices
         return shifts
     result = shifts.copy()
     result[free] = solved if np.isfinite(solved).all() else np.nan_to_num(solved)
     return result
+
+
+def _solve_dense(rows: Intp, columns: Intp, values: Float64, right: Float64) -> Float64 | None:
+    """Solution (N, 3) of the system whose matrix has these entries, each once; None if it is singular."""
+    system = np.zeros((len(right), len(right)))
+    system[rows, columns] = values
+    try:
+        return np.asarray(np.linalg.solve(system, right), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _solve_sparse(rows: Intp, columns: Intp, values: Float64, right: Float64) -> Float64 | None:
+    """What `_solve_dense` returns, for large systems."""
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    try:
+        return np.asarray(splu(csc_array((values, (rows, columns)))).solve(right), dtype=np.float64)
+    except RuntimeError:
+        return None
