@@ -59,6 +59,7 @@ PLACEMENT = "player/fba_player/scene/point_placement.py"
 SESSION = "player/fba_player/session/session.py"
 TAKES = "player/fba_player/session/takes.py"
 SOLES = "fba/capture/limbs/soles.py"
+TOES = "fba/capture/limbs/toes.py"
 RENDER = "player/fba_player/export/render.py"
 GLTF_READER = "fba/formats/gltf/reader.py"
 BODIES, OWN_HEADS = "fba/formats/gltf/bodies.py", "fba/formats/gltf/_own_heads.py"
@@ -119,6 +120,7 @@ RECOGNITION_TEST = "tests/test_recognition.py"
 CAPTURE_TEST = (
     "tests/capture/test_capture_rules.py tests/capture/test_planting.py tests/capture/test_retargeting.py"
 )
+PLANTING_TEST = "tests/capture/test_planting.py"
 PREPARATION_TEST = "tests/capture/test_rest_poses.py"
 ZOO_TEST = "tests/capture/zoo"
 WEIGHTS_TEST = "tests/body/skin/test_skin_weights.py"
@@ -261,7 +263,7 @@ MUTANTS = (
     Mutant(MATCHING, "2 * count >= len(names) > 1", "2 * count > len(names) > 1", CAPTURE_TEST),
     Mutant(MATCHING, "mapped.setdefault(joint, number)", "mapped[joint] = number", CAPTURE_TEST),
     Mutant(PLANTING, "STEPS = 4", "STEPS = 3", CAPTURE_TEST),
-    Mutant(PLANTING, "ROUNDS = 2", "ROUNDS = 0", CAPTURE_TEST),
+    Mutant(PLANTING, "ROUNDS = 3", "ROUNDS = 0", CAPTURE_TEST),
     Mutant(RETARGET, "FOREARM_SHARE = 0.5", "FOREARM_SHARE = 0.0", CAPTURE_TEST),
     Mutant(RETARGET, "FOREARM_SPEED = 10.0", "FOREARM_SPEED = 20.0", CAPTURE_RULES_TEST),
     Mutant(RETARGET, "CLAVICLE_SHARE = 0.5", "CLAVICLE_SHARE = 0.1", CAPTURE_TEST),
@@ -320,6 +322,9 @@ MUTANTS = (
     Mutant(SOLES, "WITHIN = 0.012", "WITHIN = 0.01", CAPTURE_TEST),
     Mutant(SOLES, "TOLERATED = 0.005", "TOLERATED = 0.006", CAPTURE_TEST),
     Mutant(SOLES, "FARTHEST = 0.03", "FARTHEST = 0.04", CAPTURE_TEST),
+    Mutant(SOLES, "FARTHEST_UP = 0.025", "FARTHEST_UP = 0.035", CAPTURE_TEST),
+    Mutant(SOLES, "np.maximum(depth - UNDER, 0.0)", "0.0 * depth", PLANTING_TEST),
+    Mutant(TOES, "np.where(enough, bend, high)", "bend", PLANTING_TEST),
     Mutant(SESSION, "LEAVING = 6.0", "LEAVING = 5.0", NOTICES_TEST),
     Mutant(SESSION, "LEAVING = 6.0", "LEAVING = 7.0", NOTICES_TEST),
     Mutant(SESSION, "NOTICE_SECONDS = 4.0", "NOTICE_SECONDS = 3.0", NOTICES_TEST),

@@ -120,7 +120,6 @@ def retarget_report(
     has_feet = True
     metres = rest_alignment.scale(motion, mapped, skeleton) if scale is None else scale
     source = soles.source_soles(motion, mapped, turned, positions, metres) if metres else None
-    toes = source is not None and source.tips
     for begin in range(0, count, CHUNK):
         end = min(begin + CHUNK, count)
         matrices = solver.pose(animation.body.values[begin:end])
@@ -133,7 +132,7 @@ def retarget_report(
                 theirs = frames_of_bone @ (alignment.corrections[joint] @ bone)
             angles[begin:end, column] = _between(ours, theirs)
         frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
-        own = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3], toes)
+        own = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3])
         has_feet = own is not None
         if own is not None:
             heights[:, begin:end] = own.lowest

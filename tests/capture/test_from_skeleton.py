@@ -278,15 +278,10 @@ def test_forward_kinematics_against_scipy() -> None:
 
 
 GROUNDED = {
-    "greta/c-Walkaround.bvh": 0.75,
-    "greta/c-ladder.bvh": 0.1,  # climbs
-    "greta/GangnamStyle.bvh": 0.8,  # stands on the edges of the soles
-    "vreng/cmu_walk.bvh": 0.35,  # runs
-    "greta/Fluid_gesture.bvh": -1,  # three who sit
-    "greta/fast_gesture.bvh": -1,
-    "greta/strong_gesture.bvh": -1,
+    "greta/c-ladder.bvh": 0.3,  # climbs
+    "vreng/cmu_walk.bvh": 0.6,  # runs
 }
-"""Least share of frames in which the shown person's soles are within 5 mm of the ground; others: 0.9."""
+"""Least share of frames in which the shown person's soles are within 5 mm of the ground; others: 0.95."""
 
 
 @pytest.mark.parametrize("name", REAL)
@@ -313,18 +308,19 @@ def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
             assert bone.worst == pytest.approx(errors[bone.joint, bone.aim].max(), abs=1e-6)
     assert np.abs(animation.body.values[:, :180]).max() <= 314_160
     low = BapSolver().pose(animation.body.values)[:, :, 1, 3].min(axis=1)
-    assert abs(np.percentile(low, 5) - 0.0092) < 0.015  # the balls of the feet reach the ground
+    # the balls of the feet reach the ground; those of people who sit on the edges of their shoes are above it
+    assert abs(np.percentile(low, 5) - 0.0092) < (0.018 if "gesture" in name else 0.015)
     assert low.min() > -0.045
     assert report.feet is not None
     assert report.feet.mean < 0.005
-    rolled = name == "greta/GangnamStyle.bvh"  # stands on the edges of its soles, which count since they do
-    assert report.feet.worst < (0.018 if not rolled else 0.028)
-    assert report.feet.within > (0.985 if not rolled else 0.93)
+    # the hips of cmu_walk fall by 4 cm in its first 5 frames, with both legs straight
+    assert report.feet.worst < (0.017 if name != "vreng/cmu_walk.bvh" else 0.0225)
+    assert report.feet.within > 0.985
     shown = GroundedPoser(BodyModel.default().skeleton)
     rows = np.unique(np.linspace(0, len(animation) - 1, 100).astype(int))
     lowest = lowest_sole(BodyModel.default().skeleton, shown.pose(animation.body.values[rows]))
     assert lowest is not None
-    assert (np.abs(lowest) < 0.005).mean() > GROUNDED.get(name, 0.9)
+    assert (np.abs(lowest) < 0.005).mean() > GROUNDED.get(name, 0.95)
 
 
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")

@@ -11,9 +11,11 @@ from test_from_skeleton import NAMES
 
 from capture_bodies import bone_errors, limb_bones, motion
 from fba.body import BapSolver, Skeleton
+from fba.body.footing import lowest_sole
 from fba.capture import SkeletonMotion, from_skeleton, retarget_report
 from fba.capture.limbs import _leg_ik as leg_ik
 from fba.capture.limbs import ground
+from fba.parameters import bap_numbers
 
 THIGH, SHANK = 0.36, 0.54
 """Metres: a body of quite other proportions than the default's, whose thigh and shank are of one length."""
@@ -160,6 +162,52 @@ def test_leg_reaches_by_the_law_of_cosines() -> None:
     thigh, shank = leg_ik.reach(leg, move)
     reached = (thigh @ knee[0]) + (shank @ (ankle - knee)[0])
     np.testing.assert_allclose(reached[0], (ankle + move)[0], atol=5e-4)
+
+
+def tiptoe(toes: bool) -> SkeletonMotion:
+    """Somebody who rises on the balls of both feet by 50 degrees. toes: whether the file has them."""
+    count = 60
+    rise = Rotation.from_rotvec(np.outer(np.radians(50) * np.sin(np.linspace(0, np.pi, count)), [1.0, 0, 0]))
+    turns = {f"{side}{joint}": rise if joint == "Foot" else rise.inv() for side in ("Left", "Right")
+             for joint in ("Foot", "ToeBase")}  # fmt: skip
+    captured = motion("standing", count, turns=turns)
+    places = np.array(captured.positions)
+    balls = captured.world()[1][:, [captured.names.index(f"{side}ToeBase") for side in ("Left", "Right")], 1]
+    places[:, 1] += balls[0, 0] - balls[:, 0]
+    captured = replace(captured, positions=places)
+    if toes:
+        return captured
+    names = tuple(name.replace("ToeBase", "Marker") for name in captured.names)
+    return replace(captured, names=names)
+
+
+@pytest.mark.parametrize("toes", [True, False])
+def test_toes_stay_on_the_ground_while_somebody_rises_over_the_balls(toes: bool) -> None:
+    """Stiff toes would be 5 cm under it. A file without joints of toes has its feet end at the balls."""
+    values = from_skeleton(tiptoe(toes)).body.values  # type: ignore[union-attr]
+    skeleton = Skeleton.default()
+    matrices = BapSolver().pose(values)
+    lowest = lowest_sole(skeleton, matrices)
+    assert lowest is not None
+    assert np.abs(lowest).max() < 0.005
+    heel = matrices[30, skeleton.number("l_ankle"), 1, 3] - matrices[0, skeleton.number("l_ankle"), 1, 3]
+    assert heel > 0.06
+    bend = values[:, bap_numbers()["l_metatarsal_flexion"] - 1] / 1e5
+    assert np.degrees(bend[30]) == pytest.approx(50, abs=8)
+
+
+def test_a_foot_in_the_air_is_never_under_the_ground() -> None:
+    """Somebody swings a leg whose foot points down: toes would be 3.5 cm under the ground."""
+    count = 60
+    down = Rotation.from_rotvec([np.radians(20), 0.0, 0.0])
+    swing = Rotation.from_rotvec(
+        np.outer(np.radians(20) * np.sin(np.linspace(0, 2 * np.pi, count)), [1.0, 0, 0])
+    )
+    captured = motion("standing", count, turns={"RightUpLeg": swing, "RightFoot": down})
+    values = from_skeleton(captured).body.values  # type: ignore[union-attr]
+    lowest = lowest_sole(Skeleton.default(), BapSolver().pose(values))
+    assert lowest is not None
+    assert lowest.min() > -0.004
 
 
 def test_straight_leg_is_not_broken_for_a_millimetre() -> None:

@@ -75,7 +75,6 @@ def truth() -> tuple[Float64, tuple[str, ...]]:
         "sacroiliac",
         "subtalar",
         "midtarsal",
-        "metatarsal",
         "acromioclavicular",
         "sternoclavicular",
     ):

@@ -9,6 +9,7 @@ import numpy as np
 
 from fba.arrays import Array, Float64
 from fba.body import BapSolver, Skeleton
+from fba.body.footing import GroundedPoser
 from fba.body.model import BodyModel, BodyPart
 from fba.capture.comparison.figure import SIDES
 
@@ -25,7 +26,7 @@ def sole_heights(solver: BapSolver, baps: Array) -> dict[str, Float64]:
     model = _soles()
     if solver.skeleton is not Skeleton.default():
         return {}
-    shown = BapSolver(model.skeleton, solver.convention.name)  # the same joints, in the order of its file
+    shown = GroundedPoser(model.skeleton, solver.convention.name)  # as players show it
     left = model.vertices[:, 0] > 0
     result = {side: np.empty(len(baps)) for side in SIDES}
     for begin in range(0, len(baps), CHUNK):

@@ -7,12 +7,14 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 from fba.capture.limbs import _leg_ik as leg_ik
-from fba.capture.limbs import bone_ik, ground, soles
+from fba.capture.limbs import bone_ik, ground, soles, toes
 from fba.capture.limbs.targets import Targets
 
 STEPS = 4
 """Iterations that find the rotations of ankle and subtalar joint with which a foot points exactly."""
-ROUNDS = 2
+HANGING = 0.5
+"""Share of a foot's height above the ground by which toes may hang below the rest of it."""
+ROUNDS = 3
 """Iterations that move the legs: turning a foot moves its sole again."""
 
 
@@ -63,34 +65,51 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
     source = soles.source_soles(
         targets.motion, targets.mapped, targets.source_rotations, targets.source_positions, scale
     )
-    toes = source is not None and source.tips
-    body = soles.body_soles(targets.skeleton, targets.rotations, root, toes)
-    if source is None or body is None:
+    if source is None or soles.body_soles(targets.skeleton, targets.rotations, root) is None:
         return root
     middles = source.points.mean(axis=1)
     level = ground.find(source.lowest, middles).under(middles)
     above = soles.settle(source.lowest - level, source.points, rate)
     under = np.zeros_like(level) if floor == "floor" else level
+    bends = [toes.source_bend(targets, side) for side in "lr"]
+    room = HANGING * above + source.balls
+    body = _settle_toes(targets, root, bends, room, np.full_like(above, -np.inf))
     stiff = np.ones_like(above)
     if plant and all(targets.aims.get(f"{side}_hip") == f"{side}_knee" for side in "lr"):
         # a straight leg counts most in the height of the body: a bent one can adapt
         stiff = 1.0 - np.array([leg_ik.pliancy(_leg(targets, side, root)) for side in "lr"])
         raised = soles.lift(above, body.lowest - under, stiff, rate)
+        body = _settle_toes(targets, root, bends, room, under - raised)
         common, along = soles.slips(source.points, body.points, level, rate)
         root[:, [0, 2]] += common
         ups = soles.heights(above, body.lowest - under + raised, rate)
-        for side, pitch in zip("lr", soles.pitches(body.points, ups), strict=True):
+        for side, pitch in zip("lr", soles.pitches(body.points, ups, above), strict=True):
             targets.feet[side] = pitch @ targets.feet[side]
             turn_foot(targets, side)
+        done = np.zeros_like(above)
         for _ in range(ROUNDS):
-            body = soles.body_soles(targets.skeleton, targets.rotations, root, toes) or body
-            ups = soles.heights(above, body.lowest - under + raised, rate)
+            body = _settle_toes(targets, root, bends, room, under - raised)
+            ups = soles.heights(above, body.lowest - under + raised, rate, done)
+            done += ups
             for side, up, course in zip("lr", ups, along, strict=True):
                 _move_foot(targets, side, root, np.stack([course[:, 0], up, course[:, 1]], axis=1))
             along = np.zeros_like(along)
-        body = soles.body_soles(targets.skeleton, targets.rotations, root, toes) or body
-    root[:, 1] += soles.lift(above, body.lowest - under, stiff, rate)
+        body = _settle_toes(targets, root, bends, room, under - raised)
+    lowest = body.lowest - under
+    raised = soles.lift(above, lowest, stiff, rate)
+    root[:, 1] += raised + soles.rise_above(-(lowest + raised).min(axis=0), rate)
     return root
+
+
+def _settle_toes(
+    targets: Targets, root: Float64, bends: list[Float64], room: Float64, level: Float64
+) -> soles.Soles:  # fmt: skip
+    """Bend the toes, and return the soles of the body. bends, room, level: (2, T), see `toes.bend_toes`."""
+    for number, side in enumerate("lr"):
+        toes.bend_toes(targets, side, root, bends[number], room[number], level[number])
+    result = soles.body_soles(targets.skeleton, targets.rotations, root)
+    assert result is not None
+    return result
 
 
 def _move_foot(targets: Targets, side: str, root: Float64, move: Float64) -> None:

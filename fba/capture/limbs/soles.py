@@ -9,7 +9,7 @@ frame by frame, so that the foot on the ground is as high above it as the source
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,8 +29,6 @@ SUPPORT = 0.08
 """Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
 LEVEL_SECONDS = 0.2
 """Seconds over which the height of the ground under feet that stand is averaged."""
-TOES = 0.07
-"""Metres from the ball to the tip of the shown person's shoes."""
 FRONT = 0.05
 """Metres from an ankle ahead up to which a source's foot has no front."""
 ANKLE_HEIGHT, BALL = 0.076, 0.15
@@ -47,16 +45,24 @@ WITHIN = 0.012
 """Height in metres up to which a leg moves its foot all the way."""
 TOLERATED = 0.005
 """Error in metres of a sole's height below which its leg does not move."""
-PITCH_SHARE = 0.8
+PITCH_SHARE = 0.9
 """Share of the height correction of a foot on its ball that its own pitch makes."""
 MOST_PITCH = np.radians(3.0)
 """Largest change of a foot's pitch, in radians."""
+MOST_AIR_PITCH = np.radians(6.0)
+"""The same of a foot in the air, whose toes would be under the ground."""
 TIPTOE = 0.02
 """Metres from ball up to heel at which a foot stands mostly on its ball."""
 LEVER = 0.1
 """Least horizontal distance in metres from heel to ball that is assumed."""
 FARTHEST = 0.03
 """Most metres by which a leg moves its foot."""
+FARTHEST_UP = 0.025
+"""The same upwards: knees bend more for it."""
+FARTHEST_DIP = 0.015
+"""The same for a foot in the air that would be under the ground; the body as a whole rises by the rest."""
+UNDER = 0.002
+"""Metres under the ground that nobody sees."""
 SWING = 0.002
 """Weight of a foot in the air moving as it did, relative to one on the ground not slipping."""
 RETURN = 0.3
@@ -71,12 +77,12 @@ class Soles:
     """Soles of the left and the right foot, in metres.
 
     lowest: (2, T), height of the lowest point. points: (2, 2, T, 3), heel, and ball or tip, whichever the
-    source has. tips: whether the tips of the toes count, too.
+    source has. balls: (2, T), how much higher than the lowest point the ball's sole is.
     """
 
     lowest: Float64
     points: Float64
-    tips: bool
+    balls: Float64
 
 
 def source_soles(
@@ -92,8 +98,7 @@ def source_soles(
     if "l_ankle" not in mapped or "r_ankle" not in mapped:
         return None
     rest = motion.rest()
-    estimated = False
-    lows, points = [], []
+    lows, points, balls = [], [], []
     for side in "lr":
         ankle = mapped[f"{side}_ankle"]
         foot = [ankle]
@@ -112,17 +117,15 @@ def source_soles(
         along = [float(point @ ahead) * metres for point in at_rest]
         depth = min(float(point[1]) for point in at_rest)
         if max(along) < FRONT:  # a foot that ends at the ankle: the front is where the body's is
-            estimated = True
             depth = min(depth, -ANKLE_HEIGHT / metres)
             turn = rotations.matrices(turned[:, ankle])
             left = rest[mapped["l_ankle"]] - rest[mapped["r_ankle"]]
             ahead = np.cross(left, [0.0, 1.0, 0.0])
             ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
-            for far in (BALL, BALL + TOES):
-                point = np.array([0.0, depth, 0.0]) + ahead * (far / metres)
-                at_rest.append(point)
-                along.append(far)
-                moving.append(positions[:, ankle] + turn @ point)
+            point = np.array([0.0, depth, 0.0]) + ahead * (BALL / metres)
+            at_rest.append(point)
+            along.append(BALL)
+            moving.append(positions[:, ankle] + turn @ point)
         if min(along) < -HEEL / 2:
             heel = moving[int(np.argmin(along))]
         else:
@@ -131,22 +134,22 @@ def source_soles(
             heel = positions[:, ankle] + turn @ behind
             moving.append(heel)
         ball = mapped.get(f"{side}_metatarsal")
-        front = moving[along.index(BALL) if BALL in along else int(np.argmax(along))]
-        front = front if ball is None else positions[:, ball]
-        lows.append(np.min([point[:, 1] for point in moving], axis=0))
+        front = moving[int(np.argmax(along))] if ball is None else positions[:, ball]
+        lowest = np.min([point[:, 1] for point in moving], axis=0)
+        thick = 0.0 if ball is None else float(rest[ball, 1] - rest[ankle, 1]) - depth
+        balls.append(np.zeros(len(lowest)) if ball is None else front[:, 1] - thick - lowest)
+        lows.append(lowest)
         points.append([heel, front])
-    tips = "l_metatarsal" in mapped or estimated
-    return Soles(np.array(lows) * metres, np.array(points) * metres, tips)
+    return Soles(np.array(lows) * metres, np.array(points) * metres, np.maximum(balls, 0.0) * metres)
 
 
-def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64, toes: bool) -> Soles | None:
+def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64) -> Soles | None:
     """Return the body's soles, or None if it lacks a joint of the feet.
 
     wanted: joint -> world rotations (T, 3, 3); other joints turn with their parents. root: (T, 3), metres.
-    toes: whether the tips of the toes count, besides heel and ball. The lowest points are of the soles' edge,
-    see `fba.body.footing`.
+    The lowest points are of the soles' edge, see `fba.body.footing`.
     """
-    lows, points = [], []
+    lows, points, balls = [], [], []
     for side in "lr":
         parts = [f"{side}_ankle", f"{side}_subtalar", f"{side}_midtarsal", f"{side}_metatarsal"]
         if not all(joint in skeleton for joint in parts):
@@ -157,22 +160,41 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64,
             parts[1]: np.array([ankle[0], 0.0, ankle[2] - HEEL]),
             parts[2]: np.array([ball[0], 0.0, ball[2]]),
         }
-        outwards = 1.0 if side == "l" else -1.0
-        rim: dict[str, list[Float64]] = {}
-        for joint, x, y, z in (*OUTLINE, *(TIP if toes else ())):
-            name = f"{side}_{joint}"
-            start = centres[skeleton.number(name)]
-            rim.setdefault(name, []).append(np.array([outwards * x, y - start[1], z]))
-        own, lowest = [], []
-        for name, position, frame in joint_frames(skeleton, wanted, root, parts[3]):
-            if name in soles:
-                own.append(position + frame @ (soles[name] - centres[skeleton.number(name)]))
-            if name in rim:
-                heights = frame[..., 1, :] @ np.array(rim[name]).T  # (T, points)
-                lowest.append(position[:, 1] + heights.min(axis=-1))
-        lows.append(np.min(lowest, axis=0))
-        points.append(own)
-    return Soles(np.array(lows), np.array(points), toes)
+        frames = {
+            name: (position, frame)
+            for name, position, frame in joint_frames(skeleton, wanted, root, parts[3])
+        }
+        points.append([
+            frames[name][0] + frames[name][1] @ (sole - centres[skeleton.number(name)])
+            for name, sole in soles.items()
+        ])  # fmt: skip
+        lows.append(lowest_edge(skeleton, frames, side, (*OUTLINE, *TIP)))
+        balls.append(points[-1][1][:, 1] - lows[-1])
+    return Soles(np.array(lows), np.array(points), np.array(balls))
+
+
+def lowest_edge(
+    skeleton: Skeleton,
+    frames: Mapping[str, tuple[Float64, Float64]],
+    side: str,
+    edge: Sequence[tuple[str, float, float, float]],
+) -> Float64:
+    """Return the height (T,) of the lowest point of a sole's edge.
+
+    frames: joint -> position (T, 3) and rotation (T, 3, 3). edge: of `fba.body.footing`.
+    """
+    outwards = 1.0 if side == "l" else -1.0
+    points: dict[str, list[Float64]] = {}
+    for joint, x, y, z in edge:
+        name = f"{side}_{joint}"
+        height = skeleton.centres[skeleton.number(name), 1]
+        points.setdefault(name, []).append(np.array([outwards * x, y - height, z]))
+    heights = []
+    for name, own in points.items():
+        position, frame = frames[name]
+        heights.append(position[:, 1] + (frame[..., 1, :] @ np.array(own).T).min(axis=-1))
+    lowest: Float64 = np.min(heights, axis=0)
+    return lowest
 
 
 def joint_frames(
@@ -240,23 +262,41 @@ def grounded(above: Float64) -> Float64:
     return contact
 
 
-def heights(above: Float64, body: Float64, rate: float) -> Float64:
-    """Return (2, T), metres to raise each foot by after the body was: as little as needed, 0 in the air."""
+def heights(above: Float64, body: Float64, rate: float, done: Float64 | float = 0.0) -> Float64:
+    """Return (2, T), metres to raise each foot by after the body was: as little as needed.
+
+    Feet in the air are raised only where they would be under the ground. done: (2, T), by how much they have
+    been raised before.
+    """
     lacking = above - body
     needed = np.sign(lacking) * np.maximum(np.abs(lacking) - TOLERATED, 0.0)
     moves = np.array([smooth(foot, rate) for foot in needed * grounded(above - WITHIN)])
-    result: Float64 = np.clip(moves, -FARTHEST, FARTHEST)
+    dips = np.array([rise_above(foot, rate) for foot in -body])
+    moves = np.clip(done + moves, -FARTHEST, FARTHEST_UP) - done
+    dips = np.minimum(done + dips, np.maximum(done, FARTHEST_DIP)) - done
+    result: Float64 = moves + np.maximum(dips - np.maximum(moves, 0.0), 0.0)
     return result
 
 
-def pitches(body: Float64, ups: Float64) -> Float64:
+def rise_above(depth: Float64, rate: float) -> Float64:
+    """Return metres (T,) to raise what is at a depth (T,) under the ground, so that it hardly is.
+
+    0 or more, whatever is above the ground; a little before and after, so that it does not start abruptly.
+    """
+    needed = np.maximum(depth - UNDER, 0.0)
+    return np.maximum(needed, smooth(needed, rate))
+
+
+def pitches(body: Float64, ups: Float64, above: Float64) -> Float64:
     """Return (2, T, 3, 3), world turns of the feet: those on their balls pitch to correct their heights.
 
     body: (2, 2, T, 3), points of the soles. ups: (2, T), metres to raise the feet by; legs make the rest.
+    above: (2, T), target heights: in the air, feet pitch further.
     """
     sole = body[:, 1] - body[:, 0]
     length = np.maximum(np.hypot(sole[..., 0], sole[..., 2]), LEVER)
-    angle = np.clip(PITCH_SHARE * tiptoe(body) * ups / length, -MOST_PITCH, MOST_PITCH)
+    most = MOST_AIR_PITCH + (MOST_PITCH - MOST_AIR_PITCH) * grounded(above)
+    angle = np.clip(PITCH_SHARE * tiptoe(body) * ups / length, -most, most)
     across = np.stack([-sole[..., 2], np.zeros_like(length), sole[..., 0]], axis=-1)
     across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
     return rotations.turn(across, angle)

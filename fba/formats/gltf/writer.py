@@ -22,7 +22,7 @@ from fba.source import Path
 from fba.tracks import hold
 
 if TYPE_CHECKING:
-    from fba.body import BapSolver
+    from fba.body import BapSolver, Skeleton
     from fba.body.model import BodyModel
     from fba.face.model import FaceModel
     from fba.formats.gltf._head import HeadParts
@@ -32,6 +32,8 @@ MOST_FRAMES = 100_000
 """Near an hour at 30 frames/s; a frame of a body takes up to 1.4 kB."""
 CHUNK = 2048
 """Frames that are posed at once."""
+LOWEST_LIFT = 1e-4
+"""Metres below which a person need not be raised to the ground."""
 MARK = "fba"
 """Key of this project's note in the extras of the animation."""
 
@@ -116,6 +118,7 @@ def _add_person(
         shifts = positions if joint == 0 else np.broadcast_to(skeleton.offsets[joint], positions.shape)
         move(builder, clip, node, turns[joint], shifts, always=joint == 0)
     note |= {"axes": axes, "root": nodes[0], "centre": skeleton.centres[0].tolist()}
+    top = nodes[0] if person is None else _stand_on_ground(builder, clip, skeleton, axes, baps, nodes[0])
     if person is None:
         bind = np.tile(np.eye(4), (len(skeleton), 1, 1))
         bind[:, :3, 3] = skeleton.centres
@@ -143,7 +146,7 @@ def _add_person(
         bound += [matrix for _, matrix in head.bound]
     _add_skin(builder, joints, np.array(bound), nodes[0])
     materials = PartWriter(builder)
-    roots = [nodes[0]]
+    roots = [top]
     for part in person.parts:
         if part.kind == "neck" and head is not None and head.on is not None and head.on.brings_neck:
             continue
@@ -157,6 +160,25 @@ def _add_person(
         roots += head.add_meshes(slots, materials, True, {})
     _note_face(builder, animation, note, model, head)
     return roots
+
+
+def _stand_on_ground(
+    builder: Builder, clip: Clip, skeleton: Skeleton, axes: str, baps: Int32, root: int
+) -> int:
+    """Return the node at the top: one that raises the root to where feet stand, or the root itself.
+
+    The root's own translation stays what the BAPs say, so that they are read again as they were.
+    """
+    from fba.body.footing import GroundedPoser
+
+    poser = GroundedPoser(skeleton, axes)
+    lifts = np.concatenate([poser.lifts(baps[n : n + CHUNK]) for n in range(0, len(baps), CHUNK)])
+    if float(np.abs(lifts).max()) < LOWEST_LIFT:
+        return root
+    node = builder.add("nodes", {"name": "Ground", "children": [root]})
+    turns = np.broadcast_to(np.eye(3), (len(lifts), 3, 3))
+    move(builder, clip, node, turns, np.column_stack([0.0 * lifts, lifts, 0.0 * lifts]))
+    return node
 
 
 def _make_head(

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation, Slerp
 import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.body import BapSolver, Skeleton
+from fba.body.footing import GroundedPoser
 from fba.body.head_attachment import attach_head
 from fba.body.model import BodyModel
 from fba.errors import FormatError, ModelError
@@ -178,7 +179,7 @@ def test_every_vertex_is_where_body_and_face_are(written: Path, frame: int) -> N
     assert animation.body is not None
     assert animation.face is not None
     faps = animation.face.values[frame].astype(float)
-    matrices = BapSolver(body.skeleton).pose(animation.body.values[frame])
+    matrices = GroundedPoser(body.skeleton).pose(animation.body.values[frame])
     move = Deformer(face)
     skull = np.concatenate(
         [np.full(len(p.vertices), p.kind in ("eye", "teeth", "tongue", "brow", "lash")) for p in face.parts]
@@ -223,7 +224,7 @@ def test_joints_have_the_standards_names_and_places(written: Path) -> None:
     assert set(Skeleton.default().names) <= set(names)
     animation = person()
     assert animation.body is not None
-    matrices = BapSolver(BodyModel.default().skeleton).pose(animation.body.values[3])
+    matrices = GroundedPoser(BodyModel.default().skeleton).pose(animation.body.values[3])
     world, _ = worlds(gltf, 4 / 25)  # index 9, four frames after the first
     for joint, name in enumerate(BodyModel.default().skeleton.names):
         np.testing.assert_allclose(world[names.index(name)], matrices[joint], atol=1e-5)
