@@ -239,7 +239,7 @@ def _with_tables(model: FaceModel, fitted: FaceModel, shape: Shape, how: str) ->
         return carried
     bent = Poser(carried)
     errors = _count_errors(bent)
-    if errors <= _count_errors(Poser(model)):
+    if not errors or errors <= _count_errors(Poser(model)):
         return carried
     new = Poser(_author_anew(model, fitted), like=bent)
     best = Poser(_best_tables(new, bent), like=new)
