@@ -58,18 +58,23 @@ class Studio:
 
         The others only let the panels settle: the scene is not drawn in them.
         """
-        session = self.session
+        self.settle(pictures - 1, delta)
         with self._gl:
-            if self._target is None or self._target.size != session.size:
-                self._resize()
-            for number in range(pictures):
-                if number == pictures - 1:
-                    self._draw_scene()
+            self._fit_size()
+            self._draw_scene()
+            self._screen.use()
+            self.gui.draw(delta)
+            data = self._screen.read(components=4)
+        width, height = self.session.size
+        return np.frombuffer(data, np.uint8).reshape(height, width, 4)[::-1]
+
+    def settle(self, pictures: int, delta: float = 1 / 60) -> None:
+        """Let the panels follow the mouse and the session for some pictures; the scene is not drawn."""
+        with self._gl:
+            self._fit_size()
+            for _ in range(pictures):
                 self._screen.use()
                 self.gui.draw(delta)
-            data = self._screen.read(components=4)
-        width, height = session.size
-        return np.frombuffer(data, np.uint8).reshape(height, width, 4)[::-1]
 
     def close(self) -> None:
         """Release its resources; safe to call twice."""
@@ -98,7 +103,10 @@ class Studio:
         within = self._renderer.draw(session.view(time), session.camera(time), session.size)
         self._target.finish(self._screen, within)
 
-    def _resize(self) -> None:
+    def _fit_size(self) -> None:
+        """Make the framebuffers as large as the session's window, if they are not."""
+        if self._target is not None and self._target.size == self.session.size:
+            return
         if self._target is not None:
             self._target.close()
         self._release_screen()

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 class StudioHand:
-    """Moves and presses imgui's own mouse, and draws until the panels know."""
+    """Moves and presses imgui's own mouse, and draws the panels until they know."""
 
     def __init__(self, studio: Studio) -> None:
         self.studio = studio
@@ -17,11 +17,11 @@ class StudioHand:
     def move(self, x: float, y: float) -> None:
         self.studio.gui.io.add_mouse_pos_event(x, y)
         self.studio.session.touched()
-        self.studio.draw(2)
+        self.studio.settle(2)
 
     def button(self, down: bool, number: int = 0) -> None:
         self.studio.gui.io.add_mouse_button_event(number, down)
-        self.studio.draw(2)
+        self.studio.settle(2)
 
     def click(self, x: float, y: float, number: int = 0) -> None:
         self.move(x, y)
@@ -40,12 +40,12 @@ class StudioHand:
 
     def wheel(self, steps: float) -> None:
         self.studio.gui.io.add_mouse_wheel_event(0, steps)
-        self.studio.draw(2)
+        self.studio.settle(2)
 
     def write(self, text: str) -> None:
         for letter in text:
             self.studio.gui.io.add_input_character(ord(letter))
-        self.studio.draw(2)
+        self.studio.settle(2)
 
 
 def panel_of(studio: Studio, name: str) -> Any:

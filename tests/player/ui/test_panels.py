@@ -54,12 +54,12 @@ def place(studio: Studio, share: float) -> tuple[float, float]:
 def move(studio: Studio, x: float, y: float) -> None:
     studio.gui.io.add_mouse_pos_event(x, y)
     studio.session.touched()
-    studio.draw(2)
+    studio.settle(2)
 
 
 def button(studio: Studio, down: bool, number: int = 0) -> None:
     studio.gui.io.add_mouse_button_event(number, down)
-    studio.draw(2)
+    studio.settle(2)
 
 
 def click(studio: Studio, x: float, y: float) -> None:
@@ -85,7 +85,7 @@ def test_scrubbing_follows_the_mouse_and_goes_on_playing(studio: Studio, clock: 
     move(studio, *place(studio, 0.75))
     assert transport.time == pytest.approx(0.27, abs=0.002)
     clock.now += 0.05  # the mouse holds it where it is
-    studio.draw(1)
+    studio.settle(1)
     assert transport.time == pytest.approx(0.27, abs=0.002)
     button(studio, False)
     clock.now += 0.05
@@ -130,14 +130,14 @@ def test_a_right_drag_sets_both_marks(studio: Studio) -> None:
 def test_the_picture_turns_only_where_no_panel_is(studio: Studio) -> None:
     session = studio.session
     session.open.add("file")
-    studio.draw(4)
+    studio.settle(4)
     before = session.viewpoint.camera
     drag(studio, (60, 200), (160, 200))  # on the panel
     assert session.viewpoint.camera == before
     drag(studio, (600, 300), (700, 300))
     assert session.viewpoint.camera.yaw == pytest.approx(before.yaw - 35)
     studio.gui.io.add_mouse_wheel_event(0, 1)
-    studio.draw(2)
+    studio.settle(2)
     assert session.viewpoint.camera.distance == pytest.approx(before.distance * 0.9)
 
 
@@ -170,7 +170,7 @@ def test_the_bar_hides_itself_while_playing_and_comes_back(studio: Studio, clock
     session.transport.loop = True
     session.transport.play()
     clock.now += 60
-    studio.draw(30)
+    studio.settle(30)
     assert studio.gui.shown == 0.0
     session.transport.pause()
     session.transport.seek(0.0)
@@ -178,7 +178,7 @@ def test_the_bar_hides_itself_while_playing_and_comes_back(studio: Studio, clock
     hidden = studio.draw(1).astype(int)
     assert hidden[-100:].mean() > shown[-100:].mean() + 20  # the studio floor is lighter than the bar
     session.touched()
-    studio.draw(30)
+    studio.settle(30)
     assert studio.gui.shown == 1.0
 
 

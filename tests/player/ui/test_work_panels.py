@@ -108,7 +108,7 @@ def test_choosing_from_the_list(opened: Opened, walking: Animation) -> None:
     hand.write("left knee")
     assert panel.chooser.query == "left knee"
     panel.chooser.query = "l_knee flexion"
-    studio.draw(3)
+    studio.settle(3)
     hand.click(*panel.chooser.first_row)
     assert session.selection.baps == [10]
     hand.click(*panel.chooser.first_row)
@@ -174,16 +174,16 @@ def test_the_bit_rate_of_what_is_no_stream_yet(opened: Opened, talking: Animatio
     studio = opened(talking)
     studio.session.open.add("rate")
     panel = panel_of(studio, "rate")
-    studio.draw(1)
+    studio.settle(1)
     assert studio.session.restless or panel._encoded[1]  # pictures go on until it is known
     for _ in range(600):
-        studio.draw(1)
+        studio.settle(1)
         if panel._encoded is not None and panel._encoded[1]:
             break
         import time
 
         time.sleep(0.02)
-    studio.draw(2)
+    studio.settle(2)
     assert panel.bars[2] > panel.bars[0] > 0
     assert panel._rates[1].totals[0].planes == 1
     assert not studio.session.restless
