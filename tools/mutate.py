@@ -139,6 +139,7 @@ PLAUSIBLE_TEST = "tests/body/test_plausibility.py -k 'limits or twenty or carry 
 MOMENT_TEST = "tests/body/test_plausibility.py -k moment"
 JUMP_TEST = "tests/body/test_plausibility.py -k jump"
 STEP_CHOICE_TEST = "tests/formats/test_step_choice.py -k 'round or coarse'"
+TRANSPARENCY_TEST = "tests/player/gl/test_transparency.py"
 HEAD_TURN_TEST = "tests/formats/test_step_choice.py -k head"
 MEASURED_TEST = "tests/body/gait/test_measured.py"
 STRIPS_TEST = "tests/mesh/test_ply.py -k strips"
@@ -387,6 +388,8 @@ MUTANTS = (
     Mutant(PLAUSIBILITY, "SUNK = -2.0", "SUNK = -2.2", PLAUSIBLE_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 0.9", JUMP_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 1.1", JUMP_TEST),
+    Mutant("player/fba_player/gl/_mesh_renderer.py", "CORE = 0.9", "CORE = 1.0", TRANSPARENCY_TEST),
+    Mutant("player/fba_player/gl/_mesh_renderer.py", "CORE = 0.9", "CORE = 0.1", TRANSPARENCY_TEST),
     Mutant(ROUND_ANGLES, "ROUND_RADIANS = 5.0, 0.1", "ROUND_RADIANS = 6.0, 0.1", STEP_CHOICE_TEST),
     Mutant(ROUND_ANGLES, "ROUND_RADIANS = 5.0, 0.1", "ROUND_RADIANS = 5.0, 0.5", STEP_CHOICE_TEST),
     Mutant(ROUND_ANGLES, "ROUND_MORE = 6.0, 2.0", "ROUND_MORE = 1.0, 2.0", STEP_CHOICE_TEST),

@@ -54,7 +54,7 @@ def change_map(
     for source, joint in pairs.items():
         if source not in motion.names:
             raise OptionError(
-                f"the motion has no joint {source!r}{did_you_mean(source, motion.names)}; it has "
+                f"the skeleton has no joint {source!r}{did_you_mean(source, motion.names)}; it has "
                 f"{_list(motion.names)}"
             )
         _check_joint(joint, allow_none=True)
@@ -63,7 +63,7 @@ def change_map(
             result[source] = joint
     if ROOT not in result.values():
         raise OptionError(
-            f"no joint of the motion is mapped to {ROOT}, the hips: give one, such as Hips={ROOT}"
+            f"no joint of the skeleton is mapped to {ROOT}, the hips: give one, such as Hips={ROOT}"
         )
     order = {name: number for number, name in reversed(list(enumerate(motion.names)))}
     return dict(sorted(result.items(), key=lambda pair: order.get(pair[0], len(order))))

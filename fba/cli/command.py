@@ -85,8 +85,10 @@ def _remedy_text(remedy: Remedy, context: click.Context) -> str:
     name = OPTIONS.get(remedy.argument)
     if remedy.call == "fba.write" and name == "format":
         name = "to"
-    if remedy.call.endswith(".read_body"):  # the joints of a body that is shown, not of a capture
-        name = None
+    if remedy.call.endswith(".read_body") and not any(
+        param.name == "body" for param in context.command.params
+    ):
+        name = None  # the joints of a body that is shown, not of a capture
     option = _option_text(context.command, name, remedy.value)
     if option is not None:
         return remedy.fill_in(option)

@@ -242,10 +242,10 @@ def read_model(path: Path | None) -> FaceModel | None:
     return import_model(path)
 
 
-def read_body(path: Path | None) -> BodyModel | None:
-    """Return the body of `--body`, or None for the built-in one."""
+def read_body(path: Path | None, joints: Mapping[str, str] | None = None) -> BodyModel | None:
+    """Return the body of `--body`, or None for the built-in one. joints: see `fba.capture.from_skeleton`."""
     if path is None:
         return None
     from fba.formats.gltf.bodies import read_body as read
 
-    return read(path)
+    return read(path, joints=joints)

@@ -11,6 +11,7 @@ import click
 from fba.cli.command import Decorated
 from fba.cli.inputs import input_file
 from fba.cli.outputs import OutputType
+from fba.cli.program import as_typed
 from fba.errors import OptionError
 from fba.limits import Limits
 
@@ -57,6 +58,17 @@ class RestType(click.ParamType["str | int"]):
         return int(text)
 
 
+body_map_option = click.option(
+    "--map",
+    "maps",
+    type=MapType(),
+    multiple=True,
+    metavar="JOINT=JOINT|FILE",
+    help="With --body: which joint of the standard a joint of its skeleton is, Pelvis=HumanoidRoot; none: "
+    "Hat=. Repeatable. Or a TOML file of such pairs.",
+)
+
+
 def map_options(*, out: bool) -> Callable[[Decorated], Decorated]:
     """Return a decorator that adds `--map`, and `--map-out` if `out`."""
     given = click.option(
@@ -92,11 +104,30 @@ def read_joints(
     """Return the map that `--map` gives, None without; click.UsageError where there is nothing to map."""
     if not maps:
         return None
+    if not captures:
+        raise click.UsageError("--map goes with motion capture: a BVH or glTF file")
+    return _combine(maps, limits, lambda: read_capture(captures[0], format, clip, limits))
+
+
+def read_body_joints(maps: Sequence[Path | Pair], body: Path | None, limits: Limits) -> dict[str, str] | None:
+    """Return the map that `--map` gives for the person of `--body`, None without."""
+    if not maps:
+        return None
+    from fba.formats.gltf.bodies import read_skeleton
+
+    if body is None:
+        encode = as_typed("fba encode")
+        raise click.UsageError(f"--map names the joints of a --body: give one; {encode} has it for captures")
+    return _combine(maps, limits, lambda: read_skeleton(body, limits=limits))
+
+
+def _combine(
+    maps: Sequence[Path | Pair], limits: Limits, skeleton: Callable[[], SkeletonMotion]
+) -> dict[str, str]:
+    """Return the map of a file of joints and pairs, which change it or what is found in the skeleton."""
     from fba.capture.joint_maps import change_map, read_map
     from fba.formats.gltf.humanoid import joints_of_bones
 
-    if not captures:
-        raise click.UsageError("--map goes with motion capture: a BVH or glTF file")
     saved = [each for each in maps if isinstance(each, Path)]
     bones = joints_of_bones()  # VRM's names are known to many
     pairs = {
@@ -105,10 +136,10 @@ def read_joints(
     if len(saved) > 1:
         raise click.UsageError("--map: give one file of joints at most; pairs change what it says")
     base = read_map(saved[0], limits=limits) if saved else None
-    if not pairs:
+    if base is not None and not pairs:
         return base
     try:
-        return change_map(read_capture(captures[0], format, clip, limits), base, pairs)
+        return change_map(skeleton(), base, pairs)
     except OptionError as error:
         raise click.UsageError(f"--map: {error}") from error
 

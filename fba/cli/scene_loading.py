@@ -15,6 +15,7 @@ import click
 
 from fba.animation import Animation
 from fba.cli import inputs
+from fba.cli.joint_options import read_body_joints
 from fba.cli.scene_options import SceneOptions, SoundOptions
 from fba.errors import FbaWarning, FormatError
 
@@ -88,7 +89,8 @@ def is_pipe(file: Path) -> bool:
 
 def build_scene(opened: list[Opened], names: list[str], how: SceneOptions, *, over: bool = False) -> Any:
     """Return one scene of opened files. over: draws them over each other unless `--arrange` is given."""
-    face, figure = inputs.read_model(how.model), inputs.read_body(how.body)
+    joints = read_body_joints(how.maps, how.body, how.limit)
+    face, figure = inputs.read_model(how.model), inputs.read_body(how.body, joints)
     scenes = [_build_one(animation, growing, face, figure, how) for animation, growing in opened]
     result: Any = scenes[0]
     if len(scenes) > 1:

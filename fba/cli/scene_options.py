@@ -14,6 +14,7 @@ import click
 from fba.cli import inputs, options
 from fba.cli.command import Decorated
 from fba.cli.inputs import EXISTING
+from fba.cli.joint_options import Pair, body_map_option
 from fba.limits import Limits
 
 MOST = 8
@@ -26,6 +27,7 @@ class SceneOptions:
 
     model: Path | None
     body: Path | None
+    maps: tuple[Path | Pair, ...]
     arrange: str | None
     fps: Fraction | None
     format: str | None
@@ -86,6 +88,7 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]
             help="The body: one of this project, or any skinned person (.glb, .vrm) with its own head. "
             "Default: the built-in person.",
         ),
+        body_map_option,
         click.option("--arrange", type=click.Choice(["side", "over"]), help=arrange),
         options.fps_option(fps),
         options.from_option,

@@ -12,6 +12,7 @@ from fba.cli.command import Decorated
 from fba.cli.inputs import read_body, read_model
 
 if TYPE_CHECKING:
+    from fba.body.model import BodyModel
     from fba.formats.registry import Format
 
 UNITS = {"cm": 100.0, "m": 1.0, "mm": 1000.0, "in": 1 / 0.0254}
@@ -66,8 +67,12 @@ def writer_options(command: Decorated) -> Decorated:
     return command
 
 
-def settings(target: Path, writing: Format, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keywords for the writer of a format. given: values of the options, None if not given.
+def settings(
+    target: Path, writing: Format, given: Mapping[str, Any], joints: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Return keywords for the writer of a format.
+
+    given: values of the options, None if not given. joints: of the body, as for `read_body`.
 
     Raises click.UsageError for an option that the format does not have, ModelError or FormatError for a
     model that cannot be read.
@@ -76,7 +81,12 @@ def settings(target: Path, writing: Format, given: Mapping[str, Any]) -> dict[st
     for name in given:
         if name not in writing.write_options:
             raise click.UsageError(_misplaced_text(name, target, writing))
-    return {name: _CONVERTERS[name](value) if name in _CONVERTERS else value for name, value in given.items()}
+
+    def read_person(path: Path) -> BodyModel | None:
+        return read_body(path, joints)
+
+    converters: dict[str, Callable[[Any], Any]] = {**_CONVERTERS, "body": read_person}
+    return {name: converters[name](value) if name in converters else value for name, value in given.items()}
 
 
 def _misplaced_text(name: str, target: Path, writing: Format) -> str:
@@ -93,5 +103,4 @@ def _misplaced_text(name: str, target: Path, writing: Format) -> str:
 _CONVERTERS: dict[str, Callable[[Any], Any]] = {
     "unit": UNITS.__getitem__,
     "model": read_model,
-    "body": read_body,
 }

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import warnings
+from typing import Literal
 
 from fba.errors import FbaWarning
 from fba.gltf.document import Document
 from fba.gltf.scene import Material
 from fba.gltf.values import Value, optional_member
 
-PICTURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+WEBP = "EXT_texture_webp"
+"""The extension by which a texture has a picture in WebP."""
+PICTURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
 """First bytes and media types of the pictures that a glTF file may hold."""
+ALPHA: dict[str, Literal["opaque", "mask", "blend"]] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
 
 
 def media_type(data: bytes) -> str | None:
-    """Return "image/png" or "image/jpeg" by the first bytes of a picture, None for other content."""
-    return next((name for mark, name in PICTURES.items() if data.startswith(mark)), None)
+    """Return "image/png", "image/jpeg" or "image/webp" by the first bytes, None for other content."""
+    kind = next((name for mark, name in PICTURES.items() if data.startswith(mark)), None)
+    return None if kind == "image/webp" and data[8:12] != b"WEBP" else kind
 
 
 def read_materials(document: Document) -> tuple[Material, ...]:
@@ -36,6 +41,8 @@ def _material(entry: Value, number: int, pictures: _Pictures) -> Material:
     )
     red, green, blue, alpha = (1.0,) * 4 if colour is None else colour.numbers(4, 0.0, 1.0)
     coordinates = optional_member(texture, "texCoord")
+    given, cutoff, two_sided = (entry.get(key) for key in ("alphaMode", "alphaCutoff", "doubleSided"))
+    mode = None if given is None else given.choice(*ALPHA)
     return Material(
         name=f"material {number}" if name is None else name.text(),
         colour=(red, green, blue, alpha),
@@ -43,6 +50,9 @@ def _material(entry: Value, number: int, pictures: _Pictures) -> Material:
         roughness=1.0 if roughness is None else roughness.number(0.0, 1.0),
         texture=None if texture is None else pictures.texture(texture),
         texcoord=0 if coordinates is None else coordinates.integer(0, 31),
+        alpha=None if mode is None else ALPHA[mode],
+        cutoff=0.5 if cutoff is None else cutoff.number(0.0, 1e6),
+        two_sided=two_sided is not None and two_sided.boolean(),
     )
 
 
@@ -58,9 +68,11 @@ class _Pictures:
 
     def texture(self, info: Value) -> bytes | None:
         index = info.member("index").index(len(self._textures), "texture")
-        source = self._textures[index].get("source")
-        if source is None:  # only an extension names its picture
-            self._left_out.append((self._textures[index], "has no PNG or JPEG picture"))
+        texture = self._textures[index]
+        better = optional_member(texture.get("extensions"), WEBP)
+        source = texture.get("source") if better is None else better.member("source")
+        if source is None:  # only another extension names its picture
+            self._left_out.append((texture, "has no PNG, JPEG or WebP picture"))
             return None
         number = source.index(len(self._images), "image")
         if number not in self._known:
@@ -78,7 +90,7 @@ class _Pictures:
             self.document.budget.add_source(len(data))
             self.document.budget.charge(len(data), entry)
         if media_type(data) is None:
-            self._left_out.append((entry, "is neither PNG nor JPEG"))
+            self._left_out.append((entry, "is neither PNG, JPEG nor WebP"))
             return None
         return data
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Protocol
 
 from fba.arrays import Float32
 from fba.errors import ModelError
 from fba.gltf.scene import Gltf
+from fba.gltf.scene import Material as GltfMaterial
 from fba.gltf.values import Value
 from fba.gltf.writer import Builder
 from fba.mesh.meshes import Material, Mesh
@@ -58,28 +60,35 @@ class PartWriter:
     def _material(self, part: MeshPart) -> int:
         # colours of vertices multiply the material's in glTF, but replace it in fba
         material, colour = part.material, part.material.colour if part.colours is None else WHITE
-        shown = Material(material.name, colour, material.roughness, material.texture)
+        shown = replace(material, colour=colour)
         if shown not in self._known:
             self._known[shown] = self._builder.add("materials", self._entry(shown, part.name))
         return self._known[shown]
 
     def _entry(self, material: Material, part: str) -> dict[str, Any]:
-        numbers = (*material.colour, material.roughness)
-        if len(numbers) != 4 or not all(0 <= number <= 1 for number in numbers):
+        numbers = (*material.colour, material.roughness, material.opacity)
+        if len(numbers) != 5 or not all(0 <= number <= 1 for number in numbers):
             raise ModelError(
-                f"part {part!r}: colour and roughness of its material must be within 0..1, not {numbers}"
+                f"part {part!r}: colour, roughness and opacity must be within 0..1, not {numbers}"
             )
         surface: dict[str, Any] = {
-            "baseColorFactor": [*map(float, material.colour), 1.0],
+            "baseColorFactor": [*map(float, (*material.colour, material.opacity))],
             "metallicFactor": 0.0,
             "roughnessFactor": float(material.roughness),
         }
         if material.texture is not None:
             image = self._builder.image(material.texture, material.name)
             if image not in self._textures:
-                self._textures[image] = self._builder.add("textures", {"source": image})
+                self._textures[image] = self._builder.texture(image)
             surface["baseColorTexture"] = {"index": self._textures[image]}
-        return {"name": material.name, "pbrMetallicRoughness": surface}
+        entry: dict[str, Any] = {"name": material.name, "pbrMetallicRoughness": surface}
+        if material.alpha != "auto":
+            entry["alphaMode"] = material.alpha.upper()
+        if material.alpha == "mask":
+            entry["alphaCutoff"] = float(material.cutoff)
+        if material.two_sided:
+            entry["doubleSided"] = True
+        return entry
 
 
 def read_material(entry: Value, gltf: Gltf, index: int | None) -> Material:
@@ -92,5 +101,18 @@ def read_material(entry: Value, gltf: Gltf, index: int | None) -> Material:
     if index is None:
         return Material()
     material = gltf.materials[index]
-    red, green, blue = material.colour[:3] if given is None else given.numbers(3, 0.0, 1.0)
-    return Material(material.name, (red, green, blue), material.roughness, material.texture)
+    read = convert_material(material, material.texture)
+    if given is not None:
+        red, green, blue = given.numbers(3, 0.0, 1.0)
+        read = replace(read, colour=(red, green, blue))
+    return read if material.alpha is not None else replace(read, alpha="auto")
+
+
+def convert_material(material: GltfMaterial, texture: bytes | None) -> Material:
+    """Return a document's material as that of a part that has this texture."""
+    *colour, opacity = material.colour
+    red, green, blue = colour
+    return Material(
+        material.name, (red, green, blue), material.roughness, texture, opacity, material.alpha or "opaque",
+        min(material.cutoff, 1.0), material.two_sided,
+    )  # fmt: skip

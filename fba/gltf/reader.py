@@ -26,6 +26,7 @@ PACKED = {
 KNOWN = {
     "KHR_draco_mesh_compression",
     "EXT_meshopt_compression",
+    "EXT_texture_webp",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
     "KHR_lights_punctual",
@@ -38,9 +39,9 @@ def read_gltf(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> Gltf:
     """Return the content of a .glb or .gltf file.
 
     Buffers and pictures may be in the file, in data URIs, or in files in the same folder or below it. Points,
-    lines, and pictures that are neither PNG nor JPEG are left out with an FbaWarning. FormatError where the
-    file cannot be opened; ModelError, which names the place in the document, where it is damaged, too large,
-    or requires an unknown extension; LimitError where it takes more memory than the limits allow.
+    lines, and pictures that are neither PNG, JPEG nor WebP are left out with an FbaWarning. FormatError where
+    the file cannot be opened; ModelError, which names the place in the document, where it is damaged, too
+    large, or requires an unknown extension; LimitError where it takes more memory than the limits allow.
     """
     return read_document(open_document(path, limits))
 

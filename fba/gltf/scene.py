@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from fba.arrays import Float32, Float64, Int32
 from fba.gltf._accessors import Accessors
@@ -13,8 +14,10 @@ from fba.gltf.values import Budget, Value
 class Material:
     """The look of a surface.
 
-    colour: red, green, blue in linear light, and opacity, 0..1; it multiplies the texture. texture: PNG or
-    JPEG bytes, sRGB, or None. texcoord: number of the set of texture coordinates that it uses.
+    colour: red, green, blue in linear light, and opacity, 0..1; it multiplies the texture. texture: PNG,
+    JPEG or WebP bytes, sRGB, or None. texcoord: number of the set of texture coordinates that it uses. alpha:
+    "opaque", "mask" with a cutoff, or "blend"; None where the file does not say, which means "opaque".
+    two_sided: whether backs are seen.
     """
 
     name: str
@@ -23,6 +26,9 @@ class Material:
     roughness: float
     texture: bytes | None
     texcoord: int
+    alpha: Literal["opaque", "mask", "blend"] | None = None
+    cutoff: float = 0.5
+    two_sided: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from fba.atomic import atomic
 from fba.errors import ModelError
 from fba.gltf._accessors import COMPONENTS, MAX_ELEMENTS, WIDTHS
 from fba.gltf._glb import MAX_BYTES, join_container
-from fba.gltf._materials import media_type
+from fba.gltf._materials import WEBP, media_type
 from fba.gltf.document import MAX_JSON
 from fba.gltf.packed import pack
 from fba.source import Path
@@ -112,19 +112,29 @@ class Builder:
         return self.add("accessors", entry)
 
     def image(self, data: bytes, name: str = "") -> int:
-        """Add a PNG or JPEG picture once; return its index. ModelError for other content."""
+        """Add a PNG, JPEG or WebP picture once; return its index. ModelError for other content."""
         if data not in self._pictures:
             kind = media_type(data)
             if kind is None:
-                raise ModelError(f"the picture {name!r} is neither PNG nor JPEG")
+                raise ModelError(f"the picture {name!r} is neither PNG, JPEG nor WebP")
             entry: dict[str, Any] = {"bufferView": self._blob(data), "mimeType": kind}
             self._pictures[data] = self.add("images", entry | ({"name": name} if name else {}))
         return self._pictures[data]
+
+    def texture(self, image: int) -> int:
+        """Add a texture that shows an image; return its index."""
+        source: dict[str, Any] = {"source": image}
+        if self.root["images"][image]["mimeType"] == "image/webp":
+            source = {"extensions": {WEBP: source}}
+        return self.add("textures", source)
 
     def glb(self) -> bytes:
         """Return the bytes of the file. ModelError where it would be too large, or a text is not Unicode."""
         chunks: list[bytes] = []
         offset = 0
+        if any(image["mimeType"] == "image/webp" for image in self.root.get("images", [])):
+            for key in ("extensionsUsed", "extensionsRequired"):
+                self.root[key] = [*self.root.get(key, []), *({WEBP} - set(self.root.get(key, [])))]
         views = self.root.get("bufferViews", [])
         streams = [(number, bytes(content), key) for key, (number, content) in self._views.items()]
         for number, content, (target, stride) in (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Literal, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,18 +13,29 @@ import numpy.typing as npt
 from fba.arrays import Float32, Floating, Int32, Integer
 from fba.errors import ModelError
 
+Alpha = Literal["auto", "opaque", "mask", "blend"]
 NORMAL_TOLERANCE = 1e-4
 """Lengths of normals within this of 1 are taken as 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """How a surface looks. colour: linear light, 0..1. roughness: 0..1. texture: PNG or JPEG bytes, sRGB."""
+    """How a surface looks.
+
+    colour: linear light, 0..1. roughness: 0..1. texture: PNG, JPEG or WebP bytes, sRGB. opacity: 0..1.
+    alpha: what a texture's alpha and the opacity mean. "opaque": nothing. "mask": pixels with less than
+    `cutoff` are holes, others opaque. "blend": how much hides what is behind. "auto", for surfaces of this
+    project: as "blend" where the texture has alpha. two_sided: whether the back is seen, too, and lit.
+    """
 
     name: str = "plain"
     colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
     roughness: float = 0.6
     texture: bytes | None = None
+    opacity: float = 1.0
+    alpha: Alpha = "auto"
+    cutoff: float = 0.5
+    two_sided: bool = False
 
 
 def vertex_normals(vertices: Floating, triangles: Integer) -> Float32:

@@ -45,7 +45,7 @@ def test_joints_are_given_and_left_out(motion: SkeletonMotion) -> None:
     [
         ({"LeftHant": "l_wrist"}, r"no joint 'LeftHant' \(did you mean 'LeftHand'\?\)"),
         ({"LeftHand": "l_wrists"}, r"no joint 'l_wrists' \(did you mean 'l_wrist'\?\)"),
-        ({"Hips": ""}, "no joint of the motion is mapped to HumanoidRoot"),
+        ({"Hips": ""}, "no joint of the skeleton is mapped to HumanoidRoot"),
     ],
 )
 def test_wrong_joints(motion: SkeletonMotion, pairs: dict[str, str], message: str) -> None:

@@ -113,15 +113,38 @@ def test_joints_that_names_do_not_tell_can_be_given(run: Run, bvh: Path, tmp_pat
     assert np.array_equal(written.values, animation.body.values)
 
 
-def test_what_only_python_can_do_is_shown_as_python(run: Run, tmp_path: Path, face: Animation) -> None:
+def test_joints_of_a_body_are_given_as_options(run: Run, tmp_path: Path, face: Animation) -> None:
     path = write_person(tmp_path / "p.glb", names={bone: f"n{k}" for k, bone in enumerate(BONES)})
     fba.write(tmp_path / "a.fap", face)
     code, _, err = run("render", tmp_path / "a.fap", "-o", tmp_path / "a.png", "--body", path)
     assert code == 1
-    assert err.endswith(
-        "with fba.formats.gltf.bodies.read_body(FILE, joints={'Pelvis': 'HumanoidRoot', ...}) in Python; "
-        "the command line has no option for it\n"
+    assert err.endswith("name each joint's counterpart in the standard with --map Pelvis=HumanoidRoot\n")
+
+
+def test_what_only_python_can_do_is_shown_as_python(run: Run, tmp_path: Path) -> None:
+    """A trunk with shoulders alone does not tell how long its unit is."""
+    path = tmp_path / "trunk.bvh"
+    joints = {
+        "Hips": "HumanoidRoot",
+        "Spine": "vl5",
+        "A": "l_shoulder",
+        "B": "r_shoulder",
+        "Head": "skullbase",
+    }
+    channels = "CHANNELS 3 Zrotation Xrotation Yrotation"
+    ends = "End Site { OFFSET 0 15 0 } }"
+    children = " ".join(
+        f"JOINT {name} {{ OFFSET {x} {y} 0 {channels} {ends}"
+        for name, x, y in (("A", 18, 30), ("B", -18, 30), ("Head", 0, 45))
     )
+    path.write_text(
+        f"HIERARCHY\nROOT Hips {{ OFFSET 0 0 0 {channels} JOINT Spine {{ OFFSET 0 12 0 {channels} {children} "
+        f"}} }}\nMOTION\nFrames: 1\nFrame Time: 0.04\n{' '.join(['5'] * 15)}\n"
+    )
+    maps = [word for pair in joints.items() for word in ("--map", "=".join(pair))]
+    code, _, err = run("convert", path, tmp_path / "a.bap", *maps)
+    assert "with fba.read(FILE, scale=0.001) in Python; the command line has no option for it\n" in err
+    assert code == 0
 
 
 def test_a_format_can_be_named(run: Run, tmp_path: Path) -> None:

@@ -262,10 +262,47 @@ def test_materials_and_pictures(tmp_path: Path) -> None:
     assert (plain.name, plain.colour, plain.metallic, plain.roughness) == ("material 0", (1, 1, 1, 1), 1, 1)
     assert (skin.name, skin.colour, skin.roughness, skin.texcoord) == ("skin", (1, 0.5, 0, 1), 0.25, 1)
     assert (plain.texture, skin.texture) == (None, png)
-    for number, text in ((1, "is neither PNG nor JPEG"), (2, "has no PNG or JPEG picture")):
+    assert (skin.alpha, skin.two_sided) == (None, False)
+    for number, text in ((1, "is neither PNG, JPEG nor WebP"), (2, "has no PNG, JPEG or WebP picture")):
         sheet.json["materials"][1]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": number}
         with pytest.warns(FbaWarning, match=text):
             assert read_gltf(sheet.save(tmp_path / "a.glb")).materials[1].texture is None
+
+
+def test_pictures_in_webp(tmp_path: Path) -> None:
+    """The extension's picture counts, not that for readers without it; RIFF files of other kinds do not."""
+    sheet = Sheet()
+    sheet.show(sheet.triangle(material=0))
+    webp, wave = b"RIFF\4\0\0\0WEBP", b"RIFF\4\0\0\0WAVE"
+    sheet.json["images"] = [
+        {"bufferView": sheet.bytes(data), "mimeType": "image/webp"} for data in (b"\xff\xd8\xff", webp, wave)
+    ]
+    sheet.json["textures"] = [{"source": 0, "extensions": {"EXT_texture_webp": {"source": 1}}}]
+    sheet.json["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    sheet.json["extensionsRequired"] = ["EXT_texture_webp"]
+    assert read_gltf(sheet.save(tmp_path / "a.glb")).materials[0].texture == webp
+    sheet.json["textures"][0]["extensions"]["EXT_texture_webp"]["source"] = 2
+    with pytest.warns(FbaWarning, match="is neither PNG, JPEG nor WebP"):
+        read_gltf(sheet.save(tmp_path / "a.glb"))
+
+
+def test_alpha_of_materials(tmp_path: Path) -> None:
+    sheet = Sheet()
+    sheet.show(sheet.triangle(material=0))
+    sheet.json["materials"] = [
+        {"alphaMode": "MASK", "alphaCutoff": 0.25, "doubleSided": True},
+        {"alphaMode": "BLEND"},
+        {"alphaMode": "OPAQUE", "doubleSided": False},
+    ]
+    found = read_gltf(sheet.save(tmp_path / "a.glb")).materials
+    assert [(each.alpha, each.cutoff, each.two_sided) for each in found] == [
+        ("mask", 0.25, True),
+        ("blend", 0.5, False),
+        ("opaque", 0.5, False),
+    ]
+    sheet.json["materials"][1]["alphaMode"] = "GLASS"
+    with pytest.raises(ModelError, match=r"materials\[1\]\.alphaMode.*GLASS"):
+        read_gltf(sheet.save(tmp_path / "a.glb"))
 
 
 def test_text_documents_with_buffers_elsewhere(tmp_path: Path) -> None:

@@ -134,12 +134,23 @@ def test_a_picture_is_kept_once() -> None:
     png = b"\x89PNG\r\n\x1a\n123"
     assert builder.image(png, "skin") == builder.image(png) == 0
     assert builder.image(b"\xff\xd8\xff") == 1
-    with pytest.raises(ModelError, match="'hair' is neither PNG nor JPEG"):
+    with pytest.raises(ModelError, match="'hair' is neither PNG, JPEG nor WebP"):
         builder.image(b"GIF89a", "hair")
     document, binary = parsed(builder.glb())
     assert [image["mimeType"] for image in document["images"]] == ["image/png", "image/jpeg"]
     view = document["bufferViews"][0]
     assert binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]] == png
+
+
+def test_textures_in_webp_need_an_extension() -> None:
+    builder = Builder()
+    builder.root["extensionsUsed"] = ["FBA_face"]
+    plain, packed = (builder.image(data) for data in (b"\xff\xd8\xff", b"RIFF\4\0\0\0WEBP"))
+    assert [builder.texture(plain), builder.texture(packed)] == [0, 1]
+    document, _ = parsed(builder.glb())
+    assert document["textures"] == [{"source": 0}, {"extensions": {"EXT_texture_webp": {"source": 1}}}]
+    assert document["extensionsUsed"] == ["FBA_face", "EXT_texture_webp"]
+    assert document["extensionsRequired"] == ["EXT_texture_webp"]
 
 
 def test_what_glTF_cannot_hold() -> None:

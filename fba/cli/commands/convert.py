@@ -74,12 +74,14 @@ def command(
         [source, given["model"], given["body"]],
         no_clobber=no_clobber,
     )
-    extra = writer_options.settings(target, writing, given)
+    captures = [source] if has_skeleton(source, format) else []
+    bodies_map = maps if given["body"] is not None and not captures else ()
+    joints_of_body = joint_options.read_body_joints(bodies_map, given["body"], limit)
+    extra = writer_options.settings(target, writing, given, joints_of_body)
     check_clip(clip, [source], format)
     if mark is not None and writing.name != "fba":
         raise click.UsageError(f"--mark is for streams, and {display_name(target)} becomes none")
-    captures = [source] if has_skeleton(source, format) else []
-    joints = joint_options.read_joints(maps, captures, format, clip, limit)
+    joints = None if bodies_map else joint_options.read_joints(maps, captures, format, clip, limit)
     tables: list[str] = []
     animation = read_input(
         source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format, clip=clip,

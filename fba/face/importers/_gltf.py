@@ -19,6 +19,7 @@ from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.symmetry import ALIKE, EXACT, asymmetry, mirror_tables, stand_upright
 from fba.face.importers.points.points_file import given_points, points_beside
 from fba.face.model import FaceModel, Material, Part
+from fba.gltf.part_materials import convert_material
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh.text_files import MAX_VERTICES
 
@@ -107,7 +108,7 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
         material = Material()
         if (own := surface.material) is not None:
             texture = None if surface.texcoords is None else own.texture
-            material = Material(own.name, own.colour[:3], own.roughness, texture)
+            material = convert_material(own, texture)
         name = surface.name or "mesh"
         if primitives[surface.node] > 1 and guess_kind(material.name) is not None:
             name = material.name  # of several surfaces of one node, the material says which this is

@@ -24,6 +24,7 @@ from fba.body.own_head import OwnHead
 from fba.body.skeleton import ROOT, Skeleton
 from fba.body.skin.skin_weights import strongest_weights
 from fba.capture.blendshapes.shape_table import amounts_of
+from fba.capture.motion import SkeletonMotion
 from fba.capture.rest import Rest, find_rest
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
@@ -31,6 +32,7 @@ from fba.formats.gltf._pose import bind_matrices
 from fba.formats.gltf._skeletons import Joints, find_joints
 from fba.gltf import Gltf, Node, Primitive, read_gltf
 from fba.gltf import Material as GltfMaterial
+from fba.gltf.part_materials import convert_material
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh.meshes import Material
 from fba.mesh.names import UniqueNames
@@ -85,6 +87,12 @@ def read_body(
         remedies = [replace(each, call=call) for each in error.remedies]
         finding = error.finding.removeprefix(f"{os.path.basename(path)}: ")
         raise FormatError(finding, path=path).with_remedies(*remedies) from error
+
+
+def read_skeleton(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> SkeletonMotion:
+    """Return the skeleton of a skinned person at rest, without frames, to be mapped by its joints' names."""
+    gltf = read_gltf(path, limits=limits)
+    return find_joints(gltf).resting(gltf)
 
 
 @dataclass(frozen=True)
@@ -413,7 +421,7 @@ def _look(
         primitive.texcoords[material.texcoord] if material.texcoord < len(primitive.texcoords) else None
     )
     texture = None if texcoords is None else material.texture
-    look = Material(material.name, material.colour[:3], material.roughness, texture)
+    look = convert_material(material, texture)
     colours = None
     if primitive.colours is not None and texture is None:
         colours = primitive.colours.copy()

@@ -75,11 +75,14 @@ def make_shape(part: Part, sways: Float32) -> FaceShape:
         picture,
         SCATTER.get(part.kind, 0.0),
         _relief(part),
-        part.kind in TWO_SIDED,
+        part.kind in TWO_SIDED or part.material.two_sided,
         find_hairs(part) if part.kind in HAIRY and picture is None else None,
         name=part.name,
         kind=part.kind,
         smooth=_is_smooth(part),
+        alpha=part.material.alpha,
+        opacity=part.material.opacity,
+        cutoff=part.material.cutoff,
     )
 
 

@@ -180,8 +180,14 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
     random = np.random.default_rng(7).standard_normal((joints, SEEN_WEIGHTS)) / SEEN_WEIGHTS**0.5
     carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * BEND
     coarser = detail_levels(part, [part.vertices], carried.astype(np.float32))
+    open_surface = part.material.two_sided
     return replace(
-        shape, scatter=SCATTER.get(part.kind, 0.0), two_sided=False, closed=True, name="", coarser=coarser
+        shape,
+        scatter=SCATTER.get(part.kind, 0.0),
+        two_sided=open_surface,
+        closed=not open_surface,
+        name="",
+        coarser=coarser,
     )
 
 

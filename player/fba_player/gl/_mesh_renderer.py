@@ -22,6 +22,8 @@ from fba_player.view.view import FaceMesh, FaceShape
 
 MOST_SHAPES = 64
 """Number of parts whose buffers are cached; the least recently used goes first."""
+CORE = 0.9
+"""Opacity from which pixels of blended parts are drawn as opaque ones, before all others are blended."""
 FAINTEST = 0.25
 """The skin's relief is not drawn if it is reduced to less than this share of its size."""
 
@@ -53,6 +55,7 @@ class FaceRenderer:
             if not mesh.shape.see_through:
                 self._draw(mesh)
         transparent = [mesh for mesh in meshes if mesh.shape.see_through]
+        self._draw_cores(transparent)
         if transparent:
             gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
             gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
@@ -61,6 +64,12 @@ class FaceRenderer:
                 self._draw(mesh)
             gl.fbo.depth_mask = True
             gl.enable_only(gl.DEPTH_TEST)
+
+    def _draw_cores(self, meshes: list[FaceMesh]) -> None:
+        """Draw what is nearly opaque of blended parts, which then hides what is behind, in any order."""
+        for mesh in meshes:
+            if mesh.shape.alpha == "blend":
+                self._draw(mesh, core=True)
 
     def close(self) -> None:
         """Free all OpenGL objects."""
@@ -101,7 +110,8 @@ class FaceRenderer:
             set_uniform(program, "camera", matrix)
         set_uniform(program, "pixel", pixel)
 
-    def _draw(self, mesh: FaceMesh) -> None:
+    def _draw(self, mesh: FaceMesh, *, core: bool = False) -> None:
+        """Draw a part. core: of a blended one, pixels that hide at least `CORE` of what is behind."""
         shape = mesh.shape
         if not len(shape.triangles):  # a part so small that no level of detail is left of it from afar
             return
@@ -118,12 +128,17 @@ class FaceRenderer:
                 ("HAIRS", shape.across is not None),
                 ("TEXTURED", picture is not None),
                 ("FINE", repeats is not None),
+                ("SOLID", shape.alpha == "opaque"),
+                ("CUT", shape.alpha == "mask" or core),
+                ("VEIL", shape.alpha == "blend"),
             )
             if used
         )
         program, array = self._program(options), self._array(parts, options)
         _set_shape(program, shape)
         _set_pose(program, mesh)
+        if "CUT" in options:
+            set_uniform(program, "cut", CORE if core else shape.cutoff)
         if picture is not None:
             picture.use(0)
         if repeats is not None:
@@ -187,6 +202,7 @@ def _set_shape(program: Any, shape: FaceShape) -> None:
     set_uniform(program, "fine", shape.fine)
     set_uniform(program, "two_sided", 1.0 if shape.two_sided else 0.0)
     set_uniform(program, "relief", 1)
+    set_uniform(program, "opacity", shape.opacity)
 
 
 def _set_pose(program: Any, mesh: FaceMesh) -> None:

@@ -1,4 +1,4 @@
-"""Textures of faces: pictures in PNG or JPEG, how large they lie on a mesh, and the relief of skin.
+"""Textures of faces: pictures in PNG, JPEG or WebP, how large they lie on a mesh, and the relief of skin.
 
 Decoding a picture takes a tenth of a second, so the reduced sizes that screens show are cached on disk.
 """
@@ -45,7 +45,8 @@ RELIEF_MAKING = 1
 class FacePicture:
     """A texture; see `load_picture`.
 
-    data: the bytes of a PNG or JPEG file. size: width and height. opaque: whether alpha is 255 everywhere.
+    data: the bytes of a PNG, JPEG or WebP file. size: width and height. opaque: whether alpha is 255
+    everywhere.
     """
 
     data: bytes
@@ -70,7 +71,7 @@ class FacePicture:
 
 
 def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture:
-    """The picture in the bytes of a PNG or JPEG file.
+    """The picture in the bytes of a PNG, JPEG or WebP file.
 
     Raises OSError, ValueError or SyntaxError if it cannot be read, LimitError if it has more pixels, or takes
     more memory for its bytes, than the limits allow.
@@ -116,7 +117,7 @@ def _opened(data: bytes) -> Iterator[Any]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
+            image = Image.open(io.BytesIO(data), formats=("PNG", "JPEG", "WEBP"))
     except Image.DecompressionBombError as error:
         raise ValueError(str(error)) from error
     with image:

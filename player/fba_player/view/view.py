@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32
+from fba.mesh.meshes import Alpha
 from fba_player.mesh.textures import linear_light
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class FaceShape:
     tip, and 1 or -1 for its side; hairs narrower than a pixel are drawn a pixel wide and fainter. closed:
     whether the inside is never visible and not drawn. name, kind: of the model's part, "" if there is none.
     coarser: levels of detail for small sizes, None if there are none. smooth: False if triangles are so large
-    that light changes visibly within them.
+    that light changes visibly within them. alpha, opacity, cutoff: as of `fba.mesh.meshes.Material`.
     """
 
     triangles: Int32
@@ -84,11 +85,17 @@ class FaceShape:
     kind: str = ""
     coarser: DetailLevels | None = None
     smooth: bool = True
+    alpha: Alpha = "auto"
+    opacity: float = 1.0
+    cutoff: float = 0.5
 
     @property
     def see_through(self) -> bool:
         """Whether parts of it are transparent: its picture has alpha, or it consists of hairs."""
-        return (self.picture is not None and not self.picture.opaque) or self.across is not None
+        if self.across is not None:
+            return True
+        pictured = self.picture is not None and not self.picture.opaque
+        return pictured if self.alpha == "auto" else self.alpha == "blend" and (pictured or self.opacity < 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -103,13 +103,35 @@ def test_mistakes(run: Run, tmp_path: Path) -> None:
         ((source, "--map", "leftHant=l_wrist"), "no joint 'leftHant' (did you mean 'leftHand'?)"),
         ((source, "--map", "leftHand=l_wrists"), "no joint 'l_wrists' (did you mean 'l_wrist'?)"),
         ((source, "--map", "nothing"), "'nothing' is neither a file nor a pair of joints"),
-        ((source, "--map", "hips="), "no joint of the motion is mapped to HumanoidRoot"),
+        ((source, "--map", "hips="), "no joint of the skeleton is mapped to HumanoidRoot"),
         ((fap, "--map", "hips=HumanoidRoot"), "--map goes with motion capture"),
         ((fap, "--map-out", tmp_path / "m.toml"), "--map-out goes with motion capture"),
     ):
         code, _, err = run("encode", *words, "-o", tmp_path / "out.fba", *STEPS)
         assert (code, message in err) == (2, True), err
     assert not (tmp_path / "out.fba").exists()
+
+
+def test_joints_of_a_body_that_is_shown(run: Run, tmp_path: Path) -> None:
+    """`--map` names the joints of `--body` where the input is no capture."""
+    riddle = write_person(tmp_path / "p.glb", names=RIDDLES)
+    walk, out = tmp_path / "walk.bap", tmp_path / "out.glb"
+    assert run("gait", "--cycles", 1, "-o", walk)[0] == 0
+    code, _, err = run("convert", walk, out, "--body", riddle)
+    assert code == 1
+    assert "--map" in err
+    maps = [word for bone, joint in LIMBS.items() for word in ("--map", f"{RIDDLES[bone]}={joint}")]
+    assert run("convert", walk, out, "--body", riddle, *maps)[0] == 0
+    assert out.stat().st_size > 10_000
+    for words, message in (
+        (("render", walk, "--map", "a=l_hip", "-o", "a.png"), "--map names the joints of a --body: give one"),
+        (
+            ("render", walk, "--body", riddle, "--map", "n99=l_hip", "-o", "a.png"),
+            "--map: the skeleton has no joint 'n99'",
+        ),
+    ):
+        code, _, err = run(*words)
+        assert (code, message in err) == (2, True), err
 
 
 def test_hands_are_found(run: Run, tmp_path: Path) -> None:

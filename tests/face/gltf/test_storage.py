@@ -171,8 +171,8 @@ def test_a_large_face_stays_small(tmp_path: Path) -> None:
 UNFIT: list[tuple[dict[str, Any], str]] = [
     ({"triangles": np.zeros((0, 3), int)}, "part 'left eye' has no triangles"),
     ({"texcoords": None}, "part 'left eye' has a texture, but no texture coordinates"),
-    ({"material": Material("m", (2, 0, 0))}, "part 'left eye': colour and roughness of its material"),
-    ({"material": Material("m", texture=b"GIF89a")}, "the picture 'm' is neither PNG nor JPEG"),
+    ({"material": Material("m", (2, 0, 0))}, "part 'left eye': colour, roughness and opacity"),
+    ({"material": Material("m", texture=b"GIF89a")}, "the picture 'm' is neither PNG, JPEG nor WebP"),
     ({"material": Material("\ud800")}, "half a character"),
 ]
 

@@ -5,6 +5,12 @@ uniform sampler2D relief;  // noise of three channels
 uniform vec2 fine;         // strength of the skin's relief, 0 for none, and its repetitions
 uniform float scatter;     // how much light scatters below the surface: 1 skin, 0 cloth
 uniform float two_sided;   // 0: the inside is drawn as a dark hollow
+#if defined(CUT) || defined(VEIL)
+uniform float opacity;
+#endif
+#ifdef CUT
+uniform float cut;         // pixels that are less opaque are holes
+#endif
 in vec4 upright;
 in vec4 coordinates;
 #ifdef SMOOTH
@@ -27,7 +33,16 @@ void main() {
 #ifdef TEXTURED
     vec4 texel = texture(picture, coordinates.xy);
     albedo = texel.rgb * texel.rgb;
+#ifndef SOLID
     opaque *= texel.a;
+#endif
+#endif
+#if defined(CUT) || defined(VEIL)
+    opaque *= opacity;
+#endif
+#ifdef CUT
+    if (opaque < cut) discard;
+    opaque = 1.0;
 #endif
 #ifdef SMOOTH
     vec3 n = upright.xyz;

@@ -1,6 +1,7 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
-// multiplies the colour by a picture; FINE adds the skin's relief. Software OpenGL runs both branches of a
+// multiplies the colour by a picture; FINE adds the skin's relief; SOLID ignores alpha, CUT makes holes where
+// it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
 // The head turns rigidly; the neck bends with it, and stands still at its lower end.
