@@ -12,6 +12,7 @@ from fba.face.checks.posing import Poser
 from fba.face.model import Part
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, OPEN_JAW, TONGUE_ROLL
 from fba.parameters import faps
+from fba.rotations import cross, dot, lengths
 
 TURNING = {OPEN_JAW, 19, 20, 21, 22, TONGUE_ROLL}
 """FAPs that rotate the skin: under these a triangle has turned over if it faces away from its neighbours."""
@@ -92,7 +93,8 @@ def count_damage(
     before: Float64, after: Float64, triangles: Integer, *, turning: bool
 ) -> tuple[int, int, float]:
     """(triangles turned over, edges torn, share of the moving area turned over)."""
-    moved_triangles = triangles[_touching(np.abs(after - before).max(axis=1) > 1e-9, triangles)]
+    moves = np.abs(after - before) > 1e-9
+    moved_triangles = triangles[_touching(moves[:, 0] | moves[:, 1] | moves[:, 2], triangles)]
     sides = [
         (
             before[moved_triangles[:, k]] - before[moved_triangles[:, k - 1]],
@@ -100,18 +102,18 @@ def count_damage(
         )
         for k in range(3)
     ]
-    normals = [np.cross(sides[0][which], sides[1][which]) for which in (0, 1)]
-    areas = np.linalg.norm(normals[0], axis=1)
+    normals = [cross(sides[0][which], sides[1][which]) for which in (0, 1)]
+    areas = lengths(normals[0])
     not_degenerate = areas > DEGENERATE * np.median(areas) if len(areas) else areas > 0
     if turning:
         facing = [_facing(normal, moved_triangles, len(before)) for normal in normals]
         over = (facing[0] > 0) & (facing[1] < FACING)
     else:
-        over = (normals[0] * normals[1]).sum(axis=1) <= 0
+        over = dot(normals[0], normals[1]) <= 0
     over &= not_degenerate
-    lengths = np.array([[np.linalg.norm(side[which], axis=1) for side in sides] for which in (0, 1)])
-    typical = float(np.median(lengths[0])) if lengths.size else 0.0
-    torn = lengths[1] > LONGEST * np.maximum(lengths[0], SHORT * typical)
+    edges = np.array([[lengths(side[which]) for side in sides] for which in (0, 1)])
+    typical = float(np.median(edges[0])) if edges.size else 0.0
+    torn = edges[1] > LONGEST * np.maximum(edges[0], SHORT * typical)
     share = float(areas[over].sum() / max(areas.sum(), 1e-30))
     return int(over.sum()), int(torn.sum()), share
 
@@ -122,8 +124,8 @@ def _facing(normals: Float64, triangles: Integer, count: int) -> Float64:
     for corner in range(3):
         np.add.at(sums, triangles[:, corner], normals)
     around = sums[triangles].sum(axis=1) - 3 * normals
-    lengths = np.linalg.norm(around, axis=1) * np.linalg.norm(normals, axis=1)
-    result: Float64 = np.where(lengths > 0, (around * normals).sum(axis=1) / np.maximum(lengths, 1e-300), 1.0)
+    product = lengths(around) * lengths(normals)
+    result: Float64 = np.where(product > 0, dot(around, normals) / np.maximum(product, 1e-300), 1.0)
     return result
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
 from fba.face.authoring.surface.surface import positions_in_rows
-from fba.rotations import cross
+from fba.rotations import cross, dot, lengths
 
 LEAST_AREA = 0.12
 """Least share of its area that a triangle keeps, seen along its neutral normal."""
@@ -105,23 +105,23 @@ class Patch:
     @cached_property
     def areas(self) -> Float64:
         """(M,) twice the areas of the triangles, m²."""
-        return _lengths(self._normals)
+        return lengths(self._normals)
 
     @cached_property
     def _square_areas(self) -> Float64:
-        return _dot(self._normals, self._normals)
+        return dot(self._normals, self._normals)
 
     @cached_property
     def _edge_lengths(self) -> tuple[Float64, ...]:
-        return tuple(_lengths(edge) for edge in self._edges)
+        return tuple(lengths(edge) for edge in self._edges)
 
     @cached_property
     def _typical_length(self) -> float:
-        lengths = np.concatenate(self._edge_lengths)
-        if not len(lengths):
+        edges = np.concatenate(self._edge_lengths)
+        if not len(edges):
             return 0.0
-        middle = [(len(lengths) - 1) // 2, len(lengths) // 2]
-        return float(np.partition(lengths, middle)[middle].mean())  # the median, four times as fast
+        middle = [(len(edges) - 1) // 2, len(edges) // 2]
+        return float(np.partition(edges, middle)[middle].mean())  # the median, four times as fast
 
     @cached_property
     def _most_lengths(self) -> tuple[Float64, ...]:
@@ -138,8 +138,8 @@ class Patch:
     def _facing_neighbours(self, normals: Float64) -> Float64:
         """(M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any vertex."""
         around = self._sum_around(normals) - 3 * normals
-        product = _lengths(around) * _lengths(normals)
-        result: Float64 = _dot(around, normals) / np.maximum(product, 1e-30)
+        product = lengths(around) * lengths(normals)
+        result: Float64 = dot(around, normals) / np.maximum(product, 1e-30)
         result[product < 1e-30] = 1.0
         return result
 
@@ -162,7 +162,7 @@ class Patch:
     def _stretching(self) -> tuple[tuple[Float64, Float64], ...]:
         """For each edge its squared length, and by how much that may grow."""
         shortest = (TINY_EDGE * self._typical_length) ** 2
-        squares = (_dot(edge, edge) for edge in self._edges)
+        squares = (dot(edge, edge) for edge in self._edges)
         return tuple((square, MOST_STRETCH**2 * np.maximum(square, shortest) - square) for square in squares)
 
     def reach(self, field: Float64) -> Float64:
@@ -172,11 +172,11 @@ class Patch:
         d1, d2 = field[b] - first, field[c] - first
         e1, e2, _ = self._edges
         normal, area = self._normals, self._square_areas
-        linear = _dot(cross(e1, d2) + cross(d1, e2), normal) / area
-        square = _dot(cross(d1, d2), normal) / area
+        linear = dot(cross(e1, d2) + cross(d1, e2), normal) / area
+        square = dot(cross(d1, d2), normal) / area
         result = _first_root(square, linear, np.full(len(area), 1 - LEAST_AREA))
         for edge, move, (_, growth) in zip(self._edges, (d1, d2, d2 - d1), self._stretching, strict=True):
-            stretch = _first_root(-_dot(move, move), -2 * _dot(edge, move), growth)
+            stretch = _first_root(-dot(move, move), -2 * dot(edge, move), growth)
             result = np.minimum(result, stretch)
         return result
 
@@ -208,21 +208,10 @@ class Patch:
         if turning:
             fine: Bool = (self._facing_neighbours(after) >= FOLDED) | self._folded_before
         else:
-            fine = _dot(self._normals, after) >= 0.8 * LEAST_AREA * self._square_areas
+            fine = dot(self._normals, after) >= 0.8 * LEAST_AREA * self._square_areas
         for edge, most in zip((f1, f2, f2 - f1), self._most_lengths, strict=True):
-            fine &= _lengths(edge) <= most
+            fine &= lengths(edge) <= most
         return fine
-
-
-def _dot(a: Float64, b: Float64) -> Float64:
-    """(M,) products of vectors (M, 3); by columns: sums along so short an axis take three times as long."""
-    result: Float64 = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
-    return result
-
-
-def _lengths(vectors: Float64) -> Float64:
-    """(M,) lengths of vectors (M, 3)."""
-    return np.sqrt(_dot(vectors, vectors))
 
 
 def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:
