@@ -68,6 +68,9 @@ FACE_MOTION, HUMANOID = "fba/formats/gltf/face_motion.py", "fba/formats/gltf/hum
 SHAPE_TABLE = "fba/capture/blendshapes/shape_table.py"
 COMBINATION = "fba/capture/blendshapes/combination.py"
 LIVELINK, TIMES = "fba/formats/face_tables/_shape_rows.py", "fba/formats/face_tables/_times.py"
+INVERSION = "fba/capture/blendshapes/inversion.py"
+LIVELINK_CSV = "fba/formats/face_tables/livelink_csv.py"
+SHAPES_BACK_TEST = "tests/capture/faces/test_faps_to_shapes.py"
 SAMPLING = "fba/capture/sampling.py"
 LIVELINK_TEST = "tests/formats/face_tables/test_livelink_csv.py"
 SHAPES_TEST = "tests/capture/faces/test_shapes_to_faps.py"
@@ -352,6 +355,8 @@ MUTANTS = (
     Mutant(LIVELINK, "correlation < 0", "correlation > 0", LIVELINK_TEST),
     Mutant(LIVELINK, "wrong = expected if", "wrong = False if", LIVELINK_TEST),
     Mutant(TIMES, "np.diff(seconds, prepend=seconds[0]) < -NOON", "seconds < 0", LIVELINK_TEST),
+    Mutant(INVERSION, "+ SHARED**2 * np.eye(len(shapes))", "", SHAPES_BACK_TEST),
+    Mutant(LIVELINK_CSV, "* rate > SPARSE", "* rate < 0", SHAPES_BACK_TEST),
     Mutant(TIMES, "if largest < rate", "if largest <= rate", LIVELINK_TEST),
     Mutant(SAMPLING, "np.where(length > BRIDGED, RETURN, length)", "length", LIVELINK_TEST),
     Mutant(SHAPE_TABLE, "            result[fap.number - 1] = True", "            pass", FACES_TEST),

@@ -5,7 +5,7 @@ May use: parameters, face and body, and the modules of `fba` itself.
 """
 
 from fba.capture._report import BoneError, FeetError, RetargetReport, retarget_report
-from fba.capture.blendshapes import ShapeMotion, from_blendshapes
+from fba.capture.blendshapes import ShapeMotion, from_blendshapes, to_blendshapes
 from fba.capture.motion import SkeletonMotion
 from fba.capture.skeleton import from_skeleton
 
@@ -18,4 +18,5 @@ __all__ = [
     "from_blendshapes",
     "from_skeleton",
     "retarget_report",
+    "to_blendshapes",
 ]

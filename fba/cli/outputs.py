@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 STANDARD = Path("-")
 """Standard output, or standard input."""
 NAMES_OF_STANDARD_OUTPUT = ("-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
-TEXT_FORMATS = ("fap", "bap", "epf", "bvh")
+TEXT_FORMATS = ("fap", "bap", "epf", "bvh", "livelink")
 """Formats that a terminal can show."""
 REFERRING = (".gltf", ".obj", ".mtl", ".fdp", ".xml")
 """Suffixes of text files that name other files, which are read with them."""

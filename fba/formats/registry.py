@@ -150,8 +150,9 @@ def formats() -> tuple[Format, ...]:
         ),
         Format(
             "livelink", (".csv",), "table of blendshapes: Live Link Face's, or with ARKit's names",
-            lazy("face_tables.livelink_csv", "sniff"), lazy("face_tables.livelink_csv", "read"), None,
-            ("face",),
+            lazy("face_tables.livelink_csv", "sniff"), lazy("face_tables.livelink_csv", "read"),
+            lazy("face_tables.livelink_writer", "write"), ("face",),
+            written="table of blendshapes as Live Link Face's",
             read_face=lazy("face_tables.livelink_csv", "read_face"),
         ),
     )  # fmt: skip

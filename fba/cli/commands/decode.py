@@ -45,6 +45,7 @@ _FOLDER_OR_FILE = OutputType(folders=True)
         "fba decode talk.fba --fap decoded.fap --epf talk.epf    # encode --epf makes the same bytes again",
         "fba decode both.fba -o person.glb",
         "fba decode walk.fba -o walk.bvh --joints moving",
+        "fba decode talk.fba -o talk.csv",
         "fba decode talk.fba --fap - | less",
         "fba decode archive/*.fba --fap decoded/",
         "fba decode archive/*.fba -o decoded/ --to glb",
@@ -68,7 +69,7 @@ _FOLDER_OR_FILE = OutputType(folders=True)
     "-o",
     "--output",
     type=_FOLDER_OR_FILE,
-    metavar="OUT.bvh|OUT.glb",
+    metavar="OUT.bvh|OUT.glb|OUT.csv",
     help="File for other programs, in the format of its suffix, or a folder with --to.",
 )
 @options.to_option
@@ -93,7 +94,7 @@ def command(
     **given: Any,
 ) -> None:
     """Decode FBA streams: to ASCII FAP and BAP files, to EPF files with the settings of their planes, and to
-    BVH and glTF for other programs.
+    BVH, glTF and tables of blendshapes (CSV) for other programs.
 
     One of the files can be -, standard output.
     """

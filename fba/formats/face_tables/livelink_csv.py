@@ -36,6 +36,8 @@ HEAD = ("headyaw", "headpitch", "headroll")
 EYES = ("lefteyeyaw", "righteyeyaw", "lefteyepitch", "righteyepitch")
 UNUSED = ("lefteyeroll", "righteyeroll", "neutral")
 """Columns that no FAP stands for."""
+SPARSE = 1.2
+"""Counts of time codes between frames from which on frames are fewer than these count."""
 MOST_GAPS = 3
 """Gaps that a warning names."""
 
@@ -161,6 +163,8 @@ def _read_times(table: Table, fps: Fraction | int | str | None) -> _Times:
     if coded is not None:
         seconds, rate, start = read_time_codes(table.column(coded), table.lines, table.path)
         check_order(seconds, table.lines, table.path)
+        if len(seconds) > 1 and float(np.median(np.diff(seconds))) * rate > SPARSE:
+            rate = find_rate(seconds)  # fewer frames than the time codes count
         return _Times(seconds, rate, start, True)
     if timed is not None:
         read = table.numbers([timed])[:, 0]

@@ -35,7 +35,7 @@ def test_body_and_face_come_from_one_file(tmp_path: Path) -> None:
     jaw = column(animation, "open_jaw")
     np.testing.assert_allclose(jaw, RAMP * jaw[-1], atol=1)
     assert 800 < jaw[-1] <= 1080  # what an I plane of the standard carries, from fap.csv
-    np.testing.assert_allclose(column(animation, "close_t_r_eyelid"), RAMP * 480, atol=1)
+    np.testing.assert_allclose(column(animation, "close_t_r_eyelid"), RAMP * 460, atol=1)
     assert not column(animation, "close_t_l_eyelid").any()
     assert animation.face is not None
     sent = animation.face.mask.all(axis=0)
@@ -125,7 +125,7 @@ def test_names_in_all_spellings() -> None:
         np.testing.assert_array_equal(other, jaw)
     smile = amounts_of("mouthSmile_R")
     assert smile is not None
-    assert smile[fap_numbers()["raise_r_cornerlip"] - 1] == 400
+    assert smile[fap_numbers()["raise_r_cornerlip"] - 1] == 550
     assert amounts_of("Wobble") is None
 
 

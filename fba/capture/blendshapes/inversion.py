@@ -1,0 +1,82 @@
+"""`to_blendshapes`: FAPs as weights of ARKit's 52 shapes."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Float64
+from fba.capture.blendshapes._weight_loops import find_weights
+from fba.capture.blendshapes.conversion import EYES, HEAD, RADIAN
+from fba.capture.blendshapes.motion import ShapeMotion
+from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
+from fba.errors import ModelError
+from fba.face.fapu import Fapu
+from fba.face.feature_points import neutral_points
+from fba.face.resolve import resolve
+from fba.parameters import FAP_COUNT, fap_numbers, faps
+
+EYEBALL = 0.012
+"""Radius of an eyeball, metres: how far a turn moves what one sees of it."""
+SWEEPS = 200
+"""Times that every weight is set to its best value for the others, at most."""
+SETTLED = 1e-4
+"""Largest change of a weight in a sweep at which that ends."""
+SHARED = 5e-4
+"""Metres that count as much as a weight of 1: of shapes that do nearly the same, all are used a little, as
+real faces do, and none is used for what is next to nothing."""
+
+
+def to_blendshapes(animation: Animation) -> ShapeMotion:
+    """Return weights of ARKit's 52 shapes, 0 to 1, that show a face like its FAPs, and head and eyes.
+
+    Visemes and expressions become FAPs first (`fba.face.resolve`). The weights of each frame are those whose
+    FAPs come closest, by least squares of how far an adult's face moves. What no shape moves (ears, pupils,
+    the tongue but for its tip) is lost. Times and rate are the animation's own.
+
+    Raises ModelError without a face.
+    """
+    if animation.face is None or not len(animation):
+        raise ModelError("the animation has no face; there is nothing to make blendshapes of")
+    shown = resolve(animation.face).astype(np.float64)
+    weights = _solve(_shapes(), shown * _metres())
+    times = np.asarray(animation.index, dtype=np.float64) / float(animation.rate)
+    return ShapeMotion(
+        ARKIT_ORDER, weights, times - times[0], Fraction(animation.rate),
+        head=_angles(shown, HEAD), eyes=_angles(shown, EYES), start=float(times[0]), name=animation.name,
+    )  # fmt: skip
+
+
+def _solve(shapes: Float64, wanted: Float64) -> Float64:
+    """Return weights (T, N), 0 to 1, of shapes (N, 68) that add up to what is wanted (T, 68), in metres."""
+    products = shapes @ shapes.T + SHARED**2 * np.eye(len(shapes))
+    return find_weights(products, wanted @ shapes.T, SWEEPS, SETTLED)
+
+
+@cache
+def _shapes() -> Float64:
+    """Return how far FAPs of each of ARKit's shapes move an adult's face, metres, (52, 68)."""
+    rows = [amounts_of(name) for name in ARKIT_ORDER]
+    return np.array([row for row in rows if row is not None]) * _metres()
+
+
+@cache
+def _metres() -> Float64:
+    """Return how far one step of each FAP moves an adult's face, metres (68,); 0 for what no shape moves."""
+    fapu = Fapu.measure(neutral_points())
+    metres = np.array([fapu[fap.unit] if fap.unit and fap.unit != "AU" else 0.0 for fap in faps()])
+    for name in EYES:
+        metres[fap_numbers()[name] - 1] = EYEBALL / RADIAN
+    moved = np.zeros(FAP_COUNT, dtype=bool)
+    for name in ARKIT_ORDER:
+        amounts = amounts_of(name)
+        moved |= amounts != 0 if amounts is not None else False
+    return np.where(moved, metres, 0.0)
+
+
+def _angles(shown: Float64, names: tuple[str, ...]) -> Float64:
+    """Return angles (T, n), radians, of FAPs."""
+    return shown[:, [fap_numbers()[name] - 1 for name in names]] / RADIAN

@@ -1,0 +1,120 @@
+"""FAPs to blendshapes and back: weights that come out as they went in, visemes, tables that are written."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba.animation import Animation, FaceTrack
+from fba.capture import ShapeMotion, from_blendshapes, to_blendshapes
+from fba.capture.blendshapes.shape_table import ARKIT_ORDER
+from fba.errors import FbaWarning, FormatError, ModelError
+from fba.face.authoring.shapes.shape_names import arkit_names
+from fba.formats.face_tables.livelink_csv import read_face
+from fba.parameters import fap_numbers
+
+COUNT = 40
+ALIKE = ("mouthDimpleLeft", "mouthDimpleRight", "mouthShrugLower", "mouthPressLeft", "mouthPressRight")
+"""Shapes of which others do a part: these come back with them."""
+RAMP = 0.5 - 0.5 * np.cos(np.linspace(0, 2 * np.pi, COUNT))
+
+
+def single(shape: str, size: float = 0.7) -> ShapeMotion:
+    weights = np.zeros((COUNT, len(ARKIT_ORDER)))
+    weights[:, ARKIT_ORDER.index(shape)] = size * RAMP
+    if shape == "mouthClose":
+        weights[:, ARKIT_ORDER.index("jawOpen")] = size
+    return ShapeMotion(ARKIT_ORDER, weights, np.arange(COUNT) / 25, Fraction(25))
+
+
+def test_the_order_has_all_52() -> None:
+    assert sorted(ARKIT_ORDER) == sorted(arkit_names())
+
+
+@pytest.mark.parametrize("shape", ARKIT_ORDER)
+def test_each_shape_alone_comes_back(shape: str) -> None:
+    motion = single(shape)
+    back = to_blendshapes(from_blendshapes(motion))
+    column = ARKIT_ORDER.index(shape)
+    off = np.abs(back.weights[:, column] - motion.weights[:, column]).max()
+    assert off < (0.4 if shape in ALIKE else 0.15)
+    assert np.corrcoef(back.weights[:, column], RAMP)[0, 1] > 0.98
+    assert ((back.weights >= 0) & (back.weights <= 1)).all()
+    again, first = from_blendshapes(back).face, from_blendshapes(motion).face
+    assert again is not None
+    assert first is not None
+    difference = np.abs(again.values - first.values)[:, np.abs(first.values).max(axis=0) < 10_000]
+    assert difference.max() <= 130  # 1.5 mm
+
+
+def test_angles_come_back() -> None:
+    motion = single("jawOpen")
+    head = np.outer(RAMP, [0.1, -0.2, 0.3])
+    eyes = np.outer(RAMP, [0.2, 0.18, -0.1, -0.12])
+    turned = ShapeMotion(motion.names, motion.weights, motion.times, motion.rate, head=head, eyes=eyes)
+    back = to_blendshapes(from_blendshapes(turned))
+    assert back.head is not None
+    assert back.eyes is not None
+    np.testing.assert_allclose(back.head, head, atol=1e-5)
+    np.testing.assert_allclose(back.eyes, eyes, atol=1e-5)
+    out, into = (back.weights[:, ARKIT_ORDER.index(f"eyeLookOut{side}")] for side in ("Left", "Right"))
+    assert out.max() > 0.3  # both look to the left
+    assert into.max() == 0
+
+
+def test_visemes_and_expressions_become_shapes() -> None:
+    viseme = np.zeros((2, 4), dtype=np.int16)
+    viseme[:, 0], viseme[:, 2] = 10, 63  # A:
+    expression = np.zeros((2, 6), dtype=np.int16)
+    expression[:, 0], expression[:, 1] = 1, 63  # joy
+    mask = np.zeros((2, 68), dtype=bool)
+    for column, shapes in ((0, ["jawOpen"]), (1, ["mouthSmileLeft", "mouthSmileRight"])):
+        sent = mask.copy()
+        sent[:, column] = True
+        face = FaceTrack(np.zeros((2, 68), dtype=np.int32), sent, viseme, expression)
+        back = to_blendshapes(Animation(25, np.arange(2), face))
+        for shape in shapes:
+            assert back.weights[:, ARKIT_ORDER.index(shape)].min() > 0.1
+
+
+def test_a_table_that_is_written_reads_back(tmp_path: Path) -> None:
+    weights = np.zeros((COUNT, len(ARKIT_ORDER)))
+    sizes = {"jawOpen": 0.5, "mouthSmileLeft": 0.6, "mouthLeft": 0.3, "eyeBlinkRight": 1.0}
+    for shape, size in sizes.items():
+        weights[:, ARKIT_ORDER.index(shape)] = size * RAMP
+    head = np.outer(RAMP, [0.1, -0.2, 0.3])
+    for rate in (25, 30, 60, 29.97, 12):
+        exact = Fraction(30000, 1001) if rate == 29.97 else Fraction(rate)
+        motion = ShapeMotion(ARKIT_ORDER, weights, np.arange(COUNT) / float(exact), exact, head=head)
+        animation = from_blendshapes(motion)
+        fba.write(tmp_path / "a.csv", animation)
+        written, read = to_blendshapes(animation), read_face(tmp_path / "a.csv", swap="no")
+        assert (len(read), read.rate, read.names) == (COUNT, exact, ARKIT_ORDER)
+        np.testing.assert_allclose(read.weights, written.weights, atol=1e-6)
+        np.testing.assert_allclose(read.head, written.head, atol=1e-6)
+        np.testing.assert_allclose(read.times, np.arange(COUNT) / float(exact), atol=2e-5)
+
+
+def test_what_cannot_be_written(tmp_path: Path) -> None:
+    body = Animation(25, np.arange(2), None, fba.BodyTrack(np.zeros((2, 296), int), np.ones((2, 296), bool)))
+    with pytest.raises(ModelError, match="has no face"):
+        to_blendshapes(body)
+    with pytest.raises(FormatError, match=r"a\.csv: the animation has no face"):
+        fba.write(tmp_path / "a.csv", body)
+    both = Animation(25, np.arange(2), FaceTrack.empty(2), body.body)
+    with pytest.warns(FbaWarning, match="LIVELINK holds no body"):
+        fba.write(tmp_path / "a.csv", both)
+
+
+@pytest.mark.filterwarnings("ignore:.*all angles of")
+def test_slow_animations_are_resampled(tmp_path: Path) -> None:
+    values = np.zeros((3, 68), dtype=np.int32)
+    values[:, fap_numbers()["thrust_jaw"] - 1] = [0, 200, 400]
+    slow = Animation(2, np.arange(3), FaceTrack(values, values != -1))
+    fba.write(tmp_path / "a.csv", slow)
+    assert (tmp_path / "a.csv").read_text().count("\n") == 32
+    assert fba.read(tmp_path / "a.csv").duration == pytest.approx(31 / 30)
