@@ -16,8 +16,8 @@ from PIL import Image
 from fba.animation import Animation
 from fba.body import Skeleton
 from fba.capture import from_skeleton
+from fba.capture.bones import find_bones
 from fba.capture.comparison import compare
-from fba.capture.preparation import find_bones
 from fba.cli.capture_report import CaptureReport, draw_sights
 from fba.errors import FbaWarning
 from fba.formats.bvh.reader import read_motion

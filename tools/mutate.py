@@ -86,6 +86,9 @@ BOUNDS = "fba/capture/comparison/thresholds.csv"
 REPORT = "fba/capture/_report.py"
 FOOTING = "fba/body/footing.py"
 PREPARATION = "fba/capture/preparation.py"
+UP_AXIS = "fba/capture/_up_axis.py"
+REST_CHOICE = "fba/capture/_rest_choice.py"
+BONES = "fba/capture/bones.py"
 SPINE = "fba/capture/_spine.py"
 FOUND_REST = "fba/capture/_rest_from_motion.py"
 REST_CORRECTION = "fba/capture/_rest_correction.py"
@@ -317,8 +320,9 @@ MUTANTS = (
     Mutant(GROUND, "Ground(level if level <= FAR", "Ground(level if abs(level) <= FAR", CAPTURE_TEST),
     Mutant(SPINE, 'TOP = "vt1"', 'TOP = "vt9"', PREPARATION_TEST),
     Mutant(PREPARATION, "LEAST = 0.5", "LEAST = 0.0", PREPARATION_TEST),
-    Mutant(PREPARATION, "if turn > most:", "if turn > 9 * most:", ZOO_TEST),
-    Mutant(PREPARATION, "CLEAR_UP = 0.75", "CLEAR_UP = 1.1", PREPARATION_TEST),
+    Mutant(REST_CHOICE, "if turn > most:", "if turn > 9 * most:", ZOO_TEST),
+    Mutant(BONES, "BACKWARDS = -0.5", "BACKWARDS = -2.0", ZOO_TEST),
+    Mutant(UP_AXIS, "CLEAR_UP = 0.75", "CLEAR_UP = 1.1", PREPARATION_TEST),
     Mutant(FOUND_REST, "LOW_ARM = 0.6", "LOW_ARM = 2.0", PREPARATION_TEST),
     Mutant(REST_CORRECTION, "OWN_CLAVICLE = 5.0", "OWN_CLAVICLE = 90.0", PREPARATION_TEST),
     Mutant(BVH, "MOST_OF_BODY = 0.75", "MOST_OF_BODY = 2.0", ZOO_TEST),

@@ -215,6 +215,25 @@ def _digit(number: int) -> int:
     return int(str(number)[0])
 
 
+def _crown(top: int, meanings: Sequence[Meaning], parents: Int64) -> list[int]:
+    """Return the joints of neck and head that have no such names: the chain in the middle, above the arms.
+
+    That is the longest one that hangs on the joint that the arms hang on, if it has no side and no helpers.
+    """
+    chain: list[int] = []
+    joint = top
+    while True:
+        upwards = [
+            number
+            for number in np.flatnonzero(parents == joint).tolist()
+            if not meanings[number].side and not meanings[number].helper
+        ]
+        if len(upwards) != 1:
+            return chain if len(chain) > 1 else []
+        joint = upwards[0]
+        chain.append(joint)
+
+
 def _spine(
     mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64, lengths: Float64, skeleton: Skeleton
 ) -> dict[str, int]:
@@ -240,18 +259,24 @@ def _spine(
         top = necks[-1]
     elif len(arms) == 2:
         top = _common(_path(parents, arms[0]), _path(parents, arms[1])) or hips
+        necks = _crown(top, meanings, parents)
+        if necks:  # vertebrae by their numbers, up to the one that carries the head
+            top = necks.pop()
+            heads = [top]
+            result["skullbase"] = top
     else:
         return {}
     way = _path(parents, top)
     if hips not in way:
         return result
     line = [number for number in way[way.index(hips) + 1 :] if number not in limbs]
-    neck = [number for number in line if number in necks][:2]
+    neck = [number for number in line if number in necks]
+    neck = neck[:2] if len(neck) < 4 else [neck[0], neck[len(neck) // 2]]
     if neck:
         result["vc7"] = neck[0]
         if len(neck) > 1:
             result["vc4"] = neck[1]
-    end = line.index(neck[0]) if neck else len(line) - (1 if heads else 0)
+    end = line.index(neck[0]) if neck and neck[0] in line else len(line) - (1 if heads else 0)
     back = line[:end]
     total = float(sum(lengths[number] for number in line[: end + 1]))
     chain = spine_joints(skeleton)

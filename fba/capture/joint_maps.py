@@ -11,8 +11,8 @@ from collections.abc import Mapping
 
 from fba.atomic import atomic
 from fba.body.skeleton import ROOT, Skeleton
+from fba.capture.bones import find_bones
 from fba.capture.motion import SkeletonMotion
-from fba.capture.preparation import find_bones
 from fba.errors import FormatError, ModelError, OptionError, did_you_mean
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_whole

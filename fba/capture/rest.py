@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from fba.arrays import Float64
 from fba.body.skeleton import Skeleton
 from fba.capture import _rest_alignment as rest_alignment
+from fba.capture._up_axis import find_upright, turn_axes
+from fba.capture.bones import find_bones
 from fba.capture.motion import SkeletonMotion
-from fba.capture.preparation import find_bones, find_upright, turn_axes
 
 
 @dataclass(frozen=True, eq=False)

@@ -93,8 +93,8 @@ def compare_captures(
     """
     from fba.body import Skeleton
     from fba.capture import retarget_report
+    from fba.capture.bones import find_bones
     from fba.capture.comparison import compare
-    from fba.capture.preparation import find_bones
     from fba.formats import format_of
 
     given = {name: value for name, value in (options or {}).items() if name in ("joints", "rest", "up")}

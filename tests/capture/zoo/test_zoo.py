@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fba.body import BapSolver, Skeleton
 from fba.capture import from_skeleton
+from fba.capture.bones import find_bones
+from fba.errors import ModelError
 from fba.formats.bvh.reader import parse
 from zoo_bodies import Maker, truth, write
 
@@ -144,6 +148,32 @@ def turned(a: np.ndarray, b: np.ndarray) -> float:
 
 def _angles(matrices: np.ndarray) -> np.ndarray:
     return np.arccos(np.clip((np.trace(matrices, axis1=1, axis2=2) - 1) / 2, -1.0, 1.0))
+
+
+@pytest.mark.parametrize("name", ["mixamo", "lafan: along +x", "biped", "one spine joint, along +x"])
+def test_a_person_whose_left_is_called_right_is_refused(name: str) -> None:
+    maker = next(maker for maker in MAKERS if maker.name == name)
+    text, _ = write(replace(maker, sides=(maker.sides[1], maker.sides[0])))
+    with pytest.raises(ModelError, match="left and right are swapped"):
+        from_skeleton(parse(text))
+
+
+def test_toes_of_another_name_than_the_familys() -> None:
+    """LaFAN1 calls the toes "LeftToe", where others of its family say "LeftToeBase"."""
+    toes = replace(MAKERS[2], parts=(*MIXAMO[:-2], "{}Foot", "{}Toe"))
+    joints = find_bones(parse(write(toes)[0]), None, Skeleton.default())
+    assert joints[0] == "arm"
+    assert {"l_metatarsal", "r_metatarsal"} <= joints[1].keys()
+
+
+def test_vertebrae_up_to_the_atlas_carry_the_head() -> None:
+    """Nothing is called neck or head."""
+    parts = (*CLINIC[:2], "J_C7", "J_Atlas", *CLINIC[4:])
+    text, _ = write(replace(next(maker for maker in MAKERS if maker.parts == CLINIC), parts=parts))
+    _, mapped, *_ = find_bones(parse(text), None, Skeleton.default())
+    names = parse(text).names
+    assert names[mapped["skullbase"]] == "J_Atlas"
+    assert names[mapped["vc7"]] == "J_C7"
 
 
 def test_there_are_thirty_makers() -> None:

@@ -1,0 +1,182 @@
+"""Which joint of a source is which joint of the body: by a family of names, or else word by word.
+
+And whether the joints that a source calls left are on the person's left side: toes and knees point ahead, and
+left is where up and ahead say. In a file that was mirrored, as by a program with left-handed axes, or whose
+names are swapped, they point backwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fba.body.skeleton import ROOT, Skeleton
+from fba.capture import _named_bones as named_bones
+from fba.capture import _standing as standing
+from fba.capture import matching
+from fba.capture.motion import SkeletonMotion
+from fba.errors import ModelError, Remedy
+
+CORE = tuple(
+    f"{side}_{joint}" for side in "lr" for joint in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+)
+"""Joints that a whole body has."""
+ENDS = {"l_metatarsal": "l_ankle", "r_metatarsal": "r_ankle", "skullbase": ROOT}
+"""Joints that makers of one family name otherwise, and the joint that they hang on, or far above."""
+LIMBS = tuple(
+    tuple(f"{side}_{joint}" for joint in chain)
+    for side in "lr"
+    for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
+)
+BACKWARDS = -0.5
+"""Mean cosine to ahead of knees, or of toes where knees hardly bend, from which on they point backwards. In
+real files knees have 0.8 to 1, toes 0.15 to 1."""
+BENT = 0.12
+"""Distance of a knee from the line from hip to ankle, in leg lengths, from which on it shows the way."""
+FEWEST = 5
+"""Frames with a bent knee from which on they say where knees point."""
+
+
+def find_bones(
+    motion: SkeletonMotion, joints: Mapping[str, str] | None, skeleton: Skeleton
+) -> tuple[str, dict[str, int], float, str]:
+    """Return the family of names, body joint -> source's joint, the confidence, and a reason.
+
+    A family that names all limbs is taken as it is. Otherwise names are read word by word; where that finds
+    more limbs, its joints are added to a family that names at least as many joints, and else replace it.
+    ModelError where no bones are found.
+    """
+    if joints is None and motion.declared:
+        family, mapped = matching.map_joints(motion.names, motion.declared, skeleton)
+        return family, mapped, 1.0, f"{len(mapped)} joints as the file says"
+    if joints is not None:
+        family, mapped = matching.map_joints(motion.names, joints, skeleton)
+        return family, mapped, 1.0, f"{len(mapped)} joints as given"
+    try:
+        family, by_family = matching.map_joints(motion.names, None, skeleton)
+        failure = None
+    except ModelError as error:
+        family, by_family, failure = "", {}, error
+    own = _core(by_family, motion)
+    ends = any(joint in skeleton and joint not in by_family for joint in ENDS)
+    if failure is not None or own < len(CORE) or (ends and len(by_family) < len(motion.names)):
+        by_words = named_bones.find(motion.names, motion.parents, motion.offsets, skeleton)
+        if _core(by_words, motion) > own:
+            both = _fill_limbs(by_family, by_words)
+            if len(by_family) >= len(by_words) and _core(both, motion) == _core(by_words, motion):
+                by_family = both  # of a family, but for some joints that somebody renamed
+            else:
+                family, by_family, failure = "words", by_words, None
+        if family != "words":
+            by_family = _fill_ends(by_family, by_words)
+    if failure is not None:
+        raise failure
+    if count_limbs(by_family, motion) < 2:
+        raise _unknown_bones(motion, by_family)
+    missing = [joint for joint in CORE if joint not in by_family]
+    sure = (1.0 if family != "words" else 0.9) - 0.03 * len(missing)
+    how = f"{len(by_family)} of {len(motion.names)} joints by " + (
+        "the words in their names" if family == "words" else f"names as of {family!r}"
+    )
+    return family, by_family, sure, how
+
+
+def _fill_limbs(mapped: Mapping[str, int], others: Mapping[str, int]) -> dict[str, int]:
+    """Return joints with those joints of limbs that are missing, from others."""
+    used = set(mapped.values())
+    missing = {joint: number for joint, number in others.items() if joint in CORE and number not in used}
+    return {**missing, **mapped}
+
+
+def _fill_ends(mapped: Mapping[str, int], others: Mapping[str, int]) -> dict[str, int]:
+    """Return joints with those of toes and head that are missing, from others that agree on what is below."""
+    used = set(mapped.values())
+    return dict(mapped) | {
+        joint: others[joint]
+        for joint, above in ENDS.items()
+        if joint not in mapped
+        and others.get(joint, -1) not in (used | {-1})
+        and others.get(above) == mapped.get(above)
+    }
+
+
+def count_limbs(mapped: Mapping[str, int], motion: SkeletonMotion) -> int:
+    """Return the number of arms and legs whose upper bone is known, both its joints."""
+    return sum(
+        upper in mapped and lower in mapped and _is_below(motion, mapped[lower], mapped[upper])
+        for upper, lower, _ in LIMBS
+    )
+
+
+def _core(mapped: Mapping[str, int], motion: SkeletonMotion) -> int:
+    """Return how many of the core joints are known and hang where they should."""
+    count = 0
+    for limb in LIMBS:
+        above = mapped.get(ROOT)
+        for joint in limb:
+            number = mapped.get(joint)
+            if number is None:
+                continue
+            if above is not None and not _is_below(motion, number, above):
+                continue
+            count += 1
+            above = number
+    return count
+
+
+def _is_below(motion: SkeletonMotion, joint: int, above: int) -> bool:
+    while joint > above:
+        joint = int(motion.parents[joint])
+    return joint == above
+
+
+def _unknown_bones(motion: SkeletonMotion, mapped: Mapping[str, int]) -> ModelError:
+    found = ", ".join(f"{motion.names[number]} as {joint}" for joint, number in list(mapped.items())[:4])
+    names = ", ".join(motion.names[:8]) + (", ..." if len(motion.names) > 8 else "")
+    seen = f"; only {found} could be found" if found else ""
+    return ModelError(
+        f"no arms or legs are found among these {len(motion.names)} joint names: {names}{seen}"
+    ).with_remedies(joints_remedy())
+
+
+def joints_remedy() -> Remedy:
+    """Return what helps where joints are not found."""
+    return Remedy(
+        "joints", "name each joint's counterpart in the standard with {}", "{'Pelvis': 'HumanoidRoot', ...}"
+    )
+
+
+def refuse_swapped_sides(motion: SkeletonMotion, mapped: Mapping[str, int]) -> None:
+    """Raise ModelError if toes and knees of a motion point backwards, so that what is called left is right.
+
+    Nothing is raised where neither is known, or toes do not agree with knees.
+    """
+    needed = [f"{side}_{joint}" for side in "lr" for joint in ("hip", "knee", "ankle")]
+    if not all(joint in mapped for joint in needed):
+        return
+    positions = motion.world()[1]
+    left = positions[:, mapped["l_hip"]] - positions[:, mapped["r_hip"]]
+    toes: list[float] = []
+    knees: list[float] = []
+    for side in "lr":
+        hip, knee, ankle = (positions[:, mapped[f"{side}_{joint}"]] for joint in ("hip", "knee", "ankle"))
+        ahead = standing.unit(np.cross(left, hip - ankle))  # as this leg sees it, however the trunk leans
+        line, thigh = standing.unit(ankle - hip), knee - hip
+        off = thigh - line * (thigh * line).sum(axis=1, keepdims=True)
+        reach = np.linalg.norm(thigh, axis=1) + np.linalg.norm(ankle - knee, axis=1)
+        bent = np.linalg.norm(off, axis=1) > BENT * reach
+        knees += (standing.unit(off[bent]) * ahead[bent]).sum(axis=1).tolist()
+        if f"{side}_metatarsal" in mapped:
+            way = standing.unit(positions[:, mapped[f"{side}_metatarsal"]] - ankle)
+            toes += (way * ahead).sum(axis=1).tolist()
+    toe = float(np.mean(toes)) if toes else None
+    main = float(np.mean(knees)) if len(knees) >= FEWEST else toe
+    if main is None or main > BACKWARDS or (toe is not None and toe > 0):
+        return
+    raise ModelError(
+        "left and right are swapped: toes and knees point backwards, seen from the joints that are called "
+        "left and right; the file is mirrored, or its names are exchanged"
+    ).with_remedies(
+        Remedy("joints", "mirror it, or name joints of each side with {}", "{'LeftArm': 'r_shoulder', ...}")
+    )
