@@ -16,7 +16,15 @@ ROOT = Path(__file__).parents[1]
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files", "figures")]
 
-from face_files import face_weights, livelink_csv  # noqa: E402
+from face_files import (  # noqa: E402
+    beat,
+    face_angles,
+    face_weights,
+    ifacialmocap_records,
+    livelink_csv,
+    livelink_udp,
+    mediapipe_frames,
+)
 from fba.cache import load_or_make  # noqa: E402
 from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
@@ -244,6 +252,20 @@ def saved(folder: Path) -> dict[str, dict[str, bytes]]:
     }
 
 
+def faces() -> dict[str, bytes]:
+    """Return captures of a face, in all formats."""
+    weights = face_weights(4)
+    few = dict(list(weights.items())[:20])
+    turns = np.full((4, 6), 5.0)
+    return {
+        "livelink": livelink_csv(few).encode(),
+        "datagrams": b"".join(livelink_udp({**weights, **face_angles(4)})[:3]),
+        "records": "\n".join(ifacialmocap_records(few, turns, turns)).encode(),
+        "mediapipe": json.dumps(mediapipe_frames(few)).encode(),
+        "beat": json.dumps(beat(few)).encode(),
+    }
+
+
 def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
     """Return all files: content by name, by target. folder: for files that are read again at once."""
     limb = {name: BODY[name] for name in ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot")}
@@ -258,7 +280,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
             "mesh_text": as_text(textured()),
             "mesh_binary": textured().glb(),
         },
-        "capture": {"livelink": livelink_csv(dict(list(face_weights(6).items())[:20])).encode()},
+        "capture": faces(),
         "obj": {"triangles": OBJ.encode()},
         "mtl": {"two": MTL.encode()},
         "ply": meshes(),

@@ -155,6 +155,21 @@ def formats() -> tuple[Format, ...]:
             written="table of blendshapes as Live Link Face's",
             read_face=lazy("face_tables.livelink_csv", "read_face"),
         ),
+        Format(
+            "livelink-udp", (".udp",), "recorded datagrams of Live Link Face",
+            lazy("face_tables.livelink_udp", "sniff"), lazy("face_tables.livelink_udp", "read"), None,
+            ("face",), read_face=lazy("face_tables.livelink_udp", "read_face"),
+        ),
+        Format(
+            "ifacialmocap", (".txt",), "records of iFacialMocap and Facemotion3d",
+            lazy("face_tables.ifacialmocap", "sniff"), lazy("face_tables.ifacialmocap", "read"), None,
+            ("face",), read_face=lazy("face_tables.ifacialmocap", "read_face"),
+        ),
+        Format(
+            "shapes-json", (".json",), "blendshapes in JSON: MediaPipe's scores, BEAT",
+            lazy("face_tables.shapes_json", "sniff"), lazy("face_tables.shapes_json", "read"), None,
+            ("face",), read_face=lazy("face_tables.shapes_json", "read_face"),
+        ),
     )  # fmt: skip
 
 

@@ -31,7 +31,7 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.codec import ClampedParameter
 
-CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "swap")
+CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "swap", "face")
 """Options that say how a capture becomes BAPs and FAPs: those that its reader takes count."""
 
 
@@ -160,6 +160,7 @@ class _EncodeCommand(Command):
     "Live Link Face's tables: MouthLeft and MouthRight, JawLeft and JawRight change places.",
     "auto", "yes", "no",
 )  # fmt: skip
+@click.option("--face", metavar="NAME", help="Captures of several faces: the one to read, by its name.")
 @options.choice_option(
     "--limits",
     "Report where joints exceed normal human motion, or clamp them to it.",

@@ -10,11 +10,13 @@ from functools import cache
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float64
+from fba.arrays import Bool, Float64
 from fba.capture.blendshapes import ShapeMotion, from_blendshapes
 from fba.capture.blendshapes.shape_table import key_of
+from fba.capture.sampling import find_gaps
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError
 from fba.face.authoring.shapes.shape_names import arkit_names, arkit_of
+from fba.formats.face_tables._tables import named
 from fba.limits import Limits
 from fba.source import Path
 
@@ -25,6 +27,8 @@ SWAPPED = (("mouthLeft", "mouthRight"), ("jawLeft", "jawRight"))
 """Labels that Live Link Face's tables have the wrong way round."""
 TELLING = 0.3
 """Correlation of mouths that go aside with smiles from which on it decides."""
+MOST_GAPS = 3
+"""Gaps that a warning names."""
 MOVES = 0.01
 """Standard deviation from which on a difference of weights says something."""
 
@@ -57,17 +61,42 @@ def to_animation(
         raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
 
 
-def check_weights(weights: Float64, names: Sequence[str], lines: Sequence[int], path: Path) -> None:
-    """Raise FormatError for weights (T, N) that are no shares of 1."""
+def check_weights(
+    weights: Float64, names: Sequence[str], path: Path, lines: Sequence[int] | None = None
+) -> None:
+    """Raise FormatError for weights (T, N) that are no shares of 1. lines: (T,), where the file has lines."""
     far = np.abs(weights) > LARGEST
     if not far.any():
         return
     row, column = np.argwhere(far)[0]
     value = float(weights[row, column])
     hint = "; are these percent?" if np.nanmax(np.abs(weights)) <= 100 else ""
+    place = f"frame {row}: " if lines is None else ""
     raise FormatError(
-        f"{names[column]} has the weight {value:g}; expected 0 to 1{hint}", path=path, line=lines[row]
+        f"{place}{names[column]} has the weight {value:g}; expected 0 to 1{hint}",
+        path=path,
+        line=None if lines is None else lines[row],
     )
+
+
+def find_lacks(names: Sequence[str], weights: Float64, times: Float64, rate: Fraction) -> list[str]:
+    """Return what a capture lacks, a sentence each: shapes, rows with a face, frames.
+
+    weights: (T, N), times: (T,), seconds from the first row.
+    """
+    seen: Bool = np.isnan(weights).sum(axis=1) == 0
+    findings = []
+    lacking = [name for name in arkit_names() if name not in names]
+    if lacking and lacking != ["tongueOut"]:  # MediaPipe has none
+        findings.append(f"lacks {len(lacking)} of ARKit's 52 shapes: {named(lacking)}")
+    if not seen.all():
+        findings.append(f"{int((~seen).sum())} of {len(seen)} rows have no face; they are bridged")
+    gaps = find_gaps(times[seen], rate)
+    if gaps:
+        texts = ", ".join(f"{length:.2f} s after {start:.2f} s" for start, length in gaps[:MOST_GAPS])
+        more = f" and {len(gaps) - MOST_GAPS} more" if len(gaps) > MOST_GAPS else ""
+        findings.append(f"frames are missing: {texts}{more}")
+    return findings
 
 
 def find_swap(motion: ShapeMotion, swap: str, *, expected: bool) -> ShapeMotion:

@@ -17,10 +17,15 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture.blendshapes import ShapeMotion
 from fba.capture.blendshapes.shape_table import key_of
-from fba.capture.sampling import find_gaps, find_rate
+from fba.capture.sampling import find_rate
 from fba.errors import FormatError, ModelError, Remedy
-from fba.face.authoring.shapes.shape_names import arkit_names
-from fba.formats.face_tables._shape_rows import check_weights, find_swap, shape_of, to_animation
+from fba.formats.face_tables._shape_rows import (
+    check_weights,
+    find_lacks,
+    find_swap,
+    shape_of,
+    to_animation,
+)
 from fba.formats.face_tables._tables import Table, header_names, named, read_table
 from fba.formats.face_tables._times import check_order, read_time_codes, seconds_of
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -38,8 +43,6 @@ UNUSED = ("lefteyeroll", "righteyeroll", "neutral")
 """Columns that no FAP stands for."""
 SPARSE = 1.2
 """Counts of time codes between frames from which on frames are fewer than these count."""
-MOST_GAPS = 3
-"""Gaps that a warning names."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -84,7 +87,7 @@ def read_face(
     columns = _find_columns(table)
     shapes = list(columns.shapes)
     weights = table.numbers(list(columns.shapes.values()))
-    check_weights(weights, shapes, table.lines, path)
+    check_weights(weights, shapes, path, table.lines)
     times = _read_times(table, fps)
     head = eyes = None
     still = []
@@ -206,21 +209,10 @@ def _findings(
 ) -> list[str]:
     """Return what is odd about a table, a sentence each."""
     findings = []
-    lacking = [name for name in arkit_names() if name not in columns.shapes]
-    if lacking and lacking != ["tongueOut"]:
-        findings.append(f"lacks {len(lacking)} of ARKit's 52 shapes: {named(lacking)}")
     if columns.strange:
         findings.append(f"columns that mean nothing here are left out: {named(columns.strange)}")
     if still:
         findings.append(f"all angles of {' and '.join(still)} are 0, as where the app does not record them")
     if table.cut:
         findings.append("the last row is incomplete, as where a recording was cut off; it is left out")
-    unseen = np.isnan(weights).any(axis=1)
-    if unseen.any():
-        findings.append(f"{int(unseen.sum())} of {len(weights)} rows have no numbers; they are bridged")
-    gaps = find_gaps(times.seconds[~unseen], times.rate)
-    if gaps:
-        texts = ", ".join(f"{length:.2f} s after {start:.2f} s" for start, length in gaps[:MOST_GAPS])
-        more = f" and {len(gaps) - MOST_GAPS} more" if len(gaps) > MOST_GAPS else ""
-        findings.append(f"frames are missing: {texts}{more}")
-    return findings
+    return findings + find_lacks(list(columns.shapes), weights, times.seconds, times.rate)

@@ -206,7 +206,7 @@ def test_rows_without_numbers_are_bridged(tmp_path: Path) -> None:
         cells[2:] = ["", "NaN"] * 26
         lines[row + 1] = ",".join(cells)
     path = saved(tmp_path, "\n".join(lines))
-    with pytest.warns(FbaWarning, match=r"3 of 90 rows have no numbers.*|0\.07 s after 0\.15 s"):
+    with pytest.warns(FbaWarning, match=r"3 of 90 rows have no face.*|0\.07 s after 0\.15 s"):
         jaw = fap(path, "thrust_jaw")
     np.testing.assert_allclose(jaw, np.arange(ROWS) / ROWS * 400, atol=1)
     assert read_face(path).describe()["unseen"] == 3

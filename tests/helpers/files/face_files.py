@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import struct
+from collections.abc import Sequence
+
 import numpy as np
 
 from fba.arrays import Float64
@@ -65,3 +69,70 @@ def livelink_csv(
             cells = [cell.replace(".", ",") for cell in cells]
         lines.append(separator.join([time_code(start + row * step, rate), str(len(columns)), *cells]))
     return "\n".join(lines) + "\n"
+
+
+def datagram(
+    values: Sequence[float] | None, seconds: float, *, name: str = "iPhone", device: str = "D" * 36,
+    rate: int = 60,
+) -> bytes:  # fmt: skip
+    """Return what Live Link Face sends for a frame; values: 61, or None where no face is seen."""
+    texts = b"".join(struct.pack(">i", len(one)) + one.encode() for one in (device, name))
+    frame, part = divmod(seconds * rate, 1)
+    time = struct.pack(">ifii", int(frame), part, rate, 1)
+    numbers = b"" if values is None else struct.pack(">B61f", 61, *values)
+    return b"\x06" + texts + time + numbers
+
+
+def livelink_udp(columns: dict[str, Float64], *, start: float = 18_000.0, **options: object) -> list[bytes]:
+    """Return the datagrams of a capture with all 61 columns."""
+    rows = np.stack([columns[name] for name in [*UDP_ORDER, *ANGLES]], axis=1)
+    return [datagram(row.tolist(), start + number * STEP, **options) for number, row in enumerate(rows)]  # type: ignore[arg-type]
+
+
+def _short(name: str) -> str:
+    """Return the app's spelling: eyeBlink_L, but mouthLeft and jawLeft, whose left is no side of a pair."""
+    if name in ("MouthLeft", "MouthRight", "JawLeft", "JawRight"):
+        return camel(name)
+    return re.sub("Left$", "_L", re.sub("Right$", "_R", camel(name)))
+
+
+def ifacialmocap_records(
+    weights: dict[str, Float64], head: Float64, eyes: Float64, *, version: int = 1
+) -> list[str]:
+    """Return records; head (T, 6): degrees and metres; eyes (T, 6): degrees, the right eye's first."""
+    mark = "-" if version == 1 else "&"
+    records = []
+    for row in range(len(head)):
+        words = [f"{_short(name)}{mark}{round(100 * values[row])}" for name, values in weights.items()]
+        turns = ",".join(f"{one:.6f}" for one in head[row])
+        right, left = (",".join(f"{one:.6f}" for one in eyes[row, part]) for part in (slice(3), slice(3, 6)))
+        records.append("|".join([*words, f"=head#{turns}", f"rightEye#{right}", f"leftEye#{left}|"]))
+    return records
+
+
+def mediapipe_frames(weights: dict[str, Float64], rate: float = 30.0) -> list[dict[str, object]]:
+    """Return frames as the JavaScript of MediaPipe gives them: its own order, "_neutral" first, no tongue."""
+    names = sorted(camel(name) for name in weights if name != "TongueOut")
+    count = len(next(iter(weights.values())))
+    frames: list[dict[str, object]] = []
+    for row in range(count):
+        categories = [{"index": 0, "score": 1e-6, "categoryName": "_neutral", "displayName": ""}]
+        categories += [
+            {"index": number + 1, "score": float(weights[name[0].upper() + name[1:]][row]),
+             "categoryName": name, "displayName": ""}
+            for number, name in enumerate(names)
+        ]  # fmt: skip
+        shapes = {"categories": categories, "headIndex": -1, "headName": ""}
+        frames.append({"timestampMs": 1000 * row / rate, "faceBlendshapes": [shapes]})
+    return frames
+
+
+def beat(weights: dict[str, Float64], rate: float = 60.0) -> dict[str, object]:
+    """Return a recording as BEAT has it."""
+    names = [camel(name) for name in weights if name != "TongueOut"]
+    rows = np.stack([values for name, values in weights.items() if name != "TongueOut"], axis=1)
+    frames = [
+        {"weights": row.tolist(), "time": number / rate, "rotation": [0.0, 0.0, 0.0]}
+        for number, row in enumerate(rows)
+    ]
+    return {"names": names, "frames": frames}

@@ -470,14 +470,41 @@ def _captures() -> dict[str, HostileFile]:
     }
 
 
+RECORD = "jawOpen-1|eyeBlink_L-2|eyeBlink_R-3|mouthLeft-4|mouthClose-5|"
+NAMES = '[{"t":-1,"jawOpen":0,"mouthClose":0,"eyeBlinkLeft":0,"eyeBlinkRight":0,"mouthLeft":0},'
+
+
 def _faces() -> dict[str, HostileFile]:
-    from face_files import face_weights, livelink_csv
+    from face_files import datagram, face_weights, livelink_csv
+
+    def frames(size: int) -> bytes:
+        return b"".join(datagram([0.2] * 61, 2 + number / 60) for number in range(size // 320))
 
     table = livelink_csv(face_weights(2))
     head = table.split("\n", 1)[0]
     few = ",".join(head.split(",")[:8])
     rows = lambda size: livelink_csv(face_weights(size // 680)).encode()  # noqa: E731
     return {
+        "packets of a face": HostileFile(
+            encode_capture, "a.udp", lambda size: datagram([0.1] * 61, 1.0) + frames(size)
+        ),
+        "packets without a face": HostileFile(
+            read_any,
+            "a.udp",
+            lambda size: (
+                datagram([0.1] * 61, 0.0)
+                + b"".join(datagram(None, 1 + number / 60) for number in range(size // 75))
+            ),
+        ),
+        "records of a face": HostileFile(encode_capture, "a.txt", repeat("", RECORD + "\n")),
+        "records, bars": HostileFile(read_any, "a.txt", repeat(RECORD, "|")),
+        "records, names": HostileFile(read_any, "a.txt", repeat(RECORD, "a%d-1|")),
+        "records, small": HostileFile(read_any, "a.txt", repeat(RECORD, "jawOpen-1\n")),
+        "scores, nested": HostileFile(read_any, "a.json", repeat(NAMES, "[", "]")),
+        "scores, lists": HostileFile(read_any, "a.json", repeat(NAMES, "[],", "0]")),
+        "scores, frames": HostileFile(
+            encode_capture, "a.json", repeat(NAMES + "0", ',{"t":%d,"jawOpen":0}', "]")
+        ),
         "table of a face": HostileFile(encode_capture, "a.csv", rows),
         "table, short rows": HostileFile(read_any, "a.csv", repeat(few + "\n", "0:0:0:%d" + ",0" * 7 + "\n")),
         "table, names": HostileFile(read_any, "a.csv", repeat(few, ",a", "\n" + table)),

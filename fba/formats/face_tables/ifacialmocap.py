@@ -1,0 +1,168 @@
+"""Read records of iFacialMocap and Facemotion3d as text: `jawOpen-12|...|=head#rx,ry,rz,tx,ty,tz|...`.
+
+A record is what the app sends for a frame, in version 1 (name-number) or 2 (name&number). Records stand on
+lines of their own, before `___iFacialMocap`, or one after another: a name that comes again begins the next.
+Weights are percent. Angles are degrees about the face's own axes: x to its left, y up, z ahead.
+"""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Float64
+from fba.capture.blendshapes import ShapeMotion
+from fba.errors import FormatError
+from fba.formats.face_tables._shape_rows import find_lacks, shape_of, to_animation
+from fba.formats.face_tables._tables import named
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import Path, read_whole
+
+RATE = 60
+"""Records that the app sends in a second; they hold no times."""
+BREAK = re.compile(r"[\r\n\0]+|___iFacialMocap")
+PAIR = re.compile(r"([A-Za-z][A-Za-z0-9_]*?)[-&](-?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)")
+FEWEST = 5
+LARGEST = 400.0
+TURNS = {"head": 6, "rightEye": 3, "leftEye": 3}
+"""Numbers of each part that turns."""
+STATUS = "trackingStatus"
+RECORD_BYTES = 100
+"""Memory of a value while it is read."""
+
+Record = dict[str, list[float]]
+
+
+def sniff(head: bytes, suffix: str) -> bool:
+    """Whether a file begins with a record: several of ARKit's names with numbers, between bars."""
+    words = head[:4000].decode("utf-8", errors="replace").split("|")
+    found = [PAIR.fullmatch(word.strip().lstrip("=")) for word in words]
+    return sum(pair is not None and shape_of(pair[1]) is not None for pair in found) >= FEWEST
+
+
+def read(
+    path: Path,
+    *,
+    rate: Fraction | int | str | None = None,
+    fps: Fraction | int | str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> Animation:
+    """Return a captured face as FAPs, at `rate` or at the rate of the records.
+
+    fps: records in a second. Warns (FbaWarning) of what is odd. Raises FormatError, LimitError.
+    """
+    return to_animation(read_face(path, fps=fps, limits=limits), rate, path, limits, warn=4)
+
+
+def read_face(
+    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> ShapeMotion:
+    """Return weights, head and eyes as they are in the records.
+
+    fps: records in a second; without it the app's 60, which is said. Raises FormatError, LimitError.
+    """
+    data = read_whole(path)
+    text = data.decode("utf-8-sig", errors="replace")
+    limits.check_bytes(RECORD_BYTES * text.count("|"), "the records", source=len(data))
+    records, strange = _read_records(text, path)
+    limits.check_frames(len(records), "the recording")
+    names = list(dict.fromkeys(name for record in records for name in record if name not in TURNS))
+    shapes = [name for name in names if name != STATUS]
+    if len(shapes) < FEWEST:
+        raise FormatError(
+            f"{len(shapes)} blendshapes in the records; expected at least {FEWEST} of ARKit's", path=path
+        )
+    weights = np.array([[record.get(name, [np.nan])[0] for name in shapes] for record in records]) / 100
+    lost = np.array([record.get(STATUS, [1.0])[0] == 0 for record in records])
+    weights[lost] = np.nan
+    times = np.arange(len(records)) / float(Fraction(fps or RATE))
+    findings = [] if fps is not None else [f"the records have no times; taken as {RATE} in a second"]
+    if strange:
+        findings.append(f"names that mean nothing here are left out: {named(sorted(strange))}")
+    findings += find_lacks(shapes, weights, times, Fraction(fps or RATE))
+    return ShapeMotion(
+        tuple(shapes), weights, times, Fraction(fps or RATE),
+        head=_angles(records, "head", [0, 1, 2]), eyes=_eyes(records),
+        name=FilePath(path).stem, findings=tuple(findings),
+    )  # fmt: skip
+
+
+def _eyes(records: list[Record]) -> Float64 | None:
+    """Return turns (T, 4) of both eyes: yaw of the left and the right one, then their pitch."""
+    left, right = _angles(records, "leftEye", [1, 0]), _angles(records, "rightEye", [1, 0])
+    if left is None or right is None:
+        return None
+    return np.stack([left[:, 0], right[:, 0], left[:, 1], right[:, 1]], axis=1)
+
+
+def _angles(records: list[Record], part: str, columns: list[int]) -> Float64 | None:
+    """Return some of a part's angles (T, n) in radians; NaN in records without it, None if none has it."""
+    if not any(part in record for record in records):
+        return None
+    rows = [record.get(part, [np.nan] * TURNS[part]) for record in records]
+    angles: Float64 = np.radians(np.array(rows)[:, columns])
+    return angles
+
+
+def _read_records(text: str, path: Path) -> tuple[list[Record], set[str]]:
+    """Return all records, and names that mean nothing. Raises FormatError for other words."""
+    records: list[Record] = []
+    strange: set[str] = set()
+    line = 1
+    start = 0
+    for found in [*BREAK.finditer(text), None]:
+        end = found.start() if found is not None else len(text)
+        record: Record = {}
+        for word in text[start:end].split("|"):
+            name, numbers = _read_word(word.strip().lstrip("=").strip(), line, path)
+            if not name:
+                continue
+            key = name if name in TURNS or name == STATUS else shape_of(name)
+            if key is None:
+                strange.add(name)
+                continue
+            if key in record:
+                records.append(record)
+                record = {}
+            record[key] = numbers
+        if record:
+            records.append(record)
+        if found is not None:
+            line += found[0].count("\n")
+            start = found.end()
+    if not records:
+        raise FormatError("holds no record such as jawOpen-12|...|=head#0,0,0,0,0,0|", path=path)
+    return records, strange
+
+
+def _read_word(word: str, line: int, path: Path) -> tuple[str, list[float]]:
+    """Return the name and the numbers of a word between bars; "" for an empty one."""
+    if not word:
+        return "", []
+    name, mark, rest = word.partition("#")
+    if mark:
+        try:
+            numbers = [float(number) for number in rest.split(",")]
+        except ValueError:
+            numbers = []
+        if name not in TURNS or len(numbers) != TURNS[name] or not np.isfinite(numbers).all():
+            raise FormatError(
+                "this is no turn; expected head#rx,ry,rz,tx,ty,tz, leftEye#rx,ry,rz or rightEye#rx,ry,rz",
+                path=path, line=line, token=word,
+            )  # fmt: skip
+        return name, numbers
+    pair = PAIR.fullmatch(word)
+    if pair is None:
+        known = re.match(r"([A-Za-z][A-Za-z0-9_]*)[-&]", word)
+        if known is not None and shape_of(known[1]) is None:
+            return known[1], []  # a word of the app's own, such as a time code
+        raise FormatError(
+            "this is no weight; expected jawOpen-12 or jawOpen&12", path=path, line=line, token=word
+        )
+    if not abs(float(pair[2])) <= LARGEST and shape_of(pair[1]) is not None:
+        raise FormatError("the weight is beyond 100 percent by far", path=path, line=line, token=word)
+    return pair[1], [float(pair[2])]
