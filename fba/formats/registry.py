@@ -191,7 +191,7 @@ def format_of(path: Path, format: str | None = None) -> Format:
         kind = recognition_hint(head)
         error = FormatError(f"is in no format known here: {_list_formats()}{kind}", path=path)
         raise error if kind else error.with_remedies(UNKNOWN)
-    if by_suffix and match not in by_suffix:
+    if by_suffix and match not in by_suffix and suffix not in COMMON_SUFFIXES:
         warnings.warn(
             f"{os.fspath(path)}: is named {suffix}, but holds {match.name.upper()} content; "
             f"read as {match.name}",
