@@ -78,7 +78,8 @@ def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Fl
         assembled = assemble(upright, options.kinds)
         eyes = find_eyes(assembled, path)
     uneven = asymmetry(assembled, eyes["left"][0], eyes["right"][0])
-    return upright, find_points(assembled, path, symmetric=uneven < ALIKE), uneven, notes
+    points = find_points(assembled, path, symmetric=uneven < ALIKE, exactly=uneven < EXACT)
+    return upright, points, uneven, notes
 
 
 def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -> tuple[list[Piece], bool]:

@@ -21,7 +21,8 @@ from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
 from fba.face.importers.assembly._repair import repair_tables
-from fba.face.importers.assembly.pieces import assemble
+from fba.face.importers.assembly._winding import turn_outward
+from fba.face.importers.assembly.pieces import _join, assemble
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.symmetry import asymmetry, mirror_points, mirror_tables, stand_upright
 from fba.face.model import FaceModel, Part
@@ -190,6 +191,22 @@ def test_a_motion_that_folds_at_its_end_stops_earlier(base: FaceModel) -> None:
     repaired = repair_tables(wrong, lost)
     assert not any(f.severity == "error" for f in check_faps(repaired, [33]))
     np.testing.assert_allclose(shift(repaired, 33, 40), shift(base, 33, 40), atol=1e-6)
+
+
+def test_hands_of_an_avatar_do_not_turn_its_head_inside_out() -> None:
+    head = FaceModel.default().part("skin")
+    hand = Part(
+        "hands",
+        "skin",
+        np.array([(-0.6, -0.8, 0), (0.6, -0.8, 0), (0, -0.8, 0.9)], dtype=np.float32),
+        np.array([(0, 2, 1)], dtype=np.int32),
+    )
+    skin = _join([Piece(head), Piece(hand)], "skin", "skin")
+    centre = np.array([0.0, 0.0, -0.09])
+    assert turn_outward([skin], centre)[1] > 0
+    assert turn_outward([skin], centre, 0.155)[1] == 0
+    inside_out = replace(skin, part=replace(skin.part, triangles=skin.part.triangles[:, ::-1]))
+    assert turn_outward([inside_out], centre, 0.155)[1] == len(skin.part.triangles)
 
 
 def test_teeth_of_one_jaw_are_the_upper_row() -> None:

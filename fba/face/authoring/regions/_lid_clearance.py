@@ -70,16 +70,25 @@ class Profile:
         count as outside.
         """
         shifted = points + shifts
-        needed = self.radius(shifted, around=True) + self.clearance + (self.dip if edges else 0.0)
-        arms = shifted - self.centre
+        way = np.linalg.norm(shifts, axis=1)
+        outside = self.is_outside(points, OUTSIDE)
+        pushed = (outside if always is None else outside | always) & (way > 1e-9)
+        result = np.zeros_like(shifted)
+        # what hardly moves, as the lining of the other lid, stays where it is
+        most = way if always is None else np.where(always, np.inf, way)
+        result[:, 2] = np.where(pushed, np.minimum(self.shortfall(shifted, edges=edges), most), 0.0)
+        return result
+
+    def shortfall(self, points: Float64, *, edges: bool = True) -> Float64:
+        """(N,) metres by which points (N, 3) are too far back for a moved lid; 0 behind the centre.
+
+        edges: leave room for the edges between vertices.
+        """
+        needed = self.radius(points, around=True) + self.clearance + (self.dip if edges else 0.0)
+        arms = points - self.centre
         level = (arms[:, :2] ** 2).sum(axis=1)
         front = np.sqrt(np.maximum(needed**2 - level, 0.0))
-        moved = np.linalg.norm(shifts, axis=1) > 1e-9
-        outside = self.is_outside(points, OUTSIDE)
-        pushed = (outside if always is None else outside | always) & moved & (arms[:, 2] > 0)
-        result = np.zeros_like(shifted)
-        result[:, 2] = np.where(pushed, np.maximum(front - arms[:, 2], 0.0), 0.0)
-        return result
+        return np.where(arms[:, 2] > 0, np.maximum(front - arms[:, 2], 0.0), 0.0)
 
 
 def measure_profile(eye: Eye, parts: Sequence[Part], edge: float) -> Profile:

@@ -70,6 +70,9 @@ LEAST_TURN = 0.3
 """Least motion of a margin, as a share of its largest, against which that of other vertices is measured."""
 HEM = 0.006
 """Shares of a motion below this are set to 0."""
+SUNK = 0.03
+"""Shortfall of a margin from the clearance of moved lids, in radii of the eyeball, from which on both margins
+meet where they are, as a gap would be seen otherwise."""
 CORNER = 0.12
 """Distance from the corners, as a share of the eye's width, within which folds do not stop a lid."""
 
@@ -108,11 +111,13 @@ def lid_motion(
     profile = measure_profile(eye, parts, edge_length(marks, own, other))
     margins = np.concatenate([own, other])
     pinned = marks.surface.mask(margins)
-    shifts = push_vertices_outside(profile, points, shifts, values, pinned[vertices] if follows else None)
+    # margins that lie in the eyeball, or close to it, meet where they are
+    sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > SUNK * profile.size
+    shifts = push_vertices_outside(profile, points, shifts, values, pinned[vertices] if sunk else None)
     motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
     points = marks.surface.vertices[motion.vertices]
     shifts = push_vertices_outside(
-        profile, points, motion.shifts, values, pinned[motion.vertices] if follows else None
+        profile, points, motion.shifts, values, pinned[motion.vertices] if sunk else None
     )
     shifts = push_edges_outside(profile, marks.surface, motion.vertices, shifts, pinned, values)
     motion = Motion(values, motion.vertices, shifts)
@@ -121,9 +126,9 @@ def lid_motion(
     near = np.linalg.norm(marks.surface.vertices[margins][:, None] - ends, axis=2).min(axis=1)
     corners = margins[near < CORNER * np.linalg.norm(ends[1] - ends[0])]
     limited = stop_at_folds(limiter.without(corners), motion, turning=True)
-    if not follows:
+    if not follows and _moving_range(limited)[1] >= CLOSED:
         return limited
-    # the way to the other lid is the sculptor's; the way up is not
+    # an eye closes although its lids' edges roll in; the way up is no sculptor's
     closing = stop_at_folds(sculptors.without(margins), motion, turning=True)
     up, down = limited.values < 0, closing.values >= 0
     return Motion(
@@ -195,7 +200,7 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, ot
     away = surface.distances(own, 2 * REACH * es)
     crease = CREASE * es
     if marks.has(FOLD[side, lid]):
-        crease = float(np.clip(away[marks.vertex[FOLD[side, lid]]], 0.5 * crease, 1.5 * crease))
+        crease = float(np.clip(away[marks.vertex[FOLD[side, lid]]], 0.8 * crease, 1.5 * crease))
     gap = np.maximum(opening.upper[:, 0] - opening.lower[:, 0], 0.0)
     high = np.interp(surface.vertices[:, 0], opening.x, gap / gap.max())
     end = max(min(ENDS, 0.85 * float(away[still].min(initial=np.inf)) / crease), EDGE + 0.3)

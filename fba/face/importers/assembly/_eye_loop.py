@@ -9,8 +9,11 @@ from fba.face.authoring.surface.surface import Surface
 
 REACH = 1.6
 """Distance from the eyeball's axis, in its radii, within which margins are sought."""
-HIDDEN = 0.08
-"""Depth behind the front of the eyeball, in its radii, from which on a vertex is hidden by it."""
+SEEN, HIDDEN = 0.02, 0.08
+"""Depths behind the front of the eyeball, in its radii, up to which a vertex is seen, and from which on it is
+surely hidden: eyeballs are not quite round, and some lids cut into them."""
+LONGER = 1.1
+"""Most length of a loop that is seen all around, by that of the shortest of which parts may be hidden."""
 MOST_STARTS = 60
 """Most edges from which loops are sought."""
 
@@ -18,18 +21,31 @@ MOST_STARTS = 60
 def find_eye_loop(surface: Surface, centre: Float64, radius: float) -> Intp:
     """(N,) vertices of the shortest loop of visible edges around an eye's axis, in order; empty without one.
 
-    centre: (3,), radius: of the eyeball, in the unit of the surface. The face looks to +z.
+    centre: (3,), radius: of the eyeball, in the unit of the surface. The face looks to +z. Lids are thick: of
+    the loops around their back and their front edges, one that the eyeball does not hide is taken.
+    """
+    (seen, seen_length), (any_loop, length) = (
+        _shortest_loop(surface, centre, radius, hidden) for hidden in (SEEN, HIDDEN)
+    )
+    return seen if seen_length < LONGER * length else any_loop
+
+
+def _shortest_loop(surface: Surface, centre: Float64, radius: float, hidden: float) -> tuple[Intp, float]:
+    """(vertices (N,) of the shortest loop around an eye's axis, its length; none and infinite without one).
+
+    hidden: depth behind the front of the eyeball, in its radii, from which on vertices do not count.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
+    none = np.zeros(0, dtype=np.intp), np.inf
     arms = surface.vertices - centre
     across = np.hypot(arms[:, 0], arms[:, 1])
     front = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
-    visible = (across < REACH * radius) & (arms[:, 2] > front - HIDDEN * radius)
+    visible = (across < REACH * radius) & (arms[:, 2] > front - hidden * radius)
     edges = surface.edges[visible[surface.edges].all(axis=1)]
     if not len(edges):
-        return np.zeros(0, dtype=np.intp)
+        return none
     vertices, local = np.unique(edges, return_inverse=True)
     edges = local.reshape(-1, 2)
     points = arms[vertices]
@@ -46,7 +62,7 @@ def find_eye_loop(surface: Surface, centre: Float64, radius: float) -> Intp:
     graph = csr_array((np.tile(length, 2), ends.T), shape=(2 * count, 2 * count))
     starts = edges[crossing][:, 0]
     if not len(starts):
-        return np.zeros(0, dtype=np.intp)
+        return none
     starts = np.unique(starts)
     # the margins are nearest to the axis
     starts = starts[np.argsort(points[starts, 1], kind="stable")][:MOST_STARTS]
@@ -54,11 +70,12 @@ def find_eye_loop(surface: Surface, centre: Float64, radius: float) -> Intp:
     round_trip = away[np.arange(len(starts)), starts + count]
     best = int(round_trip.argmin())
     if not np.isfinite(round_trip[best]):
-        return np.zeros(0, dtype=np.intp)
+        return none
     walk = [int(starts[best]) + count]
     while walk[-1] != starts[best]:
         walk.append(int(before[best, walk[-1]]))
-    return np.asarray(vertices[np.array(walk[1:], dtype=np.intp) % count])
+    loop = np.asarray(vertices[np.array(walk[1:], dtype=np.intp) % count])
+    return loop, float(round_trip[best])
 
 
 def lid_points_of_loop(points: Float64, loop: Intp, x: float) -> dict[str, int]:

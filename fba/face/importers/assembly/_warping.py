@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -20,11 +20,16 @@ SMOOTHING = 0.1
 
 
 def warp_points(
-    pieces: Sequence[Piece], located: Mapping[str, Float64], *, symmetric: bool = False
+    pieces: Sequence[Piece],
+    located: Mapping[str, Float64],
+    *,
+    symmetric: bool = False,
+    own: Collection[str] = (),
 ) -> Float64:
     """(84, 3) the adult head's points, warped to those located and moved onto parts of their kind.
 
-    symmetric: points of the right side stand on the vertices that mirror those of the left.
+    symmetric: points of the right side stand on the vertices that mirror those of the left. own: those of the
+    right side that stay where they were located.
     """
     from scipy.interpolate import RBFInterpolator
     from scipy.spatial import cKDTree
@@ -48,6 +53,8 @@ def warp_points(
     centre = points[[row["3.5"], row["3.6"], row["7.1"]]].mean(axis=0)
     trees = {}
     mirrored = {right: left for left, right in MIRRORED.items()} if symmetric else {}
+    for name in known.keys() & own:
+        mirrored.pop(name, None)
     for name in sorted(names(), key=lambda name: name in mirrored):
         if name in known:
             points[row[name]] = known[name]

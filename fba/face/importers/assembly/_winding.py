@@ -11,11 +11,12 @@ from fba.arrays import Bool, Float64, Int32
 from fba.face.importers.assembly.polygon_parts import Piece
 
 
-def turn_outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece], int]:
+def turn_outward(pieces: Sequence[Piece], centre: Float64, reach: float = np.inf) -> tuple[list[Piece], int]:
     """(pieces with the skin facing away from the centre of the head, number of triangles turned).
 
-    Within the skin, triangles that run against their neighbours are turned first. When the skin was
-    inside out the other pieces are taken to be so too.
+    reach: distance from the centre within which skin is that of the head; hands and feet of avatars, which
+    may have its material, face anywhere as seen from there. Within the skin, triangles that run against their
+    neighbours are turned first. When the skin was inside out the other pieces are taken to be so too.
     """
     masks = [np.zeros(len(piece.part.triangles), dtype=np.bool_) for piece in pieces]
     all_inside_out = False
@@ -23,7 +24,9 @@ def turn_outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece],
         if part.kind == "skin":
             wrong = _opposing(part.triangles)
             triangles = _flip(part.triangles, wrong)
-            inside_out = float(_facing(part.vertices.astype(np.float64), triangles, centre).sum()) < 0
+            vertices = part.vertices.astype(np.float64)
+            near = np.linalg.norm(vertices[triangles].mean(axis=1) - centre, axis=1) < reach
+            inside_out = float(_facing(vertices, triangles[near], centre).sum()) < 0
             all_inside_out |= inside_out
             masks[number] = wrong ^ inside_out
     if all_inside_out:

@@ -45,14 +45,19 @@ UNLIKE = 1.3
 """Ratio of the radii above which two shells are not a pair of eyes."""
 IN_FRONT = 0.7
 """Least distance of a pupil in front of its eyeball's centre, in radii."""
+RIGHT_LID = ("3.2", "3.4", "3.8", "3.12")
+"""Points of the right lids' margins and of the corners between them."""
 FEWEST_FAPS = 20
 """With at least this many shapes named after FAPs, points are where these move most."""
 
 
-def find_points(pieces: Sequence[Piece], path: str, *, symmetric: bool = False) -> Float64:
+def find_points(
+    pieces: Sequence[Piece], path: str, *, symmetric: bool = False, exactly: bool = False
+) -> Float64:
     """Feature points (84, 3) of a head, in its own unit; +y up, looking to +z.
 
-    symmetric: the points of the right side are the mirror images of those of the left.
+    symmetric: the points of the right side are the mirror images of those of the left. exactly: those of the
+    margin of the lids too, whose rows of vertices otherwise need not be the same.
 
     Raises ModelError that says which eyes or shapes are missing, and how to give the points instead.
     """
@@ -73,7 +78,8 @@ def find_points(pieces: Sequence[Piece], path: str, *, symmetric: bool = False) 
     if not symmetric:
         return warp_points(pieces, points)
     middle = float(eyes["left"][0][0] + eyes["right"][0][0]) / 2
-    return warp_points(pieces, mirror_points(points, middle), symmetric=True)
+    own = () if exactly else tuple(name for name in RIGHT_LID if name in points)
+    return warp_points(pieces, mirror_points(points, middle, own), symmetric=True, own=own)
 
 
 def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:

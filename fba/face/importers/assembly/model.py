@@ -25,6 +25,8 @@ PUPILS = 0.062
 USUAL = (0.04, 0.08)
 """Limits of the distance between the pupils of a real head, metres."""
 UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
+HEAD = 2.5
+"""Distance from the middle of the head within which skin is that of the head, in distances of the pupils."""
 AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
 """Rotations to +x left, +y up, +z forward, by the vertical axis of a file; faces with z up look to -y."""
 EYES = [row_of()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
@@ -83,7 +85,8 @@ def finish_import(
     ]
     # a point in the middle of the head, behind the pupils or the lids
     eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
-    parts, turned = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * pupil_distance(points) * size))
+    apart = pupil_distance(points) * size
+    parts, turned = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * apart), HEAD * apart)
     points = (points - origin) * size
     parts = apply_default_materials(parts, points)
     bound = bind_by_number(parts, vertices)

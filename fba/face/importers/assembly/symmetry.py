@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -73,15 +73,15 @@ def asymmetry(pieces: Sequence[Piece], left: Float64, right: Float64) -> float:
     return float(np.percentile(away, 98)) / float(np.linalg.norm(left - right))
 
 
-def mirror_points(points: dict[str, Float64], middle: float) -> dict[str, Float64]:
+def mirror_points(points: dict[str, Float64], middle: float, own: Collection[str] = ()) -> dict[str, Float64]:
     """Located points with those of the right side, and those of the midline, from the left and the middle.
 
-    middle: the x of the plane of symmetry.
+    middle: the x of the plane of symmetry. own: points of the right side that stay where they were located.
     """
     result = dict(points)
     sides = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
     for name, position in points.items():
-        if name in MIRRORED:
+        if name in MIRRORED and MIRRORED[name] not in own:
             result[MIRRORED[name]] = position * (-1.0, 1.0, 1.0) + (2 * middle, 0.0, 0.0)
         elif name not in sides:
             result[name] = np.array([middle, *position[1:]])
