@@ -9,6 +9,7 @@ import numpy as np
 
 from fba.arrays import Float64, Floating
 from fba.face.feature_points import row_of
+from fba.face.points import EYEBALL_PER_IRIS
 
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
@@ -18,6 +19,8 @@ PUPIL_FAP = {"left": 29, "right": 30}
 PUPIL_POINT = {"left": "3.5", "right": "3.6"}
 LID_POINTS = {"left": ("3.1", "3.3"), "right": ("3.2", "3.4")}
 """Middles of the upper and the lower lid margin."""
+FLAT = 0.3
+"""Depth of an eye by its width below which it is a drawn iris, not a ball; of half a ball it is 0.5."""
 FEWEST_VERTICES = 8
 """Fewest vertices that determine a sphere."""
 
@@ -44,14 +47,40 @@ def eyeballs(model: FaceModel) -> dict[str, Eyeball]:
     result: dict[str, Eyeball] = {}
     middle = symmetry_plane(model.points)
     for part in model.of_kind("eye"):
-        fitted = sphere(part)
+        own = float(part.vertices[:, 0].min() + part.vertices[:, 0].max()) / 2 if len(part.vertices) else 0.0
+        side = "left" if own > middle else "right"
+        fitted = fit_eyeball(part, model.points[row_of()[PUPIL_POINT[side]]])
         if fitted is None:
             continue
         centre, radius, error, share = fitted
-        side = "left" if centre[0] > middle else "right"
         if side not in result or radius > result[side].radius:
             result[side] = Eyeball(part.name, side, centre, radius, error, share)
     return result
+
+
+def fit_eyeball(part: Part, pupil: Float64) -> tuple[Float64, float, float, float] | None:
+    """(centre, radius, error, share) of an eyeball, as in `Eyeball`; None for too few vertices.
+
+    A flat eye, as drawn figures have, stands for a ball of usual size behind its pupil. pupil: (3,), NaN
+    where unknown.
+    """
+    width = flat_width(part)
+    if width is None or not np.isfinite(pupil).all():
+        return sphere(part)
+    radius = EYEBALL_PER_IRIS * width
+    centre = pupil - (0.0, 0.0, radius)
+    away = np.linalg.norm(part.vertices.astype(np.float64) - centre, axis=1) - radius
+    return centre, radius, float(np.sqrt((away**2).mean())), 1.0
+
+
+def flat_width(part: Part) -> float | None:
+    """The width of a flat eye, which is an iris without a ball, in the unit of the part; None for others."""
+    vertices = np.unique(part.vertices.astype(np.float64), axis=0)
+    if len(vertices) < FEWEST_VERTICES:
+        return None
+    arms = vertices - vertices.mean(axis=0)
+    extents = np.ptp(arms @ np.linalg.svd(arms, full_matrices=False)[2].T, axis=0)
+    return float(extents.max()) if extents[2] < FLAT * extents.max() else None
 
 
 def symmetry_plane(points: Float64) -> float:

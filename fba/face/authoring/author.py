@@ -53,6 +53,8 @@ EYE_FAPS = {"left": (23, 25, 27), "right": (24, 26, 28)}
 HEAD_AXES = {48: (1.0, 0.0, 0.0), 49: (0.0, 1.0, 0.0), 50: (0.0, 0.0, 1.0)}
 JAW_FAPS = (OPEN_JAW, THRUST_JAW, SHIFT_JAW)
 LIP_POINTS = tuple(name for pair in HANDLES.values() for name in pair)
+IN_EYE = 1.5
+"""Distance from an eyeball's centre, in its radii, within which parts that are no skin belong to it."""
 CARRIED_KINDS = ("brow", "lash", "other")
 
 
@@ -141,7 +143,8 @@ def _start(parts: tuple[Part, ...], surface: Surface, points: Float64, bound: In
     """The authoring of a face, without any motion yet."""
     marks = find_landmarks(surface, points, bound)
     limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
-    return _Authoring(parts, marks, limiter, find_eyes(marks, parts), _attach_parts(marks, parts))
+    eyes = find_eyes(marks, parts)
+    return _Authoring(parts, marks, limiter, eyes, _attach_parts(marks, parts, eyes))
 
 
 def _check_size(parts: tuple[Part, ...]) -> None:
@@ -158,8 +161,8 @@ def _check_size(parts: tuple[Part, ...]) -> None:
         )
 
 
-def _attach_parts(marks: Landmarks, parts: tuple[Part, ...]) -> dict[str, Anchors]:
-    """The attachment to the skin of each part that moves with it, by name."""
+def _attach_parts(marks: Landmarks, parts: tuple[Part, ...], eyes: Mapping[str, Eye]) -> dict[str, Anchors]:
+    """The attachment to the skin of each part that moves with it, by name; what is in an eye stays."""
     result = {}
     es = marks.fapu.ES * 1024
     for part in parts:
@@ -167,10 +170,18 @@ def _attach_parts(marks: Landmarks, parts: tuple[Part, ...]) -> dict[str, Anchor
             continue
         if part.kind == "other" and np.ptp(part.vertices, axis=0).max() > LARGEST * es:
             continue
+        if part.kind == "other" and _is_in_eyes(part, eyes):
+            continue
         anchors = attach(marks.surface, part)
         if np.median(anchors.distance) < NEAR * es:
             result[part.name] = anchors
     return result
+
+
+def _is_in_eyes(part: Part, eyes: Mapping[str, Eye]) -> bool:
+    """Whether all of a part is within the reach of an eyeball, as the whites of drawn eyes are."""
+    away = [np.linalg.norm(part.vertices - eye.centre, axis=1) / eye.radius for eye in eyes.values()]
+    return bool(len(part.vertices)) and bool((np.min(away, axis=0) < IN_EYE).all())
 
 
 def _explain_far_points(lost: dict[int, str], binding: Binding) -> None:

@@ -39,7 +39,7 @@ def check_lids(poser: Poser, side: str) -> Iterator[Finding]:
             f"a gap of {gap:.1%} of IRISD0 at {split} + {CLOSED - split}",
             f"under {GAP:.0%}",
         )
-    if not poser.eyes[side].measured:
+    if not poser.eyes[side].measured or poser.eyes[side].flat:
         return
     cut, split = max((lid_cut(poser, side, split), split) for split in SPLITS)
     if not cut <= CUT:

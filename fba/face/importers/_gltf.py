@@ -13,6 +13,7 @@ from fba.arrays import Float32, Float64
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers._vrm import expression_targets, looks_backwards, name_shapes
+from fba.face.importers.assembly._repair import repair_tables
 from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
 from fba.face.importers.assembly.pieces import assemble, guess_kind, part_names
 from fba.face.importers.assembly.polygon_parts import Piece
@@ -57,7 +58,8 @@ def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceM
     """A face from pieces whose feature points are to be found."""
     upright, points, uneven, notes = locate(pieces, options)
     model = finish_import(upright, points, {}, replace(options, up="y"), notes)
-    return mirror_tables(model) if uneven < EXACT else model
+    # the mirror image of a sound motion may fold a triangle that has none on the other side
+    return repair_tables(mirror_tables(model)) if uneven < EXACT else model
 
 
 def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Float64, float, dict[str, str]]:

@@ -12,7 +12,7 @@ from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, fap_limits
 from fba.face.authoring.surface.motion_limits import stop_at_folds
-from fba.face.eyeball import sphere
+from fba.face.eyeball import fit_eyeball, flat_width
 from fba.face.model import Part
 from fba.face.points import EYEBALL_PER_IRIS
 from fba.face.tables import FaceDefTransform
@@ -35,7 +35,8 @@ class Eye:
     """One eye of a face.
 
     side: "left" or "right". parts: names of all parts that turn with it. centre: (3,). radius: metres.
-    pupil: (3,) position. measured: whether there is an eyeball, else the sphere is a guess from the points.
+    pupil: (3,) position. measured: whether there is an eyeball, else the sphere is a guess from the points. flat: whether
+    it is a drawn iris without a ball.
     """
 
     side: str
@@ -44,6 +45,7 @@ class Eye:
     radius: float
     pupil: Float64
     measured: bool
+    flat: bool = False
 
     @property
     def gaze(self) -> Float64:
@@ -65,13 +67,14 @@ def find_eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
             for part in parts
             if part.kind == "eye" and len(part.vertices) and (_middle(part)[0] > middle) == (side == "left")
         ]
-        spheres = [fit for part in own if (fit := sphere(part)) is not None]
+        spheres = [fit for part in own if (fit := fit_eyeball(part, pupil)) is not None]
+        flat = any(flat_width(part) is not None for part in own)
         radius = EYEBALL_PER_IRIS * iris
         if spheres:
             centre, radius = max(spheres, key=lambda fit: fit[1])[:2]
         else:
             centre = pupil - (0.0, 0.0, radius)
-        eyes[side] = Eye(side, tuple(part.name for part in own), centre, radius, pupil, bool(spheres))
+        eyes[side] = Eye(side, tuple(part.name for part in own), centre, radius, pupil, bool(spheres), flat)
     return eyes
 
 

@@ -108,19 +108,22 @@ def lid_motion(
     points = marks.surface.vertices[vertices]
     values = lid_values(fap)
     shifts = slide_lid(points, share[vertices], opening, eye, lid, values / CLOSED)
-    profile = measure_profile(eye, parts, edge_length(marks, own, other))
     margins = np.concatenate([own, other])
     pinned = marks.surface.mask(margins)
-    # margins that lie in the eyeball, or close to it, meet where they are
-    sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > SUNK * profile.size
-    shifts = push_vertices_outside(profile, points, shifts, values, pinned[vertices] if sunk else None)
-    motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
-    points = marks.surface.vertices[motion.vertices]
-    shifts = push_vertices_outside(
-        profile, points, motion.shifts, values, pinned[motion.vertices] if sunk else None
-    )
-    shifts = push_edges_outside(profile, marks.surface, motion.vertices, shifts, pinned, values)
-    motion = Motion(values, motion.vertices, shifts)
+    if eye.flat:  # the lids of a drawn eye slide in front of it, where no ball is in their way
+        motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
+    else:
+        profile = measure_profile(eye, parts, edge_length(marks, own, other))
+        # margins that lie in the eyeball, or close to it, meet where they are
+        sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > SUNK * profile.size
+        shifts = push_vertices_outside(profile, points, shifts, values, pinned[vertices] if sunk else None)
+        motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
+        points = marks.surface.vertices[motion.vertices]
+        shifts = push_vertices_outside(
+            profile, points, motion.shifts, values, pinned[motion.vertices] if sunk else None
+        )
+        shifts = push_edges_outside(profile, marks.surface, motion.vertices, shifts, pinned, values)
+        motion = Motion(values, motion.vertices, shifts)
     # in the corners of the eye, skin closes on itself
     ends = marks.surface.vertices[own[[0, -1]]]
     near = np.linalg.norm(marks.surface.vertices[margins][:, None] - ends, axis=2).min(axis=1)

@@ -61,6 +61,12 @@ class Surface:
         """(E, 2) each edge once."""
         return self._edge_counts[0]
 
+    @property
+    def open_edges(self) -> Intp:
+        """(E, 2) each edge of one triangle only."""
+        edges, count = self._edge_counts
+        return edges[count == 1]
+
     @cached_property
     def graph(self) -> Any:
         """(N, N) sparse matrix of edge lengths."""

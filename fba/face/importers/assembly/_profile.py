@@ -12,6 +12,10 @@ from fba.face.model import Part
 
 STEPS = 400
 """Number of heights at which the profile is sampled."""
+FLAT_LIP = 0.48
+"""Share of the way from the line of the lips to the tip of the nose from which on no lip is foremost."""
+NOSE = 0.01
+"""Least depth of the bottom of a nose behind the line from its tip to the lip, in distances of the pupils."""
 CHIN = 0.3
 """Distance of the chin from the lower lip at least, by that of the lips from the eyes; nearer is the lip."""
 
@@ -44,12 +48,15 @@ def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Floa
     result["9.3"] = point(tip)
     upper = foremost(lip[1], float(lip[1] + 0.5 * (heights[tip] - lip[1])))
     if upper is not None:
+        # drawn faces have hardly any lip: there the profile only rises towards the nose
+        has_lip = bool(heights[upper] < lip[1] + FLAT_LIP * (heights[tip] - lip[1]))
+        start = upper if has_lip else int(np.abs(heights - lip[1]).argmin())
         # the nose ends where the profile is furthest behind the line from its tip to the lip
-        along = (heights - heights[upper]) / (heights[tip] - heights[upper])
-        behind = front[upper] + along * (front[tip] - front[upper]) - front
-        between = (np.arange(STEPS) > upper) & (np.arange(STEPS) < tip) & np.isfinite(front)
-        if between.any():
-            result["8.1"] = point(upper)
+        along = (heights - heights[start]) / (heights[tip] - heights[start])
+        behind = front[start] + along * (front[tip] - front[start]) - front
+        between = (np.arange(STEPS) > start) & (np.arange(STEPS) < tip) & np.isfinite(front)
+        if between.any() and float(np.nanmax(behind[between])) > NOSE * apart:
+            result |= {"8.1": point(upper)} if has_lip else {}
             result["9.15"] = point(int(np.where(between, behind, -np.inf).argmax()))
     chin = _hill(
         front, (heights > located["2.3"][1] - 0.8 * tall) & (heights < located["2.3"][1] - CHIN * tall)

@@ -6,31 +6,36 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fba.face.authoring.regions.eyes import PUPIL_OF_IRIS
 from fba.face.checks.fap_checks import check_posed
 from fba.face.checks.posing import Poser
+from fba.face.eyeball import PUPIL_FAP, eyeballs, pupil_diameter
 from fba.face.model import FaceModel
 from fba.face.points import DILATE_PUPIL
 from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.parameters import faps
 
+FALSE_PUPIL = 0.5
+"""Relative deviation of a pupil's size from the usual one from which on it is none."""
 STOPS = (0.85, 0.7, 0.55, 0.4)
 """Shares of the range of a motion at which it is made to stop, until its triangles are sound."""
 
 
-def repair_tables(model: FaceModel, plain: FaceModel) -> FaceModel:
+def repair_tables(model: FaceModel, plain: FaceModel | None = None) -> FaceModel:
     """The model with sound tables for FAPs whose own break the rules of `check_faps`.
 
     Tried are the same motion with an earlier stop, and the table of `plain`, the face made from the mesh
-    alone; the one with the fewest errors is taken. A pupil that cannot move correctly is lost.
+    alone, if given; the one with the fewest errors is taken. A pupil that cannot move correctly is lost.
     """
     poser = Poser(model)
+    others = plain.table_of if plain is not None else {}
     tables, lost = dict(model.table_of), dict(model.lost)
     replaced: list[int] = []
     for fap, table in model.table_of.items():
         least = _count_errors(poser, fap)
         if not least:
             continue
-        for candidate in _candidates(table, plain.table_of.get(fap)):
+        for candidate in _candidates(table, others.get(fap)):
             trial = Poser(model.with_tables((candidate,), {}), like=poser)
             errors = _count_errors(trial, fap)
             if errors < least:
@@ -38,19 +43,30 @@ def repair_tables(model: FaceModel, plain: FaceModel) -> FaceModel:
         if least and fap in DILATE_PUPIL:
             del tables[fap]
             lost[fap] = "the eyeball has too few vertices around its pupil"
-        elif tables[fap] is plain.table_of.get(fap):
+        elif tables[fap] is others.get(fap):
             replaced.append(fap)
     for fap in list(replaced):
         mate = faps()[fap - 1].lip_mate
-        if mate in tables and mate in plain.table_of and mate not in replaced:
+        if mate in tables and mate in others and mate not in replaced:
             # both contours of a lip are made to move together
-            tables[mate] = plain.table_of[mate]
+            tables[mate] = others[mate]
             replaced.append(mate)
     repaired = model.with_tables(tuple(tables.values()), lost)
     if not replaced:
         return repaired
     names = ", ".join(faps()[fap - 1].name for fap in sorted(replaced))
     return repaired.with_notes({"mesh": f"shapes break the standard's rules for {names}: made from the mesh"})
+
+
+def drop_false_pupils(model: FaceModel) -> FaceModel:
+    """The model without the FAPs of pupils that the mesh of the eyeball does not have."""
+    lost = dict(model.lost)
+    for side, eye in eyeballs(model).items():
+        size, wanted = pupil_diameter(model, eye), model.fapu.IRISD * 1024 * PUPIL_OF_IRIS
+        if size is not None and abs(size / wanted - 1) > FALSE_PUPIL:
+            lost[PUPIL_FAP[side]] = f"the {side} eyeball has too few vertices around its pupil"
+    kept = tuple(table for table in model.tables if table.fap not in lost)
+    return model if len(kept) == len(model.tables) else model.with_tables(kept, lost)
 
 
 def _count_errors(poser: Poser, fap: int) -> int:

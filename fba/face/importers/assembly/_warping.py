@@ -15,6 +15,8 @@ ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11
 """Parts that points of the teeth stand on."""
 LOCAL = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12", "6.1", "6.2", "6.3", "6.4")
 """Points that are not used for the warp."""
+FOLD = 0.08
+"""Usual distance of the fold of a lid from its margin, in distances of the pupils."""
 SMOOTHING = 0.1
 """Smoothing of the warp: points that coincide on the adult head may be apart on another."""
 
@@ -75,7 +77,29 @@ def warp_points(
             trees[key] = cKDTree(np.concatenate(candidates)) if candidates else None
         tree = trees[key]
         points[row[name]] = np.nan if tree is None else tree.data[tree.query(points[row[name]])[1]]
+    _put_folds_beyond_lids(pieces, points)
     return points
+
+
+def _put_folds_beyond_lids(pieces: Sequence[Piece], points: Float64) -> None:
+    """Move the folds of lids, in place, that the warp put on the wrong side of the margin."""
+    row = row_of()
+    apart = float(points[row["3.5"], 0] - points[row["3.6"], 0])
+    skin = [piece.part.vertices.astype(np.float64) for piece in pieces if piece.part.kind == "skin"]
+    vertices = np.concatenate(skin) if skin else np.zeros((0, 3))
+    for fold, margin, way in (
+        ("3.9", "3.3", -1),
+        ("3.10", "3.4", -1),
+        ("3.13", "3.1", 1),
+        ("3.14", "3.2", 1),
+    ):
+        edge = points[row[margin]]
+        if way * (points[row[fold], 1] - edge[1]) > 0 or not np.isfinite(edge).all():
+            continue
+        away = np.linalg.norm(vertices - edge - (0.0, way * FOLD * apart, 0.0), axis=1)
+        away[way * (vertices[:, 1] - edge[1]) < FOLD / 2 * apart] = np.inf
+        if np.isfinite(away).any():
+            points[row[fold]] = vertices[int(away.argmin())]
 
 
 def _outside(piece: Piece, centre: Float64) -> Float64:

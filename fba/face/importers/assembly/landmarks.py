@@ -17,13 +17,16 @@ from fba.errors import ModelError, Remedy
 from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import weld_parts
-from fba.face.eyeball import LID_POINTS, PUPIL_POINT, sphere
+from fba.face.eyeball import LID_POINTS, PUPIL_POINT, flat_width, sphere
 from fba.face.feature_points import row_of
 from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
+from fba.face.importers.assembly._mouth_loop import mouth_points
 from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._warping import warp_points
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.symmetry import mirror_points
+from fba.face.model import Part
+from fba.face.points import EYEBALL_PER_IRIS
 from fba.parameters import faps
 
 OUTSIDE = 0.2
@@ -145,13 +148,20 @@ def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, fl
     eyes = {}
     for piece in pieces:
         if piece.part.kind == "eye":
-            ball = sphere(piece.part)
-            if ball is not None:
+            side = "left" if "left" in piece.part.name else "right"
+            vertices = piece.part.vertices.astype(np.float64)
+            width = flat_width(piece.part)
+            if width is not None:  # a drawn eye: its pupil is in its middle
+                middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+                pupil = vertices[int(np.linalg.norm((vertices - middle)[:, :2], axis=1).argmin())]
+                radius = EYEBALL_PER_IRIS * width
+                eyes[side] = (pupil - (0.0, 0.0, radius), radius, pupil)
+            elif (ball := sphere(piece.part)) is not None:
                 centre, radius = ball[0], ball[1]
-                vertices = piece.part.vertices.astype(np.float64)
                 away = np.hypot(vertices[:, 0] - centre[0], vertices[:, 1] - centre[1])
-                away[vertices[:, 2] < centre[2]] = np.inf
-                side = "left" if "left" in piece.part.name else "right"
+                ahead = vertices[:, 2] - centre[2]
+                # the flat back of half a ball has a vertex on the axis, too
+                away[ahead < (IN_FRONT * radius if ahead.max() > IN_FRONT * radius else 0.0)] = np.inf
                 eyes[side] = (centre, radius, vertices[int(away.argmin())])
     missing = [f"the {side} eye" for side in ("left", "right") if side not in eyes]
     if missing:
@@ -208,7 +218,7 @@ def _from_arkit(
     facing = skin.part.normals[:, 2].astype(np.float64) > OUTSIDE
     for side in lidless:
         points |= _lids(vertices, shapes[f"eyeBlink{side.title()}"], eyes[side], side)
-    return points | _mouth(vertices, facing, shapes, eyes, path)
+    return points | _mouth(skin.part, facing, shapes, eyes, path)
 
 
 def _lids(
@@ -269,13 +279,14 @@ def _lids_by_loops(
 
 
 def _mouth(
-    vertices: Float64,
+    skin: Part,
     facing: Bool,
     shapes: Mapping[str, Float64],
     eyes: Mapping[str, tuple[Float64, float, Float64]],
     path: str,
 ) -> dict[str, Float64]:
     """Middles of the lips, corners of the mouth, and points between. facing: vertices that face forwards."""
+    vertices = skin.vertices.astype(np.float64)
     left, right = eyes["left"][0], eyes["right"][0]
     apart = left[0] - right[0]
     if not apart > 0:
@@ -290,6 +301,7 @@ def _mouth(
         raise ModelError(f"{path}: the shape jawOpen does not part any lips at the midline of the face")
     upper, lower = pair
     points = {"2.2": vertices[upper], "2.3": vertices[lower]}
+    on_edge = mouth_points(skin, drop, points["2.2"], points["2.3"], float(apart))
     for side, sign, inner, outer in (("Left", 1, "2.4", "8.3"), ("Right", -1, "2.5", "8.4")):
         level = np.abs(vertices[:, 1] - vertices[upper, 1]) < 0.25 * apart
         beside = (vertices[:, 0] - middle[0]) * sign > 0.15 * apart
@@ -300,9 +312,9 @@ def _mouth(
         shape = next((s for s in (f"mouthSmile{side}", f"mouthStretch{side}") if s in shapes), None)
         if shape is None:
             end = _end_of_slit(vertices, drop, level & front, float(middle[0]), sign, apart)
-            if end is None:
+            if end is None and inner not in on_edge:
                 continue
-            points[inner] = vertices[end]
+            points[inner] = on_edge[inner] if end is None else vertices[end]
         else:
             size = np.linalg.norm(shapes[shape], axis=1)
             # what moves furthest is the corner of the mouth, or the cheek behind it; only the outside counts
@@ -312,6 +324,7 @@ def _mouth(
             within = (corner[0] - vertices[:, 0]) * sign > 0.015 * apart
             away = np.linalg.norm(vertices - corner + (0.035 * apart * sign, 0, 0), axis=1)
             points[inner] = vertices[int(np.where(within & front, away, np.inf).argmin())]
+        points[inner] = on_edge.get(inner, points[inner])
         # the contours need skin between them: next to each other, one could not move without the other
         beyond = points[inner] + (CORNER_WIDTH * apart * sign, 0.0, 0.25 * CORNER_WIDTH * apart)
         away = np.linalg.norm(vertices - beyond, axis=1)
@@ -321,7 +334,7 @@ def _mouth(
         if half is not None and np.linalg.norm(vertices[half[0]] - vertices[half[1]]) < 0.08 * apart:
             points[{"2.4": "2.6", "2.5": "2.7"}[inner]] = vertices[half[0]]
             points[{"2.4": "2.8", "2.5": "2.9"}[inner]] = vertices[half[1]]
-    return points
+    return points | on_edge
 
 
 def _end_of_slit(

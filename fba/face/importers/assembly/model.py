@@ -12,7 +12,7 @@ import numpy as np
 from fba.arrays import Float64, Int32
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.assembly._repair import repair_tables
+from fba.face.importers.assembly._repair import drop_false_pupils, repair_tables
 from fba.face.importers.assembly._winding import turn_outward
 from fba.face.importers.assembly.default_materials import apply_default_materials
 from fba.face.importers.assembly.pieces import FREE, assemble, shift_piece
@@ -110,7 +110,7 @@ def author_pieces(
     face = author(parts, points, bound=known, name=name, notes=notes)
     shapes = sorted({shape for piece in pieces for shape in piece.morphs})
     if not shapes:
-        return face
+        return drop_false_pupils(face)
     from fba.face.authoring.shapes.morphs import add_shapes
 
     morphs = {
@@ -118,7 +118,7 @@ def author_pieces(
         for shape in shapes
     }
     made = add_shapes(face, morphs)
-    return made if made is face else repair_tables(made, face)
+    return drop_false_pupils(made if made is face else repair_tables(made, face))
 
 
 def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from fba.arrays import Bool, Float32, Float64
 from fba.errors import ModelError, OptionError
+from fba.face.eyeball import flat_width
 from fba.face.importers.assembly.polygon_parts import Piece, vertex_components
 from fba.face.model import PART_KINDS, Part
 from fba.mesh.names import UniqueNames
@@ -31,6 +32,8 @@ FRONT, SAME_HEIGHT = 0.25, 0.6
 one jaw differ, as a share of their height."""
 PAIR = 1.7
 """Two eyes are together at least this many times as wide as tall; one eye is round."""
+WHITE = re.compile("white|sclera", re.IGNORECASE)
+"""In the names of the whites of eyes."""
 EYE_SIZES = (0.02, 0.12)
 """Radius of an eyeball by the height of the mesh, head alone to head and shoulders."""
 
@@ -54,6 +57,7 @@ def assemble(
             guessed.append((piece, kind))
     if not guessed:
         raise ModelError("no part of the mesh is left: all are named as transparent shells of the eye")
+    guessed = [(piece, "other" if _is_white(piece, kind, guessed) else kind) for piece, kind in guessed]
     unknown = [piece for piece, kind in guessed if kind is None or kind == "skin"]
     if not any(kind == "eye" for _, kind in guessed):
         known = {id(piece): kind for piece, kind in guessed}
@@ -67,6 +71,17 @@ def assemble(
     if middle is None:
         middle = _middle(guessed)
     return _join_by_kind([(p, kind or "other") for p, kind in guessed], middle)
+
+
+def _is_white(piece: Piece, kind: str | None, pieces: Sequence[tuple[Piece, str | None]]) -> bool:
+    """Whether a piece is the white of drawn eyes, which stays while their irises turn."""
+    whites = [
+        own for own, each in pieces if each == "eye" and WHITE.search(f"{own.part.name} {own.material}")
+    ]
+    if kind != "eye" or piece not in whites or len(whites) == sum(each == "eye" for _, each in pieces):
+        return False
+    halves = _side([piece], lambda centres: centres[:, 0] > centres[:, 0].mean()) or [piece]
+    return all(flat_width(half.part) is not None for half in halves)
 
 
 def _middle(pieces: Sequence[tuple[Piece, str | None]]) -> float:
