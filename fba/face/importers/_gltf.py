@@ -12,11 +12,12 @@ import numpy as np
 from fba.arrays import Float32, Float64
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names, row_of
+from fba.face.importers._both_sides import split_sides
 from fba.face.importers._vrm import expression_targets, looks_backwards, name_shapes
-from fba.face.importers.assembly._repair import repair_tables
 from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
 from fba.face.importers.assembly.pieces import assemble, guess_kind, part_names
 from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly.repair import repair_tables
 from fba.face.importers.assembly.symmetry import ALIKE, EXACT, asymmetry, mirror_tables, stand_upright
 from fba.face.importers.points.points_file import given_points, points_beside
 from fba.face.model import FaceModel, Material, Part
@@ -59,7 +60,11 @@ def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceM
     upright, points, uneven, notes = locate(pieces, options)
     model = finish_import(upright, points, {}, replace(options, up="y"), notes)
     # the mirror image of a sound motion may fold a triangle that has none on the other side
-    return repair_tables(mirror_tables(model)) if uneven < EXACT else model
+    if uneven >= EXACT:
+        return model
+    return repair_tables(
+        mirror_tables(model), model, note=("symmetry", "both sides differ a little for {}: left as they are")
+    )
 
 
 def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Float64, float, dict[str, str]]:
@@ -135,7 +140,7 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
         start += count
     if not pieces:
         raise ModelError(f"{path}: the scene contains no triangles; export the head as a mesh")
-    return pieces, is_own
+    return split_sides(pieces), is_own
 
 
 def _with_gloss(colours: Float32, material: Material) -> Float32:

@@ -11,9 +11,17 @@ from fba.face.authoring.shapes.shape_names import canonical_names
 from fba.gltf.scene import Gltf
 from fba.gltf.values import Value
 
+VISEMES = {
+    "a": "viseme aa", "i": "viseme I", "u": "viseme U", "e": "viseme E", "o": "viseme O",
+    "aa": "viseme aa", "ih": "viseme I", "ou": "viseme U", "ee": "viseme E", "oh": "viseme O",
+    "joy": "mood joy", "happy": "mood joy", "angry": "mood anger", "sorrow": "mood sadness",
+    "sad": "mood sadness", "surprised": "mood surprise",
+}  # fmt: skip
+"""Names of visemes and expressions (`assembly/visemes.csv`) by VRM's presets, in lower case."""
 NAMES = {
     "a": "jawOpen",
     "aa": "jawOpen",
+    "blink": "eyesClosed",
     "blink_l": "eyeBlinkLeft",
     "blinkleft": "eyeBlinkLeft",
     "blink_r": "eyeBlinkRight",
@@ -37,7 +45,8 @@ def expression_targets(gltf: Gltf) -> dict[int, dict[str, list[tuple[int, float]
     """
     result: dict[int, dict[str, list[tuple[int, float]]]] = {}
     for preset, binds, full in _expressions(gltf):
-        if preset.lower() not in NAMES:
+        names = [table[preset.lower()] for table in (NAMES, VISEMES) if preset.lower() in table]
+        if not names:
             continue
         for bind in binds:
             number = bind.member("index").integer(0, MOST)
@@ -48,7 +57,8 @@ def expression_targets(gltf: Gltf) -> dict[int, dict[str, list[tuple[int, float]
             else:
                 mesh = bind.member("mesh").index(len(gltf.meshes), "mesh")
             if mesh is not None and number < len(gltf.meshes[mesh].morph_names):
-                result.setdefault(mesh, {}).setdefault(NAMES[preset.lower()], []).append((number, weight))
+                for name in names:
+                    result.setdefault(mesh, {}).setdefault(name, []).append((number, weight))
     return result
 
 
@@ -67,7 +77,8 @@ def name_shapes(
         moving = [(names[number], weight) for number, weight in parts if names[number] in morphs]
         if shape in own or not moving:
             continue
-        if len(parts) == 1 and parts[0][1] == 1.0 and moving[0][0] not in own.values():
+        single = len(parts) == 1 and parts[0][1] == 1.0 and shape in NAMES.values()
+        if single and moving[0][0] in result and moving[0][0] not in own.values():
             name = moving[0][0]
             result = {shape if each == name else each: morph for each, morph in result.items()}
         else:

@@ -9,6 +9,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
 from fba.compiled import compiled
+from fba.face.eyeball import flat_width
 from fba.face.model import FaceModel, Part, point_row
 from fba_player.view.view import Eye
 
@@ -76,7 +77,7 @@ class Eyeball:
 def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     """The sphere that fits a part, or None if it is not round."""
     vertices = part.vertices.astype(np.float64)
-    if len(vertices) < FEWEST:
+    if len(vertices) < FEWEST or flat_width(part) is not None:
         return None
     on_sphere = np.ones(len(vertices), dtype=bool)
     for _ in range(4):  # leaves out what stands out, such as a cornea

@@ -20,10 +20,10 @@ from fba.face.feature_points import row_of
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
-from fba.face.importers.assembly._repair import repair_tables
 from fba.face.importers.assembly._winding import turn_outward
 from fba.face.importers.assembly.pieces import _join, assemble
 from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly.repair import repair_tables
 from fba.face.importers.assembly.symmetry import asymmetry, mirror_points, mirror_tables, stand_upright
 from fba.face.model import FaceModel, Part
 from fba.face.tables import FaceDefMesh, FaceDefTables

@@ -134,9 +134,8 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64,
         behind = surface.distances(pulled, 1.6 * reach) < np.inf
         behind &= marks.inside_mouth if area.behind == "mouth" else ~marks.lips & ~marks.on_inner_lips
         behind[stays] = False
-        for k, handle in enumerate(own):
-            own_point = marks.vertices_of(faps()[handle.fap - 1].feature_points)
-            targets = np.setdiff1d(np.flatnonzero(behind), own_point)
+        targets = np.setdiff1d(np.flatnonzero(behind), pulled)  # points stay where they are given
+        for k in range(len(own)):
             lifted = carry_through(surface, solved[:, k], targets, area.through * es)
             for _ in range(SMOOTHINGS):
                 lifted[targets] = average_with_neighbours(surface, lifted, 1)[targets]

@@ -35,8 +35,8 @@ class Eye:
     """One eye of a face.
 
     side: "left" or "right". parts: names of all parts that turn with it. centre: (3,). radius: metres.
-    pupil: (3,) position. measured: whether there is an eyeball, else the sphere is a guess from the points. flat: whether
-    it is a drawn iris without a ball.
+    pupil: (3,) position. measured: whether there is an eyeball, else the sphere is a guess from the points.
+    flat: whether it is a drawn iris without a ball.
     """
 
     side: str

@@ -65,7 +65,8 @@ class Surface:
     def open_edges(self) -> Intp:
         """(E, 2) each edge of one triangle only."""
         edges, count = self._edge_counts
-        return edges[count == 1]
+        result: Intp = edges[count == 1]
+        return result
 
     @cached_property
     def graph(self) -> Any:

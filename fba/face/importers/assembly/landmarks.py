@@ -50,6 +50,8 @@ IN_FRONT = 0.7
 """Least distance of a pupil in front of its eyeball's centre, in radii."""
 RIGHT_LID = ("3.2", "3.4", "3.8", "3.12")
 """Points of the right lids' margins and of the corners between them."""
+LIDS_ALIKE = 0.02
+"""Most difference between the heights of both eyes' openings, as a share, of lids that stay as located."""
 FEWEST_FAPS = 20
 """With at least this many shapes named after FAPs, points are where these move most."""
 
@@ -81,8 +83,16 @@ def find_points(
     if not symmetric:
         return warp_points(pieces, points)
     middle = float(eyes["left"][0][0] + eyes["right"][0][0]) / 2
-    own = () if exactly else tuple(name for name in RIGHT_LID if name in points)
+    own = () if exactly or not _open_alike(points) else tuple(name for name in RIGHT_LID if name in points)
     return warp_points(pieces, mirror_points(points, middle, own), symmetric=True, own=own)
+
+
+def _open_alike(points: Mapping[str, Float64]) -> bool:
+    """Whether both eyes are open equally far, as the one unit of their lids' FAPs needs."""
+    if any(name not in points for pair in LID_POINTS.values() for name in pair):
+        return False
+    left, right = (float(points[upper][1] - points[lower][1]) for upper, lower in LID_POINTS.values())
+    return abs(right - left) < LIDS_ALIKE * left
 
 
 def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:

@@ -12,11 +12,12 @@ import numpy as np
 from fba.arrays import Float64, Int32
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.assembly._repair import drop_false_pupils, repair_tables
 from fba.face.importers.assembly._winding import turn_outward
 from fba.face.importers.assembly.default_materials import apply_default_materials
+from fba.face.importers.assembly.definitions import define_by_shapes
 from fba.face.importers.assembly.pieces import FREE, assemble, shift_piece
 from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly.repair import drop_false_pupils, repair_tables
 from fba.face.model import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
 
@@ -118,7 +119,8 @@ def author_pieces(
         for shape in shapes
     }
     made = add_shapes(face, morphs)
-    return drop_false_pupils(made if made is face else repair_tables(made, face))
+    repaired = drop_false_pupils(made if made is face else repair_tables(made, face))
+    return define_by_shapes(repaired, morphs)
 
 
 def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:

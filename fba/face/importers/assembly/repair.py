@@ -17,18 +17,20 @@ from fba.parameters import faps
 
 FALSE_PUPIL = 0.5
 """Relative deviation of a pupil's size from the usual one from which on it is none."""
+MESH = ("mesh", "shapes break the standard's rules for {}: made from the mesh")
+"""Name and text of the note about FAPs whose tables were replaced."""
 STOPS = (0.85, 0.7, 0.55, 0.4)
 """Shares of the range of a motion at which it is made to stop, until its triangles are sound."""
 
 
-def repair_tables(model: FaceModel, plain: FaceModel | None = None) -> FaceModel:
+def repair_tables(model: FaceModel, plain: FaceModel, *, note: tuple[str, str] = MESH) -> FaceModel:
     """The model with sound tables for FAPs whose own break the rules of `check_faps`.
 
-    Tried are the same motion with an earlier stop, and the table of `plain`, the face made from the mesh
-    alone, if given; the one with the fewest errors is taken. A pupil that cannot move correctly is lost.
+    Tried are the same motion with an earlier stop, and the table of `plain`, such as the face made from the
+    mesh alone, whose use the note tells; the one with the fewest errors is taken. A pupil that cannot move
+    correctly is lost.
     """
-    poser = Poser(model)
-    others = plain.table_of if plain is not None else {}
+    poser, others = Poser(model), plain.table_of
     tables, lost = dict(model.table_of), dict(model.lost)
     replaced: list[int] = []
     for fap, table in model.table_of.items():
@@ -55,7 +57,7 @@ def repair_tables(model: FaceModel, plain: FaceModel | None = None) -> FaceModel
     if not replaced:
         return repaired
     names = ", ".join(faps()[fap - 1].name for fap in sorted(replaced))
-    return repaired.with_notes({"mesh": f"shapes break the standard's rules for {names}: made from the mesh"})
+    return repaired.with_notes({note[0]: note[1].format(names)})
 
 
 def drop_false_pupils(model: FaceModel) -> FaceModel:
