@@ -153,6 +153,7 @@ MARK_TEST = "tests/codec/test_mark.py"
 LONG_TEST = "tests/body/test_plausibility.py -k long_motion"
 GAIT_TEST = "tests/body/gait/test_gait_rules.py"
 FOREIGN_HEADS_TEST = "tests/face/importers/test_foreign_heads.py"
+DRAWN_TEST = "tests/face/importers/test_drawn_heads.py"
 HEAD_ZOO_TEST = "tests/face/importers/test_head_zoo.py -k 'same or surfaces'"
 PACKED_TEST = "tests/gltf/test_gltf_packed.py"
 SURFACE_TEST = "tests/face/importers/test_head_surface.py"
@@ -181,6 +182,22 @@ MUTANTS = (
         "if mate is None or",
         "if mate or mate is None or",
         HEAD_ZOO_TEST,
+    ),
+    Mutant("fba/face/eyeball.py", "FLAT = 0.3", "FLAT = 0.7", DRAWN_TEST),
+    Mutant("fba/face/importers/assembly/_mouth_loop.py", "NEAR = 0.08", "NEAR = 0.8", DRAWN_TEST),
+    Mutant("fba/face/importers/assembly/definitions.py", "ROUNDS = 4", "ROUNDS = 1", DRAWN_TEST),
+    Mutant(
+        "fba/face/importers/assembly/definitions.py",
+        "target = _even(sides)[numbers_known - 1]",
+        "pass",
+        DRAWN_TEST,
+    ),
+    Mutant("fba/face/importers/_both_sides.py", "sum(ends) / 2", "0.0", DRAWN_TEST),
+    Mutant(
+        "fba/face/importers/assembly/_winding.py",
+        "triangles[near], centre",
+        "triangles, centre",
+        FOREIGN_HEADS_TEST,
     ),
     Mutant("fba/face/importers/assembly/_profile.py", "CHIN = 0.3", "CHIN = 0.15", HEAD_ZOO_TEST),
     Mutant(

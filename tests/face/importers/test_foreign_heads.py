@@ -278,15 +278,19 @@ VRM_1 = {
 }
 
 
-@pytest.mark.parametrize(("extension", "way"), [(VRM_0, -1.0), (VRM_1, 1.0)])
-def test_expressions_of_vrm_name_the_shapes(extension: dict[str, object], way: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("extension", "way", "moods"), [(VRM_0, -1.0, ["viseme aa", "mood joy"]), (VRM_1, 1.0, ["viseme aa"])]
+)
+def test_expressions_of_vrm_name_the_shapes(
+    extension: dict[str, object], way: float, moods: list[str], tmp_path: Path
+) -> None:
     sheet = Sheet()
     targets = [{"POSITION": sheet.array([(0, 0, 1 + k)] * 3)} for k in range(3)]
     sheet.show(sheet.triangle(targets=targets))
     sheet.json["extensions"] = extension
     (piece,), own = gltf_pieces(sheet.save(tmp_path / "a.vrm"))
     assert not own
-    assert list(piece.morphs) == ["eyeBlinkLeft", "jawOpen", "target 2"]
+    assert list(piece.morphs) == ["eyeBlinkLeft", "jawOpen", "target 2", *moods]
     assert piece.morphs["jawOpen"][0].tolist() == [0, 0, 2 * way]
     # avatars of VRM 0 look to -z: turned half around, they look to +z
     assert piece.part.vertices[1].tolist() == [way, 0, 0]
@@ -300,5 +304,5 @@ def test_an_expression_of_several_targets_is_their_sum(tmp_path: Path) -> None:
     groups = [{"presetName": "a", "binds": binds}]
     sheet.json["extensions"] = {"VRM": {"blendShapeMaster": {"blendShapeGroups": groups}}}
     (piece,), _ = gltf_pieces(sheet.save(tmp_path / "a.vrm"))
-    assert list(piece.morphs) == ["target 0", "target 1", "target 2", "jawOpen"]
+    assert list(piece.morphs) == ["target 0", "target 1", "target 2", "jawOpen", "viseme aa"]
     assert piece.morphs["jawOpen"][0].tolist() == [0, 0, -(2 + 3 / 2)]

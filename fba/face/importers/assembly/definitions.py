@@ -26,6 +26,12 @@ FACE = (*MOUTH, *range(19, 23), *range(31, 43))
 """FAPs by which an expression is shown."""
 ROUNDS = 4
 """Number of times that the rest is measured: motions of the jaw and of lids are not straight."""
+SCALINGS = 3
+"""Number of times that a shape is made smaller, until all points reach what it asks for."""
+LARGE, ENOUGH = 0.5, 0.75
+"""Share of the largest motion from which on a point counts, and the share of its way that it must reach."""
+LEAST_SCALE = 0.7
+"""Least factor by which a shape is made smaller at once."""
 LEAST = 0.004
 """Least motion of a point, in distances of the pupils, of a shape that shows something."""
 STILL = 0.001
@@ -92,12 +98,24 @@ def _measure(
     target = np.einsum("ij,ij->i", moved[rows], ways)
     target[np.abs(target) < STILL * apart] = 0.0
     numbers_known = np.array([entry.number for entry in known])
+    sides = np.zeros(FAP_COUNT)
+    sides[numbers_known - 1] = target
+    target = _even(sides)[numbers_known - 1]
+    rest = deform.feature_points(np.zeros(FAP_COUNT))[rows]
+    large = np.abs(target) > LARGE * np.abs(target).max()
     values = np.zeros(FAP_COUNT)
-    rest = deform.feature_points(values)[rows]
-    for _ in range(ROUNDS):
+    for _ in range(SCALINGS):
+        values = np.zeros(FAP_COUNT)
+        for _ in range(ROUNDS):
+            now = np.einsum("ij,ij->i", deform.feature_points(values)[rows] - rest, ways)
+            values[numbers_known - 1] += (target - now) / units
+            values = _within_limits(_even(values))
         now = np.einsum("ij,ij->i", deform.feature_points(values)[rows] - rest, ways)
-        values[numbers_known - 1] += (target - now) / units
-        values = _within_limits(_even(values))
+        reached = float((now[large] / target[large]).min())
+        if reached > ENOUGH:
+            break
+        # where one point stops early, a smaller motion of all keeps the form
+        target *= max(reached, LEAST_SCALE)
     return np.round(values)
 
 

@@ -80,8 +80,9 @@ def _is_white(piece: Piece, kind: str | None, pieces: Sequence[tuple[Piece, str 
     ]
     if kind != "eye" or piece not in whites or len(whites) == sum(each == "eye" for _, each in pieces):
         return False
-    halves = _side([piece], lambda centres: centres[:, 0] > centres[:, 0].mean()) or [piece]
-    return all(flat_width(half.part) is not None for half in halves)
+    size, middle = np.ptp(piece.part.vertices, axis=0), _centre([piece.part.vertices])
+    of_one = [piece] if size[0] < PAIR * size[1] else _side([piece], lambda centres: centres[:, 0] > middle)
+    return all(flat_width(eye.part) is not None for eye in of_one)
 
 
 def _middle(pieces: Sequence[tuple[Piece, str | None]]) -> float:
