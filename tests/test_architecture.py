@@ -58,6 +58,7 @@ fba.body
 fba.body.builtin
 fba.body.gait
 fba.body.importers
+fba.capture.markers
 fba.capture.motion
 fba.capture.sampling
 fba.capture.limbs
@@ -68,6 +69,8 @@ fba.formats
 fba.formats.text
 fba.formats.epf
 fba.formats.bvh
+fba.formats.markers
+fba.formats.c3d
 fba.formats.gltf
 fba.formats.face_tables
 fba_conformance

@@ -27,6 +27,7 @@ OPTIONS = {
     "limits": "limit",
     "clip": "clip",
     "joints": "maps",
+    "markers": "maps",
     "rest": "rest",
     "up": "up",
 }

@@ -24,6 +24,7 @@ from fba.source import read_whole
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
+    from fba.capture.markers.summary import MarkerSummary
     from fba.codec.stream_info import StreamInfo
     from fba.face.model import FaceModel
     from fba.formats.gltf.bodies import PersonInfo
@@ -205,6 +206,23 @@ def is_capture(path: Path, format: str | None) -> bool:
 def has_skeleton(path: Path, format: str | None) -> bool:
     """Whether a file holds the motion of a skeleton; False for standard input, which is read only once."""
     return str(path) != "-" and _find_format(path, format).read_motion is not None
+
+
+def has_markers(path: Path, format: str | None) -> bool:
+    """Whether a file holds the motion of markers; False for standard input, which is read only once."""
+    return str(path) != "-" and _find_format(path, format).read_markers is not None
+
+
+def summarise_markers(
+    path: Path, format: str | None, fps: Fraction | None, limits: Limits
+) -> tuple[str, MarkerSummary] | None:
+    """Return the name of the format and what a capture of markers holds; None for other files."""
+    reader = _find_format(path, format)
+    if reader.read_markers is None:
+        return None
+    from fba.capture.markers.summary import summarise
+
+    return reader.name, summarise(reader.read_markers(path, fps=fps, limits=limits))
 
 
 def describe_face(

@@ -76,15 +76,16 @@ def map_options(*, out: bool) -> Callable[[Decorated], Decorated]:
         "maps",
         type=MapType(),
         multiple=True,
-        metavar="JOINT=JOINT|FILE",
+        metavar="NAME=PLACE|FILE",
         help="Motion capture: which joint of the standard a joint of the file is, Pelvis=HumanoidRoot; none: "
-        "Hat=. Repeatable. Or a TOML file of such pairs, instead of what is found.",
+        "Hat=. Or where on the face a marker is, Chin=2.1. Repeatable. Or a TOML file of such pairs, in "
+        "place of what is found.",
     )
     saved = click.option(
         "--map-out",
         type=OutputType(),
         metavar="FILE.toml",
-        help="Motion capture: write the joints that were found, to be changed and read with --map.",
+        help="Motion capture: write the joints or markers that were found, for --map.",
     )
 
     def decorate(command: Decorated) -> Decorated:
@@ -105,7 +106,7 @@ def read_joints(
     if not maps:
         return None
     if not captures:
-        raise click.UsageError("--map goes with motion capture: a BVH or glTF file")
+        raise click.UsageError("--map goes with motion capture: joints of a body, or markers on a face")
     return _combine(maps, limits, lambda: read_capture(captures[0], format, clip, limits))
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import click
 
-from fba.cli import joint_options, options, step_tables, writer_options
+from fba.cli import joint_options, marker_options, options, step_tables, writer_options
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, check_clip, has_skeleton, read_input
+from fba.cli.inputs import EXISTING, check_clip, has_markers, has_skeleton, read_input
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
@@ -75,21 +75,26 @@ def command(
         no_clobber=no_clobber,
     )
     captures = [source] if has_skeleton(source, format) else []
-    bodies_map = maps if given["body"] is not None and not captures else ()
+    with_markers = has_markers(source, format)
+    bodies_map = maps if given["body"] is not None and not captures and not with_markers else ()
     joints_of_body = joint_options.read_body_joints(bodies_map, given["body"], limit)
     extra = writer_options.settings(target, writing, given, joints_of_body)
     check_clip(clip, [source], format)
     if mark is not None and writing.name != "fba":
         raise click.UsageError(f"--mark is for streams, and {display_name(target)} becomes none")
-    joints = None if bodies_map else joint_options.read_joints(maps, captures, format, clip, limit)
+    joints = places = None
+    if with_markers:
+        places = marker_options.read_places(maps, [source], format, limit)
+    elif not bodies_map:
+        joints = joint_options.read_joints(maps, captures, format, clip, limit)
     tables: list[str] = []
     animation = read_input(
         source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format, clip=clip,
-        tables=tables, capture={"joints": joints},
+        tables=tables, capture={"joints": joints, "markers": places},
     )  # fmt: skip
     marked = mark is not False
     if writing.name == "fba":
-        made = bool(captures)
+        made = bool(captures) or with_markers
         table = step_tables.table_to_write(bap_steps, made=made, marked=marked, read=next(iter(tables), None))
         step_tables.warn_of_coarse_steps(animation, table)
         extra |= {"bap_steps": table, "mark": marked}

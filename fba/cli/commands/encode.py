@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from fba.animation import Animation
-from fba.cli import capture_report, joint_options, options, step_tables
+from fba.cli import capture_report, joint_options, marker_options, options, step_tables
 from fba.cli.clamped_values import bring_near, clamped_lines, clamped_values
 from fba.cli.command import Command, examples
 from fba.cli.inputs import (
     EXISTING,
     check_capture_options,
     check_clip,
+    has_markers,
     has_skeleton,
     input_file,
     is_capture,
@@ -31,7 +32,7 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.codec import ClampedParameter
 
-CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "swap", "face")
+CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "swap", "face", "neutral", "gaze", "head_path")
 """Options that say how a capture becomes BAPs and FAPs: those that its reader takes count."""
 
 
@@ -56,6 +57,7 @@ class _EncodeCommand(Command):
         "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
         "fba encode talk.fap -o again.fba --epf talk.epf",
         "fba encode walk.bvh -o walk.fba --report --limits report",
+        "fba encode face.c3d -o face.fba --fps 25 --map-out markers.toml",
     ),
 )
 @click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=EXISTING)
@@ -161,6 +163,7 @@ class _EncodeCommand(Command):
     "auto", "yes", "no",
 )  # fmt: skip
 @click.option("--face", metavar="NAME", help="Captures of several faces: the one to read, by its name.")
+@marker_options.marker_options
 @options.choice_option(
     "--limits",
     "Report where joints exceed normal human motion, or clamp them to it.",
@@ -213,11 +216,21 @@ def command(
     read = [*inputs, epf, *(each for each in maps if isinstance(each, Path))]
     outputs = Outputs([*written, *saved], read, no_clobber=no_clobber)
     captures = [path for path in inputs if has_skeleton(path, format)]
-    check_capture_options({name: f"--{name}" for name in CAPTURE if not _is_left_open(name)}, inputs, format)
-    if map_out is not None and not captures:
-        raise click.UsageError("--map-out goes with motion capture: a BVH or glTF file")
-    joints = joint_options.read_joints(maps, captures, format, clip, limit)
-    capture = {option: settings.pop(option) for option in CAPTURE} | {"joints": joints}
+    marked = [path for path in inputs if has_markers(path, format)]
+    typed = {name: f"--{name.replace('_', '-')}" for name in CAPTURE if not _is_left_open(name)}
+    check_capture_options(typed, inputs, format)
+    if map_out is not None and not (captures or marked):
+        raise click.UsageError("--map-out goes with motion capture: joints of a body, or markers on a face")
+    if (maps or map_out is not None) and captures and marked:
+        raise click.UsageError("--map and --map-out go with one capture; encode face and body by themselves")
+    joints = places = None
+    if marked:
+        places = marker_options.read_places(maps, marked, format, limit)
+    else:
+        joints = joint_options.read_joints(maps, captures, format, clip, limit)
+    capture = {option: settings.pop(option) for option in CAPTURE} | {"joints": joints, "markers": places}
+    if capture["head_path"] is None:
+        capture["head_path"] = len(inputs) == 1  # of two files, the other has a body
     tables: list[str] = []
     with Progress("reading", len(inputs)) as step:
         animation = _read_all(
@@ -233,7 +246,7 @@ def command(
         settings["clamp"] = any(is_capture(path, format) for path in inputs)
     mark = mark if mark is not None else epf is None
     table = step_tables.table_to_write(
-        bap_steps, made=bool(captures), marked=mark, read=tables[0] if tables else None
+        bap_steps, made=bool(captures or marked), marked=mark, read=tables[0] if tables else None
     )
     settings |= {"bap_steps": table, "mark": mark}
     if captures and _is_left_open("origin"):
@@ -246,8 +259,12 @@ def command(
     outputs.write(output, coded.data)
     if map_out is not None:
         with outputs.file(map_out) as file:
-            mapped = joint_options.write_joints(file, joints, captures[0], format, clip, limit)
-        outputs.say(f"{display_name(map_out)}: {mapped} joints of {captures[0]}")
+            if marked:
+                mapped = marker_options.write_places(file, places, marked[0], format, limit)
+            else:
+                mapped = joint_options.write_joints(file, joints, captures[0], format, clip, limit)
+        what = f"markers of {marked[0]}" if marked else f"joints of {captures[0]}"
+        outputs.say(f"{display_name(map_out)}: {mapped} {what}")
     detailed = report is not None
     reports = []
     if captures and animation.body is not None:

@@ -21,6 +21,7 @@ from fba.cli.inputs import (
     input_file,
     list_clips,
     probe_input,
+    summarise_markers,
 )
 from fba.cli.printing import print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
@@ -29,8 +30,12 @@ from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO
 
 if TYPE_CHECKING:
+    from fba.capture.markers.summary import MarkerSummary
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
+
+SHOWN = 8
+"""Names of markers in a line."""
 
 
 @click.command(
@@ -89,6 +94,13 @@ def command(
                 if not as_json:
                     _print_person(path, size, person)
                 continue
+            if (markers := summarise_markers(file, format, fps, limit)) is not None:
+                kind, summary = markers
+                size = file.stat().st_size
+                reports.append({"file": str(path), "format": kind, "size": size, "markers": asdict(summary)})
+                if not as_json:
+                    _print_markers(path, kind, size, summary)
+                continue
             capture = describe_face(file, fps, format, limit)
             with warnings.catch_warnings():
                 if capture is not None:  # which lists what would be warned of
@@ -134,6 +146,30 @@ def _print_person(path: Path, size: int, person: PersonInfo) -> None:
     click.echo(f"  person   {person.matched} of {person.joints} joints are the standard's{declared}")
     click.echo(f"  meshes   {person.meshes}; {person.shapes} shapes of a face with known names")
     click.echo(f"  motion   none; show one on it: fba play MOTION --body {path}")
+
+
+def _print_markers(path: Path, kind: str, size: int, summary: MarkerSummary) -> None:
+    click.echo(f"{path}: {kind.upper()}, {size} bytes")
+    click.echo(
+        f"  time     {summary.frames} frames, {seconds_text(summary.seconds)} at "
+        f"{rate_text(Fraction(summary.rate))} frames/s"
+    )
+    names = ", ".join(summary.markers[:SHOWN]) + (", ..." if len(summary.markers) > SHOWN else "")
+    unit = f", in {summary.unit}" if summary.unit else ", unit not given"
+    up = f", {summary.up} up" if summary.up else ""
+    click.echo(f"  markers  {len(summary.markers)}{unit}{up}: {names}")
+    if summary.gaps:
+        click.echo(
+            f"  gaps     {summary.gaps}, {100 * summary.missing:.1f} % of all positions; the longest "
+            f"{summary.longest:.2f} s ({summary.longest_marker})"
+        )
+    else:
+        click.echo("  gaps     none")
+    how = "the shape of the cloud" if summary.map == "shape" else f"the names ({summary.map})"
+    placed = f"{summary.placed} markers have a place by {how}"
+    click.echo(
+        f"  face     {placed if summary.map else 'not found; fba encode --map says which marker is where'}"
+    )
 
 
 def _print(path: Path, info: StreamInfo, clips: tuple[ClipInfo, ...], steps: str) -> None:

@@ -1,0 +1,304 @@
+"""Markers on a face to an `Animation`: FAPs, the head's turns among them, and its path as BAPs."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Float64
+from fba.capture.markers.gaps import RARELY, Filled, fill_gaps
+from fba.capture.markers.marker_maps import check_map, find_map, list_names
+from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers.neutral import neutral_frames
+from fba.capture.markers.registration import GIVE_MAP, Registration, complete_points, register
+from fba.capture.markers.responses import measure_responses
+from fba.capture.markers.solving import choose_unknowns, solve
+from fba.capture.markers.stabilisation import fill_poses, fit_poses, refine_reference, remove_poses
+from fba.capture.markers.targets import RIGID
+from fba.errors import FbaWarning, ModelError, OptionError
+from fba.face import FaceModel, Fapu
+from fba.face.feature_points import row_of
+from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, PITCH_EYE, YAW_EYE
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import BAP_COUNT, FAP_COUNT
+from fba.tracks import BodyTrack, FaceTrack
+
+PATH = (181, 182, 183)
+"""BAPs that move the body up, to its left, and to its front, millimetres."""
+GAZES = ("none", "camera")
+MOST_FRAMES = 1_000_000
+"""More than two hours at 120 frames/s."""
+FRAME_BYTES, MARKER_BYTES = 6000, 400
+"""Memory for each frame, and for each marker in it."""
+LARGEST_GAZE = 0.6
+"""Radians that an eye turns at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerFace:
+    """A face found in a capture, and how it moves.
+
+    markers: marker -> place. found_by: how: a set's name, "shape", or "given". registration: where the face
+    is. neutral: first frame of the neutral face, and the one after its last. points: float64 (84, 3), the
+    actor's neutral feature points, metres, in the actor's axes. fapu: the actor's. filled: gaps. faps:
+    float64 (T, 68), at the capture's own times. sent: the FAPs that the markers tell. path: float64 (T, 3),
+    metres that the top of the spine moves to the left, up and to the front.
+    """
+
+    markers: dict[str, str]
+    found_by: str
+    registration: Registration
+    neutral: tuple[int, int]
+    points: Float64
+    fapu: Fapu
+    filled: Filled
+    faps: Float64
+    sent: tuple[int, ...]
+    path: Float64
+
+
+def from_markers(
+    motion: MarkerMotion,
+    rate: Fraction | int | str | None = None,
+    *,
+    markers: Mapping[str, str] | None = None,
+    neutral: str | int | tuple[float, float] = "auto",
+    gaze: str = "none",
+    head_path: bool = True,
+    model: FaceModel | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> Animation:
+    """Return the FAPs of a face with markers, and the path of its head as BAPs 181 to 183.
+
+    rate: frames per second; None for the capture's own, else values are interpolated at its times. markers:
+    marker -> place on the face, see `fba.capture.markers.targets`; None to find them by names, or by the
+    cloud's shape. neutral: the frames in which all FAPs are 0: "auto", "first", a frame, or (from, to) in
+    seconds. gaze: "none", or "camera": eyes turn against the head, so that they keep looking where they did.
+    head_path: whether the path of the head goes into the stream, too. model: the face whose motions tell
+    FAPs apart; None for the built-in head.
+
+    FAPs are relative to the actor's own FAPU, measured on the neutral face. Lids and lips that no marker
+    tells are left to the decoder, except that the inner lips do as the outer.
+
+    Raises ModelError where there is no face, or its motion cannot be told from the head's; OptionError;
+    LimitError. Warns (FbaWarning) of everything that was repaired: units, mirrored or swapped markers, gaps.
+    """
+    rate = motion.rate if rate is None else Fraction(rate)
+    if rate <= 0:
+        raise OptionError(f"the frame rate must be positive, not {rate}")
+    count = int((motion.times[-1] - motion.times[0]) * float(rate) + 1e-6) + 1 if len(motion) else 0
+    limits.check_frames(count, f"the capture at {float(rate):g} frames/s")
+    limits.check_bytes(
+        count * (FAP_COUNT * 12 + BAP_COUNT * 6),
+        f"the capture at {float(rate):g} frames/s",
+        source=motion.positions.nbytes,
+    )
+    face = find_face(motion, markers=markers, neutral=neutral, gaze=gaze, model=model, limits=limits)
+    at = motion.times[0] + np.arange(count) / float(rate)
+    columns = np.array(face.sent) - 1
+    values = np.zeros((count, FAP_COUNT), dtype=np.int32)
+    mask = np.zeros((count, FAP_COUNT), dtype=bool)
+    mask[:, columns] = True
+    for column in columns:
+        values[:, column] = np.rint(np.interp(at, motion.times, face.faps[:, column]))
+    body = None
+    if head_path:
+        baps = np.zeros((count, BAP_COUNT), dtype=np.int32)
+        sent = np.zeros((count, BAP_COUNT), dtype=bool)
+        for bap, axis in zip(PATH, (1, 0, 2), strict=True):
+            sent[:, bap - 1] = True
+            baps[:, bap - 1] = np.rint(1000 * np.interp(at, motion.times, face.path[:, axis]))
+        body = BodyTrack(baps, sent)
+    return Animation(rate, np.arange(count), FaceTrack(values, mask), body, motion.name)
+
+
+def find_face(
+    motion: MarkerMotion,
+    *,
+    markers: Mapping[str, str] | None = None,
+    neutral: str | int | tuple[float, float] = "auto",
+    gaze: str = "none",
+    model: FaceModel | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> MarkerFace:
+    """Return the face in a capture and its motion; options and errors as for `from_markers`."""
+    if gaze not in GAZES:
+        raise OptionError(f"gaze must be one of {', '.join(GAZES)}, not {gaze!r}")
+    if not len(motion):
+        raise ModelError("the capture has no frames")
+    if len(motion) > MOST_FRAMES:
+        raise ModelError(f"the capture has {len(motion)} frames, more than {MOST_FRAMES}; cut it into pieces")
+    limits.check_bytes(
+        len(motion) * (FRAME_BYTES + MARKER_BYTES * len(motion.names)),
+        "the capture",
+        source=motion.positions.nbytes,
+    )
+    model = FaceModel.default() if model is None else model
+    places, found_by = (dict(markers), "given") if markers is not None else find_map(motion)
+    if markers is not None:
+        check_map(places)
+        missing = [name for name in places if name not in motion.names]
+        if missing:
+            raise OptionError(
+                f"the capture has no marker {list_names(missing)}; it has {list_names(motion.names)}"
+            )
+    places = _without_rare(motion, places)
+    names = tuple(places)
+    positions = motion.positions[:, [motion.names.index(name) for name in names]]
+    fixed = [n for n, name in enumerate(names) if places[name] in RIGID]
+    if len(fixed) < 3:
+        raise ModelError(
+            "the head's motion needs three markers that the face does not move (hairline, ears, bridge of "
+            f"the nose, a cap); the map has {len(fixed)}"
+        ).with_remedies(GIVE_MAP)
+    rotation, shift = _follow_head(positions[:, fixed], motion.times)
+    local = remove_poses(rotation, shift, positions)
+    rest = neutral_frames(local, motion.times, neutral)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a marker that is missing in all of these frames
+        still = np.nanmedian(positions[rest], axis=0)
+    still = _complete_still(still, local, rotation[rest.start], shift[rest.start])
+    where = register(names, places, still, model.points)
+    _tell(motion, where)
+    # from here on in the actor's axes and in metres
+    turn = where.axes * where.factor
+    mirror = np.array([-1.0 if where.mirrored else 1.0, 1.0, 1.0])
+    positions = (positions * mirror) @ turn.T
+    for one, other in where.swapped:
+        a, b = names.index(one), names.index(other)
+        positions[:, [a, b]] = positions[:, [b, a]]
+    kept = [n for n, name in enumerate(names) if name not in where.astray]
+    names = tuple(names[n] for n in kept)
+    mapped, places = places, {name: places[name] for name in names}
+    positions = positions[:, kept]
+    changed = {name for pair in where.swapped for name in pair} | set(where.astray)
+    if any(target in RIGID for name, target in mapped.items() if name in changed):
+        fixed = [n for n, name in enumerate(names) if places[name] in RIGID]
+        rotation, shift = _follow_head(positions[:, fixed], motion.times)
+    else:
+        basis = where.axes * mirror
+        rotation, shift = basis @ rotation @ basis.T, (shift * mirror) @ turn.T
+    rotation, shift = _relative_to(rotation, shift, rest)
+    local = remove_poses(rotation, shift, positions)
+    local, filled = fill_gaps(names, local, motion.times)
+    _tell_gaps(filled)
+    neutral_local = np.median(local[rest], axis=0)
+    known = {places[name]: neutral_local[n] for n, name in enumerate(names) if places[name] != "head"}
+    points = complete_points(known, model.points)
+    try:
+        fapu = Fapu.measure(points)
+    except ModelError as error:
+        raise ModelError(f"the neutral face: {error.finding}").with_remedies(GIVE_MAP) from error
+    moved = np.zeros((len(motion), len(points), 3))
+    rows = row_of()
+    for n, name in enumerate(names):
+        if places[name] in rows:
+            moved[:, rows[places[name]]] = local[:, n] - neutral_local[n]
+    unknowns = choose_unknowns([place for place in places.values() if place in rows and place not in RIGID])
+    values = np.zeros((len(motion), FAP_COUNT))
+    sent: tuple[int, ...] = ()
+    if unknowns.faps:
+        values = solve(moved, unknowns, measure_responses(model), fapu)
+        sent = (*unknowns.faps, *unknowns.mates)
+    values[:, [HEAD_PITCH - 1, HEAD_YAW - 1, HEAD_ROLL - 1]] = _head_angles(rotation) / fapu.AU
+    sent = (*sent, HEAD_PITCH, HEAD_YAW, HEAD_ROLL)
+    if gaze == "camera":
+        sent = (*sent, *YAW_EYE, *PITCH_EYE)
+        values[:, [fap - 1 for fap in YAW_EYE]] = -values[:, [HEAD_YAW - 1]]
+        values[:, [fap - 1 for fap in PITCH_EYE]] = -values[:, [HEAD_PITCH - 1]]
+        eyes = [fap - 1 for fap in (*YAW_EYE, *PITCH_EYE)]
+        values[:, eyes] = np.clip(values[:, eyes], -LARGEST_GAZE / fapu.AU, LARGEST_GAZE / fapu.AU)
+    spine = points[rows["7.1"]]
+    path = np.einsum("tcd,d->tc", rotation, spine) + shift - spine
+    return MarkerFace(
+        places, found_by, where, (rest.start, rest.stop), points, fapu, filled, values, tuple(sorted(sent)),
+        path,
+    )  # fmt: skip
+
+
+def _without_rare(motion: MarkerMotion, places: dict[str, str]) -> dict[str, str]:
+    """Return the map without markers that are hardly ever seen; warns of them."""
+    share = motion.seen.mean(axis=0)
+    rare = [name for name in places if share[motion.names.index(name)] < RARELY]
+    if rare:
+        warnings.warn(
+            f"seen in less than {RARELY:.0%} of the frames, and left out: {list_names(rare)}",
+            FbaWarning, stacklevel=4,
+        )  # fmt: skip
+    return {name: place for name, place in places.items() if name not in rare}
+
+
+def _follow_head(fixed: Float64, times: Float64) -> tuple[Float64, Float64]:
+    """Return the head's rotation (T, 3, 3) and shift (T, 3) from markers that only it moves: (T, K, 3)."""
+    seen = ~np.isnan(fixed[..., 0])
+    first = int(seen.sum(axis=1).argmax())
+    reference = refine_reference(fixed[first].copy(), fixed)
+    rotation, shift, _ = fit_poses(reference, fixed)
+    if np.isnan(shift[:, 0]).all():
+        raise ModelError(
+            "the head's motion cannot be found: in no frame three markers that the face does not move are "
+            "seen that are not on one line"
+        )
+    return fill_poses(rotation, shift, times)
+
+
+def _complete_still(still: Float64, local: Float64, rotation: Float64, shift: Float64) -> Float64:
+    """Return the neutral markers (M, 3); those missing then are where they are most of the time.
+
+    local: (T, M, 3), relative to the head; rotation, shift: the head's in the neutral face.
+    """
+    usual = [np.nanmedian(path[~np.isnan(path[:, 0])], axis=0) for path in local.swapaxes(0, 1)]
+    return np.where(np.isnan(still), np.array(usual) @ rotation.T + shift, still)
+
+
+def _relative_to(rotation: Float64, shift: Float64, rest: slice) -> tuple[Float64, Float64]:
+    """Return poses relative to that of the neutral face, the mean over its frames."""
+    near = rotation[rest].sum(axis=0)
+    left, _, right = np.linalg.svd(near)
+    base = left @ right
+    centre = shift[rest].mean(axis=0)
+    turned = rotation @ base.T
+    moved = shift - np.einsum("tcd,d->tc", turned, centre)
+    return turned, moved
+
+
+def _head_angles(rotation: Float64) -> Float64:
+    """Return pitch, yaw and roll, radians (T, 3), of rotations yaw . roll . pitch."""
+    roll = np.arcsin(np.clip(rotation[:, 1, 0], -1.0, 1.0))
+    yaw = np.unwrap(np.arctan2(-rotation[:, 2, 0], rotation[:, 0, 0]))
+    pitch = np.unwrap(np.arctan2(-rotation[:, 1, 2], rotation[:, 1, 1]))
+    return np.stack([pitch, yaw, roll], axis=1)
+
+
+def _tell(motion: MarkerMotion, where: Registration) -> None:
+    """Warn of what was wrong with the capture and is repaired."""
+    said = []
+    if where.factor != 1.0:
+        stored = motion.unit or "metres"
+        said.append(
+            f"in {stored} the face would be {where.scale / where.factor:.3g} times as large as an adult's: "
+            f"lengths are multiplied by {where.factor:g}"
+        )
+    if where.mirrored:
+        said.append("the capture is mirrored: x is turned round")
+    for one, other in where.swapped:
+        said.append(f"markers {one} and {other} have each other's places: exchanged")
+    if where.astray:
+        said.append(f"far from their places on a face, and left out: {list_names(where.astray)}")
+    for text in said:
+        warnings.warn(text, FbaWarning, stacklevel=4)
+
+
+def _tell_gaps(filled: Filled) -> None:
+    """Warn of gaps that the marker's own path does not fill."""
+    if filled.long:
+        warnings.warn(
+            f"{filled.long} long gaps are filled by neighbouring markers, the longest {filled.longest:.2f} s "
+            f"of {filled.marker}" + (f"; {filled.short} short ones by splines" if filled.short else ""),
+            FbaWarning, stacklevel=4,
+        )  # fmt: skip

@@ -1,0 +1,209 @@
+"""Maps from markers to places on the face: found, corrected by hand, in TOML files."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import textwrap
+import tomllib
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
+
+from fba.atomic import atomic
+from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers.targets import HEAD, RIGID, TARGETS
+from fba.errors import FormatError, OptionError, did_you_mean
+from fba.face.feature_points import row_of
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import Path, read_whole
+
+MOST_BYTES = 1 << 20
+"""Longest file of a map."""
+TABLE = "markers"
+NAMED = 12
+"""Most markers that a message names."""
+FEWEST = 8
+"""Least number of names by which a set of markers fits."""
+SHARE = 0.6
+"""Share of a set's names that must be there."""
+
+
+@cache
+def marker_sets() -> dict[str, dict[str, str]]:
+    """Return the built-in sets: name of the set -> simplified marker name -> target, "" for none."""
+    result: dict[str, dict[str, str]] = {}
+    text = (files(__package__) / "marker_sets.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        result.setdefault(row["set"], {})[simplify(row["marker"])] = row["target"]
+    return result
+
+
+def simplify(name: str) -> str:
+    """Return a name in lower case, letters and digits only, without a subject: "Anna:LPT_1" -> "lpt1"."""
+    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
+
+
+def match_names(names: Sequence[str]) -> tuple[str, dict[str, str]]:
+    """Return the set whose names fit, and marker -> target; ("", {}) if none does.
+
+    Names that are feature points ("2.1", "FDP_2.1", "fp8_3"), "head" or a tragion mean these.
+    """
+    direct = {name: target for name in names if (target := _named_point(name))}
+    if len(direct) >= FEWEST:
+        return "feature points", direct
+    simple = {name: simplify(name) for name in names}
+    best: tuple[str, dict[str, str]] = ("", {})
+    for family, members in marker_sets().items():
+        found = {name: members[short] for name, short in simple.items() if short in members}
+        used = {name: target for name, target in found.items() if target}
+        if len(found) >= SHARE * len(members) and len(used) >= FEWEST and len(used) > len(best[1]):
+            best = family, used
+    return best
+
+
+def _named_point(name: str) -> str:
+    """Return the target that a marker's name says, "" if it says none."""
+    word = name.rpartition(":")[2].strip().lower()
+    if word in TARGETS:
+        return word
+    match = re.fullmatch(r"(?:fdp|fp|point|p)?[ _\-]?(\d{1,2})[._\-](\d{1,2})", word)
+    point = f"{int(match[1])}.{int(match[2])}" if match else ""
+    return point if point in TARGETS else ""
+
+
+def find_map(motion: MarkerMotion) -> tuple[dict[str, str], str]:
+    """Return marker -> target of a capture, and how it was found: a set's name, or "shape".
+
+    Where names tell nothing, the shape of the cloud does. ModelError if it is not that of a face.
+    """
+    family, found = match_names(motion.names)
+    if found:
+        return found, family
+    from fba.capture.markers.proposal import propose_map
+
+    return propose_map(motion), "shape"
+
+
+def change_map(
+    motion: MarkerMotion, base: Mapping[str, str] | None, pairs: Mapping[str, str]
+) -> dict[str, str]:
+    """Return a map with some markers given by hand.
+
+    base: the map that is changed, None for what is found. pairs: marker -> target, or "" to leave it out.
+    Another marker that had the same feature point loses it. OptionError for an unknown marker or target.
+    """
+    result = dict(find_map(motion)[0] if base is None else base)
+    for marker, target in pairs.items():
+        if marker not in motion.names:
+            raise OptionError(
+                f"the capture has no marker {marker!r}{_like(marker, motion.names)}; it has "
+                f"{list_names(motion.names)}"
+            )
+        check_target(target, allow_none=True)
+        result = {
+            each: taken
+            for each, taken in result.items()
+            if each != marker and (taken != target or target == HEAD)
+        }
+        if target:
+            result[marker] = target
+    order = {name: number for number, name in enumerate(motion.names)}
+    return dict(sorted(result.items(), key=lambda pair: order.get(pair[0], len(order))))
+
+
+def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
+    """Return the map in a TOML file: the table "markers", marker -> target.
+
+    Raises FormatError for a file that is none, with the line, and for targets that do not exist.
+    """
+    data = read_whole(path)
+    if len(data) > MOST_BYTES:
+        raise FormatError(f"has {len(data)} bytes, more than the {MOST_BYTES} that a map may have", path=path)
+    limits.check_bytes(40 * len(data), f"{os.fspath(path)}: the map", source=len(data))
+    try:
+        content = tomllib.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise FormatError(f"is not UTF-8 text (byte {error.start})", path=path) from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        raise FormatError(
+            f'is not TOML: {str(error)[:200]}; expected lines such as "Chin" = "2.1" below [{TABLE}]',
+            path=path, line=int(line[1]) if line else None,
+        ) from None  # fmt: skip
+    table = content.get(TABLE)
+    if not isinstance(table, dict) or not table:
+        raise FormatError(
+            f'has no table [{TABLE}]; expected lines such as "Chin" = "2.1" below it', path=path
+        )
+    for marker, target in table.items():
+        try:
+            check_target(target if isinstance(target, str) else repr(target))
+        except OptionError as error:
+            raise FormatError(f"{marker!r}: {error}", path=path) from None
+    try:
+        check_map(table)
+    except OptionError as error:
+        raise FormatError(str(error), path=path) from None
+    return dict(table)
+
+
+def write_map(path: Path, markers: Mapping[str, str], motion: MarkerMotion | None = None) -> None:
+    """Write a map as TOML; a comment names the markers without a place, if the motion is given."""
+    lines = [
+        "# Markers of a capture, and where they are on the face: feature points of ISO/IEC 14496-2,",
+        "# l_tragion and r_tragion in front of the ears, or head for one on the skull.",
+        "# Change it and give it to `fba encode --map`.",
+        "",
+        f"[{TABLE}]",
+    ]
+    for marker, target in markers.items():
+        lines.append(f"{json.dumps(marker, ensure_ascii=False)} = {json.dumps(target)}")
+    unused = [] if motion is None else [name for name in motion.names if name not in markers]
+    if unused:
+        quoted = ", ".join(json.dumps(name)[1:-1] for name in unused)
+        lines += textwrap.wrap(
+            f"Markers that are not used: {quoted}", 100, initial_indent="# ", subsequent_indent="#   "
+        )
+    with atomic(path) as file:
+        file.write(("\n".join(lines) + "\n").encode())
+
+
+def check_map(markers: Mapping[str, str]) -> None:
+    """Raise OptionError where two markers are at one place that is no more than a point."""
+    taken: dict[str, str] = {}
+    for marker, target in markers.items():
+        check_target(target)
+        if target != HEAD and target in taken:
+            raise OptionError(f"{taken[target]!r} and {marker!r} are both at {target}")
+        taken[target] = marker
+
+
+def check_target(target: str, allow_none: bool = False) -> None:
+    """Raise OptionError for a target that markers cannot have."""
+    if target in TARGETS or (allow_none and not target):
+        return
+    if target in row_of():
+        raise OptionError(
+            f"no marker can be at feature point {target}, which is inside the head or the mouth, or on hair"
+        )
+    special = [name for name in RIGID if name not in row_of()]
+    raise OptionError(
+        f"there is no place {target!r}{did_you_mean(target, TARGETS)}; a marker is at a feature point of the "
+        f"face, such as 2.1 or 8.3, or at {', '.join(special)}"
+    )
+
+
+def _like(marker: str, names: Sequence[str]) -> str:
+    """Return " (did you mean 'LCL'?)", whatever is written in capitals, or ""."""
+    by_lower = {name.lower(): name for name in names}
+    near = get_close_matches(marker.lower(), by_lower, n=1)
+    return f" (did you mean {by_lower[near[0]]!r}?)" if near else ""
+
+
+def list_names(names: Sequence[str]) -> str:
+    """Return names as text, the first of many."""
+    return ", ".join(names[:NAMED]) + (f", and {len(names) - NAMED} more" if len(names) > NAMED else "")

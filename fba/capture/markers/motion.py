@@ -1,0 +1,96 @@
+"""`MarkerMotion`: captured motion of named points from a file of any format."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from fba.arrays import Bool, Float64
+from fba.errors import ModelError
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "dm": 0.1, "in": 0.0254, "ft": 0.3048}
+"""Units of length, in metres."""
+MOST_MARKERS = 2000
+"""More are damage: the largest captures of faces have some hundred, those of crowds a thousand."""
+LARGEST = 1e6
+"""Largest coordinate, metres; more is damage."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerMotion:
+    """Motion of points, in metres, in the axes of the source.
+
+    names: M names, each once. positions: float64 (T, M, 3), metres, NaN where a marker was not seen.
+    times: float64 (T,), seconds, rising. rate: nominal frames per second. unit: the unit of length in the
+    file; "" if it does not say. up: the axis that the file says is up, such as "+y"; "" if it does not say.
+    name: of the performance.
+
+    Arrays are read-only copies. Raises ModelError if the parts contradict each other, times do not rise, or
+    a coordinate is infinite or beyond a million metres.
+    """
+
+    names: tuple[str, ...]
+    positions: Float64
+    times: Float64
+    rate: Fraction
+    unit: str = ""
+    up: str = ""
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        positions = np.array(self.positions, dtype=np.float64)
+        times = np.array(self.times, dtype=np.float64)
+        count = len(self.names)
+        if positions.ndim != 3 or positions.shape[1:] != (count, 3) or times.shape != positions.shape[:1]:
+            raise ModelError(
+                f"MarkerMotion: {count} names need positions (T, {count}, 3) and times (T,), not "
+                f"{positions.shape} and {times.shape}"
+            )
+        if not 0 < count <= MOST_MARKERS:
+            raise ModelError(f"a capture needs 1 to {MOST_MARKERS} markers, not {count}")
+        if len(set(self.names)) != count:
+            twice = next(name for name in self.names if self.names.count(name) > 1)
+            raise ModelError(f"two markers are called {twice!r}")
+        object.__setattr__(self, "rate", Fraction(self.rate))
+        if self.rate <= 0:
+            raise ModelError(f"the frame rate must be positive, not {self.rate}")
+        if not np.isfinite(times).all():
+            raise ModelError(f"the time of frame {int(np.argmin(np.isfinite(times)))} is not a number")
+        steps = np.diff(times)
+        if len(steps) and steps.min() <= 0:
+            frame = int(np.argmin(steps > 0)) + 1
+            raise ModelError(
+                f"time runs backwards: frame {frame} is at {times[frame]:g} s, the one before it at "
+                f"{times[frame - 1]:g} s"
+            )
+        # a marker is seen with all three coordinates, or not at all
+        positions[np.isnan(positions).any(axis=2)] = np.nan
+        beyond = np.abs(positions) > LARGEST
+        if beyond.any():
+            frame, marker, axis = (int(index) for index in np.argwhere(beyond)[0])
+            raise ModelError(
+                f"marker {self.names[marker]!r} is at {positions[frame, marker, axis]:g} m in frame {frame}"
+            )
+        for what, array in (("positions", positions), ("times", times)):
+            array.flags.writeable = False
+            object.__setattr__(self, what, array)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    @property
+    def seen(self) -> Bool:
+        """Whether each marker was seen in each frame: bool (T, M)."""
+        return ~np.isnan(self.positions[..., 0])
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the end of the last."""
+        return float(self.times[-1] - self.times[0] + 1 / self.rate) if len(self) else 0.0
+
+
+def regular_times(count: int, rate: Fraction, first: float = 0.0) -> Float64:
+    """Return the times of frames at a constant rate: float64 (count,), seconds."""
+    return first + np.arange(count, dtype=np.float64) * np.float64(1 / rate)

@@ -1,0 +1,80 @@
+"""The neutral face of a take: frames in which the mouth is shut, the lids are open, and nothing moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fba.arrays import Float64
+from fba.errors import OptionError
+
+WINDOW = 0.1
+"""Seconds whose median is the neutral face."""
+START = 1.5
+"""The take's start counts as neutral unless another moment is this many times as restful."""
+
+
+def neutral_frames(local: Float64, times: Float64, neutral: str | int | tuple[float, float]) -> slice:
+    """Return the frames of the neutral face.
+
+    local: float64 (T, M, 3), markers relative to the head, NaN for gaps. neutral: "auto", "first", the
+    number of a frame, or (from, to) in seconds from the start. Raises OptionError for frames that the take
+    has not.
+    """
+    length = max(1, int(np.searchsorted(times - times[0], WINDOW)))
+    if isinstance(neutral, tuple):
+        first, last = (int(np.searchsorted(times - times[0], second)) for second in neutral)
+        if not 0 <= neutral[0] < neutral[1] or first >= len(times) or last <= first:
+            raise OptionError(
+                f"neutral: no frames between {neutral[0]:g} and {neutral[1]:g} s; the take lasts "
+                f"{times[-1] - times[0]:.2f} s"
+            )
+        return slice(first, last)
+    if isinstance(neutral, int):
+        if not 0 <= neutral < len(times):
+            raise OptionError(
+                f"neutral: there is no frame {neutral}; the take has frames 0 to {len(times) - 1}"
+            )
+        return slice(neutral, neutral + 1)
+    if neutral == "first":
+        return slice(0, length)
+    if neutral != "auto":
+        raise OptionError(f"neutral must be auto, first, a frame or two times, not {neutral!r}")
+    return _find(local, length)
+
+
+def _find(local: Float64, length: int) -> slice:
+    """Return the window in which the face is nearest to its rest.
+
+    Rest is where each coordinate stays for most of the time; a mouth that speaks and lids that blink come
+    back to it. Windows with gaps count by the markers seen.
+    """
+    flat = local.reshape(len(local), -1)
+    if len(flat) <= length:
+        return slice(0, len(flat))
+    centre = _most_usual(flat)
+    away = np.nanmean(np.abs(flat - centre), axis=1)
+    away = np.nan_to_num(away, nan=np.inf)
+    speed = np.nan_to_num(np.nanmean(np.abs(np.diff(flat, axis=0, prepend=flat[:1])), axis=1), nan=np.inf)
+    cost = away + speed
+    total = np.convolve(cost, np.ones(length), "valid") if np.isfinite(cost).all() else _sums(cost, length)
+    best = int(total.argmin())
+    return slice(0, length) if total[0] <= START * total[best] else slice(best, best + length)
+
+
+def _sums(cost: Float64, length: int) -> Float64:
+    return np.array([cost[n : n + length].sum() for n in range(len(cost) - length + 1)])
+
+
+def _most_usual(flat: Float64) -> Float64:
+    """Return the value at which each column is densest: the middle of the shortest half of its values."""
+    ordered = np.sort(flat, axis=0)  # NaN last
+    result = np.full(flat.shape[1], np.nan)
+    counts = (~np.isnan(flat)).sum(axis=0)
+    for column, count in enumerate(counts):
+        if count:
+            half = max(1, int(count) // 2)
+            values = ordered[:count, column]
+            widths = values[half - 1 :] - values[: count - half + 1]
+            start = int(widths.argmin())
+            result[column] = values[start : start + half].mean()
+    return result

@@ -1,0 +1,4 @@
+"""C3D: positions of markers in, from binary files of any maker.
+
+May use: capture.
+"""

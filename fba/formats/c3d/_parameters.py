@@ -1,0 +1,165 @@
+"""The parameter section of C3D files: groups of named arrays, in the byte order of three processors.
+
+See "The C3D file format user guide", Motion Lab Systems. The first block of the section names the processor
+that wrote the file: its numbers, and those of header and data, are in that processor's order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.arrays import Array, Float64
+from fba.errors import FormatError
+from fba.source import Path
+
+BLOCK = 512
+"""Bytes of a block, in which C3D counts."""
+INTEL, DEC, MIPS = 84, 85, 86
+KEY = 0x50
+MOST_PARAMETERS = 4096
+TEXT, BYTE, INTEGER, FLOAT = -1, 1, 2, 4
+_KINDS = {TEXT: "S1", BYTE: "i1", INTEGER: "i2", FLOAT: "f4"}
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """How numbers are stored. order: "<" or ">". dec: whether floats are those of a VAX."""
+
+    order: str
+    dec: bool
+
+    def words(self, data: bytes | memoryview, count: int, start: int = 0) -> Array:
+        """Return signed numbers of 16 bits: int16 (count,)."""
+        return np.frombuffer(data, f"{self.order}i2", count, start)
+
+    def floats(self, data: bytes | memoryview, count: int, start: int = 0) -> Array:
+        """Return numbers of 32 bits: float32 (count,)."""
+        if not self.dec:
+            return np.frombuffer(data, f"{self.order}f4", count, start)
+        halves = np.frombuffer(data, "<u2", 2 * count, start).reshape(-1, 2)
+        # the word with sign and exponent comes first, and the exponent counts from 2 more
+        return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel() / np.float32(4)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The parameters of a file, by "GROUP:NAME" in upper case: arrays, texts as lists."""
+
+    numbers: Numbers
+    arrays: dict[str, Array]
+    texts: dict[str, tuple[str, ...]]
+
+    def number(self, name: str, default: float = 0.0) -> float:
+        """Return the first number of a parameter, or the default where there is none."""
+        array = self.arrays.get(name)
+        return float(array[0]) if array is not None and len(array) else default
+
+    def unsigned(self, name: str) -> Float64:
+        """Return the numbers of a parameter; those of 16 bits without a sign: float64."""
+        array = self.arrays.get(name, np.zeros(0))
+        return (array.view(np.uint16) if array.dtype == np.int16 else array).astype(np.float64)
+
+    def numbered_texts(self, name: str) -> tuple[str, ...]:
+        """Return the texts of NAME, NAME2, NAME3 ..., in one: a parameter holds 255 at most."""
+        result = list(self.texts.get(name, ()))
+        number = 2
+        while f"{name}{number}" in self.texts:
+            result += self.texts[f"{name}{number}"]
+            number += 1
+        return tuple(result)
+
+
+def read_parameters(data: bytes, path: Path) -> Parameters:
+    """Return the parameters of a C3D file.
+
+    Raises FormatError where the section is cut off or contradicts itself.
+    """
+    start = (data[0] - 1) * BLOCK
+    if start < BLOCK or start + 4 > len(data):
+        raise FormatError(
+            f"its first byte says that parameters begin in block {data[0]}, but the file has "
+            f"{len(data) // BLOCK} blocks of {BLOCK} bytes; was it copied whole?", path=path,
+        )  # fmt: skip
+    processor = data[start + 3]
+    if processor not in (INTEL, DEC, MIPS):
+        raise FormatError(
+            f"byte {start + 3} names no processor (84 Intel, 85 DEC, 86 MIPS)",
+            path=path,
+            token=str(processor),
+        )
+    numbers = Numbers(">" if processor == MIPS else "<", processor == DEC)
+    groups: dict[int, str] = {}
+    found: list[tuple[int, str, int]] = []
+    position = start + 4
+    while True:
+        if position + 2 > len(data):
+            raise FormatError(f"is cut off in its parameters, at byte {len(data)}", path=path)
+        length, group = abs(_signed(data[position])), _signed(data[position + 1])
+        if not length or not group:
+            break
+        after_name = position + 2 + length
+        if after_name + 2 > len(data):
+            raise FormatError(f"is cut off in its parameters, at byte {len(data)}", path=path)
+        name = _text(data[position + 2 : after_name]).upper()
+        if group < 0:
+            groups.setdefault(-group, name)
+        else:
+            found.append((group, name, after_name + 2))
+        if len(found) + len(groups) > MOST_PARAMETERS:
+            raise FormatError(f"has more than {MOST_PARAMETERS} parameters", path=path)
+        step = int(np.frombuffer(data, f"{numbers.order}u2", 1, after_name)[0])
+        if not step:
+            break
+        if step < 2:
+            raise FormatError(f"parameter {name!r} at byte {position} points at itself", path=path)
+        position = after_name + step
+    result = Parameters(numbers, {}, {})
+    for group, name, place in found:
+        _read_one(f"{groups.get(group, group)}:{name}", data, place, result, path)
+    return result
+
+
+def _read_one(name: str, data: bytes, place: int, result: Parameters, path: Path) -> None:
+    """Read the values of one parameter into the result."""
+    if place + 2 > len(data):
+        raise FormatError(f"is cut off in parameter {name!r}", path=path)
+    kind, dimensions = _signed(data[place]), data[place + 1]
+    if kind not in _KINDS or dimensions > 7:
+        raise FormatError(
+            f"parameter {name!r} at byte {place} has type {kind} and {dimensions} dimensions; there is none",
+            path=path,
+        )
+    shape = data[place + 2 : place + 2 + dimensions]
+    count = 1
+    for size in shape:
+        count *= size
+    begin = place + 2 + dimensions
+    if len(shape) < dimensions or begin + count * abs(kind) > len(data):
+        raise FormatError(
+            f"parameter {name!r} at byte {place} has {count} values, more than the file holds", path=path
+        )
+    if kind == TEXT:
+        # the first dimension is the length of each text
+        each = shape[0] if dimensions > 1 else count
+        texts = [_text(data[begin + n : begin + n + each]) for n in range(0, count, each)] if each else []
+        result.texts.setdefault(name, tuple(texts))
+    elif kind == FLOAT:
+        result.arrays.setdefault(name, result.numbers.floats(data, count, begin))
+    else:
+        order = result.numbers.order if kind == INTEGER else ""
+        array = np.frombuffer(data, f"{order}{_KINDS[kind]}", count, begin)
+        result.arrays.setdefault(name, array.astype(array.dtype.newbyteorder("=")))
+
+
+def _signed(byte: int) -> int:
+    return byte - 256 if byte > 127 else byte
+
+
+def _text(raw: bytes) -> str:
+    try:
+        text = raw.decode()
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")
+    return text.split("\0")[0].strip()

@@ -1,0 +1,173 @@
+"""Captures of markers in every format: what is written comes back, damage is an error."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import marker_files
+from fba.capture.markers.motion import MarkerMotion
+from fba.errors import FbaError, FbaWarning, FormatError, LimitError
+from fba.formats import format_of
+from fba.limits import Limits
+
+RATE = Fraction(50)
+
+
+def cloud(markers: int = 5, frames: int = 12) -> MarkerMotion:
+    """Markers with gaps, coordinates of both signs."""
+    random = np.random.default_rng(3)
+    positions = random.uniform(-0.9, 0.9, (frames, markers, 3)).round(4)
+    positions[3:5, 1] = positions[-1, 0] = np.nan
+    names = tuple(f"M{n}a" for n in range(markers))
+    return MarkerMotion(names, positions, np.arange(frames) / 50, RATE)
+
+
+def read(path: Path, **options: object) -> MarkerMotion:
+    reader = format_of(path).read_markers
+    assert reader is not None
+    return reader(path, **options)
+
+
+@pytest.mark.parametrize("name", marker_files.MAKERS)
+@pytest.mark.filterwarnings("ignore:.*without a label are left out")
+def test_positions_gaps_and_rate_come_back(tmp_path: Path, name: str) -> None:
+    motion = cloud()
+    got = read(marker_files.write(tmp_path, name, motion))
+    assert got.names == motion.names
+    assert got.rate == RATE
+    np.testing.assert_array_equal(got.seen, motion.seen)
+    off = 0.05e-3 / 2 + 1e-9 if "integers" in name else 2e-7
+    np.testing.assert_allclose(got.positions, motion.positions, atol=off)
+    np.testing.assert_allclose(got.times - got.times[0], motion.times, atol=1e-9)
+
+
+def test_the_content_decides_the_format(tmp_path: Path) -> None:
+    kinds = {"usual.trc": "trc", "motive.csv": "motive", "nexus.csv": "nexus", "qualisys.tsv": "qualisys",
+             "long.csv": "markers", "float.c3d": "c3d"}  # fmt: skip
+    for name, kind in kinds.items():
+        path = marker_files.write(tmp_path, name, cloud()).rename(tmp_path / f"{kind}.dat")
+        assert format_of(path).name == kind
+
+
+def test_units_of_each_marker_and_computed_values(tmp_path: Path) -> None:
+    motion = cloud(4)
+    path = tmp_path / "a.c3d"
+    path.write_bytes(marker_files.c3d(motion, units=("mm", "m", "cm", "mm"), computed=("M2a",)))
+    got = read(path)
+    assert got.names == ("M0a", "M1a", "M3a")
+    np.testing.assert_allclose(got.positions, motion.positions[:, [0, 1, 3]], atol=2e-7)
+    assert got.up == "+z"
+
+
+def test_more_markers_than_a_list_of_labels_holds(tmp_path: Path) -> None:
+    motion = cloud(300, 2)
+    path = tmp_path / "a.c3d"
+    path.write_bytes(marker_files.c3d(motion))
+    assert read(path).names == motion.names
+
+
+def test_a_rate_that_is_missing(tmp_path: Path) -> None:
+    path = tmp_path / "a.c3d"
+    path.write_bytes(marker_files.c3d(cloud(), rate=0.0))
+    with pytest.raises(FormatError, match="no frame rate; give one with fps=100"):
+        read(path)
+    assert read(path, fps=Fraction(120)).rate == 120
+
+
+def test_times_that_are_not_regular_are_kept(tmp_path: Path) -> None:
+    motion = cloud()
+    times = motion.times.copy()
+    times[6:] += 0.5
+    path = tmp_path / "a.csv"
+    path.write_bytes(marker_files.wide(replace(motion, times=times)))
+    np.testing.assert_allclose(read(path).times, times, atol=1e-9)
+
+
+def test_time_that_runs_backwards(tmp_path: Path) -> None:
+    text = marker_files.trc(cloud()).replace(b"\r\n4\t0.060", b"\r\n4\t0.010")
+    path = tmp_path / "a.trc"
+    path.write_bytes(text)
+    with pytest.raises(FormatError, match=r"a\.trc:10: time runs backwards: 0\.01 s after 0\.04 s"):
+        read(path)
+
+
+def test_a_file_that_is_cut_short(tmp_path: Path) -> None:
+    path = tmp_path / "a.c3d"
+    whole = marker_files.c3d(cloud(40, 100))
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.warns(FbaWarning, match="is cut short: it holds 4. of its 100 frames"):
+        assert 40 < len(read(path)) < 50
+    path.write_bytes(whole[:1500])
+    with pytest.raises(FormatError, match="cut short: it holds 0 of its 100 frames"):
+        read(path)
+    path.write_bytes(whole[:700])
+    with pytest.raises(FormatError, match=r"cut off in its parameters|more than the file holds"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "message"),
+    [
+        ("usual.trc", b"M1a", b"M0a", None),  # the second becomes "M0a (2)"
+        ("usual.trc", b"\n50\t", b"\nx\t", "frame rate must be between 0 and"),
+        ("usual.trc", b"Frame#", b"Bild", "no line of names"),
+        ("motive.csv", b"Position", b"Rotation", "which columns are the positions"),
+        ("motive.csv", b"Frame,", b"Nr,", "no line of columns that begins with Frame"),
+        ("nexus.csv", b"Trajectories", b"Joints", "no section Trajectories"),
+        ("qualisys.tsv", b"NO_OF_MARKERS\t5", b"NO_OF_MARKERS\t6", "has 6 markers, but names 5"),
+        ("qualisys.tsv", b"MARKER_NAMES", b"BODY_NAMES", "has no line MARKER_NAMES"),
+        ("wide.csv", b",0.0200,", b",zwei,", r"wide\.csv:3: expected a number.*found 'zwei'"),
+        ("long.csv", b"frame,time", b"a,b", "no column time or frame"),
+    ],
+)
+def test_what_is_wrong_is_named(
+    tmp_path: Path, name: str, old: bytes, new: bytes, message: str | None
+) -> None:
+    path = marker_files.write(tmp_path, name, cloud())
+    reader = format_of(path).read_markers
+    assert reader is not None
+    data = path.read_bytes()
+    assert old in data
+    path.write_bytes(data.replace(old, new))
+    if message is None:
+        assert reader(path).names[:2] == ("M0a", "M0a (2)")
+        return
+    with pytest.raises(FormatError, match=message):
+        reader(path)
+
+
+@pytest.mark.parametrize("name", marker_files.MAKERS)
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
+def test_damage_is_an_error_of_ours(tmp_path: Path, name: str) -> None:
+    path = marker_files.write(tmp_path, name, cloud(4, 5))
+    reader = format_of(path).read_markers
+    assert reader is not None
+    data = bytearray(path.read_bytes())
+    random = np.random.default_rng(len(name))
+    for _ in range(60):
+        broken = bytearray(data)
+        for place in random.integers(0, min(len(data), 1500), 3):
+            broken[place] = random.integers(0, 256)
+        path.write_bytes(broken[: random.integers(1, len(data) + 1)])
+        with contextlib.suppress(FbaError):
+            assert len(reader(path).names) > 0
+
+
+def test_what_is_read_is_limited(tmp_path: Path) -> None:
+    path = marker_files.write(tmp_path, "wide.csv", cloud())
+    with pytest.raises(LimitError):
+        read(path, limits=Limits(frames=11))
+
+
+def test_tables_of_something_else_are_not_taken(tmp_path: Path) -> None:
+    for text in ("frame,x_0,x_1,y_0,y_1,z_0,z_1\n1,1,2,3,4,5,6\n", "a,b,c\n1,2,3\n"):
+        path = tmp_path / "a.dat"
+        path.write_text(text)
+        with pytest.raises(FormatError, match="in no format known here"):
+            format_of(path)
