@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ ROOT = Path(__file__).parents[1]
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files", "figures")]
 
+import marker_files  # noqa: E402
 from face_files import (  # noqa: E402
     beat,
     face_angles,
@@ -26,6 +28,8 @@ from face_files import (  # noqa: E402
     mediapipe_frames,
 )
 from fba.cache import load_or_make  # noqa: E402
+from fba.capture import MarkerMotion  # noqa: E402
+from fba.face import feature_point_names, neutral_points  # noqa: E402
 from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from mesh_files import ply  # noqa: E402
@@ -266,6 +270,24 @@ def faces() -> dict[str, bytes]:
     }
 
 
+def markers() -> dict[str, bytes]:
+    """Return captures of markers in all formats: a few that fell, and a face in a table."""
+    names = ("a", "b", "c", "d")
+    positions = np.arange(36.0).reshape(3, 4, 3) / 50
+    positions[1, 2] = np.nan
+    some = MarkerMotion(names, positions, np.arange(3) / 25, Fraction(25))
+    kinds = ("float.c3d", "mips_integers.c3d", "dec.c3d", "usual.trc", "motive.csv", "nexus.csv")
+    kinds += ("qualisys.tsv", "long.csv")
+    found = {kind: marker_files.MAKERS[kind](some) for kind in kinds}
+    points = dict(zip(feature_point_names(), neutral_points(), strict=True))
+    named = ("2.1", "2.10", "8.1", "8.2", "8.3", "8.4", "4.1", "4.2", "9.3", "9.12", "9.15", "11.1", "11.2")
+    still = np.array([[points[name] for name in named]] * 3)
+    still[1:, 0, 1] -= 0.01
+    face_of_points = MarkerMotion(tuple(f"p{name}" for name in named), still, np.arange(3) / 25, Fraction(25))
+    found["wide.csv"] = marker_files.wide(face_of_points)
+    return {f"markers_{name.replace('.', '_')}": data for name, data in found.items()}
+
+
 def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
     """Return all files: content by name, by target. folder: for files that are read again at once."""
     limb = {name: BODY[name] for name in ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot")}
@@ -280,7 +302,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
             "mesh_text": as_text(textured()),
             "mesh_binary": textured().glb(),
         },
-        "capture": faces(),
+        "capture": {**faces(), **markers()},
         "obj": {"triangles": OBJ.encode()},
         "mtl": {"two": MTL.encode()},
         "ply": meshes(),

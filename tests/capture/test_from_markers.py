@@ -13,12 +13,12 @@ import pytest
 from fba.capture import MarkerMotion, from_markers
 from fba.capture.markers import stabilisation
 from fba.capture.markers.faces import MarkerFace, find_face
+from fba.capture.markers.gaps import fill_gaps
 from fba.capture.markers.marker_maps import change_map, find_map, marker_sets, read_map, write_map
 from fba.capture.markers.targets import RIGID
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError
 from fba.face import FaceModel
 from fba.face.authoring import author
-from fba.face.importers import import_model
 from fba.limits import Limits
 from fba.parameters import faps
 from marker_actor import NAMES, Take, perform
@@ -28,7 +28,7 @@ TURNED = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """To axes with z up and the actor looking along x."""
 PER_MILLE = 1024 / 1000
 EXACT = {18: 45, 3: 30, 19: 20, 20: 20}
-"""Thousandths of FAPU, root mean square, for FAPs that markers tell less well, see docs/capture-markers.md."""
+"""Thousandths of FAPU, root mean square, for FAPs that markers tell less well: docs/capture-markers.md."""
 
 
 @cache
@@ -79,19 +79,6 @@ def test_with_noise() -> None:
     noise = np.random.default_rng(1).normal(0, 0.3e-3, take().motion.positions.shape)
     face = find_face(with_positions(take().motion.positions + noise))
     check(face, take(), 50)
-
-
-def test_the_makehuman_head(shared: Path) -> None:
-    folder = shared / "models/makehuman"
-    if not (folder / "base.obj").is_file():
-        pytest.skip("no MakeHuman base mesh")
-    truth = perform(import_model(folder), 500)
-    found = errors(find_face(truth.motion), truth)
-    # its lids are open 9.2 mm, which markers on the upper lids do not tell
-    assert max(found.pop(19), found.pop(20)) < 40
-    assert found.pop(18) < 45
-    assert found.pop(3) < 30
-    assert max(found.values()) < 20
 
 
 def test_a_stream_of_another_rate_lasts_as_long() -> None:
@@ -167,14 +154,31 @@ def test_drop_outs() -> None:
     assert face.filled.short > 100
 
 
-def test_a_long_gap_follows_its_neighbours() -> None:
-    positions = take().motion.positions.copy()
-    positions[200:300, NAMES.index("LPL1")] = np.nan
-    with pytest.warns(FbaWarning, match=r"1 long gaps.*1\.01 s of LPL1"):
-        face = find_face(with_positions(positions))
-    truth = take().faps[200:300, 54]
-    off = np.sqrt(((face.faps[200:300, 54] - truth) ** 2).mean())
-    assert off < 0.8 * np.sqrt((truth**2).mean()) + 30
+def test_a_long_gap_follows_its_neighbours_and_meets_both_ends() -> None:
+    """By hand: neighbours move 5 mm aside and back, the marker as they do, and ends 1 mm higher."""
+    times = np.arange(101) / 100
+    positions = np.zeros((101, 4, 3)) + np.array([[0.0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0.01, 0.01, 0]])
+    bump = 0.005 * np.sin(np.pi * times)
+    positions[..., 0] += bump[:, None]
+    truth = positions[:, 0].copy()
+    positions[80:, 0, 1] += 0.001
+    positions[20:80, 0] = np.nan
+    filled, what = fill_gaps(("A", "B", "C", "D"), positions, times)
+    assert (what.short, what.long, what.marker) == (0, 1, "A")
+    assert what.longest == pytest.approx(0.61)
+    np.testing.assert_allclose(filled[:, 0, 0], truth[:, 0], atol=1e-9)
+    np.testing.assert_allclose(filled[19:81, 0, 1], 0.001 * np.arange(62) / 61, atol=1e-9)
+
+
+def test_a_short_gap_is_a_cubic_through_its_ends() -> None:
+    times = np.arange(60) / 100
+    positions = np.zeros((60, 1, 3))
+    positions[:, 0, 2] = times**2
+    truth = positions.copy()
+    positions[30:40] = np.nan
+    filled, what = fill_gaps(("A",), positions, times)
+    assert (what.short, what.long) == (1, 0)
+    np.testing.assert_allclose(filled, truth, atol=3e-4)  # a straight line is off by 3e-3
 
 
 def test_jitter_of_a_fixed_marker_hardly_turns_the_head() -> None:
@@ -185,8 +189,7 @@ def test_jitter_of_a_fixed_marker_hardly_turns_the_head() -> None:
 
 
 def test_rigid_fit_beats_the_local_frame() -> None:
-    """The digest's local frame (left to right means, forehead to bridge of the nose, repeated) turns more with
-    noise in the fixed markers than the rigid fit does."""
+    """A local frame (left to right, forehead to bridge of the nose, repeated) turns more with noise."""
     positions = take().motion.positions
     noisy = positions + np.random.default_rng(2).normal(0, 0.3e-3, positions.shape)
     places = marker_sets()["regions50"]
@@ -233,8 +236,8 @@ def test_names_that_tell_nothing() -> None:
 def test_names_of_feature_points() -> None:
     places = marker_sets()["regions50"]
     rows = [n for n, name in enumerate(NAMES) if places[name.lower()]]
-    names = tuple(f"FDP {places[NAMES[n].lower()]}" if "." in places[NAMES[n].lower()] else places[NAMES[n].lower()]
-                  for n in rows)  # fmt: skip
+    targets = [places[NAMES[n].lower()] for n in rows]
+    names = tuple(f"FDP {target}" if "." in target else target for target in targets)
     motion = take().motion
     points = MarkerMotion(names, motion.positions[:, rows], motion.times, motion.rate)
     assert find_map(points)[1] == "feature points"
@@ -304,7 +307,7 @@ def test_captures_without_a_face() -> None:
     with pytest.raises(ModelError, match="their shape is not that of a face"):
         find_face(body)
     flat = {name: place for name, place in find_map(motion)[0].items() if place not in RIGID}
-    with pytest.raises(ModelError, match="needs three markers that the face does not move.*the map has 0"):
+    with pytest.raises(ModelError, match=r"needs three markers that the face does not move.*the map has 0"):
         find_face(motion, markers=flat)
     with pytest.raises(ModelError, match=r"\d+ markers have a place on the face, but 6"):
         find_face(motion, markers={"FHL": "11.3", "FHR": "11.2", "NSB": "9.12"})
@@ -322,7 +325,7 @@ def test_options_that_are_wrong() -> None:
         from_markers(motion, gaze="left")
     with pytest.raises(OptionError, match="has no marker Nose"):
         from_markers(motion, markers={"Nose": "9.3"})
-    with pytest.raises(OptionError, match="both at 8.3"):
+    with pytest.raises(OptionError, match=r"both at 8\.3"):
         from_markers(motion, markers={"LCL": "8.3", "LCR": "8.3"})
 
 

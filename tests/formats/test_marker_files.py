@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fba
 import marker_files
 from fba.capture.markers.motion import MarkerMotion
 from fba.errors import FbaError, FbaWarning, FormatError, LimitError
@@ -103,7 +104,7 @@ def test_a_file_that_is_cut_short(tmp_path: Path) -> None:
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.warns(FbaWarning, match="is cut short: it holds 4. of its 100 frames"):
         assert 40 < len(read(path)) < 50
-    path.write_bytes(whole[:1500])
+    path.write_bytes(whole[: 3 * 512 + 600])
     with pytest.raises(FormatError, match="cut short: it holds 0 of its 100 frames"):
         read(path)
     path.write_bytes(whole[:700])
@@ -115,7 +116,7 @@ def test_a_file_that_is_cut_short(tmp_path: Path) -> None:
     ("name", "old", "new", "message"),
     [
         ("usual.trc", b"M1a", b"M0a", None),  # the second becomes "M0a (2)"
-        ("usual.trc", b"\n50\t", b"\nx\t", "frame rate must be between 0 and"),
+        ("usual.trc", b"\n50\t", b"\nx\t", r"frame rate must be 0\.001 to"),
         ("usual.trc", b"Frame#", b"Bild", "no line of names"),
         ("motive.csv", b"Position", b"Rotation", "which columns are the positions"),
         ("motive.csv", b"Frame,", b"Nr,", "no line of columns that begins with Frame"),
@@ -171,3 +172,19 @@ def test_tables_of_something_else_are_not_taken(tmp_path: Path) -> None:
         path.write_text(text)
         with pytest.raises(FormatError, match="in no format known here"):
             format_of(path)
+
+
+def test_headers_that_fuzzing_found(tmp_path: Path) -> None:
+    """A line break within a cell, a frame in a century, a capture that lasts for years."""
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"a\r,")
+    with pytest.raises(FormatError):
+        fba.read(path)
+    path = tmp_path / "a.trc"
+    path.write_bytes(marker_files.trc(cloud()).replace(b"\n50\t", b"\n1e-320\t"))
+    with pytest.raises(FormatError, match=r"frame rate must be 0\.001 to"):
+        read(path)
+    path = tmp_path / "b.csv"
+    path.write_bytes(marker_files.wide(cloud()).replace(b"\n11,0.2200", b"\n11,99999999.0"))
+    with pytest.raises(LimitError, match=r"b\.csv: the capture at 50 frames/s has"):
+        fba.read(path)

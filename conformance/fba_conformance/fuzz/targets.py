@@ -66,7 +66,8 @@ def targets() -> tuple[Target, ...]:
         ),
         _reader(
             "capture", "captured faces, as FAPs", b",", b";", b"00:00:00:01.000", b"23:59:59:59.999",
-            b"JawOpen", b"timestamp", *_TEXT,
+            b"JawOpen", b"timestamp", b"PathFileType", b"Frame#\t", b"Format Version,", b"Trajectories\n",
+            b"NO_OF_FRAMES\t", b"MARKER_NAMES\t", b"marker,x,y,z", b"\x02\x50", *_TEXT,
         ),
         _reader("face", "face models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),
         _reader("body", "body models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),

@@ -52,13 +52,18 @@ def _find(local: Float64, length: int) -> slice:
     if len(flat) <= length:
         return slice(0, len(flat))
     centre = _most_usual(flat)
-    away = np.nanmean(np.abs(flat - centre), axis=1)
-    away = np.nan_to_num(away, nan=np.inf)
-    speed = np.nan_to_num(np.nanmean(np.abs(np.diff(flat, axis=0, prepend=flat[:1])), axis=1), nan=np.inf)
-    cost = away + speed
+    cost = _mean(np.abs(flat - centre)) + _mean(np.abs(np.diff(flat, axis=0, prepend=flat[:1])))
     total = np.convolve(cost, np.ones(length), "valid") if np.isfinite(cost).all() else _sums(cost, length)
     best = int(total.argmin())
     return slice(0, length) if total[0] <= START * total[best] else slice(best, best + length)
+
+
+def _mean(values: Float64) -> Float64:
+    """Return the mean of each row over what is known, infinity where nothing is: float64 (T,)."""
+    known = ~np.isnan(values)
+    count = known.sum(axis=1)
+    total = np.where(known, values, 0.0).sum(axis=1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.inf)
 
 
 def _sums(cost: Float64, length: int) -> Float64:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from fba.animation import Animation
 from fba.capture.markers.faces import from_markers
 from fba.capture.markers.motion import MarkerMotion
-from fba.errors import FormatError, ModelError
+from fba.errors import FormatError, LimitError, ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -37,3 +37,6 @@ def read_face(
         )
     except ModelError as error:
         raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
+    except LimitError as error:
+        error.args = (f"{path}: {error.finding}",)
+        raise

@@ -44,7 +44,10 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
     lines = read_lines(path, "a CSV export of Motive")
     if not sniff(lines[0].encode(), ""):
         raise FormatError("a CSV export of Motive begins with Format Version", path=path, line=1)
-    head = list(csv.reader(lines[:HEADER_LINES]))
+    try:
+        head = list(csv.reader(lines[:HEADER_LINES]))
+    except csv.Error as error:
+        raise FormatError(f"its header is no table: {error}", path=path) from error
     # the reader of CSV passes over no empty lines, so rows are lines
     row = next((n for n, cells in enumerate(head) if cells and cells[0].strip().lower() == "frame"), None)
     if row is None:

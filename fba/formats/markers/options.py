@@ -11,8 +11,8 @@ from fba.errors import FormatError, Remedy
 from fba.formats.text.frame_rates import parse_rate
 from fba.source import Path
 
-MOST = 100_000
-"""Frames per second beyond which a rate is damage."""
+LEAST, MOST = 0.001, 100_000
+"""Frames per second below and beyond which a rate is damage."""
 GIVE_RATE = Remedy("fps", "give one with {}", "100")
 
 
@@ -29,9 +29,9 @@ def file_rate(stored: float | str, fps: Fraction | None, path: Path) -> Fraction
         if fps is None:
             raise FormatError("has no frame rate", path=path).with_remedies(GIVE_RATE)
         return Fraction(fps)
-    if not 0 < number <= MOST:
-        raise FormatError(f"its frame rate must be between 0 and {MOST}", path=path, token=str(stored))
-    return parse_rate(f"{number:.6f}".rstrip("0").rstrip(".")) if number >= 1e-5 else Fraction(number)
+    if not LEAST <= number <= MOST:
+        raise FormatError(f"its frame rate must be {LEAST} to {MOST}", path=path, token=str(stored))
+    return parse_rate(f"{number:.6f}".rstrip("0").rstrip("."))
 
 
 def rate_of_times(times: Sequence[float]) -> float:

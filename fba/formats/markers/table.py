@@ -27,6 +27,8 @@ TIMES = ("time", "times", "timestamp", "t", "seconds", "sec", "time (s)", "time 
 FRAMES = ("frame", "frames", "frame#", "index", "")
 NAMES = ("marker", "name", "label", "marker_name")
 AXIS = re.compile(r"(.+?)[ _.:\-]?([xyz])(?:\s*[\[(](m|cm|mm)[\])])?", re.IGNORECASE)
+SHARE = 0.5
+"""Share of the columns that are markers'; tables of something else have columns x, y, z, too."""
 FEWEST = 3
 """Markers that a wide table needs."""
 
@@ -38,7 +40,8 @@ def sniff(head: bytes, suffix: str) -> bool:
         cells = _cells(line.decode(), _delimiter(line.decode()))
     except UnicodeDecodeError:
         return False
-    return _is_long(cells) or len(_triples(cells)) >= FEWEST
+    count = len(_triples(cells))
+    return _is_long(cells) or (count >= FEWEST and 3 * count >= SHARE * len(cells))
 
 
 def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
@@ -86,7 +89,10 @@ def _delimiter(line: str) -> str:
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    except csv.Error:  # a line break in a cell, or a cell of 131,072 characters
+        return []
 
 
 def _is_long(cells: list[str]) -> bool:

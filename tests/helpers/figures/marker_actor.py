@@ -31,10 +31,10 @@ BETWEEN = {
 }  # fmt: skip
 """Markers that nothing is measured from lie between feature points."""
 NAMES = (
-    *("FHC", "FHL", "FHR", "FHM", "FHM2", "FHL2", "FHR2", "BRL1", "BRL2", "BRL3", "BRR1", "BRR2", "BRR3"),
-    *("BRC", "LIDL", "LIDR", "NSB", "NST", "NSL", "NSR", "EAL", "EAR", "LPT", "LPL1", "LPR1", "LPB", "LPL2"),
-    *("LPR2", "LCL", "LCR", "LPP", "CKL1", "CKL2", "CKL3", "CKL4", "CKL5", "CKR1", "CKR2", "CKR3", "CKR4", "CKR5"),
-    *("CHN", "CHB", "CHL1", "CHR1", "CHL2", "CHR2", "CHC", "CHL3", "CHR3"),
+    "FHC", "FHL", "FHR", "FHM", "FHM2", "FHL2", "FHR2", "BRL1", "BRL2", "BRL3", "BRR1", "BRR2", "BRR3", "BRC",
+    "LIDL", "LIDR", "NSB", "NST", "NSL", "NSR", "EAL", "EAR", "LPT", "LPL1", "LPR1", "LPB", "LPL2", "LPR2",
+    "LCL", "LCR", "LPP", "CKL1", "CKL2", "CKL3", "CKL4", "CKL5", "CKR1", "CKR2", "CKR3", "CKR4", "CKR5",
+    "CHN", "CHB", "CHL1", "CHR1", "CHL2", "CHR2", "CHC", "CHL3", "CHR3",
 )  # fmt: skip
 AMPLITUDES = {
     3: 500, 14: 120, 15: 60, 16: 150, 17: 150, 18: 120, 19: 900, 20: 900, 31: 200, 32: 200, 33: 200, 34: 200,

@@ -10,6 +10,7 @@ import struct
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -411,7 +412,17 @@ FAP = FAP_HEAD + mask(3) + "\n0 1\n"
 
 def hostile_files() -> dict[str, HostileFile]:
     """Return all hostile files, by name."""
-    return {**_texts(), **_captures(), **_faces(), **_gltf(), **_meshes(), **_points(), **_sounds()}
+    return {
+        **_texts(),
+        **_captures(),
+        **_faces(),
+        **_markers(),
+        **_markers(),
+        **_gltf(),
+        **_meshes(),
+        **_points(),
+        **_sounds(),
+    }
 
 
 def _texts() -> dict[str, HostileFile]:
@@ -512,6 +523,58 @@ def _faces() -> dict[str, HostileFile]:
         "table, one line": HostileFile(read_any, "a.csv", repeat(table, "1,")),
         "table, empty cells": HostileFile(
             read_any, "a.csv", repeat(head + "\n", "0:0:0:1" + "," * 53 + "\n")
+        ),
+    }
+
+
+def read_markers(path: Path) -> object:
+    """Read a capture of markers."""
+    from fba.formats import format_of
+
+    reader = format_of(path).read_markers
+    assert reader is not None
+    return reader(path, fps=Fraction(50))
+
+
+def _markers() -> dict[str, HostileFile]:
+    from fba.capture.markers.motion import MarkerMotion
+    from marker_files import c3d, qualisys, trc
+
+    def take(markers: int, frames: int) -> MarkerMotion:
+        positions = np.full((frames, markers, 3), 0.5)
+        return MarkerMotion(
+            tuple(f"M{n}a" for n in range(markers)), positions, np.arange(frames) / 50, Fraction(50)
+        )
+
+    one = take(1, 1)
+    trc_head = trc(one).split(b"\r\n1\t")[0].decode()
+    motive = "Format Version,1.23,Length Units,Meters\n\n"
+    nexus = "Trajectories\n50\n,,a\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n"
+    wide = "time,a_x,a_y,a_z,b_x,b_y,b_z,c_x,c_y,c_z\n"
+    return {
+        "c3d frames": HostileFile(read_markers, "a.c3d", lambda size: c3d(take(10, size // 160))),
+        "c3d markers": HostileFile(read_markers, "a.c3d", lambda size: c3d(take(min(size // 30, 1000), 1))),
+        "trc rows": HostileFile(read_markers, "a.trc", repeat(trc_head + "\n", "%d\t\t1\t2\t3\n")),
+        "trc names": HostileFile(read_markers, "a.trc", repeat(trc_head[:-8], "\tA", "\n1\t0\n")),
+        "trc keys": HostileFile(
+            read_markers, "a.trc", repeat("PathFileType\n", "a ", "\nFrame#\tTime\tA\n1\t0\t1")
+        ),
+        "motive columns": HostileFile(
+            read_markers, "a.csv", repeat(motive + ",Type", ",Marker", "\nFrame,X\n")
+        ),
+        "motive quotes": HostileFile(read_markers, "a.csv", repeat(motive, '"')),
+        "nexus rows": HostileFile(read_markers, "a.csv", repeat(nexus, "%d,0,1,2,3\n")),
+        "nexus sections": HostileFile(read_markers, "a.csv", repeat(nexus[:-20], "Devices\n1\n\n")),
+        "qualisys names": HostileFile(
+            read_markers, "a.tsv", lambda size: qualisys(take(max(1, min(size // 20, 1000)), 1))
+        ),
+        "table of markers": HostileFile(read_markers, "a.csv", repeat(wide, "%d,1,2,3,4,5,6,7,8,9\n")),
+        "table, gaps": HostileFile(read_markers, "a.csv", repeat(wide, "%d\n")),
+        "table, many names": HostileFile(
+            read_markers, "a.csv", repeat("time,marker,x,y,z\n", "%d,m,1,2,3\n", most=100_000)
+        ),
+        "table, a name each row": HostileFile(
+            read_markers, "a.csv", repeat("time,marker,x,y,z\n", "1,n%d,1,2,3\n")
         ),
     }
 

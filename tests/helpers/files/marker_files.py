@@ -61,6 +61,7 @@ def c3d(
         return entry(group, name, body)
 
     labels = [f"{subject}:{name}" if subject else name for name in motion.names]
+    section_blocks = 1 + (2 * count * max(map(len, labels)) + 4 * len(units) + 300) // BLOCK
     parameters = b""
     for number, name in ((1, "POINT"), (2, "TRIAL")):
         parameters += struct.pack("bb", len(name), -number) + name.encode() + word(3) + b"\0"
@@ -70,14 +71,19 @@ def c3d(
     parameters += text(1, "UNITS", list(units) or [unit])
     if computed:
         parameters += text(1, "ANGLES", computed)
+    parameters += entry(1, "USED", struct.pack("bB", 2, 0) + word(count))
+    parameters += entry(1, "SCALE", struct.pack("bB", 4, 0) + real(scale if integers else -1.0))
+    own_rate = float(motion.rate) if rate is None else rate
+    parameters += entry(1, "RATE", struct.pack("bB", 4, 0) + real(own_rate))
+    parameters += entry(1, "DATA_START", struct.pack("bB", 2, 0) + word(2 + section_blocks))
     stored = struct.pack("bB", 4, 0) + real(frames) if long_frames else struct.pack("bB", 2, 0) + word(frames)
     parameters += entry(1, "FRAMES", stored)
     parameters += text(1, "Y_SCREEN", ["+Z"])
-    blocks = -(-(len(parameters) + 6) // BLOCK)
+    blocks = section_blocks
     section = bytes([1, 0x50, blocks, PROCESSORS[processor]]) + parameters
     header = bytes([2, 0x50]) + word(count, analogue, 1, 0xFFFF if long_frames else frames, 0)
     header += real(scale if integers else -1.0) + word(2 + blocks, 1 if analogue else 0)
-    header += real(float(motion.rate) if rate is None else rate)
+    header += real(own_rate)
     columns = 4 * count + analogue
     table = np.zeros((frames, columns))
     points = table[:, : 4 * count].reshape(frames, count, 4)
