@@ -72,6 +72,9 @@ INVERSION = "fba/capture/blendshapes/inversion.py"
 LIVELINK_CSV = "fba/formats/face_tables/livelink_csv.py"
 SHAPES_BACK_TEST = "tests/capture/faces/test_faps_to_shapes.py"
 SAMPLING = "fba/capture/sampling.py"
+MARKERS = "fba/capture/markers"
+MARKERS_TEST = "tests/capture/test_from_markers.py"
+MARKER_FILES_TEST = "tests/formats/test_marker_files.py"
 LIVELINK_TEST = "tests/formats/face_tables/test_livelink_csv.py"
 SHAPES_TEST = "tests/capture/faces/test_shapes_to_faps.py"
 BODIES_TEST = "tests/formats/gltf/test_foreign_bodies.py"
@@ -373,6 +376,30 @@ MUTANTS = (
     Mutant(COMBINATION, "amounts[:, but] = 0.0", "pass", FACES_TEST),
     Mutant(COMBINATION, "np.minimum(columns[closed], ", "np.maximum(columns[closed], ", SHAPES_TEST),
     Mutant(COMBINATION, "LID_GAP - values[:, upper]", "LID_GAP", SHAPES_TEST),
+    Mutant(f"{MARKERS}/gaps.py", "length <= SHORT", "length <= 5 * SHORT", MARKERS_TEST),
+    Mutant(f"{MARKERS}/gaps.py", "off[0] * (1 - share) + off[1] * share", "off[0]", MARKERS_TEST),
+    Mutant(
+        f"{MARKERS}/stabilisation.py",
+        "weights = np.where(seen, 1 / ",
+        "weights = np.where(seen, 1 + 0 / ",
+        MARKERS_TEST,
+    ),
+    Mutant(f"{MARKERS}/solving.py", "curve *= _arc_factors(", "curve *= 1 + 0 * _arc_factors(", MARKERS_TEST),
+    Mutant(f"{MARKERS}/solving.py", 'faps()[c].direction == "U"', 'faps()[c].direction == "X"', MARKERS_TEST),
+    Mutant(f"{MARKERS}/registration.py", "MIRROR = 0.5", "MIRROR = 0.0", MARKERS_TEST),
+    Mutant(f"{MARKERS}/registration.py", "ASTRAY = 0.03", "ASTRAY = 3.0", MARKERS_TEST),
+    Mutant(f"{MARKERS}/registration.py", "+ IRIS) / 2", "+ 0.013) / 2", MARKERS_TEST),
+    Mutant(f"{MARKERS}/neutral.py", "SLOW = 0.6", "SLOW = 6.0", MARKERS_TEST),
+    Mutant(f"{MARKERS}/proposal.py", "NEAR = 0.014", "NEAR = 0.004", MARKERS_TEST),
+    Mutant(f"{MARKERS}/proposal.py", "PLACED = 0.4", "PLACED = 0.0", MARKERS_TEST),
+    Mutant("fba/formats/c3d/reader.py", "quads[..., 3] >= 0", "quads[..., 3] >= -2", MARKER_FILES_TEST),
+    Mutant("fba/formats/c3d/_parameters.py", "/ np.float32(4)", "/ np.float32(2)", MARKER_FILES_TEST),
+    Mutant(
+        "fba/formats/markers/qualisys.py",
+        "(positions == 0).all(axis=2)",
+        "(positions == 9).all(axis=2)",
+        MARKER_FILES_TEST,
+    ),
     Mutant(LIVELINK, "correlation < 0", "correlation > 0", LIVELINK_TEST),
     Mutant(LIVELINK, "wrong = expected if", "wrong = False if", LIVELINK_TEST),
     Mutant(TIMES, "np.diff(seconds, prepend=seconds[0]) < -NOON", "seconds < 0", LIVELINK_TEST),

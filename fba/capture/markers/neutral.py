@@ -1,4 +1,4 @@
-"""The neutral face of a take: frames in which the mouth is shut, the lids are open, and nothing moves."""
+"""The neutral face of a take: its start if the face is still there, else where it mostly is."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from fba.errors import OptionError
 
 WINDOW = 0.1
 """Seconds whose median is the neutral face."""
-START = 1.5
-"""The take's start counts as neutral unless another moment is this many times as restful."""
+SLOW = 0.6
+"""Share of the usual motion within a window that a neutral start may have."""
 
 
 def neutral_frames(local: Float64, times: Float64, neutral: str | int | tuple[float, float]) -> slice:
@@ -43,19 +43,23 @@ def neutral_frames(local: Float64, times: Float64, neutral: str | int | tuple[fl
 
 
 def _find(local: Float64, length: int) -> slice:
-    """Return the window in which the face is nearest to its rest.
+    """Return the start of the take if the face is still there, as takes usually begin.
 
-    Rest is where each coordinate stays for most of the time; a mouth that speaks and lids that blink come
-    back to it. Windows with gaps count by the markers seen.
+    Else the window in which it is nearest to its rest, where each coordinate stays for most of the time: a
+    mouth that speaks and lids that blink come back to it.
     """
     flat = local.reshape(len(local), -1)
     if len(flat) <= length:
         return slice(0, len(flat))
     centre = _most_usual(flat)
+    smooth = np.cumsum(np.where(np.isnan(flat), centre, flat), axis=0)
+    smooth = (smooth[length:] - smooth[:-length]) / length
+    speed = np.abs(smooth[length:] - smooth[:-length]).mean(axis=1) if len(smooth) > length else np.zeros(1)
+    if speed[0] <= SLOW * float(np.median(speed)):
+        return slice(0, length)
     cost = _mean(np.abs(flat - centre)) + _mean(np.abs(np.diff(flat, axis=0, prepend=flat[:1])))
-    total = np.convolve(cost, np.ones(length), "valid") if np.isfinite(cost).all() else _sums(cost, length)
-    best = int(total.argmin())
-    return slice(0, length) if total[0] <= START * total[best] else slice(best, best + length)
+    best = int(_sums(cost, length).argmin())
+    return slice(best, best + length)
 
 
 def _mean(values: Float64) -> Float64:
