@@ -64,6 +64,7 @@ fba.capture.sampling
 fba.capture.limbs
 fba.capture.comparison
 fba.capture.blendshapes
+fba.capture.action_units
 fba.capture
 fba.formats
 fba.formats.text

@@ -26,6 +26,8 @@ from face_files import (  # noqa: E402
     livelink_csv,
     livelink_udp,
     mediapipe_frames,
+    openface_csv,
+    pyfeat_csv,
 )
 from fba.cache import load_or_make  # noqa: E402
 from fba.capture import MarkerMotion  # noqa: E402
@@ -266,6 +268,10 @@ def faces() -> dict[str, bytes]:
         "datagrams": b"".join(livelink_udp({**weights, **face_angles(4)})[:3]),
         "records": "\n".join(ifacialmocap_records(few, turns, turns)).encode(),
         "mediapipe": json.dumps(mediapipe_frames(few)).encode(),
+        "openface": openface_csv(
+            {12: np.arange(4.0), 26: np.ones(4)}, np.zeros((4, 3)), np.ones((4, 6))
+        ).encode(),
+        "pyfeat": pyfeat_csv({one: np.ones(3) / 2 for one in range(1, 7)}, frames=np.arange(3.0)).encode(),
         "beat": json.dumps(beat(few)).encode(),
     }
 

@@ -68,6 +68,10 @@ FACE_MOTION, HUMANOID = "fba/formats/gltf/face_motion.py", "fba/formats/gltf/hum
 SHAPE_TABLE = "fba/capture/blendshapes/shape_table.py"
 COMBINATION = "fba/capture/blendshapes/combination.py"
 LIVELINK, TIMES = "fba/formats/face_tables/_shape_rows.py", "fba/formats/face_tables/_times.py"
+FACES, OPENFACE = "fba/formats/face_tables/_faces.py", "fba/formats/face_tables/openface.py"
+UDP = "fba/formats/face_tables/livelink_udp.py"
+ACTION_UNITS_TEST = "tests/formats/face_tables/test_action_units.py"
+RECORDS_TEST = "tests/formats/face_tables/test_face_records.py"
 INVERSION = "fba/capture/blendshapes/inversion.py"
 LIVELINK_CSV = "fba/formats/face_tables/livelink_csv.py"
 SHAPES_BACK_TEST = "tests/capture/faces/test_faps_to_shapes.py"
@@ -405,6 +409,10 @@ MUTANTS = (
     Mutant(TIMES, "np.diff(seconds, prepend=seconds[0]) < -NOON", "seconds < 0", LIVELINK_TEST),
     Mutant(INVERSION, "+ SHARED**2 * np.eye(len(shapes))", "", SHAPES_BACK_TEST),
     Mutant(LIVELINK_CSV, "* rate > SPARSE", "* rate < 0", SHAPES_BACK_TEST),
+    Mutant(FACES, "times = times - times[0]", "pass", ACTION_UNITS_TEST),
+    Mutant(OPENFACE, ">= CONFIDENT", ">= 0", ACTION_UNITS_TEST),
+    Mutant(OPENFACE, "set(columns) == set(VERSION_3)", "False", ACTION_UNITS_TEST),
+    Mutant(UDP, "times = np.where(times < NOON, times + DAY, times)", "pass", RECORDS_TEST),
     Mutant(TIMES, "if largest < rate", "if largest <= rate", LIVELINK_TEST),
     Mutant(SAMPLING, "np.where(length > BRIDGED, RETURN, length)", "length", LIVELINK_TEST),
     Mutant(SHAPE_TABLE, "            result[fap.number - 1] = True", "            pass", FACES_TEST),

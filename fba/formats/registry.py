@@ -158,6 +158,16 @@ def formats() -> tuple[Format, ...]:
             read_face=lazy("face_tables.livelink_csv", "read_face"),
         ),
         Format(
+            "openface", (".csv",), "action units, pose and gaze of OpenFace",
+            lazy("face_tables.openface", "sniff"), lazy("face_tables.openface", "read"), None, ("face",),
+            read_face=lazy("face_tables.openface", "read_face"),
+        ),
+        Format(
+            "pyfeat", (".csv",), "action units of py-feat",
+            lazy("face_tables.pyfeat", "sniff"), lazy("face_tables.pyfeat", "read"), None, ("face",),
+            read_face=lazy("face_tables.pyfeat", "read_face"),
+        ),
+        Format(
             "livelink-udp", (".udp",), "recorded datagrams of Live Link Face",
             lazy("face_tables.livelink_udp", "sniff"), lazy("face_tables.livelink_udp", "read"), None,
             ("face",), read_face=lazy("face_tables.livelink_udp", "read_face"),

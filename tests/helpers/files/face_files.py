@@ -136,3 +136,36 @@ def beat(weights: dict[str, Float64], rate: float = 60.0) -> dict[str, object]:
         for number, row in enumerate(rows)
     ]
     return {"names": names, "frames": frames}
+
+
+def openface_csv(
+    units: dict[int, Float64], pose: Float64, gaze: Float64, *, rate: float = 30.0, blank: str = " ",
+    extra: dict[str, Float64] | None = None,
+) -> str:  # fmt: skip
+    """Return a table as OpenFace 2 writes it; units: 0 to 5. pose (T, 3): radians; gaze (T, 6): both eyes."""
+    count = len(pose)
+    columns: dict[str, Float64] = {
+        "frame": np.arange(1, count + 1), "face_id": np.zeros(count), "timestamp": np.arange(count) / rate,
+        "confidence": np.full(count, 0.98), "success": np.ones(count),
+    }  # fmt: skip
+    columns |= {f"gaze_{eye}_{axis}": gaze[:, 3 * eye + n] for eye in (0, 1) for n, axis in enumerate("xyz")}
+    columns |= {f"pose_R{axis}": pose[:, n] for n, axis in enumerate("xyz")}
+    columns |= {f"AU{unit:02}_r": values for unit, values in units.items()}
+    columns |= {f"AU{unit:02}_c": values > 1 for unit, values in units.items()}
+    columns |= extra or {}
+    lines = [f",{blank}".join(columns)]
+    rows = zip(*(np.asarray(values, dtype=float).tolist() for values in columns.values()), strict=True)
+    lines += [f",{blank}".join(f"{one:.6g}" for one in row) for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def pyfeat_csv(units: dict[int, Float64], *, frames: Float64, identity: Sequence[str] | None = None) -> str:
+    """Return a table as py-feat writes it; units: 0 to 1."""
+    count = len(frames)
+    names = [*(f"AU{unit:02}" for unit in units), "Pitch", "input"]
+    names = ["frame", "FaceRectX", "FaceRectY", "FaceScore", *names]
+    lines = [",".join([*names, *(["Identity"] if identity else [])])]
+    for row in range(count):
+        cells = [f"{frames[row]:g}", "10", "20", "0.99", *(f"{values[row]:.6f}" for values in units.values())]
+        lines.append(",".join([*cells, "1.5", "a.mp4", *([identity[row]] if identity else [])]))
+    return "\n".join(lines) + "\n"

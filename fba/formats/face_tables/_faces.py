@@ -1,0 +1,143 @@
+"""What readers of tracked faces share: rows of one face, turns of head and eyes, times."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Float64, Int64
+from fba.capture.action_units import ActionUnitMotion, from_action_units
+from fba.capture.sampling import find_gaps, find_rate
+from fba.errors import FbaWarning, FormatError, ModelError, Remedy
+from fba.formats.face_tables._tables import Table, named
+from fba.formats.face_tables._times import check_order
+from fba.limits import Limits
+from fba.source import Path
+
+USUAL = 30
+"""Rate of a single picture."""
+PICTURES = 500
+"""Rows a second from which on times are none."""
+UPRIGHT = np.diag([1.0, -1.0, -1.0])
+"""From axes of a camera (x right, y down, z away) to those of a face that looks into it (left, up, ahead)."""
+
+
+def to_animation(
+    motion: ActionUnitMotion, rate: Fraction | int | str | None, path: Path, limits: Limits
+) -> Animation:
+    """Return the FAPs of tracked action units. Warns (FbaWarning) of what its reader found.
+
+    Raises FormatError where it cannot be made.
+    """
+    for finding in motion.findings:
+        warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=4)
+    try:
+        return from_action_units(motion, rate, limits=limits)
+    except ModelError as error:
+        raise FormatError(error.finding, path=path) from error
+
+
+def choose_rows(table: Table, ids: Sequence[str], face: str | None) -> Int64:
+    """Return numbers of the rows (R,) of one face. ids: of the face in each row, "" where none is known.
+
+    Raises FormatError where there are several and `face` names none of them.
+    """
+    counts = Counter(one for one in ids if one)
+    if face is not None:
+        if face not in counts:
+            raise FormatError(f"has no face {face!r}; there are {named(sorted(counts))}", path=table.path)
+    elif len(counts) > 1:
+        listed = ", ".join(f"{one} ({count} rows)" for one, count in counts.most_common(5))
+        raise FormatError(f"has several faces: {listed}", path=table.path).with_remedies(
+            Remedy("face", "choose one with {}", repr(counts.most_common(1)[0][0]))
+        )
+    return np.flatnonzero([not one or face is None or one == face for one in ids])
+
+
+def row_times(
+    table: Table, rows: Int64, seconds: int | None, frame: int | None, fps: Fraction | int | str | None
+) -> tuple[Float64, Fraction, list[str]]:
+    """Return times (R,) of rows from the first on, the nominal rate, and what was odd about them.
+
+    seconds, frame: numbers of columns. fps: frames in a second, where no column has seconds, or where these
+    are those of pictures. Raises FormatError.
+    """
+    if len(rows) == 1:
+        return np.zeros(1), Fraction(fps or USUAL), []
+    findings = []
+    counted = seconds is not None or frame is not None
+    if seconds is not None and _are_pictures(table, seconds):
+        if fps is None:
+            fps = USUAL
+            findings.append(
+                f"the times are those of pictures whose rate nobody knew; taken as {USUAL} in a second"
+            )
+        seconds = None
+    if seconds is not None:
+        times = table.numbers([seconds])[rows, 0]
+    elif fps is not None:
+        frames = np.arange(len(table.rows), dtype=np.float64)
+        times = (frames if frame is None else table.numbers([frame])[:, 0])[rows] / float(Fraction(fps))
+    else:
+        raise FormatError("has no column of times", path=table.path).with_remedies(
+            Remedy("fps", "give the frame rate of the film with {}", "30")
+        )
+    lines = [table.lines[row] for row in rows.tolist()]
+    if np.isnan(times).any():
+        row = int(np.flatnonzero(np.isnan(times))[0])
+        raise FormatError("the row has no time", path=table.path, line=lines[row])
+    times = times - times[0]
+    check_order(times, lines, table.path)
+    try:
+        return times, (find_rate(times) if counted else Fraction(fps or USUAL)), findings
+    except ModelError as error:
+        raise FormatError(error.finding, path=table.path) from error
+
+
+def find_missing(intensities: Float64, times: Float64, rate: Fraction) -> list[str]:
+    """Return what is missing of action units (T, N) at times (T,), a sentence each."""
+    seen = np.isnan(intensities).sum(axis=1) == 0
+    findings = []
+    if not seen.all():
+        findings.append(f"{int((~seen).sum())} of {len(seen)} rows have no face; they are bridged")
+    if gaps := find_gaps(times[seen], rate):
+        longest = max(length for _, length in gaps)
+        findings.append(f"frames are missing at {len(gaps)} places, {longest:.2f} s at most")
+    return findings
+
+
+def _are_pictures(table: Table, seconds: int) -> bool:
+    """Whether times are those of pictures whose times are unknown: a thousand of them in a second."""
+    times = table.numbers([seconds])[:, 0]
+    return len(times) > 1 and bool(0 < np.median(np.diff(times)) * PICTURES <= 1)
+
+
+def head_angles(turns: Float64) -> Float64:
+    """Return pitch, yaw and roll (T, 3) of heads, as FAPs 48 to 50 turn them, of rotations (T, 3, 3).
+
+    Rotations are in a camera's axes; one that is the identity looks into the camera.
+    """
+    face = UPRIGHT @ turns @ UPRIGHT
+    pitch = np.arctan2(-face[:, 1, 2], face[:, 1, 1])
+    yaw = np.arctan2(-face[:, 2, 0], face[:, 0, 0])
+    roll = np.arcsin(np.clip(face[:, 1, 0], -1.0, 1.0))
+    return np.stack([pitch, yaw, roll], axis=1)
+
+
+def eye_angles(left: Float64, right: Float64, turns: Float64 | None) -> Float64:
+    """Return yaw of the left and the right eye, then their pitch (T, 4), of directions (T, 3) of their gaze.
+
+    turns: (T, 3, 3), of the head, which eyes are turned in. Directions and turns are in a camera's axes.
+    """
+    result = []
+    for gaze in (left, right):
+        seen = gaze if turns is None else np.einsum("tji,tj->ti", turns, gaze)
+        x, y, z = (seen @ UPRIGHT).T
+        result.append((np.arctan2(x, z), np.arctan2(-y, np.hypot(x, z))))
+    (left_yaw, left_pitch), (right_yaw, right_pitch) = result
+    return np.stack([left_yaw, right_yaw, left_pitch, right_pitch], axis=1)
