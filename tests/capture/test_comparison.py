@@ -17,6 +17,7 @@ from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.comparison import Comparison, Difference, bounds, compare, find_sticks, find_up
 from fba.capture.comparison.figure import Figure
 from fba.capture.comparison.measures import floors
+from fba.capture.comparison.measures import jumps as measure_jumps
 from fba.capture.matching import map_joints
 from fba.errors import ModelError
 from fba.parameters import bap_numbers
@@ -236,3 +237,66 @@ def test_sticks_stand_where_the_result_stands(
     assert near.sides.count("l") == near.sides.count("r") == 8
     assert len(near.soles) == 2
     assert abs(near.soles[0][:, 1].mean()) < 0.03
+
+
+def test_a_palm_that_is_off_all_the_time_is_seen_without_fingers(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    """The rest pose stands, so its palms face the thighs."""
+    assert find(compare(source, result, mapped), "palm", "left hand").worst < 5
+    one = find(compare(source, changed(result, "l_wrist_twisting", 90), mapped), "palm", "left hand")
+    assert one.typical == pytest.approx(90, abs=5)
+    assert one.grade == "poor"
+
+
+def test_a_wrung_forearm_is_seen_where_the_rest_pose_says_nothing(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    """One arm is longer than the other: nobody stands like that."""
+    offsets = source.offsets.copy()
+    offsets[mapped["l_wrist"]] *= 1.5
+    uneven = replace(source, offsets=offsets)
+    assert find(compare(uneven, result, mapped), "palm", "left hand").worst == 0
+    one = find(compare(uneven, changed(result, "l_wrist_twisting", 180), mapped), "palm", "left hand")
+    assert one.typical == pytest.approx(80, abs=15)
+
+
+def test_a_capture_that_tears_is_compared_up_to_there(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    """A camera loses a person, who is then 4 m away, in another pose."""
+    positions = source.positions.copy()
+    positions[20:, 0] += 4.0
+    torn = replace(source, positions=positions)
+    spoilt = changed(result, "l_elbow_flexion", 60, slice(20, None))
+    comparison = compare(torn, spoilt, mapped)
+    one = find(comparison, "tear", "capture")
+    assert one.worst == pytest.approx(4.0, abs=0.2)
+    assert one.frame == 20
+    assert find(comparison, "direction", "left forearm").worst < 1
+    assert comparison.verdict == "fair"
+
+
+@pytest.mark.parametrize(("bend", "jumps"), [(30.0, 0.0), (2.0, 80.0)])
+def test_an_upper_arm_follows_the_plane_in_which_an_elbow_bends(bend: float, jumps: float) -> None:
+    """The source's forearm leaps from one side to the other: no leap of the result, unless it is straight."""
+    plane = Rotation.from_euler("y", [[0], [0], [80], [80]], degrees=True)
+    forearm = plane.apply(Rotation.from_euler("x", bend, degrees=True).apply([0.0, -1.0, 0.0]))
+    shoulder = np.zeros((4, 3))
+    elbow = shoulder - [0.0, 1.0, 0.0]
+    points = {"l_shoulder": shoulder, "l_elbow": elbow, "l_wrist": elbow + forearm}
+    still = np.tile(np.eye(3), (4, 1, 1))
+    source = Figure(points, {"l_shoulder": still}, {})
+    result = Figure(points, {"l_shoulder": plane.as_matrix()}, {})
+    row = next(row for row in measure_jumps(source, result) if row.part == "left upper arm")
+    assert row.values.max() == pytest.approx(jumps, abs=0.5)
+
+
+def test_runs_of_a_long_motion_have_one_floor(mapped: dict[str, int]) -> None:
+    """Somebody steps on a box of 1 m: those who see that part only would take the box for the floor."""
+    captured = motion("standing", 64, rate=15)
+    positions = captured.positions.copy()
+    positions[40:, 1] += 1.0
+    captured = replace(captured, positions=positions)
+    comparison = compare(captured, from_skeleton(captured), mapped, most=32)
+    assert find(comparison, "floor", "left sole").worst < 25

@@ -67,21 +67,30 @@ def compare(
     neutral = figure.result_figure(solver, np.zeros((1, BAP_COUNT), dtype=np.int32))
     metres = source_scale(motion, mapped, neutral, up) if scale is None else scale
     rest = rest_figure(motion, mapped, up, metres)
+    rate = float(motion.rate)
+    lost, tears = measures.find_tears(motion.positions[:count] * metres, rate)
+    pieces = _pieces(count, most)
+    floor = measures.find_floor(
+        (figure.source_figure(rows_of(motion, piece), mapped, up, metres) for piece in pieces), rate
+    )
     found: dict[tuple[str, str], list[Difference]] = {}
-    for piece in _pieces(count, most):
+    for piece in pieces:
         baps = animation.body.values[piece]
         source = figure.source_figure(rows_of(motion, piece), mapped, up, metres)
         result = figure.result_figure(solver, baps)
-        rows = _measure(source, result, rest, neutral, sole_heights(solver, baps), float(motion.rate), level)
-        for row in rows:
-            one = _difference(row, float(motion.rate), piece.start)
+        soles = sole_heights(solver, baps)
+        for row in _measure(source, result, rest, neutral, soles, rate, level, floor):
+            kept = row._replace(values=np.where(lost[piece], np.nan, row.values))
+            one = _difference(kept, rate, piece.start)
             found.setdefault((one.measure, one.part), []).append(one)
     differences = [
         replace(max(ones, key=lambda one: one.worst), typical=float(np.mean([one.typical for one in ones])))
         for ones in found.values()
     ]
     differences += _unmatched(first, mapped)
-    compared = sum(piece.stop - piece.start for piece in _pieces(count, most))
+    if tears.any():
+        differences.append(_difference(Row("tear", "capture", tears), rate, 0))
+    compared = sum(piece.stop - piece.start for piece in pieces)
     return Comparison(compared, in_order(tuple(differences)))
 
 
@@ -109,16 +118,17 @@ def _measure(
     soles: dict[str, Float64],
     rate: float,
     level: float | None,
+    floor: measures.Floor,
 ) -> Iterator[Row]:
-    standing = measures.find_standing(source, rate)
+    standing = measures.find_standing(source, rate, floor.lows)
     yield from measures.directions(source, result)
-    yield from measures.palms(source, result)
+    yield from measures.palms(source, result, rest)
     yield from measures.turns(source, result)
     yield from measures.feet(source, result, standing, rest)
     yield from measures.heads(source, result, rest)
     yield from measures.clavicles(source, result, neutral)
     yield from measures.paths(source, result)
-    yield from measures.floors(source, soles, standing, level)
+    yield from measures.floors(source, soles, standing, level, floor.ground)
     yield from measures.slips(source, result, standing, rate)
     yield from measures.jumps(source, result)
 

@@ -5,7 +5,7 @@ Each function returns rows of `Row`: name, unit and values (T,), 0 or more; NaN 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +52,14 @@ MOST_ROW_TURN = 25.0
 head looks."""
 STEEP = 0.85
 """Cosine of the angle between a foot's bone and straight down beyond which it points nowhere."""
+HINGED = {"shoulder": ("shoulder", "elbow", "wrist"), "hip": ("hip", "knee", "ankle")}
+"""The joints of limbs whose middle one is a hinge, by the first."""
+SLIGHT_BEND = 0.12
+"""Sine of the bend of an elbow or a knee from which on its plane is known."""
+MOST_WRUNG = 100.0
+"""Degrees to either side by which forearm and wrist of a person turn the palm."""
+TEAR, TEAR_SPEED = 0.5, 20.0
+"""Metres, and metres a second, that hips do not move from one frame to the next."""
 STILL = 0.25
 """Metres a second up to which a foot stands."""
 LOW = 0.05
@@ -98,14 +106,41 @@ def directions(source: Figure, result: Figure) -> Iterator[Row]:
         yield Row("trunk", "trunk", degrees_between(trunks[0], trunks[1]))
 
 
-def palms(source: Figure, result: Figure) -> Iterator[Row]:
-    """Angles in degrees between the palms, where the source has knuckles of two fingers."""
+def palms(source: Figure, result: Figure, rest: Figure) -> Iterator[Row]:
+    """Angles in degrees between the palms.
+
+    The source's are those of the knuckles of two fingers. Without these, a rest pose that stands shows them:
+    palms face the thighs where arms hang, and the ground in a T-pose. Without either, the result's palm shows
+    whether a forearm is wrung more than people can: then the angles are what is too much.
+    """
+    axes = _standing_axes(rest) if _moves_from(rest, source) else None
     for side in SIDES:
-        both = [f for f in source.knuckles(side) if f in result.knuckles(side)]
-        if len(both) > 1 and f"{side}_wrist" in source.points:
+        part = f"{WORDS[side]} hand"
+        shown = list(result.knuckles(side))
+        if f"{side}_wrist" not in source.points or f"{side}_elbow" not in source.points or len(shown) < 2:
+            continue
+        both = [f for f in source.knuckles(side) if f in shown]
+        if len(both) > 1:
             ends = both[0], both[-1]
-            angles = degrees_between(source.palm(side, ends), result.palm(side, ends))
-            yield Row("palm", f"{WORDS[side]} hand", angles)
+            yield Row("palm", part, degrees_between(source.palm(side, ends), result.palm(side, ends)))
+            continue
+        own = result.palm(side, (shown[0], shown[-1]))
+        if axes is not None:
+            inwards = axes[:, 0] * (-1.0 if side == "l" else 1.0)
+            forearm = unit(rest.points[f"{side}_wrist"] - rest.points[f"{side}_elbow"])
+            raised = rotations.between(np.array([0.0, -1.0, 0.0]), forearm[0])
+            at_rest = rest.frames[f"{side}_wrist"][0].T @ raised @ inwards
+            yield Row("palm", part, degrees_between(source.frames[f"{side}_wrist"] @ at_rest, own))
+        else:
+            yield Row("palm", part, np.maximum(_wringing(result, side, own) - MOST_WRUNG, 0.0))
+
+
+def _wringing(result: Figure, side: str, palm: Float64) -> Float64:
+    """Return degrees (T,) by which a palm is turned about the forearm from where the thumb points up."""
+    ends = [result.points[f"{side}_{joint}"] for joint in ("elbow", "wrist")]
+    forearm = unit(ends[1] - ends[0])
+    inwards = result.frames[f"{side}_shoulder"][..., 0] * (-1.0 if side == "l" else 1.0)
+    return degrees_between(_along(inwards, forearm), _along(palm, forearm))
 
 
 def turns(source: Figure, result: Figure) -> Iterator[Row]:
@@ -201,24 +236,76 @@ def clavicles(source: Figure, result: Figure, neutral: Figure) -> Iterator[Row]:
             hangs = arm is not None and arm[:, 1] < -HANGS
             usual = unit(np.median(inside[hangs] if np.any(hangs) else inside, axis=0))
             moved = rotations.between_all(np.broadcast_to(source.frames[chest] @ usual, theirs.shape), theirs)
-            expected = (moved @ expected[..., None])[..., 0]
-        yield Row("clavicle", f"{WORDS[side]} clavicle", degrees_between(own, expected))
+            ways = [(moved @ expected[..., None])[..., 0]]
+            if (turning := _turning(source, chest, names[0], hangs)) is not None:
+                # as the joint turns, which differs where a clavicle points far from its neutral place
+                ways.append((turning @ expected[..., None])[..., 0])
+            off = np.min([degrees_between(own, way) for way in ways], axis=0)
+        else:
+            off = degrees_between(own, expected)
+        yield Row("clavicle", f"{WORDS[side]} clavicle", off)
 
 
-def find_standing(source: Figure, rate: float) -> dict[str, Bool]:
+def _turning(source: Figure, chest: str, joint: str, hangs: Bool | bool) -> Float64 | None:
+    """Return (T, 3, 3), world turns of a clavicle against the chest, from where it is with hanging arms."""
+    if joint not in source.frames:
+        return None
+    above = source.frames[chest]
+    inside = np.swapaxes(above, 1, 2) @ source.frames[joint]
+    usual = mean_rotation(inside[hangs] if np.any(hangs) else inside)
+    return above @ inside @ usual.T @ np.swapaxes(above, 1, 2)
+
+
+class Floor(NamedTuple):
+    """Where the feet of a source stand, in metres.
+
+    lows: by side, the height up to which a foot may stand. ground: where feet stand most; None if they never
+    do.
+    """
+
+    lows: dict[str, float]
+    ground: float | None
+
+
+def find_floor(sources: Iterable[Figure], rate: float) -> Floor:
+    """Return where feet stand in all pieces of a motion together: one of them may be all in the air."""
+    still: dict[str, list[Bool]] = {side: [] for side in SIDES}
+    ends: dict[str, list[Float64]] = {side: [] for side in SIDES}
+    lowest: dict[str, list[Float64]] = {side: [] for side in SIDES}
+    for source in sources:
+        for side in SIDES:
+            if points := _foot_points(source, side):
+                still[side].append(_still(points, rate))
+                ends[side].append(points[-1][:, 1])
+                lowest[side].append(np.min([point[:, 1] for point in points], axis=0))
+    known = [side for side in SIDES if ends[side]]
+    heights = {side: np.concatenate(ends[side]) for side in known}
+    lows = {side: float(np.percentile(heights[side], 5)) + LOW for side in known}
+    stands = {side: np.concatenate(still[side]) & (heights[side] < lows[side]) for side in known}
+    standing = [np.concatenate(lowest[side])[stands[side]] for side in known]
+    together = np.concatenate(standing) if standing else np.zeros(0)
+    return Floor(lows, float(np.median(together)) if len(together) else None)
+
+
+def find_standing(source: Figure, rate: float, lows: Mapping[str, float]) -> dict[str, Bool]:
     """Return by side bool (T,): whether a foot of the source stands: low, and hardly moving."""
-    result = {}
-    for side in SIDES:
-        points = [p for p in (source.points.get(f"{side}_ankle"), source.toe(side)) if p is not None]
-        if not points:
-            continue
-        count = len(points[0])
-        ok = np.zeros(count, dtype=bool)
-        for point in points:
-            speed = np.linalg.norm(np.diff(point, axis=0, append=point[-1:]), axis=1) * rate
-            ok |= speed < STILL
-        ok &= points[-1][:, 1] < np.percentile(points[-1][:, 1], 5) + LOW
-        result[side] = ok
+    return {
+        side: _still(points, rate) & (points[-1][:, 1] < lows[side])
+        for side in SIDES
+        if side in lows and (points := _foot_points(source, side))
+    }
+
+
+def _foot_points(source: Figure, side: str) -> list[Float64]:
+    """Return (T, 3), the ankle and the end of a foot, as far as they are known."""
+    return [p for p in (source.points.get(f"{side}_ankle"), source.toe(side)) if p is not None]
+
+
+def _still(points: Sequence[Float64], rate: float) -> Bool:
+    """Return bool (T,): whether any of the points (T, 3) hardly moves."""
+    result = np.zeros(len(points[0]), dtype=np.bool_)
+    for point in points:
+        result |= np.linalg.norm(np.diff(point, axis=0, append=point[-1:]), axis=1) * rate < STILL
     return result
 
 
@@ -231,19 +318,25 @@ def paths(source: Figure, result: Figure) -> Iterator[Row]:
 
 
 def floors(
-    source: Figure, soles: dict[str, Float64], standing: dict[str, Bool], level: float | None
+    source: Figure,
+    soles: dict[str, Float64],
+    standing: dict[str, Bool],
+    level: float | None,
+    ground: float | None = None,
 ) -> Iterator[Row]:
     """Heights in mm by which soles miss the floor while the source's foot stands; NaN in other frames.
 
     soles: by side (T,), height in metres of the lowest point of the person's shoe. level: height of the
-    floor, None for that where the feet stand most. The source's foot is level where it usually stands. Where
+    floor, None for that where the feet stand most. ground: that of the source's, see `find_floor`; None for
+    what these frames say. The source's foot is level where it usually stands. Where
     it is lower, since its ground drifts, the person's is on the floor; or as low, if there is no floor.
     """
     heights = {side: _lowest(source, side) for side in soles}
     known = {side: height for side, height in heights.items() if height is not None and standing[side].any()}
     if not known:
         return
-    ground = float(np.median(np.concatenate([known[side][standing[side]] for side in known])))
+    if ground is None:
+        ground = float(np.median(np.concatenate([known[side][standing[side]] for side in known])))
     own = np.concatenate([soles[side][standing[side]] for side in known])
     floor = float(np.median(own)) if level is None else level
     for side, height in known.items():
@@ -277,6 +370,8 @@ def jumps(source: Figure, result: Figure) -> Iterator[Row]:
         if joint not in source.frames or shown not in result.frames:
             continue
         theirs, ours = _steps(source.frames[joint]), _steps(result.frames[shown])
+        if joint[2:] in HINGED and shown == joint:
+            theirs = np.maximum(theirs, _plane_steps(source, joint))
         near = np.pad(theirs, 1, mode="edge")
         most = np.maximum(np.maximum(near[:-2], near[1:-1]), near[2:])
         yield Row("jump", part, np.maximum(ours - most, 0.0))
@@ -287,6 +382,19 @@ def jumps(source: Figure, result: Figure) -> Iterator[Row]:
         yield Row("leap", "hips", 1000 * np.linalg.norm(apart, axis=1))
 
 
+def find_tears(root: Float64, rate: float) -> tuple[Bool, Float64]:
+    """Return bool (T,), frames before or after a tear in the capture, and metres (T,) of each tear.
+
+    A tear is a leap that nobody makes, as where a camera lost a person: the longest part between two tears is
+    the capture. root: (T, 3), its path in metres.
+    """
+    leaps = np.linalg.norm(np.diff(root, axis=0, prepend=root[:1]), axis=1)
+    torn = (leaps > TEAR) & (leaps * rate > TEAR_SPEED)
+    part = np.cumsum(torn)
+    lost: Bool = (part != int(np.bincount(part).argmax())) | torn
+    return lost, np.where(torn, leaps, 0.0)
+
+
 def pelvis(figure: Figure) -> Float64 | None:
     """Return (T, 3), the point between the hips, else the root; None without either."""
     middle = figure.middle("hip")
@@ -295,13 +403,30 @@ def pelvis(figure: Figure) -> Float64 | None:
 
 def _lowest(figure: Figure, side: str) -> Float64 | None:
     """Return (T,), the height of the lowest point of a foot."""
-    points = [p for p in (figure.points.get(f"{side}_ankle"), figure.toe(side)) if p is not None]
+    points = _foot_points(figure, side)
     return np.min([point[:, 1] for point in points], axis=0) if points else None
 
 
 def _steps(frames: Float64) -> Float64:
     """Return (T,), angles in degrees from each frame to the next before it; 0 for the first."""
     return np.concatenate([[0.0], degrees_turned(np.swapaxes(frames[:-1], 1, 2) @ frames[1:])])
+
+
+def _plane_steps(source: Figure, joint: str) -> Float64:
+    """Return (T,), angles in degrees by which the plane of a bent limb turns from the frame before.
+
+    An elbow or a knee of the body bends about one axis: where the plane of the source's leaps, the upper bone
+    turns about its length. 0 where the limb is straight, and for the first frame.
+    """
+    side, upper = joint.split("_")
+    names = [f"{side}_{name}" for name in HINGED[upper]]
+    if not all(name in source.points for name in names):
+        return np.zeros(len(source.frames[joint]))
+    first, middle, last = (source.points[name] for name in names)
+    normal = np.cross(unit(middle - first), unit(last - middle))  # as long as the sine of the bend
+    bent = np.linalg.norm(normal, axis=1) > SLIGHT_BEND
+    steps = np.where(bent[1:] & bent[:-1], degrees_between(normal[1:], normal[:-1]), 0.0)
+    return np.concatenate([[0.0], steps])
 
 
 def _angle(name: str, part: str, source: Figure, result: Figure, start: str, end: str) -> Iterator[Row]:

@@ -57,7 +57,8 @@ def find_sticks(
     neutral = figure.result_figure(solver, np.zeros((1, BAP_COUNT), dtype=np.int32))
     metres = measurement.source_scale(motion, mapped, neutral, up) if scale is None else scale
     usual = figure.source_figure(begin, mapped, up, metres)
-    standing = measures.find_standing(usual, float(motion.rate))
+    rate = float(motion.rate)
+    standing = measures.find_standing(usual, rate, measures.find_floor([usual], rate).lows)
     levels = measures.level_soles(usual, standing, measurement.rest_figure(motion, mapped, up, metres))
     ground = min((float(np.percentile(p[:, 1], 5)) for p in _toes(usual)), default=0.0)
     numbers = list(frames)
