@@ -15,6 +15,7 @@ from fba.capture.comparison import figure, measures
 from fba.capture.comparison.figure import Figure
 from fba.capture.comparison.measures import Row
 from fba.capture.comparison.soles import sole_heights
+from fba.capture.comparison.standing import Floor, find_floor, find_standing
 from fba.capture.comparison.verdict import Comparison, Difference, bounds, in_order
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
@@ -70,7 +71,7 @@ def compare(
     rate = float(motion.rate)
     lost, tears = measures.find_tears(motion.positions[:count] * metres, rate)
     pieces = _pieces(count, most)
-    floor = measures.find_floor(
+    floor = find_floor(
         (figure.source_figure(rows_of(motion, piece), mapped, up, metres) for piece in pieces), rate
     )
     found: dict[tuple[str, str], list[Difference]] = {}
@@ -118,9 +119,9 @@ def _measure(
     soles: dict[str, Float64],
     rate: float,
     level: float | None,
-    floor: measures.Floor,
+    floor: Floor,
 ) -> Iterator[Row]:
-    standing = measures.find_standing(source, rate, floor.lows)
+    standing = find_standing(source, rate, floor.lows)
     yield from measures.directions(source, result)
     yield from measures.palms(source, result, rest)
     yield from measures.turns(source, result)

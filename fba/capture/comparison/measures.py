@@ -5,7 +5,7 @@ Each function returns rows of `Row`: name, unit and values (T,), 0 or more; NaN 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from fba.capture.comparison.figure import (
     mean_rotation,
     unit,
 )
+from fba.capture.comparison.standing import foot_points
 
 MOST_PAIRS = 4
 """Pairs of joints, left and right, that show whether a pose is its own mirror image."""
@@ -60,10 +61,6 @@ MOST_WRUNG = 100.0
 """Degrees to either side by which forearm and wrist of a person turn the palm."""
 TEAR, TEAR_SPEED = 0.5, 20.0
 """Metres, and metres a second, that hips do not move from one frame to the next."""
-STILL = 0.25
-"""Metres a second up to which a foot stands."""
-LOW = 0.05
-"""Metres above the lowest heights up to which a foot stands."""
 
 
 class Row(NamedTuple):
@@ -256,59 +253,6 @@ def _turning(source: Figure, chest: str, joint: str, hangs: Bool | bool) -> Floa
     return above @ inside @ usual.T @ np.swapaxes(above, 1, 2)
 
 
-class Floor(NamedTuple):
-    """Where the feet of a source stand, in metres.
-
-    lows: by side, the height up to which a foot may stand. ground: where feet stand most; None if they never
-    do.
-    """
-
-    lows: dict[str, float]
-    ground: float | None
-
-
-def find_floor(sources: Iterable[Figure], rate: float) -> Floor:
-    """Return where feet stand in all pieces of a motion together: one of them may be all in the air."""
-    still: dict[str, list[Bool]] = {side: [] for side in SIDES}
-    ends: dict[str, list[Float64]] = {side: [] for side in SIDES}
-    lowest: dict[str, list[Float64]] = {side: [] for side in SIDES}
-    for source in sources:
-        for side in SIDES:
-            if points := _foot_points(source, side):
-                still[side].append(_still(points, rate))
-                ends[side].append(points[-1][:, 1])
-                lowest[side].append(np.min([point[:, 1] for point in points], axis=0))
-    known = [side for side in SIDES if ends[side]]
-    heights = {side: np.concatenate(ends[side]) for side in known}
-    lows = {side: float(np.percentile(heights[side], 5)) + LOW for side in known}
-    stands = {side: np.concatenate(still[side]) & (heights[side] < lows[side]) for side in known}
-    standing = [np.concatenate(lowest[side])[stands[side]] for side in known]
-    together = np.concatenate(standing) if standing else np.zeros(0)
-    return Floor(lows, float(np.median(together)) if len(together) else None)
-
-
-def find_standing(source: Figure, rate: float, lows: Mapping[str, float]) -> dict[str, Bool]:
-    """Return by side bool (T,): whether a foot of the source stands: low, and hardly moving."""
-    return {
-        side: _still(points, rate) & (points[-1][:, 1] < lows[side])
-        for side in SIDES
-        if side in lows and (points := _foot_points(source, side))
-    }
-
-
-def _foot_points(source: Figure, side: str) -> list[Float64]:
-    """Return (T, 3), the ankle and the end of a foot, as far as they are known."""
-    return [p for p in (source.points.get(f"{side}_ankle"), source.toe(side)) if p is not None]
-
-
-def _still(points: Sequence[Float64], rate: float) -> Bool:
-    """Return bool (T,): whether any of the points (T, 3) hardly moves."""
-    result = np.zeros(len(points[0]), dtype=np.bool_)
-    for point in points:
-        result |= np.linalg.norm(np.diff(point, axis=0, append=point[-1:]), axis=1) * rate < STILL
-    return result
-
-
 def paths(source: Figure, result: Figure) -> Iterator[Row]:
     """Distances in mm between the hips; where both are on the whole does not count (`--origin`)."""
     theirs, ours = (pelvis(one) for one in (source, result))
@@ -327,7 +271,7 @@ def floors(
     """Heights in mm by which soles miss the floor while the source's foot stands; NaN in other frames.
 
     soles: by side (T,), height in metres of the lowest point of the person's shoe. level: height of the
-    floor, None for that where the feet stand most. ground: that of the source's, see `find_floor`; None for
+    floor, None for that where the feet stand most. ground: that of the source, see `find_floor`; None for
     what these frames say. The source's foot is level where it usually stands. Where
     it is lower, since its ground drifts, the person's is on the floor; or as low, if there is no floor.
     """
@@ -403,7 +347,7 @@ def pelvis(figure: Figure) -> Float64 | None:
 
 def _lowest(figure: Figure, side: str) -> Float64 | None:
     """Return (T,), the height of the lowest point of a foot."""
-    points = _foot_points(figure, side)
+    points = foot_points(figure, side)
     return np.min([point[:, 1] for point in points], axis=0) if points else None
 
 

@@ -13,6 +13,7 @@ from fba.arrays import Float64
 from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.capture.comparison import figure, measurement, measures
+from fba.capture.comparison.standing import find_floor, find_standing
 from fba.capture.motion import SkeletonMotion
 from fba.parameters import BAP_COUNT
 
@@ -58,7 +59,7 @@ def find_sticks(
     metres = measurement.source_scale(motion, mapped, neutral, up) if scale is None else scale
     usual = figure.source_figure(begin, mapped, up, metres)
     rate = float(motion.rate)
-    standing = measures.find_standing(usual, rate, measures.find_floor([usual], rate).lows)
+    standing = find_standing(usual, rate, find_floor([usual], rate).lows)
     levels = measures.level_soles(usual, standing, measurement.rest_figure(motion, mapped, up, metres))
     ground = min((float(np.percentile(p[:, 1], 5)) for p in _toes(usual)), default=0.0)
     numbers = list(frames)

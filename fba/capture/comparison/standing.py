@@ -1,0 +1,69 @@
+"""Where the feet of a capture stand, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fba.arrays import Bool, Float64
+from fba.capture.comparison.figure import SIDES, Figure
+
+STILL = 0.25
+"""Metres a second up to which a foot stands."""
+LOW = 0.05
+"""Metres above the lowest heights up to which a foot stands."""
+
+
+class Floor(NamedTuple):
+    """Where the feet of a source stand, in metres.
+
+    lows: by side, the height up to which a foot may stand. ground: where feet stand most; None if they never
+    do.
+    """
+
+    lows: dict[str, float]
+    ground: float | None
+
+
+def find_floor(sources: Iterable[Figure], rate: float) -> Floor:
+    """Return where feet stand in all pieces of a motion together: one of them may be all in the air."""
+    still: dict[str, list[Bool]] = {side: [] for side in SIDES}
+    ends: dict[str, list[Float64]] = {side: [] for side in SIDES}
+    lowest: dict[str, list[Float64]] = {side: [] for side in SIDES}
+    for source in sources:
+        for side in SIDES:
+            if points := foot_points(source, side):
+                still[side].append(_still(points, rate))
+                ends[side].append(points[-1][:, 1])
+                lowest[side].append(np.min([point[:, 1] for point in points], axis=0))
+    known = [side for side in SIDES if ends[side]]
+    heights = {side: np.concatenate(ends[side]) for side in known}
+    lows = {side: float(np.percentile(heights[side], 5)) + LOW for side in known}
+    stands = {side: np.concatenate(still[side]) & (heights[side] < lows[side]) for side in known}
+    standing = [np.concatenate(lowest[side])[stands[side]] for side in known]
+    together = np.concatenate(standing) if standing else np.zeros(0)
+    return Floor(lows, float(np.median(together)) if len(together) else None)
+
+
+def find_standing(source: Figure, rate: float, lows: Mapping[str, float]) -> dict[str, Bool]:
+    """Return by side bool (T,): whether a foot of the source stands: low, and hardly moving."""
+    return {
+        side: _still(points, rate) & (points[-1][:, 1] < lows[side])
+        for side in SIDES
+        if side in lows and (points := foot_points(source, side))
+    }
+
+
+def foot_points(source: Figure, side: str) -> list[Float64]:
+    """Return (T, 3), the ankle and the end of a foot, as far as they are known."""
+    return [p for p in (source.points.get(f"{side}_ankle"), source.toe(side)) if p is not None]
+
+
+def _still(points: Sequence[Float64], rate: float) -> Bool:
+    """Return bool (T,): whether any of the points (T, 3) hardly moves."""
+    result = np.zeros(len(points[0]), dtype=np.bool_)
+    for point in points:
+        result |= np.linalg.norm(np.diff(point, axis=0, append=point[-1:]), axis=1) * rate < STILL
+    return result
