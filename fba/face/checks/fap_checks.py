@@ -95,7 +95,7 @@ def _check_combinations(poser: Poser, wanted: set[int]) -> Iterator[Finding]:
 
 
 @cache
-def _region_table() -> dict[int, tuple[tuple[str, ...], float]]:
+def region_table() -> dict[int, tuple[tuple[str, ...], float]]:
     """By FAP: the points of its region, and how far from them its motion may reach, in ES0."""
     regions = {}
     with (files(__package__) / "fap_regions.csv").open(encoding="utf-8") as file:
@@ -107,9 +107,9 @@ def _region_table() -> dict[int, tuple[tuple[str, ...], float]]:
 
 def _check_region(poser: Poser, fap: int) -> Iterator[Finding]:
     """A finding where vertices move that are too far from the points of the FAP's region."""
-    if fap not in _region_table():
+    if fap not in region_table():
         return
-    names, reach = _region_table()[fap]
+    names, reach = region_table()[fap]
     points = poser.model.points[[row_of()[name] for name in names]]
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):

@@ -6,15 +6,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fba.easing import smoothstep
 from fba.face.authoring.regions.eyes import PUPIL_OF_IRIS
-from fba.face.checks.fap_checks import check_posed
+from fba.face.checks.fap_checks import check_posed, region_table
 from fba.face.checks.posing import Poser
 from fba.face.eyeball import PUPIL_FAP, eyeballs, pupil_diameter
+from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.points import DILATE_PUPIL
 from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.parameters import faps
 
+EDGE = (0.75, 0.97)
+"""Shares of the reach of a region between which a motion that leaves it is faded out."""
 FALSE_PUPIL = 0.5
 """Relative deviation of a pupil's size from the usual one from which on it is none."""
 MESH = ("mesh", "shapes break the standard's rules for {}: made from the mesh")
@@ -26,9 +30,9 @@ STOPS = (0.85, 0.7, 0.55, 0.4)
 def repair_tables(model: FaceModel, plain: FaceModel, *, note: tuple[str, str] = MESH) -> FaceModel:
     """The model with sound tables for FAPs whose own break the rules of `check_faps`.
 
-    Tried are the same motion with an earlier stop, and the table of `plain`, such as the face made from the
-    mesh alone, whose use the note tells; the one with the fewest errors is taken. A pupil that cannot move
-    correctly is lost.
+    Tried are the same motion faded out at the edge of its region, or with an earlier stop, and the table of
+    `plain`, such as the face made from the mesh alone, whose use the note tells; the one with the fewest
+    errors is taken. A pupil that cannot move correctly is lost.
     """
     poser, others = Poser(model), plain.table_of
     tables, lost = dict(model.table_of), dict(model.lost)
@@ -37,7 +41,7 @@ def repair_tables(model: FaceModel, plain: FaceModel, *, note: tuple[str, str] =
         least = _count_errors(poser, fap)
         if not least:
             continue
-        for candidate in _candidates(table, others.get(fap)):
+        for candidate in _candidates(model, table, others.get(fap)):
             trial = Poser(model.with_tables((candidate,), {}), like=poser)
             errors = _count_errors(trial, fap)
             if errors < least:
@@ -75,7 +79,11 @@ def _count_errors(poser: Poser, fap: int) -> int:
     return sum(finding.severity == "error" for finding in check_posed(poser, [fap], combined=False))
 
 
-def _candidates(table: FaceDefTables, plain: FaceDefTables | None) -> Iterator[FaceDefTables]:
+def _candidates(
+    model: FaceModel, table: FaceDefTables, plain: FaceDefTables | None
+) -> Iterator[FaceDefTables]:
+    if table.fap in region_table():
+        yield _within_region(model, table)
     for share in STOPS:
         for sides in ((-1,), (1,), (-1, 1)):
             yield FaceDefTables(
@@ -83,6 +91,23 @@ def _candidates(table: FaceDefTables, plain: FaceDefTables | None) -> Iterator[F
             )
     if plain is not None:
         yield plain
+
+
+def _within_region(model: FaceModel, table: FaceDefTables) -> FaceDefTables:
+    """The motion of a table, faded out towards the edge of the region of its FAP."""
+    names, reach = region_table()[table.fap]
+    points = model.points[[row_of()[name] for name in names]]
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        return table
+    meshes = []
+    for mesh in table.meshes:
+        vertices = model.part(mesh.part).vertices[mesh.vertices].astype(np.float64)
+        away = np.linalg.norm(vertices[:, None] - points, axis=2).min(axis=1) / (reach * model.fapu.ES * 1024)
+        share = smoothstep((EDGE[1] - away) / (EDGE[1] - EDGE[0]))[:, None, None]
+        moves = (mesh.displacements * share).astype(np.float32)
+        meshes.append(FaceDefMesh(mesh.part, mesh.borders, mesh.vertices, moves))
+    return FaceDefTables(table.fap, tuple(meshes), table.transforms)
 
 
 def _stopped(mesh: FaceDefMesh, share: float, sides: tuple[int, ...]) -> FaceDefMesh:
