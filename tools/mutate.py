@@ -192,7 +192,7 @@ MUTANTS = (
     ),
     Mutant("fba/face/eyeball.py", "FLAT = 0.3", "FLAT = 0.7", DRAWN_TEST),
     Mutant("fba/face/importers/assembly/_mouth_loop.py", "NEAR = 0.08", "NEAR = 0.8", DRAWN_TEST),
-    Mutant("fba/face/importers/assembly/definitions.py", "ROUNDS = 4", "ROUNDS = 1", DRAWN_TEST),
+    Mutant("fba/face/importers/assembly/definitions.py", "LEAST = 0.004", "LEAST = -1.0", DRAWN_TEST),
     Mutant(
         "fba/face/importers/assembly/definitions.py",
         "target = _even(sides)[numbers_known - 1]",

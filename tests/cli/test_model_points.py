@@ -53,6 +53,23 @@ def test_saved_points_are_reported_with_the_next_command(
     assert f"next: fba model import {head} --points {points} --kind obj -o head.fba.glb" in out
 
 
+def test_parts_that_are_left_out_are_not_shown(
+    run: Run, head: Path, user: list[Callable[[PointPlacement], None]], tmp_path: Path
+) -> None:
+    points, shown = tmp_path / "p.csv", []
+    user.append(lambda placement: shown.extend(part.name for part in placement.surface.parts))
+    user.append(lambda placement: placement.places.update(dict.fromkeys(placement.missing_units, 5)))
+    user.append(lambda placement: placement.save())
+    code, out, _ = run("model", "points", head, "-o", points, "--part", "left eye=none")
+    assert code == 0
+    assert "skin" in shown
+    assert "left eye" not in shown
+    assert "--part 'left eye=none'" in out
+    code, _, err = run("model", "points", head, "-o", points, "--part", "left eye=nose")
+    assert code == 2
+    assert "write NAME=KIND" in err
+
+
 def test_closing_without_saving_fails(
     run: Run, head: Path, user: list[Callable[[PointPlacement], None]], tmp_path: Path
 ) -> None:

@@ -24,6 +24,14 @@ if TYPE_CHECKING:
 SOURCE = click.Path(exists=True, path_type=Path)
 KINDS = ("makehuman", "gltf", "obj", "ply", "wfm", "fdp")
 POINT_FILES = "FDP, CSV or JSON file"
+PART = click.option(
+    "--part",
+    "kinds",
+    multiple=True,
+    metavar="NAME=KIND",
+    help="Kind of a group, object, mesh or material: skin, eye, teeth, tongue, ..., or none to leave it out; "
+    "repeatable.",
+)
 
 
 @click.group(
@@ -149,14 +157,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     help="Metres per unit of IN. Default: estimated from the distance between the pupils.",
 )
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis.")
-@click.option(
-    "--part",
-    "kinds",
-    multiple=True,
-    metavar="NAME=KIND",
-    help="Kind of a group, object, mesh or material: skin, eye, teeth, tongue, ..., or none to leave it out; "
-    "repeatable.",
-)
+@PART
 @click.option("--name", help="Name of the model. Default: the name of the file.")
 @click.option(
     "--sheet",
@@ -231,6 +232,7 @@ def import_(
 )
 @click.option("--kind", type=click.Choice(KINDS), help="Kind of HEAD. Default: recognised from its content.")
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis.")
+@PART
 @click.option("--size", type=options.SizeType(), default="1280x800", show_default=True, metavar="WxH")
 def points_(
     head: Path,
@@ -239,6 +241,7 @@ def points_(
     points: Path | None,
     kind: str | None,
     up: str,
+    kinds: tuple[str, ...],
     size: tuple[int, int],
 ) -> None:
     """Open a window in which you place the feature points of a head, for `fba model import --points`.
@@ -255,7 +258,7 @@ def points_(
     from fba.face.importers.head_surface import read_head_surface
 
     with Progress("reading", None):
-        surface = read_head_surface(head, kind=kind, points=points, up=up)
+        surface = read_head_surface(head, kind=kind, points=points, up=up, kinds=_parse_kinds(kinds))
     placement = place_points(surface, output, size=size)
     if not placement.written:
         outputs.say(f"{output}: not written, as the window was closed without saving")
@@ -264,14 +267,15 @@ def points_(
     if placement.missing_units:
         outputs.say(f"  no face can be made without {', '.join(placement.missing_units)}")
     else:
-        outputs.say(f"  next: {_import_command(head, output, kind, up)}")
+        outputs.say(f"  next: {_import_command(head, output, kind, up, kinds)}")
 
 
-def _import_command(head: Path, points: Path, kind: str | None, up: str) -> str:
+def _import_command(head: Path, points: Path, kind: str | None, up: str, kinds: tuple[str, ...]) -> str:
     """Return the command that imports a head with its points."""
     words = ["fba", "model", "import", str(head), "--points", str(points)]
     words += ["--kind", kind] if kind else []
     words += ["--up", up] if up != "y" else []
+    words += [word for text in kinds for word in ("--part", text)]
     return shlex.join([*words, "-o", f"{head.stem}.fba.glb"])
 
 

@@ -6,7 +6,7 @@ For placing the others by hand: vertices keep the numbers, unit and axes of the 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from fba.face.importers._gltf import gltf_pieces, locate
 from fba.face.importers._sniffing import sniff
 from fba.face.importers.assembly.landmarks import find_eye_points
 from fba.face.importers.assembly.model import AXES, ImportOptions, turn_upright
-from fba.face.importers.assembly.pieces import DROPPED, assemble, guess_kind
+from fba.face.importers.assembly.pieces import DROPPED, assemble, check_kinds, kind_of
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.mesh import POINT_FILES, READERS, polygon_pieces, read_materials
 from fba.face.importers.points.points_file import GivenPoints, given_points, points_beside
@@ -67,6 +67,7 @@ def read_head_surface(
     kind: str | None = None,
     points: object = None,
     up: str = "y",
+    kinds: Mapping[str, str] | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> HeadSurface:
     """The surface of a head, with its points as `import_model` would get them, as far as it would.
@@ -77,6 +78,7 @@ def read_head_surface(
     """
     if up not in AXES:
         raise OptionError(f"up must be one of {', '.join(AXES)}, not {up!r}")
+    given_kinds = check_kinds(kinds)
     form = sniff(path) if kind is None else kind
     name = os.fspath(path)
     if form in OTHERS:
@@ -100,15 +102,13 @@ def read_head_surface(
         given = points_beside(Path(path), beside)
         origin = f"from the file beside {Path(path).name}" if given is not None else ""
     if given is None:
-        given, origin = _find(pieces, ImportOptions(path, "head", None, up, None, limits))
+        given, origin = _find(pieces, ImportOptions(path, "head", None, up, kinds, limits))
     elif not given.vertices:  # vertices say which lip is meant
         turned, positions = turn_upright(pieces, given.points, up)
-        given = _in_file(pieces, turned, assemble(turned), positions)
+        given = _in_file(pieces, turned, assemble(turned, kinds), positions)
     _check_numbers(given, len(vertices), name)
     shown = [
-        piece
-        for piece in pieces
-        if len(piece.part.triangles) and guess_kind(piece.part.name, piece.material) != DROPPED
+        piece for piece in pieces if len(piece.part.triangles) and kind_of(piece, given_kinds) != DROPPED
     ]
     if not shown:
         raise ModelError(f"{name}: contains no triangles; export the head as a mesh")
@@ -137,11 +137,11 @@ def _find(pieces: Sequence[Piece], options: ImportOptions) -> tuple[GivenPoints,
         upright, points, _, _ = locate(list(pieces), options)
     except ModelError:
         upright, _ = turn_upright(pieces, np.full((len(names()), 3), np.nan), options.up)
-        assembled = assemble(upright)
+        assembled = assemble(upright, options.kinds)
         eyes = find_eye_points(assembled, path)
         found = bool(np.isfinite(eyes).any())
         return _in_file(pieces, upright, assembled, eyes), "found by the eyeballs" if found else ""
-    return _in_file(pieces, upright, assemble(upright), points), "found by the shapes"
+    return _in_file(pieces, upright, assemble(upright, options.kinds), points), "found by the shapes"
 
 
 def _in_file(

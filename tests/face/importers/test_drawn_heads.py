@@ -147,6 +147,7 @@ def test_visemes_and_expressions_are_those_of_the_shapes(base: FaceModel) -> Non
     raised = {f"raise_{side}_{where}_eyebrow": 120.0 for side in "lr" for where in "imo"}
     morphs = {
         "viseme_U": shape_of(base, rounded),
+        "viseme_aa": shape_of(base, {"open_jaw": 400}),
         "Fcl_ALL_Surprised": shape_of(base, raised),
         "viseme_PP": {"skin": np.zeros((len(base.part("skin").vertices), 3))},
     }
@@ -155,13 +156,18 @@ def test_visemes_and_expressions_are_those_of_the_shapes(base: FaceModel) -> Non
     for name, value in rounded.items():
         assert u[fap_numbers()[name] - 1] == pytest.approx(value, abs=12), name
     assert u[fap_numbers()["open_jaw"] - 1] == pytest.approx(0, abs=10)
+    # the jaw takes the lips along: they need no FAPs of their own
+    aa = made.definitions.visemes[10]
+    assert aa[fap_numbers()["open_jaw"] - 1] == pytest.approx(400, rel=0.05)
+    for name in ("raise_b_midlip", "raise_b_midlip_o", "stretch_l_cornerlip"):
+        assert aa[fap_numbers()[name] - 1] == pytest.approx(0, abs=25), name
     surprise = made.definitions.expressions[6]
     for name, value in raised.items():
         assert surprise[fap_numbers()[name] - 1] == pytest.approx(value, abs=12), name
     # an empty shape, and those that the file has not, leave ours
-    for select in (1, 10):
+    for select in (1, 11):
         np.testing.assert_array_equal(made.definitions.visemes[select], base.definitions.visemes[select])
-    assert made.notes["visemes and expressions"].endswith("surprise, U")
+    assert made.notes["visemes and expressions"].endswith("surprise, A:, U")
 
 
 def test_a_lopsided_shape_gives_both_sides_the_same(base: FaceModel) -> None:

@@ -50,9 +50,7 @@ def assemble(
     given = check_kinds(kinds)
     guessed: list[tuple[Piece, str | None]] = []
     for piece in pieces:
-        kind = given.get(piece.part.name, given.get(piece.material))
-        if kind is None:
-            kind = guess_kind(piece.part.name, piece.material)
+        kind = kind_of(piece, given)
         if kind != DROPPED:
             guessed.append((piece, kind))
     if not guessed:
@@ -319,6 +317,12 @@ def guess_kind(*names: str) -> str | None:
             if word in parts or word + "s" in parts or (len(word) > 4 and word in plain):
                 return kind
     return None
+
+
+def kind_of(piece: Piece, given: Mapping[str, str]) -> str | None:
+    """The kind of a piece that a user gave by its name or material, else that of its names, or None."""
+    kind = given.get(piece.part.name, given.get(piece.material))
+    return guess_kind(piece.part.name, piece.material) if kind is None else kind
 
 
 def check_kinds(kinds: Mapping[str, str] | None) -> dict[str, str]:
