@@ -24,7 +24,7 @@ def performance(count: int, rate: Fraction | int = 25, *, start: int = 0) -> Ani
     return motion.animation(face, rate=rate, index=list(range(start, start + count)))
 
 
-def restarts(data: bytes) -> list[int]:
+def restarts(data: bytes | bytearray) -> list[int]:
     """Bytes at which plane start codes begin."""
     return [at for at in range(len(data) - 3) if data[at : at + 4] == b"\0\0\1\xbb"]
 
@@ -287,6 +287,18 @@ def test_a_time_code_that_was_too_high_is_taken_back() -> None:
         animation = decode(bytes(bad), on_error="salvage")
     assert any("0:00:05 lies before the previous plane" in str(one.message) for one in caught)
     assert animation.index.tolist() == [*range(75), *range(150, 200)]
+
+
+def test_a_single_time_code_that_goes_ahead_is_taken_back_by_the_next() -> None:
+    data = bytearray(encode(performance(200), EVERY_SECOND))
+    at = 8 * restarts(data)[3] + 32 + 4 + 13 + 1 + 12 + 5  # 0:00:04 becomes 0:00:05
+    data[at >> 3] ^= 128 >> (at & 7)
+    with pytest.warns(FbaWarning) as caught:
+        animation = decode(bytes(data), on_error="salvage")
+    said = [str(one.message) for one in caught]
+    assert ["25 frames are missing" in text for text in said] == [True, False]
+    assert "the planes before it are 25 frames late" in said[1]
+    assert animation.index.tolist() == [*range(100), *range(125, 200)]
 
 
 def test_a_single_plane_with_another_rate_is_not_believed() -> None:
