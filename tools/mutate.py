@@ -115,6 +115,7 @@ GAIT_DETECTION = "fba/body/gait/_detection.py"
 GAIT_MEASURE = "fba/body/gait/_measure.py"
 DAMAGE = "fba/codec/_stream/damage.py"
 RESTARTS = "fba/codec/_stream/restart_points.py"
+PLANE_TIMES = "fba/codec/_stream/plane_times.py"
 VALUES = "conformance/fba_conformance/values.py"
 JUDGEMENT = "conformance/fba_conformance/suite/judgement.py"
 TESTED = "conformance/fba_conformance/suite/programs.py"
@@ -530,6 +531,16 @@ MUTANTS = (
     Mutant(CLOCK, "and nearest == self.index:", "and False:", LOSS_TEST),
     Mutant(CLOCK, "_REPEATED_RATES = 2", "_REPEATED_RATES = 10**6", LOSS_TEST),
     Mutant(CLOCK, "return offset == before and", "return False and", LOSS_TEST),
+    Mutant(CLOCK, "undone = self._last_jump > 0 and", "undone = False and", LOSS_TEST),
+    Mutant(CLOCK, "far = self.agreements > 0 and", "far =", LOSS_TEST),
+    Mutant(CLOCK, " and index >= self._object_index", "", LOSS_TEST),
+    Mutant(CLOCK, "return rate not in (self.rate, before) and", "return rate != self.rate and", LOSS_TEST),
+    Mutant(CLOCK, "if time_code.total_seconds >= now:", "if True:", LOSS_TEST),
+    Mutant(PLANE_TIMES, "max(lost[0] - lost[1], 0) if clock.agreements else lost[0]", "lost[0]", LOSS_TEST),
+    Mutant(PLANE_TIMES, "= not self.may_step_back", "= False", LOSS_TEST),
+    Mutant(PLANE_TIMES, "if expected is not None and expected >= clock.index:", "if False:", LOSS_TEST),
+    Mutant(PLANE_TIMES, "self._restarts.forget()", "pass", LOSS_TEST),
+    Mutant(PLANE_TIMES, "elif jump < 0 or (agreed and jump):", "elif False:", LOSS_TEST),
     Mutant(RESTARTS, "_CYCLE = 2", "_CYCLE = 1", LOSS_TEST),
     Mutant(DAMAGE, "self._frames / self._bits", "0 / self._bits", LOSS_TEST),
     Mutant(ENCODER, "- self._origin, rate)\n        plane", ", rate)\n        plane", LOSS_TEST),

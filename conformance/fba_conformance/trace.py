@@ -118,7 +118,7 @@ class Walker:
         ) is not None:
             code = reader.start_code(stuffing)
             if code not in PLANE_START_CODES:
-                self._read_rest()
+                self._read_rest(in_object=code in OBJECT_START_CODES)
                 return False
             start_code = code
         if start_code is None and reader.only_stuffing_left():
@@ -149,15 +149,15 @@ class Walker:
             reader.record(0, "headers before the object", shown, "object")
         reader.start_code(0)
 
-    def _read_rest(self) -> None:
+    def _read_rest(self, *, in_object: bool) -> None:
         """Record user data after the object, and all other data there as one element.
 
-        A plane that belongs to no object is an error.
+        A plane that belongs to no object is an error. in_object: the next object has begun.
         """
         reader = self.reader
         objects = [_find_code(reader.data, code, reader.bit // 8) for code in OBJECT_START_CODES]
         stray = [_find_code(reader.data, code, reader.bit // 8) for code in PLANE_START_CODES]
-        if min(stray) < min(objects):
+        if min(stray) < min(objects) and not in_object:
             reader.plane = self.count
             raise reader.error("a plane start code behind the end of the object", bit=8 * min(stray))
         user_data = USER_DATA_START_CODE.to_bytes(4, "big")

@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 
 from codec_streams import END, OBJECT, PLANE, content, decoded, jaw_intra, jaw_predicted, packed
-from fba import Animation, Decoder, Encoder, EncoderOptions, FbaWarning, decode, encode
-from fba.codec import Damage, RangeLists, encode_planes
+from fba import Animation, BitstreamError, Decoder, Encoder, EncoderOptions, FbaWarning, decode, encode
+from fba.codec import Damage, FrameRate, PlaneSettings, RangeLists, TimeCode, encode_planes
+from fba.codec._stream.clock import StreamClock
+from fba.codec._stream.damage import DamageLog
+from fba.codec._stream.plane_times import PlaneTimes
 from fba.codec._stream.restart_points import RestartPoints
 from fba_conformance import _motion as motion
 
@@ -310,3 +313,68 @@ def test_a_single_plane_with_another_rate_is_not_believed() -> None:
         assert decode(bytes(bad), on_error="salvage").index.tolist() == list(range(125))
     with pytest.warns(FbaWarning, match="the frame rate changes from 25"):
         decode(bytes(bad))
+
+
+def test_a_rate_that_a_second_plane_confirms_is_used() -> None:
+    clock = StreamClock()
+    for _ in range(4):
+        clock.begin_intra(FrameRate(25), None, repair=True)
+        clock.advance(np.zeros(25, dtype=np.int64))
+    clock.begin_intra(FrameRate(30), None, repair=True)
+    assert (clock.rate, "30 in place of 25" in clock.refused) == (25, True)
+    clock.begin_intra(FrameRate(30), None, repair=True)
+    assert (clock.rate, clock.refused) == (30, "")
+
+
+def test_a_stream_may_begin_hours_after_zero() -> None:
+    """No time code has agreed with the count yet, so a code that is far ahead is believed."""
+    animation = performance(60, start=25 * 3600)
+    assert decode(encode(animation, EVERY_SECOND), on_error="salvage").index.tolist() == list(animation.index)
+
+
+def test_time_codes_do_not_go_back_behind_their_object() -> None:
+    """Those of a stream behind another one agree with each other, and are earlier all the same."""
+    data = encode(performance(100), EVERY_SECOND)
+    with pytest.warns(FbaWarning) as caught:
+        assert decode(2 * data, on_error="salvage").index.tolist() == list(range(200))
+    assert ["lies before the previous plane" in str(one.message) for one in caught] == [True] * 3
+
+
+def behind_loss(*sections: tuple[int, PlaneSettings], lost: int) -> tuple[int, DamageLog]:
+    """Index of the plane behind sections of so many planes, each of 10 bytes, and so many lost bytes."""
+    log, planes = DamageLog(), 0
+    times = PlaneTimes(log)
+    for count, first in sections:
+        zeros = np.zeros(count, dtype=np.int64)
+        times.begin_intra(first, planes, 80 * planes)
+        log.add_planes(80 * (planes + np.arange(count + 1)), zeros)
+        times.advance(zeros)
+        planes += count
+    log.begin(BitstreamError("lost", plane=planes, bit=80 * planes), 10 * planes, planes)
+    log.end(10 * planes + lost)
+    times.begin_intra(PlaneSettings(intra=True, start_code=True), planes, 80 * planes + 8 * lost)
+    return int(times.advance(np.zeros(1, dtype=np.int64))[1][0]), log
+
+
+RESTART = PlaneSettings(intra=True, frame_rate=FrameRate(25), start_code=True)
+
+
+@pytest.mark.parametrize(("code", "index"), [(None, 40), (TimeCode(0, 0, 1), 34)])
+def test_with_time_codes_the_clock_is_behind_rather_than_ahead(code: TimeCode | None, index: int) -> None:
+    """In 100 bytes, 10 planes had room, give or take 6; a time code may come later."""
+    after, log = behind_loss((25, RESTART), (5, replace(RESTART, time_code=code)), lost=100)
+    assert after == index
+    assert (log.damage[0].frames_lost, log.damage[0].uncertainty) == (10, 6)
+
+
+def test_lost_frames_end_where_a_restart_point_is_expected() -> None:
+    after, log = behind_loss(*[(25, RESTART)] * 3, lost=200)
+    assert after == 100
+    assert log.damage[0].frames_lost == 25
+
+
+def test_intervals_at_another_rate_are_forgotten() -> None:
+    """40 frames at 25 frames/s are 50 at 31.25: no second interval of 25."""
+    faster = replace(RESTART, frame_rate=FrameRate(31, 4))
+    after, _ = behind_loss((25, RESTART), (15, RESTART), (5, faster), lost=100)
+    assert after == 50 + 5 + 10

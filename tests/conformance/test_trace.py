@@ -391,3 +391,12 @@ def test_elements_as_json() -> None:
         "values": {"viseme_select1": 1, "viseme_select2": 2, "viseme_blend": 18},
     }
     assert isinstance(next(e for e in trace(RICH) if e.name == "viseme segment").value, Levels)
+
+
+def test_an_object_behind_another_may_begin_with_a_plane_start_code() -> None:
+    """Only the first object is read, and a plane start code in the second is none outside of an object."""
+    second = as_bytes(stuffed(OBJECT + PLANE + JAW_PLANE) + END)
+    data = as_bytes(stuffed(OBJECT + JAW_PLANE)) + second
+    assert [plane["number"] for plane in decode_values(data)] == [0]
+    with pytest.raises(BitstreamError, match="a plane start code behind the end of the object"):
+        decode_values(one_object(JAW_PLANE) + second[4:])
