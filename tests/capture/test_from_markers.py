@@ -129,6 +129,17 @@ def test_swapped_markers(one: str, other: str) -> None:
     check(face, take(), 20)
 
 
+def test_markers_that_take_each_others_names_for_a_while() -> None:
+    positions = take().motion.positions.copy()
+    a, b, c = (NAMES.index(name) for name in ("LPL1", "LPL2", "LCL"))
+    positions[200:350, [a, b]] = positions[200:350, [b, a]]
+    positions[400:, [a, c]] = positions[400:, [c, a]]
+    message = "LPL1 and LPL2 take each other's names in frame 200, and 2 more times"
+    with pytest.warns(FbaWarning, match=message):
+        face = find_face(with_positions(positions))
+    check(face, take(), 20)
+
+
 def test_a_marker_that_fell_off() -> None:
     positions = take().motion.positions.copy()
     positions[:, NAMES.index("FHC")] = (0.3, -0.4, 0.2)
@@ -306,6 +317,12 @@ def test_captures_without_a_face() -> None:
     body = MarkerMotion(tuple(f"m{n}" for n in range(40)), random, np.arange(5) / 100, Fraction(100))
     with pytest.raises(ModelError, match="their shape is not that of a face"):
         find_face(body)
+    skin = FaceModel.default().of_kind("skin")[0].vertices
+    scalp = skin[(skin[:, 1] > 0.06) & (skin[:, 2] > -0.09)][::7][:60]
+    labels = tuple(f"m{n}" for n in range(len(scalp)))
+    cap = MarkerMotion(labels, scalp[None].repeat(2, axis=0), np.arange(2), Fraction(1))
+    with pytest.raises(ModelError, match=r"not that of a face: only \d+ of 60"):
+        find_face(cap)
     flat = {name: place for name, place in find_map(motion)[0].items() if place not in RIGID}
     with pytest.raises(ModelError, match=r"needs three markers that the face does not move.*the map has 0"):
         find_face(motion, markers=flat)

@@ -11,6 +11,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
+from fba.capture.markers.exchanges import Exchange, undo_exchanges
 from fba.capture.markers.gaps import RARELY, Filled, fill_gaps
 from fba.capture.markers.marker_maps import check_map, find_map, list_names
 from fba.capture.markers.motion import MarkerMotion
@@ -150,6 +151,8 @@ def find_face(
     places = _without_rare(motion, places)
     names = tuple(places)
     positions = motion.positions[:, [motion.names.index(name) for name in names]]
+    positions, exchanges = undo_exchanges(names, positions)
+    _tell_exchanges(exchanges)
     fixed = [n for n, name in enumerate(names) if places[name] in RIGID]
     if len(fixed) < 3:
         raise ModelError(
@@ -292,6 +295,18 @@ def _tell(motion: MarkerMotion, where: Registration) -> None:
         said.append(f"far from their places on a face, and left out: {list_names(where.astray)}")
     for text in said:
         warnings.warn(text, FbaWarning, stacklevel=4)
+
+
+def _tell_exchanges(exchanges: list[Exchange]) -> None:
+    """Warn of markers that took each other's names."""
+    if exchanges:
+        first = exchanges[0]
+        more = f", and {len(exchanges) - 1} more times in the take" if len(exchanges) > 1 else ""
+        warnings.warn(
+            f"markers {first.one} and {first.other} take each other's names in frame {first.frame}{more}: "
+            "exchanged from there on",
+            FbaWarning, stacklevel=4,
+        )  # fmt: skip
 
 
 def _tell_gaps(filled: Filled) -> None:

@@ -1,0 +1,69 @@
+"""Markers that take each other's names in the middle of a take, as trackers confuse those that come near."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.arrays import Float64
+
+JUMP = 0.05
+"""Share of the face's size by which a marker jumps, relative to the others, when it takes another's name."""
+EXCHANGED = 0.4
+"""Two markers are exchanged if they come this much nearer to each other's last places than to their own."""
+MOST_AT_ONCE = 20
+"""Markers that jump in a frame; more are a cut, or another take."""
+SAMPLES = 100
+"""Frames, about, that tell the face's size."""
+MOST = 200
+"""Exchanges that are undone; more are noise."""
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Two markers that have each other's names from a frame on."""
+
+    frame: int
+    one: str
+    other: str
+
+
+def undo_exchanges(names: tuple[str, ...], positions: Float64) -> tuple[Float64, list[Exchange]]:
+    """Return positions (T, M, 3) with exchanges undone, and these in order.
+
+    positions: NaN for gaps, in any unit of length.
+    """
+    limit = JUMP * _size(positions[:: max(1, len(positions) // SAMPLES)])
+    steps = np.diff(positions, axis=0)
+    far = (steps**2).sum(axis=2) > limit**2  # not where a step is NaN
+    fixed, found = positions, []
+    for frame in np.flatnonzero(far.sum(axis=1) >= 2).tolist():
+        usual = np.nanmedian(steps[frame], axis=0)  # the head's own motion
+        rows = np.flatnonzero(np.linalg.norm(steps[frame] - usual, axis=1) > limit)
+        if not 2 <= len(rows) <= MOST_AT_ONCE:
+            continue
+        before, after = fixed[frame, rows] + usual, fixed[frame + 1, rows]
+        apart = np.linalg.norm(after[:, None] - before[None], axis=2)
+        own = np.diag(apart)
+        together = apart + apart.T
+        together[np.diag_indices(len(rows))] = np.inf
+        for a in range(len(rows)):
+            b = int(together[a].argmin())
+            if b > a and together[a, b] < EXCHANGED * (own[a] + own[b]) and int(together[b].argmin()) == a:
+                if fixed is positions:
+                    fixed = positions.copy()
+                one, other = int(rows[a]), int(rows[b])
+                fixed[frame + 1 :, [one, other]] = fixed[frame + 1 :, [other, one]]
+                found.append(Exchange(frame + 1, names[one], names[other]))
+                if len(found) > MOST:
+                    return positions, []
+    return fixed, found
+
+
+def _size(positions: Float64) -> float:
+    """Return the median distance of the markers from their middle; 0 where none is seen."""
+    seen = ~np.isnan(positions[..., 0])
+    middle = np.where(seen[..., None], positions, 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)[:, None]
+    away = np.linalg.norm(positions - middle[:, None], axis=2)
+    return float(np.median(away[seen])) if seen.any() else 0.0
