@@ -170,6 +170,12 @@ def test_visemes_and_expressions_are_those_of_the_shapes(base: FaceModel) -> Non
     assert made.notes["visemes and expressions"].endswith("surprise, A:, U")
 
 
+def test_a_shape_that_no_fap_can_show_leaves_ours(base: FaceModel) -> None:
+    aside = np.zeros((len(base.part("skin").vertices), 3))
+    aside[base.bound[row_of()["2.2"]] - base.starts["skin"], 0] = 0.005
+    assert define_by_shapes(base, {"viseme_nn": {"skin": aside}}) is base
+
+
 def test_a_lopsided_shape_gives_both_sides_the_same(base: FaceModel) -> None:
     made = define_by_shapes(
         base, {"joy": shape_of(base, {"raise_l_cornerlip": 100.0, "raise_l_cornerlip_o": 100.0})}

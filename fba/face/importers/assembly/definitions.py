@@ -103,6 +103,8 @@ def _measure(
     target = _even(sides)[numbers_known - 1]
     rest = deform.feature_points(np.zeros(FAP_COUNT))[rows]
     large = np.abs(target) > LARGE * np.abs(target).max()
+    if not large.any():  # it moves no point in the direction of any FAP
+        return None
     values = np.zeros(FAP_COUNT)
     for _ in range(SCALINGS):
         values = np.zeros(FAP_COUNT)
