@@ -130,6 +130,7 @@ MAKERS = (
     Maker("mirrored, fingers, y up", MIXAMO, rest="M", finger=FINGERS),
     Maker("fitted to positions: hips turned aside, thighs turned back", MIXAMO, aside=-70.0),
 )  # fmt: skip
+FINGER_NAMES = ("thumb", "index", "middle", "ring", "pinky")
 BONES = (
     ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"),
 )  # fmt: skip
@@ -205,6 +206,23 @@ def test_a_person_comes_back_as_it_was(maker: Maker) -> None:
         errors[f"place {side}_ankle"] = (
             np.linalg.norm(wanted[:, n, :3, 3] - found[:, n, :3, 3], axis=1).max() / 0.01
         )
+        if f"{side}_metatarsal" in known or maker.rest in "NAT":  # else nothing says where a foot points
+            errors[f"foot frame {side}"] = turned(wanted[:, n, :3, :3], found[:, n, :3, :3]) / 5.0
+        if f"{side}_sternoclavicular" in known:
+            ends = [number[f"{side}_sternoclavicular"], number[f"{side}_shoulder"]]
+            lines = [m[:, ends[1], :3, 3] - m[:, ends[0], :3, 3] for m in (wanted, found)]
+            errors[f"clavicle {side}"] = between(*lines) / 2.0
+        for finger in FINGER_NAMES:
+            if f"{side}_{finger}1" not in known:
+                continue
+            for a, b in ((1, 2), (2, 3)):
+                ends = [number[f"{side}_{finger}{k}"] for k in (a, b)]
+                lines = [m[:, ends[1], :3, 3] - m[:, ends[0], :3, 3] for m in (wanted, found)]
+                errors[f"{finger}{a} {side}"] = between(*lines) / 2.0
+                ball = number[f"{side}_{finger}{a}"]
+                errors[f"twist {finger}{a} {side}"] = (
+                    turned(wanted[:, ball, :3, :3], found[:, ball, :3, :3]) / 5.0
+                )
     for joint in ("hip", "shoulder"):
         if joint == "shoulder" and not known & {"vt6", "vt10"}:
             continue  # the file's shoulders turn with the loins
