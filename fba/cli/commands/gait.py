@@ -98,6 +98,15 @@ def command(
         raise click.UsageError("give one of -o OUT, --list and --find FILE")
     if to is not None and output is None:
         raise click.UsageError("--to goes with -o")
+    if cycles is not None and seconds is not None:
+        raise click.UsageError("give either --cycles or --seconds, not both")
+    walking = {"--stride": stride, "--cycles": cycles, "--seconds": seconds, "--in-place": in_place or None}
+    for option, value in walking.items() if output is None else ():
+        if value is not None:
+            raise click.UsageError(f"{option} goes with -o: it is of a walk that is made")
+    for option, value in (("--cycles", cycles), ("--seconds", seconds)):
+        if value is not None and not value > 0:
+            raise click.UsageError(f"{option} must be a positive number, not {value:g}")
     if listed:
         _print_characters(as_json)
     elif find is not None:
