@@ -1,6 +1,7 @@
 """Makes the curves of docs/gait.md: `python docs/make_gait_curves.py`.
 
-Hip, knee and ankle of the normal walk beside the means that Winter measured, and the height of the pelvis.
+Hip, knee and ankle of the normal walk beside the means and deviations that Winter measured, and the height of
+the pelvis.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ OURS, THEIRS = "#b3401f", "#1f5fb3"
 
 
 def measured() -> np.ndarray:
-    """Percent of the cycle, and degrees of hip, knee and ankle, float64 (51, 4)."""
+    """Percent of the cycle, degrees of hip, knee and ankle, and their deviations, float64 (51, 7)."""
     lines = [line for line in MEASURED.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     return np.array([[float(value) for value in row] for row in list(csv.reader(lines))[1:]])
 
@@ -54,8 +55,13 @@ Line = tuple[np.ndarray, np.ndarray, str]
 """Percent of the cycle, values, and a colour."""
 
 
-def panel(x: int, y: int, title: str, low: float, high: float, lines: list[Line]) -> str:
-    """One diagram: its frame, three labels, and lines (percent, values, colour)."""
+def panel(
+    x: int, y: int, title: str, low: float, high: float, lines: list[Line], band: np.ndarray | None = None
+) -> str:
+    """One diagram: its frame, three labels, and lines (percent, values, colour).
+
+    band: percent, lowest and highest value, (N, 3), of an area behind the lines.
+    """
 
     def place(percent: np.ndarray, values: np.ndarray) -> str:
         across = x + WIDTH * percent / 100.0
@@ -68,6 +74,9 @@ def panel(x: int, y: int, title: str, low: float, high: float, lines: list[Line]
         f'<text x="{x - 6}" y="{y + 9}" text-anchor="end">{high:g}</text>',
         f'<text x="{x - 6}" y="{y + HEIGHT}" text-anchor="end">{low:g}</text>',
     ]
+    if band is not None:
+        area = f"{place(band[:, 0], band[:, 1])} {place(band[::-1, 0], band[::-1, 2])}"
+        parts.append(f'<polygon points="{area}" fill="{THEIRS}" fill-opacity="0.18"/>')
     for percent in (0, 50, 100):
         across = x + WIDTH * percent // 100
         parts.append(f'<text x="{across}" y="{y + HEIGHT + 14}" text-anchor="middle">{percent} %</text>')
@@ -85,11 +94,14 @@ def main() -> None:
     for number, name in enumerate(JOINTS):
         x, y = LEFT + (number % 2) * (WIDTH + 60), TOP + (number // 2) * (HEIGHT + 50)
         lines = [(theirs[:, 0], theirs[:, number + 1], THEIRS), (ours[:, 0], ours[:, number + 1], OURS)]
-        panels.append(panel(x, y, f"{name}, degrees", *limits[name], lines))
+        mean, deviation = theirs[:, number + 1], theirs[:, number + 4]
+        band = np.stack([theirs[:, 0], mean - deviation, mean + deviation], axis=1)
+        panels.append(panel(x, y, f"{name}, degrees", *limits[name], lines, band))
     panels.append(panel(LEFT + WIDTH + 60, TOP + HEIGHT + 50, "height of the pelvis, cm", 91.0, 99.0,
                         [(ours[:, 0], height, OURS)]))  # fmt: skip
-    legend = (f'<text x="{LEFT}" y="{2 * HEIGHT + 120}" fill="{THEIRS}">means of people (Winter)</text>'
-              f'<text x="{LEFT + 190}" y="{2 * HEIGHT + 120}" fill="{OURS}">fba gait</text>')  # fmt: skip
+    legend = (f'<text x="{LEFT}" y="{2 * HEIGHT + 120}" fill="{THEIRS}">'
+              "means of people, and one standard deviation (Winter)</text>"
+              f'<text x="{LEFT + 330}" y="{2 * HEIGHT + 120}" fill="{OURS}">fba gait</text>')  # fmt: skip
     width, whole = 2 * WIDTH + 130, 2 * HEIGHT + 135
     TARGET.write_text(
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {whole}" font-family="sans-serif" '

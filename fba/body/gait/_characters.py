@@ -66,6 +66,18 @@ class Pelvis:
 
 
 @dataclass(frozen=True)
+class Feet:
+    """When a foot rolls over the ground: fractions of the cycle, from its contact on.
+
+    flat: it lies flat. rises: its heel begins to rise. leaves: its toes leave the ground.
+    """
+
+    flat: float
+    rises: float
+    leaves: float
+
+
+@dataclass(frozen=True)
 class Spine:
     """Posture and motion of the spine.
 
@@ -116,6 +128,7 @@ class Character:
     stride: float
     width: float
     toes_out: float
+    feet: Feet
     pelvis: Pelvis
     spine: Spine
     arms: Arms
@@ -135,7 +148,7 @@ class Character:
                     f"gait character {self.name!r}: {what} must lie within {low:g}..{high:g}, not {value!r}"
                 )
         for group, part in (
-            ("pelvis", self.pelvis), ("spine", self.spine), ("arms", self.arms),
+            ("feet", self.feet), ("pelvis", self.pelvis), ("spine", self.spine), ("arms", self.arms),
             *((" ".join(key), pose) for key, pose in self.poses.items()),
         ):  # fmt: skip
             for field, value in vars(part).items():
@@ -144,6 +157,13 @@ class Character:
                         f"gait character {self.name!r}: {group}, {field} must be a number of at most "
                         f"{_MAX_DEGREES:g}, not {value!r}"
                     )
+        feet = self.feet
+        if not (0.0 < feet.flat < PHASES[1] and feet.flat < feet.rises < 0.5 < feet.leaves < 0.5 + PHASES[1]):
+            raise ModelError(
+                f"gait character {self.name!r}: feet must lie flat before {PHASES[1]:g} of the cycle, rise "
+                f"before 0.5 and leave the ground by {0.5 + PHASES[1]:g}, not at {feet.flat:g}, "
+                f"{feet.rises:g} and {feet.leaves:g}"
+            )
 
     @staticmethod
     def named(name: str) -> Character:
@@ -190,7 +210,7 @@ def _characters() -> dict[str, Character]:
     result = {}
     normal = table["normal"]
     for name, own in table.items():
-        parts = {key: {**normal[key], **own.get(key, {})} for key in ("pelvis", "spine", "arms")}
+        parts = {key: {**normal[key], **own.get(key, {})} for key in ("feet", "pelvis", "spine", "arms")}
         values = {**normal, **own}
         result[name] = Character(
             name,
@@ -199,6 +219,7 @@ def _characters() -> dict[str, Character]:
             float(values["stride"]),
             float(values["width"]),
             float(values["toes_out"]),
+            Feet(**parts["feet"]),
             Pelvis(**parts["pelvis"]),
             Spine(**parts["spine"]),
             Arms(**parts["arms"]),

@@ -17,8 +17,6 @@ from fba.body.gait._limb import foot_angles, limb_angles
 from fba.easing import smoothstep
 from fba.rotations import apply, axis_matrices
 
-TOE_OFF = 0.6
-"""Fraction of the cycle at which a foot leaves the ground."""
 _ROUNDS = 4
 """Rounds in which the roll of the subtalar joint and the turn of the foot settle."""
 _RISEN = np.sin(np.radians(12.0))

@@ -15,23 +15,17 @@ from fba.body.gait import _ground as ground
 from fba.body.gait._anatomy import Anatomy, Side
 from fba.body.gait._characters import CYCLE, PHASES, Character
 from fba.body.gait._curves import Interpolation, cosine_wave, periodic_curve, spline
-from fba.body.gait._ground import TOE_OFF, Footing, Leg
+from fba.body.gait._ground import Footing, Leg
 from fba.body.gait._limb import limb_angles
 from fba.easing import smoothstep
 from fba.errors import ModelError
 from fba.rotations import axis_matrices
 
 KNOTS = np.array([*PHASES, *(phase + 0.5 for phase in PHASES)])
-FLAT = 0.09
-"""Fraction of the cycle after which a foot that landed on its heel lies flat."""
 SHORTEST = 0.1
 """Metres: the shortest stride."""
-_DOUBLE = TOE_OFF - 0.5
-"""Fraction of the cycle in which both feet are on the ground, and the front leg takes over the height."""
-_STRAIGHT = 0.9985
+_STRAIGHT = 0.9993
 """Share of its length to which a leg may stretch: a knee is never locked."""
-_RISES = 0.33
-"""Fraction of the cycle at which a heel begins to rise."""
 _STRAIN = 0.03
 """Largest lowering of the body, as a share of the legs' length, by a stride that is long for them."""
 _RELEASE_RATE = 4.0
@@ -79,6 +73,10 @@ class Plan:
         return result
 
     @property
+    def _toe_off(self) -> float:
+        return self.character.feet.leaves
+
+    @property
     def _yaw(self) -> float:
         return float(np.radians(self.character.toes_out))
 
@@ -87,10 +85,15 @@ class Plan:
         phase = np.mod(phase, 1.0)
         # from its contact until it lies flat, a foot falls freely; the other poses lead up to the contact
         flat = min(self._foot[0], self._foot[1])
-        landing = flat + (self._foot[0] - flat) * np.maximum(1.0 - phase / FLAT, 0.0) ** 1.5
-        knots, values = np.array([0.0, FLAT, *KNOTS[1:]]), np.array([self._foot[0], flat, *self._foot[1:]])
+        landing = (
+            flat + (self._foot[0] - flat) * np.maximum(1.0 - phase / self.character.feet.flat, 0.0) ** 1.5
+        )
+        knots, values = (
+            np.array([0.0, self.character.feet.flat, *KNOTS[1:]]),
+            np.array([self._foot[0], flat, *self._foot[1:]]),
+        )
         later = periodic_curve(knots, values, phase, self.interpolation)
-        return np.where(phase < FLAT, landing, later)
+        return np.where(phase < self.character.feet.flat, landing, later)
 
     def knee(self, phase: Float64) -> Float64:
         """Return (T,) bend of the knee by the poses, at phases of its own leg, radians."""
@@ -99,8 +102,8 @@ class Plan:
     def toes(self, phase: Float64) -> Float64:
         """Return (T,) bend of the toes upward, radians: they lie flat until they leave the ground."""
         phase = np.mod(phase, 1.0)
-        flat = np.maximum(-self.pitch(np.minimum(phase, TOE_OFF)), 0.0)
-        return np.where(phase < 0.9, flat * (1.0 - smoothstep((phase - TOE_OFF) / 0.15)), 0.0)
+        flat = np.maximum(-self.pitch(np.minimum(phase, self._toe_off)), 0.0)
+        return np.where(phase < 0.9, flat * (1.0 - smoothstep((phase - self._toe_off) / 0.15)), 0.0)
 
     def lean(self, phase: Float64) -> Float64:
         """Return (T, 3, 3) rotation of the root."""
@@ -204,14 +207,14 @@ class Plan:
     def _heights(self, phase: Float64) -> tuple[Float64, Float64, Float64]:
         """Return the root over the ground (T, 3), its height (T,) by the poses, and its largest one (T,)."""
         root = self._root_along(phase) - (0.0, 0.0, self._ahead)
-        share = smoothstep(np.mod(phase, 0.5) / _DOUBLE)
+        share = smoothstep(np.mod(phase, 0.5) / (self._toe_off - 0.5))
         right_leads = np.mod(phase, 1.0) < 0.5
         heights, limits = {}, []
         for letter, side in self.anatomy.sides.items():
             heights[letter] = self._root_height(side, root, phase)
             limit = self._root_height(side, root, phase, side.leg.bend(_STRAIGHT * side.leg.reach))
             own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0)
-            released = np.maximum(own - TOE_OFF, 0.0) * _RELEASE_RATE * self.anatomy.scale
+            released = np.maximum(own - self._toe_off, 0.0) * _RELEASE_RATE * self.anatomy.scale
             limits.append(np.where(own < KNOTS[6], limit + released, np.inf))
         front = np.where(right_leads, heights["r"], heights["l"])
         rear = np.where(right_leads, heights["l"], heights["r"])
@@ -232,7 +235,7 @@ class Plan:
     @cached_property
     def _level_roll(self) -> float:
         """Roll of the left subtalar joint when the heel begins to rise, radians."""
-        side, phase = self.anatomy.sides["l"], np.array([0.5 + _RISES])
+        side, phase = self.anatomy.sides["l"], np.array([0.5 + self.character.feet.rises])
         hip = self.hip(side, self.root(phase), phase)
         leg = ground.solve_leg(side, hip, self.footing(side, phase), self._yaw)
         return float(leg.ankle()[2][0])
@@ -245,12 +248,12 @@ class Plan:
     def _swing(self, side: Side) -> tuple[Float64, Float64, Float64, Float64]:
         """Return the entry of `_swings` for one side."""
         start = 0.0 if side.letter == "r" else 0.5
-        ends = start + np.array([TOE_OFF - _TINY, TOE_OFF, 1.0, 1.0 + _TINY])
+        ends = start + np.array([self._toe_off - _TINY, self._toe_off, 1.0, 1.0 + _TINY])
         leg = self.standing_leg(side, ends)
         x, _, z = limb_angles(leg.thigh)
         solved = np.stack([x, z, leg.bend], axis=-1)
         off, on = (solved[1] - solved[0]) / _TINY, (solved[3] - solved[2]) / _TINY
-        knots = np.array([TOE_OFF, KNOTS[6], KNOTS[7], 1.0])
+        knots = np.array([self._toe_off, KNOTS[6], KNOTS[7], 1.0])
         poses = self.character.poses
         landing = -np.degrees(solved[2][0])
         usual = landing if abs(self.stride_ratio - 1.0) < 1e-9 else self._usual_landing(side)
@@ -258,7 +261,7 @@ class Plan:
         # a swinging thigh follows a longer or shorter stride, the more the nearer the foot is to its contact
         for number, (pose, follow) in enumerate((("passing", 0.6), ("anticipation", 1.0))):
             thigh = poses[pose, "swing"].thigh + follow * (landing - usual)
-            share = (knots[number + 1] - TOE_OFF) / (1.0 - TOE_OFF)
+            share = (knots[number + 1] - self._toe_off) / (1.0 - self._toe_off)
             aside = solved[1][1] + share * (solved[2][1] - solved[1][1])
             values.append(np.array([-np.radians(thigh), aside, self._knee[6 + number]]))
         values.append(solved[2])
@@ -276,10 +279,10 @@ class Plan:
     def leg(self, side: Side, phase: Float64, root: Float64) -> Leg:
         """Return the leg at any phase, standing or swinging, for positions (T, 3) of the root."""
         own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
-        stands = own <= TOE_OFF
+        stands = own <= self._toe_off
         yaw = side.sign * self._yaw
         knots, values, off, on = self._swings[side.letter]
-        swing = np.clip(own, TOE_OFF, 1.0)
+        swing = np.clip(own, self._toe_off, 1.0)
         if self.interpolation == "linear":
             x, z, bend = (np.interp(swing, knots, column) for column in values.T)
         else:
@@ -287,7 +290,7 @@ class Plan:
         thigh = axis_matrices(0, x) @ axis_matrices(2, z) @ axis_matrices(1, np.full(x.shape, yaw))
         hip = self.hip(side, root, phase)
         swinging = ground.place_swinging_foot(side, hip, thigh, bend, ground.foot_turn(self.pitch(own), yaw))
-        rise = np.minimum((own - TOE_OFF) / 0.03, (1.0 - own) / 0.06)
+        rise = np.minimum((own - self._toe_off) / 0.03, (1.0 - own) / 0.06)
         room = _CLEAR * self.anatomy.scale * np.clip(rise, 0.0, 1.0)
         lift = np.maximum(room - ground.lowest_height(side, swinging, self.toes(own)), 0.0)
         swinging.subtalar[..., 1] += lift

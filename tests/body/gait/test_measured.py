@@ -19,10 +19,9 @@ def degrees(bone: np.ndarray) -> np.ndarray:
 
 
 def test_a_normal_walk_is_like_that_of_people() -> None:
-    """Angles between the centres of the joints of the right leg, in the sagittal plane.
+    """Hip and knee stay within one standard deviation of the means for 90 % of the cycle, the ankle for 82 %.
 
-    The deviations of people from these means are in no public source that was found, so the bounds are those
-    that the walk keeps: 5, 7 and 4 degrees on average.
+    Angles between the centres of the joints of the right leg, in the sagittal plane.
     """
     lines = [line for line in MEASURED.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
     table = np.array(list(csv.reader(lines))[1:], dtype=np.float64)
@@ -35,14 +34,24 @@ def test_a_normal_walk_is_like_that_of_people() -> None:
     thigh, shank = degrees(knee - hip), degrees(ankle - knee)
     foot = np.degrees(np.arctan2(toes[:, 1], toes[:, 2])) - shank
     percent = np.linspace(0, 100, len(walk))
-    for ours, theirs, bound in (
-        (thigh[:-1], table[:, 1], 5.0),
-        ((thigh - shank)[:-1], table[:, 2], 7.0),
-        ((foot - foot[-1])[:-1], table[:, 3], 4.0),
+    ours = (thigh[:-1], (thigh - shank)[:-1], (foot - foot[-1])[:-1])
+    for column, (values, share, most) in enumerate(
+        zip(ours, (0.9, 0.9, 0.82), (1.35, 1.85, 1.5), strict=True), 1
     ):
-        apart = ours - np.interp(percent, table[:, 0], theirs)
-        assert np.sqrt((apart**2).mean()) < bound
-        assert np.abs(apart).max() < 2.1 * bound
+        apart = np.interp(table[:, 0], percent, values) - table[:, column]
+        deviations = np.abs(apart / table[:, column + 3])
+        assert deviations.max() < most
+        assert (deviations <= 1.0).mean() >= share
+
+
+def test_the_pelvis_is_lowest_on_two_feet_and_highest_on_one() -> None:
+    """The second half of the cycle repeats the first; the other foot stands until 7 % of it and from 50 %."""
+    walk = gait.walk(cycles=1, rate=60)
+    assert walk.body is not None
+    height = walk.body.values[:32, 180]
+    assert 0 <= np.argmin(height) <= 4
+    assert 16 <= np.argmax(height) <= 24
+    assert np.diff(height[4:20]).min() >= -2
 
 
 @pytest.mark.parametrize(("character", "low", "high"), [("normal", 4.0, 5.0), ("bored", 2.0, 3.0)])
@@ -54,12 +63,12 @@ def test_the_pelvis_rises_and_falls(character: str, low: float, high: float) -> 
 
 
 def test_a_sneaking_foot_lands_softly() -> None:
-    """Its knee slows down by at most 18 mm a frame, at 30 frames/s, when the foot touches the ground."""
+    """Its knee slows down by at most 12 mm a frame, at 30 frames/s, when the foot touches the ground."""
     walk = gait.walk(character="sneaking", cycles=2)
     assert walk.body is not None
     knee = BapSolver().pose(walk.body.values)[:, Skeleton.default().number("r_knee"), :3, 3]
     change = 1000 * np.linalg.norm(np.diff(knee, 2, axis=0), axis=1)
-    assert change[55] < 18  # about frame 56, the contact
+    assert change[50:62].max() < 12  # about frame 56, the contact
 
 
 def test_whole_numbers_are_degrees_too() -> None:
