@@ -92,14 +92,18 @@ class Curves:
         return frames
 
     def departures(self, letter: str) -> list[int]:
-        """Return the frames in which a foot has just left the ground."""
+        """Return the frames in which a foot has just left the ground.
+
+        A foot that is dragged along stays low while it swings, so little of the time after it was furthest
+        behind counts.
+        """
         height = self.lowest[letter]
         frames = []
         for peak in self._peaks(-self.toes[letter]):
             near = self._frames(LEAVING)
             first = max(0, peak - near)
             low = height[max(0, first - near) : peak + 1].min()
-            down = np.flatnonzero(height[first : peak + near // 2 + 1] <= low + TOUCH * self.reach)
+            down = np.flatnonzero(height[first : peak + near // 4 + 1] <= low + TOUCH * self.reach)
             frames.append(first + int(down[-1]) + 1 if len(down) else peak)
         return frames
 
