@@ -1,12 +1,14 @@
-"""Open a file for reading, with a clear error for anything but a regular, readable file with content."""
+"""Files to be read: opened, with a clear error where there is nothing to be read, and named in errors."""
 
 from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import BinaryIO
 
-from fba.errors import FormatError
+from fba.errors import BitstreamError, FormatError, LimitError, ModelError, RangeError, UnsupportedError
 
 Path = str | os.PathLike[str]
 
@@ -72,3 +74,21 @@ def _read(file: BinaryIO, count: int, path: Path) -> bytes:
         return file.read(count)
     except OSError as error:
         raise FormatError(f"cannot be read: {error.strerror or error}", path=path) from error
+
+
+@contextmanager
+def naming_file(path: Path) -> Iterator[None]:
+    """Put a file's name in front of errors that concern its content and do not have it.
+
+    A ModelError becomes a FormatError; all others keep their type and attributes.
+    """
+    name = os.fspath(path)
+    try:
+        yield
+    except ModelError as error:
+        finding = error.finding.removeprefix(f"{os.path.basename(name)}: ")
+        raise FormatError(finding, path=path).with_remedies(*error.remedies) from error
+    except (BitstreamError, LimitError, RangeError, UnsupportedError) as error:
+        if not error.finding.startswith(f"{name}: "):
+            error.args = (f"{name}: {error.finding}",)
+        raise

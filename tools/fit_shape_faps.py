@@ -28,12 +28,12 @@ sys.path.insert(0, str(ROOT))
 
 from fba.capture.blendshapes.shape_table import amounts_of  # noqa: E402
 from fba.errors import FbaError  # noqa: E402
-from fba.face.authoring.shapes.shape_names import arkit_names, canonical_names  # noqa: E402
 from fba.face.deform.deformer import Deformer  # noqa: E402
 from fba.face.feature_points import row_of  # noqa: E402
 from fba.face.importers._gltf import gltf_pieces, locate  # noqa: E402
 from fba.face.importers.assembly.model import ImportOptions, finish_import, metres_per_unit  # noqa: E402
 from fba.face.importers.assembly.pieces import assemble, shift_piece  # noqa: E402
+from fba.face.shape_names import arkit_names, canonical_names  # noqa: E402
 from fba.parameters import FAP_COUNT, fap_numbers, faps  # noqa: E402
 
 TABLE = ROOT / "fba/capture/blendshapes/shape_faps.csv"
@@ -66,6 +66,8 @@ CORRECTED = {
 opens, and cheeks that did not seem to puff, as their feature points are at the side."""
 LIPS = ((4, 5), (8, 10), (9, 11))
 """FAPs of the upper and of the lower lip at one place, which add up to 0 where the lips touch."""
+LOWEST = 330
+"""How far an upper lip comes down to meet that of an open jaw: as far as skin goes on every head."""
 LIDS = ((19, 21), (20, 22))
 CLOSED = 1024
 """Sum of the FAPs of two lids that touch."""
@@ -204,7 +206,7 @@ def touch(row: str, medians: dict[str, np.ndarray]) -> None:
             values[lower - 1] = CLOSED - values[upper - 1]
     if row == "mouthClose":
         for upper, lower in LIPS:
-            down = (values[upper - 1] - values[lower - 1]) / 2
+            down = min((values[upper - 1] - values[lower - 1]) / 2, LOWEST)
             values[[upper - 1, lower - 1]] = down, -down
         values -= medians["jawOpen"]
         values[2] = 0.0

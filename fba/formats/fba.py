@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-from collections.abc import Iterator
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.atomic import atomic
-from fba.errors import BitstreamError, LimitError, OptionError, RangeError, UnsupportedError
+from fba.errors import OptionError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
-from fba.source import Path, read_whole
+from fba.source import Path, naming_file, read_whole
 
 if TYPE_CHECKING:
     from fba.codec import EncoderOptions
@@ -95,13 +93,3 @@ def _encoder_settings() -> tuple[str, ...]:
 
 
 write_fba.extra_options = _encoder_settings  # type: ignore[attr-defined]
-
-
-@contextlib.contextmanager
-def naming_file(path: Path) -> Iterator[None]:
-    """Put the file's name in front of the codec's errors; their type and attributes stay."""
-    try:
-        yield
-    except (BitstreamError, LimitError, RangeError, UnsupportedError) as error:
-        error.args = (f"{os.fspath(path)}: {error.finding}",)
-        raise

@@ -320,8 +320,7 @@ def probe(
     Raises FormatError, BitstreamError.
     """
     from fba.codec import StreamInfo, probe_stream
-    from fba.formats.fba import naming_file
-    from fba.source import read_whole
+    from fba.source import naming_file, read_whole
 
     if isinstance(data_or_path, bytes | bytearray | memoryview):
         return probe_stream(data_or_path, bap_steps=bap_steps, limits=limits)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.capture.blendshapes.shape_table import amounts_of, key_of
-from fba.face.authoring.shapes.shape_names import arkit_of
+from fba.face.shape_names import arkit_of
 from fba.parameters import FAP_COUNT, fap_numbers
 
 LID_GAP = 1024.0

@@ -10,8 +10,8 @@ import numpy as np
 
 from fba.arrays import Float32
 from fba.easing import smoothstep
-from fba.face.authoring.shapes.shape_names import canonical_names
 from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.shape_names import canonical_names
 
 BOTH = {
     "eyesclosed": "eyeBlink",

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from fba.arrays import Float32
-from fba.face.authoring.shapes.shape_names import canonical_names
+from fba.face.shape_names import canonical_names
 from fba.gltf.scene import Gltf
 from fba.gltf.values import Value
 

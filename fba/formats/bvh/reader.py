@@ -20,10 +20,10 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.skeleton import MOST_FRAMES, check_memory
-from fba.errors import FbaWarning, FormatError, ModelError
+from fba.errors import FbaWarning, FormatError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
-from fba.source import read_whole
+from fba.source import naming_file, read_whole
 
 MAX_JOINTS = 4096
 MAX_RATE = 10_000
@@ -83,13 +83,11 @@ def read(
     irregularities.
     """
     motion = read_motion(path, limits=limits)
-    try:
+    with naming_file(path):
         return from_skeleton(
             motion, rate, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine,
             rest=rest, up=up, limits=limits,
         )  # fmt: skip
-    except ModelError as error:
-        raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
 
 
 def read_motion(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> SkeletonMotion:

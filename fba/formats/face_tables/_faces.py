@@ -17,7 +17,7 @@ from fba.errors import FbaWarning, FormatError, ModelError, Remedy
 from fba.formats.face_tables._tables import Table, named
 from fba.formats.face_tables._times import check_order
 from fba.limits import Limits
-from fba.source import Path
+from fba.source import Path, naming_file
 
 USUAL = 30
 """Rate of a single picture."""
@@ -36,10 +36,8 @@ def to_animation(
     """
     for finding in motion.findings:
         warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=4)
-    try:
+    with naming_file(path):
         return from_action_units(motion, rate, limits=limits)
-    except ModelError as error:
-        raise FormatError(error.finding, path=path) from error
 
 
 def choose_rows(table: Table, ids: Sequence[str], face: str | None) -> Int64:

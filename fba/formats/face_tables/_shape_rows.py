@@ -14,11 +14,11 @@ from fba.arrays import Bool, Float64
 from fba.capture.blendshapes import ShapeMotion, from_blendshapes
 from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_gaps
-from fba.errors import FbaWarning, FormatError, ModelError, OptionError
-from fba.face.authoring.shapes.shape_names import arkit_names, arkit_of
+from fba.errors import FbaWarning, FormatError, OptionError
+from fba.face.shape_names import arkit_names, arkit_of
 from fba.formats.face_tables._tables import named
 from fba.limits import Limits
-from fba.source import Path
+from fba.source import Path, naming_file
 
 LARGEST = 4.0
 """Largest weight; more is no share of a shape."""
@@ -55,10 +55,8 @@ def to_animation(
 
     for finding in motion.findings:
         warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=warn)
-    try:
+    with naming_file(path):
         return from_blendshapes(motion, rate, limits=limits)
-    except ModelError as error:
-        raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
 
 
 def check_weights(

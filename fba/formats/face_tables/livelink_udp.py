@@ -134,7 +134,8 @@ def _read_packets(data: bytes, path: Path) -> tuple[list[_Packet], list[str]]:
         rate = Fraction(over, under)
         values = missing
         if with_face:
-            values = np.frombuffer(data, ">f4", VALUES, end + 1).astype(np.float64)
+            with np.errstate(invalid="ignore"):  # NaNs that signal
+                values = np.frombuffer(data, ">f4", VALUES, end + 1).astype(np.float64)
             if not np.isfinite(values).all():
                 values = missing
         packets.append(_Packet((texts[0], texts[1]), (frame + part) / float(rate), rate, values))

@@ -21,7 +21,7 @@ from fba.capture.blendshapes import ShapeMotion
 from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_rate
 from fba.errors import FormatError, ModelError, Remedy
-from fba.face.authoring.shapes.shape_names import arkit_names
+from fba.face.shape_names import arkit_names
 from fba.formats.face_tables._shape_rows import check_weights, find_lacks, shape_of, to_animation
 from fba.formats.face_tables._tables import named
 from fba.formats.face_tables._times import seconds_of

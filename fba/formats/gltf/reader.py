@@ -6,7 +6,6 @@ rotations are the identity. So rotations are taken relative to the bind pose, in
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -19,7 +18,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.skeleton import MOST_FRAMES, check_memory
-from fba.errors import FbaWarning, FormatError, ModelError
+from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, key_times
 from fba.formats.gltf._skeletons import find_joints
@@ -28,7 +27,7 @@ from fba.formats.gltf.face_motion import find_face_clip, nodes_of_faces, read_fa
 from fba.gltf import Animation as Clip
 from fba.gltf import Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path
+from fba.source import Path, naming_file
 
 CHUNK = 200_000
 """Joints times frames that are sampled at once."""
@@ -75,7 +74,7 @@ def read(
     Raises FormatError for anything that is not glTF, or whose skeleton is not a body, LimitError for more
     than the limits allow; warns (FbaWarning) of what is left out.
     """
-    try:
+    with naming_file(path):
         gltf = read_gltf(path, limits=limits)
         plain = (joints, scale, origin, ground, plant, spine, rest, up) == (
             None, None, "source", "floor", True, "spread", "auto", "auto",
@@ -104,9 +103,6 @@ def read(
             warnings.warn(each.message, each.category, stacklevel=2)
         times = sampled.start + np.arange(len(animation)) / float(animation.rate)
         return replace(animation, face=read_face_motion(gltf, sampled.clip, times))
-    except ModelError as error:
-        finding = error.finding.removeprefix(f"{os.path.basename(path)}: ")
-        raise FormatError(finding, path=path).with_remedies(*error.remedies) from error
 
 
 def read_motion(

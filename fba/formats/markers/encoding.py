@@ -8,9 +8,8 @@ from fractions import Fraction
 from fba.animation import Animation
 from fba.capture.markers.faces import from_markers
 from fba.capture.markers.motion import MarkerMotion
-from fba.errors import FormatError, LimitError, ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path
+from fba.source import Path, naming_file
 
 
 def read_face(
@@ -31,12 +30,7 @@ def read_face(
     or holds no face; LimitError. Warns (FbaWarning) of what was repaired.
     """
     motion = read_markers(path, fps=None if fps is None else Fraction(fps), limits=limits)
-    try:
+    with naming_file(path):
         return from_markers(
             motion, rate, markers=markers, neutral=neutral, gaze=gaze, head_path=head_path, limits=limits
         )
-    except ModelError as error:
-        raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
-    except LimitError as error:
-        error.args = (f"{path}: {error.finding}",)
-        raise

@@ -13,7 +13,7 @@ from fba.animation import Animation, FaceTrack
 from fba.capture import ShapeMotion, from_blendshapes, to_blendshapes
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.face.authoring.shapes.shape_names import arkit_names
+from fba.face.shape_names import arkit_names
 from fba.formats.face_tables.livelink_csv import read_face
 from fba.parameters import fap_numbers
 

@@ -84,6 +84,13 @@ def test_datagrams_over_midnight(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.times, np.arange(20) / 60, atol=2e-4)
 
 
+def test_a_signalling_nan_is_a_face_that_was_not_seen(tmp_path: Path) -> None:
+    sent = livelink_udp(COLUMNS)
+    sent[5] = sent[5][:-4] + bytes.fromhex("7f800001")
+    motion = packets.read_face(saved(tmp_path, b"".join(sent), "a.udp"))
+    assert np.flatnonzero(~motion.seen).tolist() == [5]
+
+
 def test_two_senders(tmp_path: Path) -> None:
     first, second = livelink_udp(COLUMNS, name="Ann"), livelink_udp(COLUMNS, name="Bo", device="E" * 36)
     mixed = [one for pair in zip(first, second, strict=True) for one in pair]

@@ -271,7 +271,7 @@ def test_options_and_limits(tmp_path: Path) -> None:
     path = saved(tmp_path, livelink_csv(WEIGHTS))
     with pytest.raises(OptionError, match="swap must be one of auto, yes, no, not 'left'"):
         fba.read(path, swap="left")
-    with pytest.raises(LimitError, match="`frames`"):
+    with pytest.raises(LimitError, match=r"face\.csv: .*`frames`"):
         fba.read(path, limits=fba.Limits(frames=50))
-    with pytest.raises(LimitError, match="`frames`"):
+    with pytest.raises(LimitError, match=r"face\.csv: .*`frames`"):
         fba.read(path, rate=1000, limits=fba.Limits(frames=200))

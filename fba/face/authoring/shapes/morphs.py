@@ -21,9 +21,9 @@ from fba.errors import FbaWarning
 from fba.face.authoring.author import author, author_lids
 from fba.face.authoring.shapes._mixing import GROUPS, Mixer, fold_limited_tables
 from fba.face.authoring.shapes._shapes import Morphs, Shapes, check_shapes
-from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
 from fba.face.expressions import Definitions
 from fba.face.model import FaceModel, Part
+from fba.face.shape_names import canonical_names, fap_of
 from fba.face.tables import FaceDefTables
 from fba.parameters import faps
 

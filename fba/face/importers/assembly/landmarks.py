@@ -14,7 +14,6 @@ import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
 from fba.errors import ModelError, Remedy
-from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, flat_width, sphere
@@ -27,6 +26,7 @@ from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.symmetry import mirror_points
 from fba.face.model import Part
 from fba.face.points import EYEBALL_PER_IRIS
+from fba.face.shape_names import canonical_names, fap_of
 from fba.parameters import faps
 
 OUTSIDE = 0.2
