@@ -99,7 +99,7 @@ def read_table(path: Path, limits: Limits) -> Table:
             path=path,
             line=first + 1,
         )
-    limits.check_bytes(CELL_BYTES * text.count(separator), "the table", source=len(data))
+    limits.check_bytes(CELL_BYTES * text.count(separator), f"{path}: the table", source=len(data))
     rows, numbers, cut = [], [], False
     for number, line in enumerate(islice(lines, first + 1, None), first + 2):
         if not line.strip():
@@ -120,7 +120,7 @@ def read_table(path: Path, limits: Limits) -> Table:
         rows = [[cell.replace(",", ".") for cell in row] for row in rows]
     if not rows:
         raise FormatError("has no row behind the header; there is nothing to read", path=path)
-    limits.check_frames(len(rows), "the table")
+    limits.check_frames(len(rows), f"{path}: the table")
     return Table(path, names, rows, numbers, cut)
 
 

@@ -67,9 +67,9 @@ def read_face(
     """
     data = read_whole(path)
     text = data.decode("utf-8-sig", errors="replace")
-    limits.check_bytes(RECORD_BYTES * text.count("|"), "the records", source=len(data))
+    limits.check_bytes(RECORD_BYTES * text.count("|"), f"{path}: the records", source=len(data))
     records, strange = _read_records(text, path)
-    limits.check_frames(len(records), "the recording")
+    limits.check_frames(len(records), f"{path}: the recording")
     names = list(dict.fromkeys(name for record in records for name in record if name not in TURNS))
     shapes = [name for name in names if name != STATUS]
     if len(shapes) < FEWEST:

@@ -75,14 +75,14 @@ def read_face(
     UnsupportedError for other versions, LimitError, OptionError.
     """
     data = read_whole(path)
-    limits.check_bytes(len(data) // 60 * PACKET_BYTES, "the recording", source=len(data))
+    limits.check_bytes(len(data) // 60 * PACKET_BYTES, f"{path}: the recording", source=len(data))
     packets, findings = _read_packets(data, path)
     packets = _choose(packets, face, path)
     rate = packets[-1].rate
     if any(packet.rate != rate for packet in packets):
         raise FormatError("the rate changes in the recording; cut it there", path=path)
     times, order = _order(packets, findings)
-    limits.check_frames(len(order), "the recording")
+    limits.check_frames(len(order), f"{path}: the recording")
     values = np.array([packets[number].values for number in order])
     weights = values[:, : len(ARKIT_ORDER)]
     check_weights(weights, ARKIT_ORDER, path)

@@ -75,7 +75,7 @@ def read_face(
     """
     document = _read_json(path, limits)
     names, weights, stamps = _beat(document, path) or _frames(document, path)
-    limits.check_frames(len(weights), "the recording")
+    limits.check_frames(len(weights), f"{path}: the recording")
     check_weights(weights, names, path)
     times, rate = _times(stamps, len(weights), fps, path)
     return ShapeMotion(
@@ -87,7 +87,7 @@ def read_face(
 def _read_json(path: Path, limits: Limits) -> Any:
     data = read_whole(path)
     values = data.count(b",") + data.count(b"[") + data.count(b"{")
-    limits.check_bytes(VALUE_BYTES * values, "the recording", source=len(data))
+    limits.check_bytes(VALUE_BYTES * values, f"{path}: the recording", source=len(data))
     try:
         return json.loads(data)
     except json.JSONDecodeError as error:
