@@ -102,6 +102,8 @@ REST_CORRECTION = "fba/capture/_rest_correction.py"
 STANDARD = "fba/capture/_standard_skeleton.py"
 FAP_JOINTS = "fba/formats/gltf/_fap_joints.py"
 HINGES = "fba/capture/limbs/hinges.py"
+HINGE_PATH = "fba/capture/limbs/_hinge_path.py"
+WRINGING = "fba/capture/comparison/wringing.py"
 LEG_IK = "fba/capture/limbs/_leg_ik.py"
 READ_AHEAD = "player/fba_player/sound/_read_ahead.py"
 PLAUSIBILITY = "fba/body/plausibility.py"
@@ -427,6 +429,10 @@ MUTANTS = (
     Mutant(HINGES, "ABRUPT = 0.4", "ABRUPT = 0.1", CAPTURE_RULES_TEST),
     Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.0", CAPTURE_RULES_TEST),
     Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.4", CAPTURE_RULES_TEST),
+    Mutant(HINGE_PATH, "STRAIGHT = 0.3", "STRAIGHT = 0.1", CAPTURE_RULES_TEST),
+    Mutant(HINGE_PATH, "STRAIGHT = 0.3", "STRAIGHT = 0.6", CAPTURE_RULES_TEST),
+    Mutant(HINGE_PATH, "SLIGHT = 0.8", "SLIGHT = 0.3", CAPTURE_RULES_TEST),
+    Mutant(WRINGING, '"{}_hip", "{}_knee"', '"sacroiliac", "{}_knee"', "tests/capture/test_comparison.py"),
     Mutant(LEG_IK, "ROUNDS = 3", "ROUNDS = 1", CAPTURE_RULES_TEST),
     Mutant(LEG_IK, "ROUNDS = 3", "ROUNDS = 2", CAPTURE_RULES_TEST),
     Mutant(GROUND, "NEAR = 0.03", "NEAR = 0.003", CAPTURE_RULES_TEST),

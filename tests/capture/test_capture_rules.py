@@ -215,3 +215,22 @@ def test_feet_far_from_a_slope_count_little() -> None:
     assert under.slope[1] == pytest.approx(0.04, abs=1e-4)
     assert under.height == pytest.approx(0.0, abs=4e-4)
     assert ground_under(0.07 * along, along).slope[1] == pytest.approx(0.07, abs=3e-3)
+
+
+@pytest.mark.parametrize("bend", [-0.15, -0.25])
+def test_a_knee_that_is_overstretched_all_the_time_is_not_turned_round(bend: float) -> None:
+    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    knee = hinges.Hinge(down, down, across, down, 1.0)
+    local = Rotation.from_rotvec(np.outer(np.full(60, bend), across)).as_matrix()
+    angles = hinges.solve(knee, local @ down, local, 25.0)
+    np.testing.assert_allclose(angles[:, 0], 0.0, atol=0.01)
+    np.testing.assert_allclose(angles[:, 1], bend, atol=0.01)
+
+
+def test_a_knee_that_is_clearly_bent_backwards_is_turned_round() -> None:
+    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    knee = hinges.Hinge(down, down, across, down, 1.0)
+    local = Rotation.from_rotvec(np.outer(np.full(60, -0.5), across)).as_matrix()
+    angles = hinges.solve(knee, local @ down, local, 25.0)
+    np.testing.assert_allclose(np.abs(angles[:, 0]), np.pi, atol=0.02)
+    np.testing.assert_allclose(angles[:, 1], 0.5, atol=0.02)

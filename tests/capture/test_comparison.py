@@ -96,6 +96,18 @@ def test_what_is_off_all_the_time_is_seen(
     assert f" {one.worst:.0f} " in one.sentence
 
 
+def test_a_thigh_that_is_turned_round_with_a_shank_that_turns_back_is_wrung(
+    source: SkeletonMotion, result: Animation, mapped: dict[str, int]
+) -> None:
+    turned = changed(changed(result, "l_hip_twisting", 110), "l_knee_twisting", -110)
+    comparison = compare(source, turned, mapped)
+    assert find(comparison, "direction", "left shank").worst < 6
+    for part in ("left thigh", "left shank"):
+        assert find(comparison, "wrung", part).worst == pytest.approx(110, abs=5)
+        assert find(comparison, "wrung", part).grade == "poor"
+    assert find(comparison, "wrung", "right shank").worst < 10
+
+
 def test_a_hand_that_turns_over_is_seen_without_fingers(
     source: SkeletonMotion, result: Animation, mapped: dict[str, int]
 ) -> None:

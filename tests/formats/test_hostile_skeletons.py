@@ -169,4 +169,6 @@ def test_a_shoulder_is_found_by_where_it_hangs(tmp_path: Path, bones: bytes) -> 
             body = fba.read(path).body
         assert body is not None
         values.append(body.values)
-    assert np.abs(values[0] - values[1]).max() < 5000  # 0.05 rad: feet of the second are planted
+    apart = np.abs(values[0] - values[1]).max(axis=0)
+    apart[[bap_numbers()[f"{side}_metatarsal_flexion"] - 1 for side in "lr"]] = 0  # the ground bends toes
+    assert apart.max() < 5000  # 0.05 rad: feet of the second are planted

@@ -17,6 +17,7 @@ from fba.capture.comparison.measures import Row
 from fba.capture.comparison.soles import sole_heights
 from fba.capture.comparison.standing import Floor, find_floor, find_standing
 from fba.capture.comparison.verdict import Comparison, Difference, bounds, in_order
+from fba.capture.comparison.wringing import wringing
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 from fba.parameters import BAP_COUNT
@@ -132,6 +133,7 @@ def _measure(
     yield from measures.floors(source, soles, standing, level, floor.ground)
     yield from measures.slips(source, result, standing, rate)
     yield from measures.jumps(source, result)
+    yield from wringing(result)
 
 
 def _difference(row: Row, rate: float, begin: int) -> Difference:
