@@ -25,13 +25,13 @@ BOUND = 0.05
 """Error that costs another 1 per second, growing by the sixth power: it keeps errors below 5 degrees."""
 STRAIGHT = 0.3
 """Sine of a bend the wrong way up to which a limb may be straight: makers overstretch knees a little."""
-SLIGHT = 0.8
+SLIGHT = 0.6
 """Bending the wrong way up to there, in radians, that costs 1 per second: less than half a turn costs."""
 WRONG = 0.15
 """Bending the wrong way beyond, in radians, that costs 1 per second."""
 SPEED = 2.0
 """Speed of turning, in radians per second, that costs 1 per second."""
-LOYAL = 7.0
+LOYAL = 5.0
 """Distance from the usual turn, in radians, that costs 1 per second."""
 STEPS = 12
 """Most iterations of Newton's method."""

@@ -82,8 +82,9 @@ def test_report_as_json(encode: Encode, tmp_path: Path) -> None:
     said = json.loads(result.stdout)
     (capture,) = said["captures"]
     assert said["verdict"] == capture["verdict"]
-    thigh = next(one for one in capture["differences"] if one["part"] == "left thigh")
-    assert (thigh["measure"], thigh["unit"], thigh["grade"]) == ("direction", "degrees", "good")
+    differences = {(one["measure"], one["part"]): one for one in capture["differences"]}
+    thigh = differences["direction", "left thigh"]
+    assert (thigh["unit"], thigh["grade"]) == ("degrees", "good")
     assert capture["family"] == "collar"
     assert {bone["joint"] for bone in capture["bones"]} >= {"l_hip", "l_knee", "r_knee", "vc7"}
     assert all(bone["mean"] < 1 and bone["worst"] < 5 for bone in capture["bones"])
