@@ -23,12 +23,9 @@ SLACK = 0.03
 """Error in radians, sideways, that costs 1 per second."""
 BOUND = 0.05
 """Error that costs another 1 per second, growing by the sixth power: it keeps errors below 5 degrees."""
-STRAIGHT = 0.3
-"""Sine of a bend the wrong way up to which a limb may be straight: makers overstretch knees a little."""
-SLIGHT = 0.6
-"""Bending the wrong way up to there, in radians, that costs 1 per second: less than half a turn costs."""
-WRONG = 0.15
-"""Bending the wrong way beyond, in radians, that costs 1 per second."""
+WRONG = 0.6
+"""Bending the wrong way, in radians, that costs 1 per second: makers overstretch limbs a little, and half a
+turn about the bone costs more than 20 degrees."""
 SPEED = 2.0
 """Speed of turning, in radians per second, that costs 1 per second."""
 LOYAL = 5.0
@@ -44,11 +41,9 @@ SETTLED = 1e-4
 @inlined
 def _cost(sideways: float, natural: float, away: float) -> float:
     """Return the cost per second: see the constants above."""
-    slight = max(0.0, -natural) / SLIGHT
-    wrong = max(0.0, -natural - STRAIGHT) / WRONG
+    wrong = max(0.0, -natural) / WRONG
     square = (sideways / BOUND) ** 2
-    bent = slight * slight + wrong * wrong
-    return (sideways / SLACK) ** 2 + square * square * square + bent + (away / LOYAL) ** 2
+    return (sideways / SLACK) ** 2 + square * square * square + wrong * wrong + (away / LOYAL) ** 2
 
 
 @inlined
@@ -145,10 +140,7 @@ def _refine(
             pull = 2.0 * missed * slope / (SLACK * SLACK) + 6.0 * square * square * missed * slope / BOUND**2
             curve = 2.0 * slope * slope / (SLACK * SLACK) + 30.0 * square * square * slope * slope / BOUND**2
             if bent < 0.0:
-                pull += 2.0 * bent * bending / (SLIGHT * SLIGHT)
-                curve += 2.0 * bending * bending / (SLIGHT * SLIGHT)
-            if bent < -STRAIGHT:
-                pull += 2.0 * (bent + STRAIGHT) * bending / (WRONG * WRONG)
+                pull += 2.0 * bent * bending / (WRONG * WRONG)
                 curve += 2.0 * bending * bending / (WRONG * WRONG)
             pull += 2.0 * (path[t] - centre) / (LOYAL * LOYAL)
             curve += 2.0 / (LOYAL * LOYAL)
