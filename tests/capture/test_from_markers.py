@@ -15,6 +15,7 @@ from fba.capture.markers import stabilisation
 from fba.capture.markers.faces import MarkerFace, find_face
 from fba.capture.markers.gaps import fill_gaps
 from fba.capture.markers.marker_maps import change_map, find_map, marker_sets, read_map, write_map
+from fba.capture.markers.summary import summarise
 from fba.capture.markers.targets import RIGID
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError
 from fba.face import FaceModel
@@ -330,6 +331,32 @@ def test_captures_without_a_face() -> None:
         find_face(motion, markers={"FHL": "11.3", "FHR": "11.2", "NSB": "9.12"})
     with pytest.raises(ModelError, match="time runs backwards: frame 3"):
         replace(motion, times=np.r_[0.0, 0.1, 0.2, 0.15, np.arange(4, 500)])
+
+
+def test_markers_that_are_none() -> None:
+    positions, times = np.zeros((2, 2, 3)), np.arange(2.0)
+    for names, where, when, rate, message in (
+        (("A",), positions, times, 1, r"1 names need positions \(T, 1, 3\) and times \(T,\)"),
+        ((), positions[:, :0], times, 1, "a capture needs 1 to "),
+        (("A", "A"), positions, times, 1, "two markers are called 'A'"),
+        (("A", "B"), positions, times, 0, "the frame rate must be positive, not 0"),
+        (("A", "B"), positions, np.array([0.0, np.nan]), 1, "the time of frame 1 is not a number"),
+    ):
+        with pytest.raises(ModelError, match=message):
+            MarkerMotion(names, where, when, Fraction(rate))
+
+
+def test_what_a_capture_holds() -> None:
+    positions = take().motion.positions[:60].copy()
+    positions[10:20, 3] = positions[30, 3] = positions[40:42, 5] = np.nan
+    motion = replace(take().motion, positions=positions, times=take().motion.times[:60], unit="mm", up="z")
+    held = summarise(motion)
+    assert (held.frames, held.rate, held.unit, held.up) == (60, "100", "mm", "z")
+    assert (held.gaps, held.longest, held.longest_marker) == (3, pytest.approx(0.1), motion.names[3])
+    assert held.missing == pytest.approx(13 / (60 * len(motion.names)))
+    assert (held.map, held.placed) == ("regions50", 34)
+    few = MarkerMotion(("A", "B"), motion.positions[:, :2], motion.times, motion.rate)
+    assert (summarise(few).map, summarise(few).placed, summarise(few).gaps) == ("", 0, 0)
 
 
 def test_options_that_are_wrong() -> None:

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 import fba
 from fba.animation import Animation, FaceTrack
 from fba.capture import ShapeMotion, from_blendshapes, to_blendshapes
+from fba.capture.blendshapes._weight_loops import find_weights
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.face.shape_names import arkit_names
@@ -118,3 +120,15 @@ def test_slow_animations_are_resampled(tmp_path: Path) -> None:
     fba.write(tmp_path / "a.csv", slow)
     assert (tmp_path / "a.csv").read_text().count("\n") == 32
     assert fba.read(tmp_path / "a.csv").duration == pytest.approx(31 / 30)
+
+
+def test_weights_are_the_least_squares_between_0_and_1() -> None:
+    """In plain Python as in machine code, against another solver."""
+    random = np.random.default_rng(3)
+    matrix, wanted = random.normal(size=(9, 5)), random.normal(size=(4, 9))
+    expected = [lsq_linear(matrix, one, (0, 1)).x for one in wanted]
+    loops = {find_weights, getattr(find_weights, "py_func", find_weights)}
+    for loop in loops:
+        found = loop(matrix.T @ matrix, wanted @ matrix, 500, 1e-12)
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+    assert (np.array(expected) < 1e-9).any()

@@ -9,7 +9,7 @@ import pytest
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture import ShapeMotion, from_blendshapes
+from fba.capture import ActionUnitMotion, ShapeMotion, from_blendshapes
 from fba.capture.blendshapes.shape_table import amounts_of
 from fba.errors import ModelError
 from fba.parameters import fap_numbers
@@ -83,3 +83,15 @@ def test_what_cannot_be_made() -> None:
         motion(jawOpen=[np.inf])
     with pytest.raises(ModelError, match="the frame rate must be positive, not -5"):
         from_blendshapes(motion(jawOpen=0.5), -5)
+
+
+def test_motions_that_are_none() -> None:
+    times = np.arange(2.0)
+    with pytest.raises(ModelError, match=r"weights has shape \(2, 3\), not \(2, 1\)"):
+        ShapeMotion(("jawOpen",), np.zeros((2, 3)), times, Fraction(1))
+    with pytest.raises(ModelError, match="the rate must be positive, not 0"):
+        ShapeMotion(("jawOpen",), np.zeros((2, 1)), times, Fraction(0))
+    with pytest.raises(ModelError, match="a name occurs twice"):
+        ShapeMotion(("jawOpen", "jawOpen"), np.zeros((2, 2)), times, Fraction(1))
+    with pytest.raises(ModelError, match=r"^ActionUnitMotion: .*\(2, 3\), not \(2, 1\)"):
+        ActionUnitMotion((12,), np.zeros((2, 3)), times, Fraction(1))
