@@ -52,6 +52,12 @@ def test_a_stream_without_a_rate_has_25_frames_a_second() -> None:
     assert "no frame rate" in warning
 
 
+def test_a_stream_may_begin_with_its_time_code() -> None:
+    clock = StreamClock()
+    assert clock.begin_intra(FrameRate(25), TimeCode(0, 0, 0)) == []
+    assert clock.index == 0
+
+
 def test_a_new_rate_goes_on_at_the_next_whole_frame() -> None:
     clock = clock_after(1, FrameRate(25))
     clock.begin_intra(FrameRate(30), None)  # 1/25 s is frame 1.2

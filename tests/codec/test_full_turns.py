@@ -10,6 +10,7 @@ import pytest
 import fba
 from fba import Animation
 from fba.codec import EncoderOptions, EncoderStatistics, encode_with_statistics
+from fba.codec._ranges import _extremes
 from fba.parameters import bap_numbers, bap_steps
 from fba.tracks import BodyTrack
 
@@ -136,3 +137,18 @@ def test_without_clamp_values_stay_what_they_are() -> None:
     got, statistics = coded(motion({TURN: turn}), bap_steps="visage")
     assert got[:, TURN - 1].tolist() == turn
     assert statistics.intra_planes == 2
+
+
+def test_ranges_of_angles_are_those_of_the_short_way() -> None:
+    """From 310,000 to -308,318 it is 10,000, as before: 618,318 would cost bits in every frame."""
+    values = np.array([[300_000], [310_000], [-308_318]], dtype=np.int32)
+    extremes = np.zeros((4, 1), dtype=np.int64)
+    one, last, sent = np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.bool_)
+    _extremes(values, np.ones((3, 1), dtype=np.bool_), one, one * 628_318, extremes, last, sent)
+    assert extremes[2:, 0].tolist() == [10_000, 0]
+
+
+@pytest.mark.parametrize("before", [[], [300_000]])
+def test_angles_are_not_turned_unless_asked(before: list[int]) -> None:
+    with pytest.raises(fba.RangeError, match="rt_body_turn: the value 4000000"):
+        coded(motion({TURN: [*before, 4_000_000]}), bap_steps="visage", intra_period=1)
