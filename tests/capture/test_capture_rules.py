@@ -234,3 +234,13 @@ def test_a_knee_that_is_clearly_bent_backwards_is_turned_round() -> None:
     angles = hinges.solve(knee, local @ down, local, 25.0)
     np.testing.assert_allclose(np.abs(angles[:, 0]), np.pi, atol=0.02)
     np.testing.assert_allclose(angles[:, 1], 0.5, atol=0.02)
+
+
+def test_a_knee_that_bends_back_far_and_long_turns_round_after_all() -> None:
+    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    knee = hinges.Hinge(down, down, across, down, 1.0)
+    bends = np.concatenate([np.full(900, 0.5), np.linspace(0.5, -0.6, 25), np.full(750, -0.6)])
+    local = Rotation.from_rotvec(np.outer(bends, across)).as_matrix()
+    angles = hinges.solve(knee, local @ down, local, 25.0)
+    np.testing.assert_allclose(np.cos(angles[[0, -1], 0]), [1.0, -1.0], atol=0.001)
+    np.testing.assert_allclose(angles[[0, -1], 1], [0.5, 0.6], atol=0.02)
