@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import os
-import re
-import textwrap
-import tomllib
 from collections.abc import Mapping
 
-from fba.atomic import atomic
 from fba.body.skeleton import ROOT, Skeleton
 from fba.capture.bones import find_bones
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FormatError, ModelError, OptionError, did_you_mean
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path, read_whole
+from fba.name_maps import read_names, write_names
+from fba.source import Path
 
-MOST_BYTES = 1 << 20
-"""Longest file of a map."""
 TABLE = "joints"
 NAMED = 12
 """Most joints that a comment names in a line."""
@@ -74,25 +67,7 @@ def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
 
     Raises FormatError for a file that is none, with the line, and for joints that the standard lacks.
     """
-    data = read_whole(path)
-    if len(data) > MOST_BYTES:
-        raise FormatError(f"has {len(data)} bytes, more than the {MOST_BYTES} that a map may have", path=path)
-    limits.check_bytes(40 * len(data), f"{os.fspath(path)}: the map", source=len(data))
-    try:
-        content = tomllib.loads(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise FormatError(f"is not UTF-8 text (byte {error.start})", path=path) from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        line = re.search(r"at line (\d+)", str(error))
-        raise FormatError(
-            f"is not TOML: {str(error)[:200]}; expected lines such as \"Hips\" = \"{ROOT}\" below [{TABLE}]",
-            path=path, line=int(line[1]) if line else None,
-        ) from None  # fmt: skip
-    table = content.get(TABLE)
-    if not isinstance(table, dict) or not table:
-        raise FormatError(
-            f'has no table [{TABLE}]; expected one with lines such as "Hips" = "{ROOT}"', path=path
-        )
+    table = read_names(path, TABLE, f'"Hips" = "{ROOT}"', limits)
     taken: dict[str, str] = {}
     for source, joint in table.items():
         if not isinstance(joint, str):
@@ -111,26 +86,18 @@ def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
 
 def write_map(path: Path, joints: Mapping[str, str], motion: SkeletonMotion | None = None) -> None:
     """Write a map as TOML; comments name the joints without a counterpart, if the motion is given."""
-    lines = [
-        "# Joints of a capture, and the joints of ISO/IEC 14496-2 that they move.",
-        "# Change it and give it to `fba encode --map`.",
-        "",
-        f"[{TABLE}]",
-    ]
-    for source, joint in joints.items():
-        lines.append(f"{json.dumps(source, ensure_ascii=False)} = {json.dumps(joint)}")
+    left = {}
     if motion is not None:
-        unused = [name for name in motion.names if name not in joints]
         free = [joint for joint in Skeleton.default().names if joint not in joints.values()]
-        for whose, names in (("capture that move nothing", unused), ("standard that are free", free)):
-            if names:
-                # a name with a line break in it must not end the comment
-                quoted = ", ".join(json.dumps(name)[1:-1] for name in names)
-                lines += textwrap.wrap(
-                    f"Joints of the {whose}: {quoted}", 100, initial_indent="# ", subsequent_indent="#   "
-                )
-    with atomic(path) as file:
-        file.write(("\n".join(lines) + "\n").encode())
+        left = {
+            "Joints of the capture that move nothing": [name for name in motion.names if name not in joints],
+            "Joints of the standard that are free": free,
+        }
+    heading = (
+        "Joints of a capture, and the joints of ISO/IEC 14496-2 that they move.",
+        "Change it and give it to `fba encode --map`.",
+    )
+    write_names(path, TABLE, joints, heading, left)
 
 
 def _check_joint(joint: str, allow_none: bool = False) -> None:

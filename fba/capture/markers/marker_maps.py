@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import csv
-import json
-import os
 import re
-import textwrap
-import tomllib
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 
-from fba.atomic import atomic
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.targets import HEAD, RIGID, TARGETS
 from fba.errors import FormatError, OptionError, did_you_mean
 from fba.face.feature_points import row_of
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path, read_whole
+from fba.name_maps import read_names, write_names
+from fba.source import Path
 
-MOST_BYTES = 1 << 20
-"""Longest file of a map."""
 TABLE = "markers"
 NAMED = 12
 """Most markers that a message names."""
@@ -120,25 +114,7 @@ def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
 
     Raises FormatError for a file that is none, with the line, and for targets that do not exist.
     """
-    data = read_whole(path)
-    if len(data) > MOST_BYTES:
-        raise FormatError(f"has {len(data)} bytes, more than the {MOST_BYTES} that a map may have", path=path)
-    limits.check_bytes(40 * len(data), f"{os.fspath(path)}: the map", source=len(data))
-    try:
-        content = tomllib.loads(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise FormatError(f"is not UTF-8 text (byte {error.start})", path=path) from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        line = re.search(r"at line (\d+)", str(error))
-        raise FormatError(
-            f'is not TOML: {str(error)[:200]}; expected lines such as "Chin" = "2.1" below [{TABLE}]',
-            path=path, line=int(line[1]) if line else None,
-        ) from None  # fmt: skip
-    table = content.get(TABLE)
-    if not isinstance(table, dict) or not table:
-        raise FormatError(
-            f'has no table [{TABLE}]; expected lines such as "Chin" = "2.1" below it', path=path
-        )
+    table = read_names(path, TABLE, '"Chin" = "2.1"', limits)
     for marker, target in table.items():
         try:
             check_target(target if isinstance(target, str) else repr(target))
@@ -153,23 +129,13 @@ def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
 
 def write_map(path: Path, markers: Mapping[str, str], motion: MarkerMotion | None = None) -> None:
     """Write a map as TOML; a comment names the markers without a place, if the motion is given."""
-    lines = [
-        "# Markers of a capture, and where they are on the face: feature points of ISO/IEC 14496-2,",
-        "# l_tragion and r_tragion in front of the ears, or head for one on the skull.",
-        "# Change it and give it to `fba encode --map`.",
-        "",
-        f"[{TABLE}]",
-    ]
-    for marker, target in markers.items():
-        lines.append(f"{json.dumps(marker, ensure_ascii=False)} = {json.dumps(target)}")
     unused = [] if motion is None else [name for name in motion.names if name not in markers]
-    if unused:
-        quoted = ", ".join(json.dumps(name)[1:-1] for name in unused)
-        lines += textwrap.wrap(
-            f"Markers that are not used: {quoted}", 100, initial_indent="# ", subsequent_indent="#   "
-        )
-    with atomic(path) as file:
-        file.write(("\n".join(lines) + "\n").encode())
+    heading = (
+        "Markers of a capture, and where they are on the face: feature points of ISO/IEC 14496-2,",
+        "l_tragion and r_tragion in front of the ears, or head for one on the skull.",
+        "Change it and give it to `fba encode --map`.",
+    )
+    write_names(path, TABLE, markers, heading, {"Markers that are not used": unused})
 
 
 def check_map(markers: Mapping[str, str]) -> None:

@@ -1,0 +1,68 @@
+"""TOML files that map names to names: joints of a capture to those of the standard, markers to places."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import textwrap
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fba.atomic import atomic
+from fba.errors import FormatError
+from fba.limits import Limits
+from fba.source import Path, read_whole
+
+MOST_BYTES = 1 << 20
+"""Longest file of a map."""
+
+
+def read_names(path: Path, table: str, example: str, limits: Limits) -> dict[str, Any]:
+    """Return a table of a TOML file, as it is there: name -> value.
+
+    example: a line of such a table, for messages. Raises FormatError for a file without it, with the line,
+    LimitError.
+    """
+    data = read_whole(path)
+    if len(data) > MOST_BYTES:
+        raise FormatError(f"has {len(data)} bytes, more than the {MOST_BYTES} that a map may have", path=path)
+    limits.check_bytes(40 * len(data), f"{os.fspath(path)}: the map", source=len(data))
+    try:
+        content = tomllib.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise FormatError(f"is not UTF-8 text (byte {error.start})", path=path) from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        raise FormatError(
+            f"is not TOML: {str(error)[:200]}; expected lines such as {example} below [{table}]",
+            path=path, line=int(line[1]) if line else None,
+        ) from None  # fmt: skip
+    names = content.get(table)
+    if not isinstance(names, dict) or not names:
+        raise FormatError(f"has no table [{table}]; expected lines such as {example} below it", path=path)
+    return names
+
+
+def write_names(
+    path: Path,
+    table: str,
+    names: Mapping[str, str],
+    heading: Sequence[str],
+    left: Mapping[str, Sequence[str]],
+) -> None:
+    """Write a table as TOML.
+
+    heading: lines of comment before it. left: what is said behind it of other names -> these names.
+    """
+    lines = [*(f"# {line}" for line in heading), "", f"[{table}]"]
+    for name, value in names.items():
+        lines.append(f"{json.dumps(name, ensure_ascii=False)} = {json.dumps(value)}")
+    for what, others in left.items():
+        if others:
+            # a name with a line break in it must not end the comment
+            quoted = ", ".join(json.dumps(name)[1:-1] for name in others)
+            lines += textwrap.wrap(f"{what}: {quoted}", 100, initial_indent="# ", subsequent_indent="#   ")
+    with atomic(path) as file:
+        file.write(("\n".join(lines) + "\n").encode())
