@@ -12,14 +12,14 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture.markers.exchanges import Exchange, undo_exchanges
-from fba.capture.markers.gaps import RARELY, Filled, fill_gaps
+from fba.capture.markers.gaps import RARELY, Filled, fill_gaps, warn_of_gaps
 from fba.capture.markers.marker_maps import check_map, find_map, list_names
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.neutral import neutral_frames
 from fba.capture.markers.registration import GIVE_MAP, Registration, complete_points, register
 from fba.capture.markers.responses import measure_responses
 from fba.capture.markers.solving import choose_unknowns, solve
-from fba.capture.markers.stabilisation import fill_poses, fit_poses, refine_reference, remove_poses
+from fba.capture.markers.stabilisation import follow_head, relate_poses, remove_poses
 from fba.capture.markers.targets import RIGID
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel, Fapu
@@ -159,7 +159,7 @@ def find_face(
             "the head's motion needs three markers that the face does not move (hairline, ears, bridge of "
             f"the nose, a cap); the map has {len(fixed)}"
         ).with_remedies(GIVE_MAP)
-    rotation, shift = _follow_head(positions[:, fixed], motion.times)
+    rotation, shift = follow_head(positions[:, fixed], motion.times)
     local = remove_poses(rotation, shift, positions)
     rest = neutral_frames(local, motion.times, neutral)
     with warnings.catch_warnings():
@@ -182,14 +182,14 @@ def find_face(
     changed = {name for pair in where.swapped for name in pair} | set(where.astray)
     if any(target in RIGID for name, target in mapped.items() if name in changed):
         fixed = [n for n, name in enumerate(names) if places[name] in RIGID]
-        rotation, shift = _follow_head(positions[:, fixed], motion.times)
+        rotation, shift = follow_head(positions[:, fixed], motion.times)
     else:
         basis = where.axes * mirror
         rotation, shift = basis @ rotation @ basis.T, (shift * mirror) @ turn.T
-    rotation, shift = _relative_to(rotation, shift, rest)
+    rotation, shift = relate_poses(rotation, shift, rest)
     local = remove_poses(rotation, shift, positions)
     local, filled = fill_gaps(names, local, motion.times)
-    _tell_gaps(filled)
+    warn_of_gaps(filled)
     neutral_local = np.median(local[rest], axis=0)
     known = {places[name]: neutral_local[n] for n, name in enumerate(names) if places[name] != "head"}
     points = complete_points(known, model.points)
@@ -236,20 +236,6 @@ def _without_rare(motion: MarkerMotion, places: dict[str, str]) -> dict[str, str
     return {name: place for name, place in places.items() if name not in rare}
 
 
-def _follow_head(fixed: Float64, times: Float64) -> tuple[Float64, Float64]:
-    """Return the head's rotation (T, 3, 3) and shift (T, 3) from markers that only it moves: (T, K, 3)."""
-    seen = ~np.isnan(fixed[..., 0])
-    first = int(seen.sum(axis=1).argmax())
-    reference = refine_reference(fixed[first].copy(), fixed)
-    rotation, shift, _ = fit_poses(reference, fixed)
-    if np.isnan(shift[:, 0]).all():
-        raise ModelError(
-            "the head's motion cannot be found: in no frame three markers that the face does not move are "
-            "seen that are not on one line"
-        )
-    return fill_poses(rotation, shift, times)
-
-
 def _complete_still(still: Float64, local: Float64, rotation: Float64, shift: Float64) -> Float64:
     """Return the neutral markers (M, 3); those missing then are where they are most of the time.
 
@@ -257,17 +243,6 @@ def _complete_still(still: Float64, local: Float64, rotation: Float64, shift: Fl
     """
     usual = [np.nanmedian(path[~np.isnan(path[:, 0])], axis=0) for path in local.swapaxes(0, 1)]
     return np.where(np.isnan(still), np.array(usual) @ rotation.T + shift, still)
-
-
-def _relative_to(rotation: Float64, shift: Float64, rest: slice) -> tuple[Float64, Float64]:
-    """Return poses relative to that of the neutral face, the mean over its frames."""
-    near = rotation[rest].sum(axis=0)
-    left, _, right = np.linalg.svd(near)
-    base = left @ right
-    centre = shift[rest].mean(axis=0)
-    turned = rotation @ base.T
-    moved = shift - np.einsum("tcd,d->tc", turned, centre)
-    return turned, moved
 
 
 def _head_angles(rotation: Float64) -> Float64:
@@ -305,15 +280,5 @@ def _tell_exchanges(exchanges: list[Exchange]) -> None:
         warnings.warn(
             f"markers {first.one} and {first.other} take each other's names in frame {first.frame}{more}: "
             "exchanged from there on",
-            FbaWarning, stacklevel=4,
-        )  # fmt: skip
-
-
-def _tell_gaps(filled: Filled) -> None:
-    """Warn of gaps that the marker's own path does not fill."""
-    if filled.long:
-        warnings.warn(
-            f"{filled.long} long gaps are filled by neighbouring markers, the longest {filled.longest:.2f} s "
-            f"of {filled.marker}" + (f"; {filled.short} short ones by splines" if filled.short else ""),
             FbaWarning, stacklevel=4,
         )  # fmt: skip

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from fba.arrays import Bool, Float64
+from fba.errors import FbaWarning
 
 SHORT = 0.2
 """Seconds up to which a gap is filled from the marker's own path alone."""
@@ -101,3 +103,13 @@ def _as_neighbours(
     elif off:
         steps = steps + off[0]
     return np.asarray(steps[start - first : end - first])
+
+
+def warn_of_gaps(filled: Filled) -> None:
+    """Warn of gaps that the marker's own path does not fill."""
+    if filled.long:
+        warnings.warn(
+            f"{filled.long} long gaps are filled by neighbouring markers, the longest {filled.longest:.2f} s "
+            f"of {filled.marker}" + (f"; {filled.short} short ones by splines" if filled.short else ""),
+            FbaWarning, stacklevel=4,
+        )  # fmt: skip

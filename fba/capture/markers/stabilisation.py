@@ -6,6 +6,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64
+from fba.errors import ModelError
 
 PASSES = 4
 """Fits, each with less weight for markers that the one before left far off."""
@@ -67,6 +68,20 @@ def refine_reference(reference: Float64, positions: Float64) -> Float64:
     return reference
 
 
+def follow_head(fixed: Float64, times: Float64) -> tuple[Float64, Float64]:
+    """Return the head's rotation (T, 3, 3) and shift (T, 3) from markers that only it moves: (T, K, 3)."""
+    seen = ~np.isnan(fixed[..., 0])
+    first = int(seen.sum(axis=1).argmax())
+    reference = refine_reference(fixed[first].copy(), fixed)
+    rotation, shift, _ = fit_poses(reference, fixed)
+    if np.isnan(shift[:, 0]).all():
+        raise ModelError(
+            "the head's motion cannot be found: in no frame three markers that the face does not move are "
+            "seen that are not on one line"
+        )
+    return fill_poses(rotation, shift, times)
+
+
 def fill_poses(rotation: Float64, shift: Float64, times: Float64) -> tuple[Float64, Float64]:
     """Return poses with those that are NaN interpolated in time; at both ends, held."""
     known = np.flatnonzero(~np.isnan(shift[:, 0]))
@@ -79,6 +94,17 @@ def fill_poses(rotation: Float64, shift: Float64, times: Float64) -> tuple[Float
     filled = rotations.matrices(rotations.interpolate(turned[:, None], before, after, place - before)[:, 0])
     moved = np.stack([np.interp(times, times[known], shift[known, axis]) for axis in range(3)], axis=1)
     return filled, moved
+
+
+def relate_poses(rotation: Float64, shift: Float64, rest: slice) -> tuple[Float64, Float64]:
+    """Return poses relative to that of the neutral face, the mean over its frames."""
+    near = rotation[rest].sum(axis=0)
+    left, _, right = np.linalg.svd(near)
+    base = left @ right
+    centre = shift[rest].mean(axis=0)
+    turned = rotation @ base.T
+    moved = shift - np.einsum("tcd,d->tc", turned, centre)
+    return turned, moved
 
 
 def remove_poses(rotation: Float64, shift: Float64, positions: Float64) -> Float64:
