@@ -24,12 +24,11 @@ from fba.source import read_whole
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
-    from fba.capture.markers.summary import MarkerSummary
     from fba.codec.stream_info import StreamInfo
     from fba.face.model import FaceModel
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
-    from fba.formats.registry import Format
+    from fba.formats.registry import FaceCapture, Format
 
 NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
 
@@ -210,30 +209,21 @@ def has_skeleton(path: Path, format: str | None) -> bool:
 
 def has_markers(path: Path, format: str | None) -> bool:
     """Whether a file holds the motion of markers; False for standard input, which is read only once."""
-    return str(path) != "-" and _find_format(path, format).read_markers is not None
+    return str(path) != "-" and _find_format(path, format).has_markers
 
 
-def summarise_markers(
-    path: Path, format: str | None, fps: Fraction | None, limits: Limits
-) -> tuple[str, MarkerSummary] | None:
-    """Return the name of the format and what a capture of markers holds; None for other files."""
-    reader = _find_format(path, format)
-    if reader.read_markers is None:
-        return None
-    from fba.capture.markers.summary import summarise
-
-    return reader.name, summarise(reader.read_markers(path, fps=fps, limits=limits))
-
-
-def describe_face(
+def read_face(
     path: Path, fps: Fraction | None, format: str | None, limits: Limits
-) -> dict[str, Any] | None:
-    """Return what is in the capture of a face; None for other files. fps: of a file without times."""
+) -> tuple[str, FaceCapture] | None:
+    """Return the name of the format and the captured face as it is in a file; None for other files.
+
+    fps: of a file without times.
+    """
     reader = _find_format(path, format)
     if reader.read_face is None:
         return None
     options = {"fps": fps} if fps is not None and "fps" in reader.read_options else {}
-    return reader.read_face(path, limits=limits, **options).describe()
+    return reader.name, reader.read_face(path, limits=limits, **options)
 
 
 def check_capture_options(given: Mapping[str, str], files: Iterable[Path], format: str | None) -> None:

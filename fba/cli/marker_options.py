@@ -108,10 +108,13 @@ def write_places(
 
 def read_markers(path: Path, format: str | None, limits: Limits) -> MarkerMotion:
     """Return the markers of a capture, without the warnings that reading it a second time would repeat."""
+    from fba.capture.markers.motion import MarkerMotion
     from fba.formats import format_of
 
     with input_file(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
         reader = format_of(file, format)
-        assert reader.read_markers is not None  # the caller names captures of markers only
-        return reader.read_markers(file, limits=limits)
+        assert reader.read_face is not None  # the caller names captures of markers only
+        motion = reader.read_face(file, limits=limits)
+        assert isinstance(motion, MarkerMotion)
+        return motion

@@ -25,6 +25,12 @@ def seconds_text(value: Fraction | float) -> str:
     return f"{float(value):.2f} s"
 
 
+def clock_text(seconds: float) -> str:
+    """Return a time of day in seconds as "18:48:59.66"."""
+    minutes, rest = divmod(round(seconds % 86_400, 2), 60)
+    return f"{int(minutes) // 60 % 24:02}:{int(minutes) % 60:02}:{rest:05.2f}"
+
+
 def rate_text(rate: Fraction) -> str:
     """Return a frame rate as "25", "30.5", or "29.97" for 30000/1001."""
     return f"{float(rate):.3f}".rstrip("0").rstrip(".")

@@ -22,7 +22,6 @@ from fba.recognition import recognition_hint
 from fba.source import Path, read_head
 
 if TYPE_CHECKING:
-    from fba.capture.markers.motion import MarkerMotion
     from fba.capture.motion import SkeletonMotion
     from fba.codec import StreamInfo
     from fba.formats.gltf.bodies import PersonInfo
@@ -39,10 +38,14 @@ COMMON_SUFFIXES = (".csv", ".json", ".txt")
 class FaceCapture(Protocol):
     """A captured face as it is in a file: blendshapes, action units, markers or points."""
 
+    @property
+    def start(self) -> float | None:
+        """Time of day of its first row, in seconds; None where the file does not say."""
+
     def __len__(self) -> int: ...
 
     def describe(self) -> dict[str, Any]:
-        """Return what is in it: plain numbers, texts and lists of them."""
+        """Return what is in it: plain numbers, texts and lists of them; `kind` says which it is."""
 
 
 class Lazy:
@@ -75,7 +78,7 @@ class Format:
     file with this beginning (up to 64 KiB) and this lower-case suffix has this format. read, write: file to
     Animation and back; write is None if there is no writer. carries: the parts that a file can hold.
     read_motion: reads the motion of a skeleton, for formats of motion capture; `read` retargets it.
-    read_face: reads a captured face as it is; `read` makes FAPs of it. read_markers: the same of markers.
+    read_face: reads a captured face as it is, markers among them; `read` makes FAPs of it.
     list_clips: describes the animations of a file, for formats that hold several; `read` takes one as `clip`.
     describe_person: describes the person in a file without an animation. written: description of a written
     file, if `description` says more than the writer can do.
@@ -90,7 +93,6 @@ class Format:
     carries: tuple[str, ...] = ("face", "body")
     read_motion: Callable[..., SkeletonMotion] | None = None
     read_face: Callable[..., FaceCapture] | None = None
-    read_markers: Callable[..., MarkerMotion] | None = None
     list_clips: Callable[..., tuple[ClipInfo, ...]] | None = None
     describe_person: Callable[..., PersonInfo | None] | None = None
     written: str = ""
@@ -98,7 +100,12 @@ class Format:
     @property
     def is_capture(self) -> bool:
         """Whether files hold what was captured of somebody, of which `read` makes FAPs or BAPs."""
-        return (self.read_motion, self.read_face, self.read_markers) != (None, None, None)
+        return (self.read_motion, self.read_face) != (None, None)
+
+    @property
+    def has_markers(self) -> bool:
+        """Whether files hold markers, whose places on the face a map can give."""
+        return "markers" in self.read_options
 
     @property
     def read_options(self) -> tuple[str, ...]:
@@ -185,32 +192,32 @@ def formats() -> tuple[Format, ...]:
         Format(
             "c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face",
             lazy("c3d.reader", "sniff"), lazy("c3d.reader", "read"), None,
-            read_markers=lazy("c3d.reader", "read_markers"),
+            read_face=lazy("c3d.reader", "read_markers"),
         ),
         Format(
             "trc", (".trc",), "TRC (track row column): markers of a face",
             lazy("markers.trc", "sniff"), lazy("markers.trc", "read"), None,
-            read_markers=lazy("markers.trc", "read_markers"),
+            read_face=lazy("markers.trc", "read_markers"),
         ),
         Format(
             "motive", (".csv",), "OptiTrack Motive's CSV export: markers of a face",
             lazy("markers.motive", "sniff"), lazy("markers.motive", "read"), None,
-            read_markers=lazy("markers.motive", "read_markers"),
+            read_face=lazy("markers.motive", "read_markers"),
         ),
         Format(
             "nexus", (".csv",), "Vicon Nexus' CSV export: markers of a face",
             lazy("markers.nexus", "sniff"), lazy("markers.nexus", "read"), None,
-            read_markers=lazy("markers.nexus", "read_markers"),
+            read_face=lazy("markers.nexus", "read_markers"),
         ),
         Format(
             "qualisys", (".tsv",), "Qualisys Track Manager's TSV export: markers of a face",
             lazy("markers.qualisys", "sniff"), lazy("markers.qualisys", "read"), None,
-            read_markers=lazy("markers.qualisys", "read_markers"),
+            read_face=lazy("markers.qualisys", "read_markers"),
         ),
         Format(
             "markers", (".csv", ".tsv"), "table of a face's markers, wide or long",
             lazy("markers.table", "sniff"), lazy("markers.table", "read"), None,
-            read_markers=lazy("markers.table", "read_markers"),
+            read_face=lazy("markers.table", "read_markers"),
         ),
     )  # fmt: skip
 

@@ -351,12 +351,13 @@ def test_what_a_capture_holds() -> None:
     positions[10:20, 3] = positions[30, 3] = positions[40:42, 5] = np.nan
     motion = replace(take().motion, positions=positions, times=take().motion.times[:60], unit="mm", up="z")
     held = summarise(motion)
-    assert (held.frames, held.rate, held.unit, held.up) == (60, "100", "mm", "z")
-    assert (held.gaps, held.longest, held.longest_marker) == (3, pytest.approx(0.1), motion.names[3])
-    assert held.missing == pytest.approx(13 / (60 * len(motion.names)))
-    assert (held.map, held.placed) == ("regions50", 34)
-    few = MarkerMotion(("A", "B"), motion.positions[:, :2], motion.times, motion.rate)
-    assert (summarise(few).map, summarise(few).placed, summarise(few).gaps) == ("", 0, 0)
+    assert [held[key] for key in ("frames", "rate", "unit", "up")] == [60, "100", "mm", "z"]
+    assert (held["gaps"], held["longest_marker"]) == (3, motion.names[3])
+    assert held["longest"] == pytest.approx(0.1)
+    assert held["missing"] == pytest.approx(13 / (60 * len(motion.names)))
+    assert (held["map"], held["placed"]) == ("regions50", 34)
+    few = summarise(MarkerMotion(("A", "B"), motion.positions[:, :2], motion.times, motion.rate))
+    assert (few["map"], few["placed"], few["gaps"]) == ("", 0, 0)
 
 
 def test_options_that_are_wrong() -> None:

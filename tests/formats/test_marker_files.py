@@ -30,7 +30,7 @@ def cloud(markers: int = 5, frames: int = 12) -> MarkerMotion:
 
 
 def read(path: Path, **options: object) -> MarkerMotion:
-    reader = format_of(path).read_markers
+    reader = format_of(path).read_face
     assert reader is not None
     return reader(path, **options)
 
@@ -131,7 +131,7 @@ def test_what_is_wrong_is_named(
     tmp_path: Path, name: str, old: bytes, new: bytes, message: str | None
 ) -> None:
     path = marker_files.write(tmp_path, name, cloud())
-    reader = format_of(path).read_markers
+    reader = format_of(path).read_face
     assert reader is not None
     data = path.read_bytes()
     assert old in data
@@ -147,7 +147,7 @@ def test_what_is_wrong_is_named(
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 def test_damage_is_an_error_of_ours(tmp_path: Path, name: str) -> None:
     path = marker_files.write(tmp_path, name, cloud(4, 5))
-    reader = format_of(path).read_markers
+    reader = format_of(path).read_face
     assert reader is not None
     data = bytearray(path.read_bytes())
     random = np.random.default_rng(len(name))

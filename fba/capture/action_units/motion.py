@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from fba.arrays import Float64
-from fba.capture.blendshapes.motion import ShapeMotion
+from fba.capture.blendshapes.rows import describe_rows, freeze_rows
 from fba.errors import ModelError
 
 
@@ -31,26 +31,19 @@ class ActionUnitMotion:
     findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        try:
-            checked = self._as_shapes()
-        except ModelError as error:
-            raise ModelError(error.finding.replace("ShapeMotion", "ActionUnitMotion")) from error
-        for ours, theirs in (
-            ("intensities", "weights"), ("times", "times"), ("rate", "rate"), ("head", "head"),
-            ("eyes", "eyes"),
-        ):  # fmt: skip
-            object.__setattr__(self, ours, getattr(checked, theirs))
+        freeze_rows(self, {"intensities": len(self.units)})
+        if len(set(self.units)) != len(self.units):
+            raise ModelError("ActionUnitMotion: a unit occurs twice")
 
     def __len__(self) -> int:
         return len(self.times)
 
+    @property
+    def start(self) -> None:
+        """No tracker of action units says at what time of day a film was made."""
+        return None
+
     def describe(self) -> dict[str, Any]:
         """Return what is in the capture, for `fba info`: plain numbers, texts and lists of them."""
-        return {**self._as_shapes().describe(), "kind": "action units"}
-
-    def _as_shapes(self) -> ShapeMotion:
-        """Return the same with units as names of shapes, which has the same checks."""
-        return ShapeMotion(
-            tuple(f"AU{unit:02}" for unit in self.units), self.intensities, self.times, self.rate,
-            head=self.head, eyes=self.eyes, name=self.name, findings=self.findings,
-        )  # fmt: skip
+        names = [f"AU{unit:02}" for unit in self.units]
+        return describe_rows(self, "action units", names, self.intensities)

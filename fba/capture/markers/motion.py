@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
 from fba.arrays import Bool, Float64
+from fba.capture.markers.gaps import find_gaps
 from fba.errors import ModelError
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "dm": 0.1, "in": 0.0254, "ft": 0.3048}
@@ -25,7 +27,8 @@ class MarkerMotion:
     names: M names, each once. positions: float64 (T, M, 3), metres, NaN where a marker was not seen.
     times: float64 (T,), seconds, rising. rate: nominal frames per second. unit: the unit of length in the
     file; "" if it does not say. up: the axis that the file says is up, such as "+y"; "" if it does not say.
-    name: of the performance.
+    name: of the performance. start: time of day of the first frame, in seconds; None where the file does not
+    say.
 
     Arrays are read-only copies. Raises ModelError if the parts contradict each other, times do not rise, or
     a coordinate is infinite or beyond a million metres.
@@ -38,6 +41,7 @@ class MarkerMotion:
     unit: str = ""
     up: str = ""
     name: str = ""
+    start: float | None = None
 
     def __post_init__(self) -> None:
         positions = np.array(self.positions, dtype=np.float64)
@@ -79,6 +83,34 @@ class MarkerMotion:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    def describe(self) -> dict[str, Any]:
+        """Return what is in the capture, for `fba info`: plain numbers, texts and lists of them.
+
+        markers: names. frames, rate, seconds, start. unit, up: as the file says, "" if it does not. gaps: how
+        many; missing: share of all positions; longest: seconds of the longest gap, and its marker.
+        """
+        seen = self.seen
+        gaps = [
+            ((end - start) / float(self.rate), self.names[marker])
+            for marker in np.flatnonzero(~seen.all(axis=0))
+            for start, end in find_gaps(seen[:, marker])
+        ]
+        longest, whose = max(gaps, key=lambda gap: gap[0], default=(0.0, ""))
+        return {
+            "kind": "markers",
+            "markers": list(self.names),
+            "frames": len(self),
+            "rate": str(self.rate),
+            "seconds": self.duration,
+            "start": self.start,
+            "unit": self.unit,
+            "up": self.up,
+            "gaps": len(gaps),
+            "missing": float(1 - seen.mean()) if seen.size else 0.0,
+            "longest": longest,
+            "longest_marker": whose,
+        }
 
     @property
     def seen(self) -> Bool:

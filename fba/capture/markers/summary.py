@@ -1,58 +1,28 @@
-"""What a capture of markers holds, in numbers."""
+"""Whether there is a face in a capture of markers."""
 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from fba.capture.markers.gaps import find_gaps
 from fba.capture.markers.marker_maps import find_map
 from fba.capture.markers.motion import MarkerMotion
 from fba.errors import FbaWarning, ModelError
 
 
-@dataclass(frozen=True)
-class MarkerSummary:
-    """What a capture holds.
+def summarise(motion: MarkerMotion) -> dict[str, Any]:
+    """Return what a capture holds, as it describes itself, and what of that is on a face.
 
-    markers: names. frames, rate, seconds. unit, up: as the file says, "" if it does not. gaps: how many;
-    missing: share of all positions; longest: seconds of the longest gap, and its marker. map: how the places
-    on the face are found, a set's name or "shape"; "" if there is no face. placed: markers with a place.
+    map: how the places on the face are found, a set's name or "shape"; "" if there is no face. placed: number
+    of markers with a place.
     """
-
-    markers: tuple[str, ...]
-    frames: int
-    rate: str
-    seconds: float
-    unit: str
-    up: str
-    gaps: int
-    missing: float
-    longest: float
-    longest_marker: str
-    map: str
-    placed: int
-
-
-def summarise(motion: MarkerMotion) -> MarkerSummary:
-    """Return what a capture holds."""
-    seen = motion.seen
-    count, longest, whose = 0, 0.0, ""
-    for marker in np.flatnonzero(~seen.all(axis=0)):
-        for start, end in find_gaps(seen[:, marker]):
-            count += 1
-            length = float((end - start) / motion.rate)
-            if length > longest:
-                longest, whose = length, motion.names[marker]
+    placed: dict[str, str] = {}
+    found_by = ""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FbaWarning)
-            placed, found_by = find_map(motion) if len(motion) else ({}, "")
+            if len(motion):
+                placed, found_by = find_map(motion)
     except ModelError:
-        placed, found_by = {}, ""
-    return MarkerSummary(
-        motion.names, len(motion), str(motion.rate), motion.duration, motion.unit, motion.up, count,
-        float(1 - seen.mean()) if seen.size else 0.0, longest, whose, found_by, len(placed),
-    )  # fmt: skip
+        pass
+    return {**motion.describe(), "map": found_by, "placed": len(placed)}

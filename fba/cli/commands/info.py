@@ -16,23 +16,22 @@ from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import (
     EXISTING,
     check_clip,
-    describe_face,
     describe_person,
     input_file,
     list_clips,
     probe_input,
-    summarise_markers,
+    read_face,
 )
-from fba.cli.printing import print_json, rate_text, seconds_text
+from fba.cli.printing import clock_text, print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
 from fba.errors import FbaWarning
 from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO
 
 if TYPE_CHECKING:
-    from fba.capture.markers.summary import MarkerSummary
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
+    from fba.formats.registry import FaceCapture
 
 SHOWN = 8
 """Names of markers in a line."""
@@ -94,14 +93,15 @@ def command(
                 if not as_json:
                     _print_person(path, size, person)
                 continue
-            if (markers := summarise_markers(file, format, fps, limit)) is not None:
-                kind, summary = markers
+            kind, face = read_face(file, fps, format, limit) or ("", None)
+            if face is not None and (markers := _summarise_markers(face)) is not None:
                 size = file.stat().st_size
-                reports.append({"file": str(path), "format": kind, "size": size, "markers": asdict(summary)})
+                reports.append({"file": str(path), "format": kind, "size": size, "markers": markers})
                 if not as_json:
-                    _print_markers(path, kind, size, summary)
+                    click.echo(f"{path}: {kind.upper()}, {size} bytes")
+                    _print_markers(markers)
                 continue
-            capture = describe_face(file, fps, format, limit)
+            capture = None if face is None else face.describe()
             with warnings.catch_warnings():
                 if capture is not None:  # which lists what would be warned of
                     warnings.simplefilter("ignore", FbaWarning)
@@ -148,27 +148,37 @@ def _print_person(path: Path, size: int, person: PersonInfo) -> None:
     click.echo(f"  motion   none; show one on it: fba play MOTION --body {path}")
 
 
-def _print_markers(path: Path, kind: str, size: int, summary: MarkerSummary) -> None:
-    click.echo(f"{path}: {kind.upper()}, {size} bytes")
+def _summarise_markers(face: FaceCapture) -> dict[str, Any] | None:
+    """Return what a capture of markers holds, which may be no face; None for other captures."""
+    from fba.capture.markers.motion import MarkerMotion
+    from fba.capture.markers.summary import summarise
+
+    return summarise(face) if isinstance(face, MarkerMotion) else None
+
+
+def _print_markers(capture: Mapping[str, Any]) -> None:
+    """Print what is in a capture of markers, as `fba.capture.markers.summary` says it."""
+    start = f" from {clock_text(capture['start'])}" if capture["start"] is not None else ""
     click.echo(
-        f"  time     {summary.frames} frames, {seconds_text(summary.seconds)} at "
-        f"{rate_text(Fraction(summary.rate))} frames/s"
+        f"  time     {capture['frames']} frames, {seconds_text(capture['seconds'])} at "
+        f"{rate_text(Fraction(capture['rate']))} frames/s{start}"
     )
-    names = ", ".join(summary.markers[:SHOWN]) + (", ..." if len(summary.markers) > SHOWN else "")
-    unit = f", in {summary.unit}" if summary.unit else ", unit not given"
-    up = f", {summary.up} up" if summary.up else ""
-    click.echo(f"  markers  {len(summary.markers)}{unit}{up}: {names}")
-    if summary.gaps:
+    markers = capture["markers"]
+    names = ", ".join(markers[:SHOWN]) + (", ..." if len(markers) > SHOWN else "")
+    unit = f", in {capture['unit']}" if capture["unit"] else ", unit not given"
+    up = f", {capture['up']} up" if capture["up"] else ""
+    click.echo(f"  markers  {len(markers)}{unit}{up}: {names}")
+    if capture["gaps"]:
         click.echo(
-            f"  gaps     {summary.gaps}, {100 * summary.missing:.1f} % of all positions; the longest "
-            f"{summary.longest:.2f} s ({summary.longest_marker})"
+            f"  gaps     {capture['gaps']}, {100 * capture['missing']:.1f} % of all positions; the longest "
+            f"{capture['longest']:.2f} s ({capture['longest_marker']})"
         )
     else:
         click.echo("  gaps     none")
-    how = "the shape of the cloud" if summary.map == "shape" else f"the names ({summary.map})"
-    placed = f"{summary.placed} markers have a place by {how}"
+    how = "the shape of the cloud" if capture["map"] == "shape" else f"the names ({capture['map']})"
+    placed = f"{capture['placed']} markers have a place by {how}"
     click.echo(
-        f"  face     {placed if summary.map else 'not found; fba encode --map says which marker is where'}"
+        f"  face     {placed if capture['map'] else 'not found; fba encode --map says which marker is where'}"
     )
 
 
@@ -205,17 +215,12 @@ def _print_capture(capture: Mapping[str, Any] | None) -> None:
     count, still = len(capture["shapes"]), len(capture["still"])
     moving = f", {still} of which never move" if still else ""
     unseen = f", {capture['unseen']} of them without a face" if capture["unseen"] else ""
-    start = f" from {_clock_text(capture['start'])}" if capture["start"] is not None else ""
+    start = f" from {clock_text(capture['start'])}" if capture["start"] is not None else ""
     turns = [what for what, turns in capture["angles"].items() if turns]
     click.echo(f"  capture  {capture['rows']} rows{unseen}, {capture['seconds']:.2f} s{start}")
     click.echo(f"  {capture['kind']:8} {count}{moving}; angles of {' and '.join(turns) or 'nothing'}")
     for finding in capture["findings"]:
         click.echo(f"  found    {finding}")
-
-
-def _clock_text(seconds: float) -> str:
-    minutes, rest = divmod(seconds, 60)
-    return f"{int(minutes) // 60:02}:{int(minutes) % 60:02}:{rest:05.2f}"
 
 
 def _part_text(part: PartInfo, kind: str, frames: int) -> str:

@@ -531,7 +531,7 @@ def read_markers(path: Path) -> object:
     """Read a capture of markers."""
     from fba.formats import format_of
 
-    reader = format_of(path).read_markers
+    reader = format_of(path).read_face
     assert reader is not None
     return reader(path, fps=Fraction(50))
 
