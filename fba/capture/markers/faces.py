@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
+from fba.capture.markers.blinks import opening_by_blinks
 from fba.capture.markers.exchanges import Exchange, undo_exchanges
 from fba.capture.markers.gaps import RARELY, Filled, fill_gaps, warn_of_gaps
 from fba.capture.markers.marker_maps import check_map, find_map, list_names
@@ -36,6 +37,8 @@ MOST_FRAMES = 1_000_000
 """More than two hours at 120 frames/s."""
 FRAME_BYTES, MARKER_BYTES = 6000, 400
 """Memory for each frame, and for each marker in it."""
+LIDS = {"3.1": "3.3", "3.2": "3.4"}
+"""Upper lids, and the lower lid of the same eye."""
 LARGEST_GAZE = 0.6
 """Radians that an eye turns at most."""
 
@@ -193,6 +196,7 @@ def find_face(
     neutral_local = np.median(local[rest], axis=0)
     known = {places[name]: neutral_local[n] for n, name in enumerate(names) if places[name] != "head"}
     points = complete_points(known, model.points)
+    _open_by_blinks(points, places, names, local - neutral_local, motion.times)
     try:
         fapu = Fapu.measure(points)
     except ModelError as error:
@@ -206,7 +210,7 @@ def find_face(
     values = np.zeros((len(motion), FAP_COUNT))
     sent: tuple[int, ...] = ()
     if unknowns.faps:
-        values = solve(moved, unknowns, measure_responses(model), fapu)
+        values = solve(moved, points, fapu, unknowns, measure_responses(model))
         sent = (*unknowns.faps, *unknowns.mates)
     values[:, [HEAD_PITCH - 1, HEAD_YAW - 1, HEAD_ROLL - 1]] = _head_angles(rotation) / fapu.AU
     sent = (*sent, HEAD_PITCH, HEAD_YAW, HEAD_ROLL)
@@ -222,6 +226,22 @@ def find_face(
         places, found_by, where, (rest.start, rest.stop), points, fapu, filled, values, tuple(sorted(sent)),
         path,
     )  # fmt: skip
+
+
+def _open_by_blinks(
+    points: Float64, places: Mapping[str, str], names: Sequence[str], moved: Float64, times: Float64
+) -> None:
+    """Move lower lids without a marker to where blinks say that they are: points, float64 (84, 3), changes."""
+    rows, placed = row_of(), {places[name]: n for n, name in enumerate(names)}
+    lids = {upper: lower for upper, lower in LIDS.items() if upper in placed and lower not in placed}
+    if not lids:
+        return
+    usual = np.mean([points[rows[upper], 1] - points[rows[lower], 1] for upper, lower in lids.items()])
+    sunk = -moved[:, [placed[upper] for upper in lids], 1]
+    opening = opening_by_blinks(sunk, times, float(usual))
+    if opening is not None:
+        for upper, lower in lids.items():
+            points[rows[lower], 1] = points[rows[upper], 1] - opening
 
 
 def _without_rare(motion: MarkerMotion, places: dict[str, str]) -> dict[str, str]:

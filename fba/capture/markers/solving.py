@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.capture.markers.jaws import jaw_curves
 from fba.capture.markers.responses import JAW, JAW_VALUES, Responses
 from fba.face import Fapu
 from fba.face.feature_points import row_of
@@ -24,14 +25,10 @@ ROUNDS = 3
 """Solutions, each with the jaw's arc at the values of the one before."""
 SWEEPS = 8
 """Rounds in which values are held at a bound or let go."""
-OPEN = 60.0
-"""Value of open_jaw from which a frame tells how deep the jaw's arc is."""
-FEWEST = 10
-"""Frames with an open jaw that are needed for that."""
-DEEPEST = 3.0
-"""Largest ratio of two jaws' arcs, either way."""
-CHIN_FAPS = (JAW, 14, 18)
-"""FAPs that move the chin up, down, forward and back: jaw, thrust, compression."""
+JAW_STEP = 2
+"""Row of `JAW_VALUES` that is the first guess of how far the jaw moves what."""
+BESIDE_CHIN = ("2.11", "2.12")
+"""Points without a FAP of their own, which go up, down, forward and back with the jaw."""
 INNER = {"8.1": "2.2", "8.2": "2.3", "8.3": "2.4", "8.4": "2.5", "8.5": "2.6", "8.6": "2.7", "8.7": "2.8",
          "8.8": "2.9"}  # fmt: skip
 """The point of the inner lip beside each of the outer lip."""
@@ -68,14 +65,19 @@ def choose_unknowns(points: Sequence[str]) -> Unknowns:
                 mates[fap.number] = fap.lip_mate
             else:
                 solved.append(fap.number)
+    if JAW in solved:
+        rows += [(row_of()[point], axis) for point in BESIDE_CHIN if point in given for axis in (1, 2)]
     return Unknowns(tuple(solved), mates, tuple(dict.fromkeys(rows)))
 
 
-def solve(moved: Float64, unknowns: Unknowns, responses: Responses, fapu: Fapu) -> Float64:
+def solve(
+    moved: Float64, still: Float64, fapu: Fapu, unknowns: Unknowns, responses: Responses
+) -> Float64:
     """Return FAPs, float64 (T, 68), zero where no marker tells.
 
     moved: float64 (T, 84, 3), displacements of feature points from the neutral face, relative to the head,
-    in metres along the standard's axes. fapu: the actor's.
+    in metres along the standard's axes. still, fapu: the actor's, float64 (84, 3)
+    and what is measured on these points. responses: those of any face.
     """
     points, axes = np.array(unknowns.rows).T
     seen = moved[:, points, axes]
@@ -86,14 +88,18 @@ def solve(moved: Float64, unknowns: Unknowns, responses: Responses, fapu: Fapu) 
     for mate, leader in unknowns.mates.items():
         if leader in unknowns.faps:
             matrix[unknowns.faps.index(leader)] += each[mate - 1]
+    curve = responses.jaw[:, points, axes] * fapu.MNS
+    for row, shifts in jaw_curves(still, fapu).items():
+        chin = points == row
+        curve[:, chin] = shifts[:, axes[chin]] * fapu.MNS
+    jaw = unknowns.faps.index(JAW) if JAW in unknowns.faps else None
+    if jaw is not None:
+        matrix[jaw] = curve[JAW_STEP] / JAW_VALUES[JAW_STEP]
     size = float(np.linalg.norm(matrix, axis=1).mean()) or 1.0
     inverse = np.linalg.inv(matrix @ matrix.T + RIDGE * size**2 * np.eye(len(columns)))
     one_way = np.flatnonzero([faps()[c].direction == "U" for c in columns])
     values = _solve_bounded(inverse, seen @ matrix.T, one_way)
-    if JAW in unknowns.faps:
-        jaw = unknowns.faps.index(JAW)
-        curve = responses.jaw[:, points, axes] * fapu.MNS
-        curve *= _arc_factors(seen, values, matrix, curve, unknowns)
+    if jaw is not None:
         for _ in range(ROUNDS):
             opened = values[:, jaw]
             arc = np.stack([np.interp(opened, JAW_VALUES, curve[:, r]) for r in range(len(points))], axis=1)
@@ -103,38 +109,6 @@ def solve(moved: Float64, unknowns: Unknowns, responses: Responses, fapu: Fapu) 
     result[:, columns] = values
     for mate, leader in unknowns.mates.items():
         result[:, mate - 1] = result[:, leader - 1]
-    return result
-
-
-def _arc_factors(
-    seen: Float64, values: Float64, matrix: Float64, curve: Float64, unknowns: Unknowns
-) -> Float64:
-    """Return how far each row moves with the jaw, relative to the face of the responses: float64 (R,).
-
-    1 but for depth and height of the chin's points, which depend on where the jaw's hinge is. There it is the
-    weighted median, over the frames with an open jaw, of how far the point went relative to how far it
-    should: thrusts and presses of the chin that come and go do not disturb it. The chin's lowest point, whose
-    height defines how open the jaw is, is the measure.
-    """
-    result = np.ones(len(unknowns.rows))
-    chin = (row_of()["2.1"], 1)
-    if chin not in unknowns.rows:
-        return result
-    others = [n for n, fap in enumerate(unknowns.faps) if fap not in CHIN_FAPS]
-    went = seen - values[:, others] @ matrix[others]
-    down = unknowns.rows.index(chin)
-    opened = np.interp(-went[:, down], -curve[:, down], JAW_VALUES)
-    frames = opened > OPEN
-    if frames.sum() < FEWEST:
-        return result
-    for row, (point, axis) in enumerate(unknowns.rows):
-        if point in (row_of()["2.1"], row_of()["2.10"]) and axis != 0 and row != down:
-            should = np.interp(opened[frames], JAW_VALUES, curve[:, row])
-            ratio = went[frames, row] / should
-            order = np.argsort(ratio)
-            weight = np.cumsum(np.abs(should[order]))
-            middle = ratio[order][np.searchsorted(weight, weight[-1] / 2)]
-            result[row] = np.clip(middle, 1 / DEEPEST, DEEPEST)
     return result
 
 
