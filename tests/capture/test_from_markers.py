@@ -12,30 +12,34 @@ import pytest
 
 from fba.capture import MarkerMotion, from_markers
 from fba.capture.markers import stabilisation
+from fba.capture.markers.blinks import opening_by_blinks
 from fba.capture.markers.faces import MarkerFace, find_face
 from fba.capture.markers.gaps import fill_gaps
+from fba.capture.markers.jaws import jaw_curves
 from fba.capture.markers.marker_maps import change_map, find_map, marker_sets, read_map, write_map
+from fba.capture.markers.responses import JAW_VALUES
 from fba.capture.markers.summary import summarise
 from fba.capture.markers.targets import RIGID
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError
-from fba.face import FaceModel
+from fba.face import Deformer, FaceModel
 from fba.face.authoring import author
+from fba.face.feature_points import row_of
 from fba.limits import Limits
 from fba.parameters import faps
 from marker_actor import NAMES, Take, perform
-from small_head import small_head
+from small_head import adult_points, small_head
 
 TURNED = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """To axes with z up and the actor looking along x."""
 PER_MILLE = 1024 / 1000
-EXACT = {18: 45, 3: 30, 19: 20, 20: 20}
-"""Thousandths of FAPU, root mean square, for FAPs that markers tell less well: docs/capture-markers.md."""
+EXACT = {18: 30}
+"""Thousandths of FAPU, root mean square, where the lower lip carries the skin of a coarse mask too far."""
 
 
 @cache
 def actor() -> FaceModel:
     """Another head than the built-in one, by whose motions the encoder tells FAPs apart."""
-    head = small_head()
+    head = small_head(cell=0.005)
     return author(head.parts, head.points, bound=head.bound)
 
 
@@ -80,6 +84,59 @@ def test_with_noise() -> None:
     noise = np.random.default_rng(1).normal(0, 0.3e-3, take().motion.positions.shape)
     face = find_face(with_positions(take().motion.positions + noise))
     check(face, take(), 50)
+
+
+def test_the_jaw_goes_back_as_the_actors_own() -> None:
+    """From where chin and ears are, against the motion of two heads whose chins go back by 1.2 and 1.5."""
+    for head in (actor(), FaceModel.default()):
+        moved = Deformer(head).feature_points(np.eye(68)[2] * 1000, local=True)
+        found = jaw_curves(head.points, head.fapu)
+        assert len(found) == 4
+        for row, shifts in found.items():
+            shown = (moved[row] - head.points[row]) / head.fapu.MNS
+            np.testing.assert_allclose(shifts[JAW_VALUES == 1000][0], shown, atol=10)
+
+
+def test_a_long_chin() -> None:
+    """It is 15 mm lower below the ears, so it goes back by a third more than that of the built-in head."""
+    points, rows = adult_points().copy(), row_of()
+    for name, share in (("2.1", 1), ("2.10", 0.6), ("2.11", 1), ("2.12", 1), ("2.13", 0.5), ("2.14", 0.5)):
+        points[rows[name], 1] -= 0.015 * share
+    head = small_head(points, cell=0.005)
+    talk = perform(author(head.parts, head.points, bound=head.bound), 300)
+    worse = {fap: error for fap, error in errors(find_face(talk.motion), talk).items() if error > 20}
+    assert not worse
+
+
+def lid(times: np.ndarray, blinks: dict[float, float], length: float = 0.2) -> np.ndarray:
+    """Metres (T,) that a lid is lowered: second -> depth of each blink."""
+    sunk = np.zeros(len(times))
+    for second, depth in blinks.items():
+        sunk += depth * np.exp(-(((times - second) / (0.6 * length)) ** 2))
+    return sunk
+
+
+def test_blinks_tell_how_far_eyes_are_open() -> None:
+    times = np.arange(1000) / 100
+    noise = np.random.default_rng(4).normal(0, 0.3e-3, (1000, 2))
+    half_way = lid(times, {1.0: 0.009, 3.0: 0.006, 5.0: 0.009, 8.0: 0.009})
+    both = np.stack([half_way, half_way], axis=1)
+    assert opening_by_blinks(both + noise, times, 0.0117) == pytest.approx(0.010, rel=0.05)
+    assert opening_by_blinks(both, times, 0.006) == pytest.approx(0.0078)  # no eye is as wide as that
+    squint = lid(times, {4.0: 0.004, 7.0: 0.003})[:, None]
+    asleep = lid(times, {5.0: 0.008}, 2.0)[:, None]
+    assert opening_by_blinks(squint, times, 0.0117) is None
+    assert opening_by_blinks(asleep, times, 0.0117) is None
+    assert opening_by_blinks(noise[:2], times[:2], 0.0117) is None
+
+
+def test_eyes_without_blinks_are_open_as_usual() -> None:
+    still = take().faps[:, 18] < 10
+    whole = take().motion
+    motion = replace(whole, positions=whole.positions[still], times=whole.times[still])
+    opening, usual = (1024 * find_face(one).fapu.IRISD for one in (whole, motion))
+    assert opening == pytest.approx(1024 * actor().fapu.IRISD, rel=0.04)
+    assert usual == pytest.approx((0.0117 + 0.0108) / 2, abs=4e-4)
 
 
 def test_a_stream_of_another_rate_lasts_as_long() -> None:

@@ -231,7 +231,7 @@ def find_face(
 def _open_by_blinks(
     points: Float64, places: Mapping[str, str], names: Sequence[str], moved: Float64, times: Float64
 ) -> None:
-    """Move lower lids without a marker to where blinks say that they are: points, float64 (84, 3), changes."""
+    """Move lower lids without a marker to where blinks say that they are, in points, float64 (84, 3)."""
     rows, placed = row_of(), {places[name]: n for n, name in enumerate(names)}
     lids = {upper: lower for upper, lower in LIDS.items() if upper in placed and lower not in placed}
     if not lids:

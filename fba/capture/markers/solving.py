@@ -70,9 +70,7 @@ def choose_unknowns(points: Sequence[str]) -> Unknowns:
     return Unknowns(tuple(solved), mates, tuple(dict.fromkeys(rows)))
 
 
-def solve(
-    moved: Float64, still: Float64, fapu: Fapu, unknowns: Unknowns, responses: Responses
-) -> Float64:
+def solve(moved: Float64, still: Float64, fapu: Fapu, unknowns: Unknowns, responses: Responses) -> Float64:
     """Return FAPs, float64 (T, 68), zero where no marker tells.
 
     moved: float64 (T, 84, 3), displacements of feature points from the neutral face, relative to the head,
