@@ -25,24 +25,32 @@ def read_names(path: Path, table: str, example: str, limits: Limits) -> dict[str
     example: a line of such a table, for messages. Raises FormatError for a file without it, with the line,
     LimitError.
     """
+    names = read_toml(path, f"{example} below [{table}]", limits).get(table)
+    if not isinstance(names, dict) or not names:
+        raise FormatError(f"has no table [{table}]; expected lines such as {example} below it", path=path)
+    return names
+
+
+def read_toml(path: Path, expected: str, limits: Limits) -> dict[str, Any]:
+    """Return the content of a TOML file of a map.
+
+    expected: lines of such a file, for messages. Raises FormatError for a file that is none, with the line,
+    LimitError.
+    """
     data = read_whole(path)
     if len(data) > MOST_BYTES:
         raise FormatError(f"has {len(data)} bytes, more than the {MOST_BYTES} that a map may have", path=path)
     limits.check_bytes(40 * len(data), f"{os.fspath(path)}: the map", source=len(data))
     try:
-        content = tomllib.loads(data.decode("utf-8-sig"))
+        return tomllib.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise FormatError(f"is not UTF-8 text (byte {error.start})", path=path) from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         line = re.search(r"at line (\d+)", str(error))
         raise FormatError(
-            f"is not TOML: {str(error)[:200]}; expected lines such as {example} below [{table}]",
+            f"is not TOML: {str(error)[:200]}; expected lines such as {expected}",
             path=path, line=int(line[1]) if line else None,
         ) from None  # fmt: skip
-    names = content.get(table)
-    if not isinstance(names, dict) or not names:
-        raise FormatError(f"has no table [{table}]; expected lines such as {example} below it", path=path)
-    return names
 
 
 def write_names(

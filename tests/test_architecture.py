@@ -59,6 +59,7 @@ fba.body.builtin
 fba.body.gait
 fba.body.importers
 fba.capture.markers
+fba.capture.virtual_markers
 fba.capture.motion
 fba.capture.sampling
 fba.capture.limbs

@@ -11,7 +11,7 @@ from fba.face.importers._sniffing import KINDS, sniff
 from fba.face.model import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
 
-__all__ = ["KINDS", "import_model"]
+__all__ = ["KINDS", "import_model", "sniff"]
 
 
 def import_model(

@@ -1,0 +1,118 @@
+"""The vertices that a virtual marker moves: a walk over the mesh from its centre, within a cylinder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fba.arrays import Float64, Int64, Integer, Intp
+from fba.capture.virtual_markers._walk_loops import list_triangles, walk_from
+from fba.errors import ModelError
+
+MOST_SHARES = 30_000_000
+"""Vertices of all virtual markers together; 16 bytes each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """The vertices that a virtual marker moves.
+
+    vertices: intp (K,), the centre first, in the order in which the walk meets them. distances: float64 (K,)
+    from the centre, in the unit of the mesh. levels: intp (K,), 1 for the centre, 2 for those next to it, and
+    so on. radius: of the cylinder.
+    """
+
+    vertices: Intp
+    distances: Float64
+    levels: Intp
+    radius: float
+
+    @property
+    def shares(self) -> Float64:
+        """float64 (K,): by how much of the marker's displacement each moves, 1 at the centre, 0 at the edge.
+
+        At the ends of a cylinder that is longer than wide, the distance is more than the radius: 0, too.
+        """
+        return np.maximum(1.0 - self.distances / self.radius, 0.0)
+
+
+class WalkedMesh:
+    """A mesh that is prepared for walks. vertices: float64 (V, 3). triangles: (F, 3), within it."""
+
+    def __init__(self, vertices: Float64, triangles: Integer) -> None:
+        self.vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+        self.triangles: Int64 = np.ascontiguousarray(triangles, dtype=np.int64)
+
+    def walk(self, centres: Sequence[tuple[int, float, float]]) -> list[Influence]:
+        """Return the influence of each (centre vertex, radius, depth).
+
+        A vertex is inside if it is nearer than `radius` to the centre in x and y, and at most `depth` before
+        or behind it in z. The walk goes from the centre to all other corners of its triangles, on from those
+        that are inside, and ends where nothing new is: an upper lip is not joined to the lower one by being
+        near. Time is linear in what is met. Raises ModelError for a centre that is no vertex, or sizes that
+        are not positive numbers; LimitError for influences that would not fit into memory.
+        """
+        count = len(self.vertices)
+        starts, listed = self._listed
+        tested = np.full(count, -1, dtype=np.int64)
+        found, away, levels = np.empty(count, np.int64), np.empty(count), np.empty(count, np.int64)
+        result = []
+        total = 0
+        for number, (centre, radius, depth) in enumerate(centres):
+            if not 0 <= centre < count:
+                raise ModelError(f"there is no vertex {centre}: the mesh has {count}, counted from 0")
+            if not (0 < radius < np.inf and 0 < depth < np.inf):
+                raise ModelError(f"radius and depth must be positive numbers, not {radius:g} and {depth:g}")
+            size = walk_from(
+                centre, float(radius), float(depth), number, self.vertices, self.triangles, starts, listed,
+                tested, found, away, levels,
+            )  # fmt: skip
+            total += size
+            if total > MOST_SHARES:
+                raise ModelError(
+                    f"the first {number + 1} virtual markers move {total} vertices together, more than "
+                    f"{MOST_SHARES}; give them smaller radii"
+                )
+            inside = found[:size].astype(np.intp)
+            result.append(Influence(inside, away[:size].copy(), levels[:size].astype(np.intp), float(radius)))
+        return result
+
+    @cached_property
+    def _listed(self) -> tuple[Int64, Int64]:
+        starts = np.zeros(len(self.vertices) + 1, dtype=np.int64)
+        listed = np.empty(self.triangles.size, dtype=np.int64)
+        list_triangles(self.triangles, starts, listed)
+        return starts, listed
+
+
+def find_influence(
+    vertices: Float64, triangles: Integer, centre: int, radius: float, depth: float | None = None
+) -> Influence:
+    """Return the vertices that a virtual marker moves.
+
+    vertices: float64 (V, 3), in one unit with radius and depth, z to the front. triangles: (F, 3). centre: a
+    vertex. depth: half the length of the cylinder; None for the radius. Errors as of `WalkedMesh.walk`.
+    """
+    return WalkedMesh(vertices, triangles).walk([(centre, radius, radius if depth is None else depth)])[0]
+
+
+def give_to_nearest(influences: Sequence[Influence]) -> list[Influence]:
+    """Return influences of which each vertex is in one only: that whose centre is nearest, or the first."""
+    if not influences:
+        return []
+    vertices = np.concatenate([each.vertices for each in influences])
+    distances = np.concatenate([each.distances for each in influences])
+    owner = np.repeat(np.arange(len(influences)), [len(each.vertices) for each in influences])
+    order = np.lexsort((owner, distances, vertices))
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = vertices[order][1:] != vertices[order][:-1]
+    kept = np.zeros(len(order), dtype=bool)
+    kept[order[first]] = True
+    ends = np.cumsum([len(each.vertices) for each in influences])[:-1]
+    return [
+        Influence(each.vertices[mine], each.distances[mine], each.levels[mine], each.radius)
+        for each, mine in zip(influences, np.split(kept, ends), strict=True)
+    ]

@@ -1,0 +1,190 @@
+"""`MarkerMapping`: which vertex of a head each marker moves, how far around, and how vertices are shared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from fba.capture.markers.marker_maps import list_names
+from fba.capture.virtual_markers.heads import MarkedHead
+from fba.errors import FbaWarning, ModelError, OptionError
+
+ASSIGNMENTS = ("shared", "exclusive")
+OVERLAPS = ("match", "add")
+LARGEST = 1e9
+"""Largest radius or depth, in the unit of the head."""
+
+
+@dataclass(frozen=True)
+class VirtualMarker:
+    """A virtual marker: what one captured marker moves.
+
+    vertex: its centre, a vertex of the head; None for a fixed marker beside the face, such as one on a cap,
+    which only tells how the head moves. radius: of the cylinder around the centre, in x and y. depth: half
+    the cylinder's length, along z. Both in the unit of the head. fixed: the face does not move it; what the
+    capture says of it is how the head moves.
+    """
+
+    vertex: int | None
+    radius: float = 0.0
+    depth: float = 0.0
+    fixed: bool = False
+
+    def __post_init__(self) -> None:
+        if self.vertex is None:
+            if not self.fixed:
+                raise OptionError(
+                    "a virtual marker without a vertex must be fixed: it tells the head's motion"
+                )
+            return
+        if self.vertex < 0:
+            raise OptionError(f"vertices are counted from 0, and there is no vertex {self.vertex}")
+        for what, size in (("radius", self.radius), ("depth", self.depth)):
+            if not (math.isfinite(size) and 0 < size <= LARGEST):
+                raise OptionError(f"the {what} must be a positive number, not {size:g}")
+
+
+@dataclass(frozen=True)
+class MadeFor:
+    """The mesh that a mapping was made for: its name, how many vertices and triangles it has, and digests of
+    both, see `MarkedHead`."""
+
+    name: str
+    vertices: int
+    triangles: int
+    connectivity: str
+    shape: str
+
+
+@dataclass(frozen=True)
+class MarkerMapping:
+    """The virtual markers of a head.
+
+    markers: by the name of the captured marker. assignment: "shared", a vertex belongs to all virtual markers
+    in whose reach it is, or "exclusive", to the nearest alone. overlap: how displacements of shared vertices
+    go together. "match": so that each centre goes where its marker goes. "add": they are added, as in the
+    source of this method, and centres go too far where markers are close to each other. scale: two fixed
+    markers; the distance of their vertices over their own is the scale of all displacements; () for the
+    farthest apart. made_for: the mesh, None if unknown.
+
+    Raises OptionError for parts that contradict each other.
+    """
+
+    markers: Mapping[str, VirtualMarker] = field(default_factory=dict)
+    assignment: str = "shared"
+    overlap: str = "match"
+    scale: tuple[str, ...] = ()
+    made_for: MadeFor | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "markers", dict(self.markers))
+        for what, value, known in (
+            ("assignment", self.assignment, ASSIGNMENTS),
+            ("overlap", self.overlap, OVERLAPS),
+        ):
+            if value not in known:
+                raise OptionError(f"{what} must be one of {', '.join(known)}, not {value!r}")
+        taken: dict[int, str] = {}
+        for name, marker in self.markers.items():
+            if marker.vertex is not None and marker.vertex in taken:
+                raise OptionError(f"{taken[marker.vertex]!r} and {name!r} are both at vertex {marker.vertex}")
+            if marker.vertex is not None:
+                taken[marker.vertex] = name
+        if len(self.scale) not in (0, 2):
+            raise OptionError(f"scale needs two markers, not {len(self.scale)}")
+        for name in self.scale:
+            marker_of = self.markers.get(name)
+            if marker_of is None or not marker_of.fixed or marker_of.vertex is None:
+                raise OptionError(f"scale: {name!r} is no fixed marker with a vertex")
+        if len(set(self.scale)) == 1:
+            raise OptionError(f"scale needs two different markers, not {self.scale[0]!r} twice")
+
+    @property
+    def centres(self) -> dict[str, VirtualMarker]:
+        """Those with a vertex."""
+        return {name: marker for name, marker in self.markers.items() if marker.vertex is not None}
+
+    @property
+    def fixed(self) -> tuple[str, ...]:
+        """Names of the fixed ones."""
+        return tuple(name for name, marker in self.markers.items() if marker.fixed)
+
+    def changed(self, name: str, marker: VirtualMarker | None) -> MarkerMapping:
+        """Return the mapping with another virtual marker for a captured one; None takes it away.
+
+        One that was at the same vertex is taken away, and the pair of the scale if it is no longer one.
+        """
+        vertex = None if marker is None else marker.vertex
+        kept = {
+            other: each
+            for other, each in self.markers.items()
+            if other == name or each.vertex is None or each.vertex != vertex
+        }
+        if marker is None:
+            kept.pop(name, None)
+        else:
+            kept[name] = marker
+        still = all(one in kept and kept[one].fixed and kept[one].vertex is not None for one in self.scale)
+        return replace(self, markers=kept, scale=self.scale if still else ())
+
+    def for_head(self, head: MarkedHead) -> MarkerMapping:
+        """Return the mapping, marked as made for a head."""
+        made_for = MadeFor(head.name, len(head.vertices), len(head.triangles), head.connectivity, head.shape)
+        return replace(self, made_for=made_for)
+
+    def check(self, head: MarkedHead) -> None:
+        """Raise ModelError if the mapping was made for another mesh, or a vertex is none of the head's skin.
+
+        Warns (FbaWarning) if the mesh has the same triangles, but its vertices were moved.
+        """
+        import warnings
+
+        own = self.made_for
+        if own is not None:
+            here = (len(head.vertices), len(head.triangles))
+            if (own.vertices, own.triangles) != here or own.connectivity != head.connectivity:
+                counts = (
+                    f"it has {own.vertices} vertices and {own.triangles} triangles there, {here[0]} and "
+                    f"{here[1]} here"
+                    if (own.vertices, own.triangles) != here
+                    else "its triangles join other vertices"
+                )
+                raise ModelError(
+                    f"the mapping was made for another mesh ({own.name}) than {head.name}: {counts}; vertex "
+                    "numbers would mean other places. Give the head that it was made for, or map this one "
+                    "anew"
+                )
+            if own.shape != head.shape:
+                warnings.warn(
+                    f"{head.name}: vertices were moved since the mapping was made; it is used as it is, as "
+                    "their numbers are the same", FbaWarning, stacklevel=3,
+                )  # fmt: skip
+        number = head.skin.number
+        used = set(head.skin.triangles.ravel().tolist())
+        for name, marker in self.centres.items():
+            assert marker.vertex is not None
+            if marker.vertex >= len(head.vertices):
+                raise ModelError(
+                    f"virtual marker {name!r} is at vertex {marker.vertex}, but {head.name} has "
+                    f"{len(head.vertices)} vertices, counted from 0"
+                )
+            if int(number[marker.vertex]) not in used:
+                raise ModelError(
+                    f"virtual marker {name!r} is at vertex {marker.vertex} of {head.name}, which is not on "
+                    "its skin; choose another"
+                )
+
+    def check_names(self, names: tuple[str, ...]) -> None:
+        """Raise ModelError for markers that a capture with these names does not have."""
+        missing = [name for name in self.markers if name not in names]
+        if missing and len(missing) == len(self.markers):
+            raise ModelError(
+                f"the capture has none of the mapping's markers ({list_names(missing)}); it has "
+                f"{list_names(names)}"
+            )
+        if missing:
+            raise ModelError(
+                f"the capture has no marker {list_names(missing)}, which the mapping names; it has "
+                f"{list_names(names)}. Take them out of the mapping, or give the capture that it is for"
+            )

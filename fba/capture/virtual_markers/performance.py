@@ -1,0 +1,230 @@
+"""`MarkerPerformance`: a capture of markers played on a head by its virtual markers."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+
+from fba import rotations
+from fba.arrays import Float64
+from fba.capture.markers.gaps import RARELY, fill_gaps, warn_of_gaps
+from fba.capture.markers.marker_maps import list_names
+from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers.neutral import neutral_frames
+from fba.capture.markers.stabilisation import follow_head, relate_poses, remove_poses
+from fba.capture.virtual_markers.alignment import align
+from fba.capture.virtual_markers.heads import MarkedHead
+from fba.capture.virtual_markers.mapping import MarkerMapping
+from fba.capture.virtual_markers.weights import MarkerWeights, find_weights
+from fba.errors import FbaWarning, ModelError
+
+FEWEST_FIXED = 3
+"""Fixed markers from which the head's motion is measured at least."""
+TOGETHER = 1e-3
+"""Two fixed markers are at one place if they are closer than this share of the size of the cloud."""
+ODD_SCALE = 1.5
+"""The scale by two markers is doubtful if it is off by this factor from what all markers say."""
+Neutral = str | int | tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyMarkers:
+    """Captured markers without the head's motion.
+
+    names: of the markers. local: float64 (T, K, 3), metres, in the capture's axes, as if the head stayed as
+    it is in the neutral face. rotation (T, 3, 3), shift (T, 3): the head's motion from there. neutral:
+    float64 (K, 3), the markers of the neutral face. rest: its first frame, and the one after its last.
+    """
+
+    names: tuple[str, ...]
+    local: Float64
+    rotation: Float64
+    shift: Float64
+    neutral: Float64
+    rest: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerPerformance:
+    """A head that moves as captured markers do.
+
+    rate, times: the capture's. names: of the K virtual markers with a vertex. displacements: float64
+    (T, K, 3), how far each marker moves from the neutral face, in the head's axes and unit; 0 where it is
+    fixed. rotation (T, 3, 3), shift (T, 3): the head's motion. scale: the head's units per metre of the
+    capture. cloud: float64 (T, M, 3), all markers of the capture as they are in the head's axes, NaN where
+    one was not seen. weights: which vertices go with which markers.
+    """
+
+    head: MarkedHead
+    mapping: MarkerMapping
+    rate: Fraction
+    times: Float64
+    displacements: Float64
+    rotation: Float64
+    shift: Float64
+    scale: float
+    cloud: Float64
+    weights: MarkerWeights
+    _moves: Float64 = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_moves", np.matmul(self.weights.solve, self.displacements))
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the virtual markers with a vertex."""
+        return self.weights.names
+
+    @property
+    def moves(self) -> Float64:
+        """float64 (T, K, 3): what the shares of `weights` are multiplied by, in each frame."""
+        return self._moves
+
+    def vertices(self, frame: int) -> Float64:
+        """Return the head's vertices in a frame, float64 (N, 3), without the head's motion."""
+        result: Float64 = self.head.vertices + self.weights.shares @ self._moves[frame]
+        return result
+
+    def vertices_between(self, frame: int, after: int, share: float) -> Float64:
+        """Return the vertices between two frames. share: of the later one, 0..1."""
+        moves = self._moves[frame] + share * (self._moves[after] - self._moves[frame])
+        result: Float64 = self.head.vertices + self.weights.shares @ moves
+        return result
+
+    def pose_between(self, frame: int, after: int, share: float) -> Float64:
+        """Return the head's motion between two frames as a matrix (4, 4), in its unit."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = rotations.part(self.rotation[frame], self.rotation[after], share)
+        matrix[:3, 3] = self.shift[frame] + share * (self.shift[after] - self.shift[frame])
+        return matrix
+
+
+def steady(motion: MarkerMotion, mapping: MarkerMapping, neutral: Neutral = "auto") -> SteadyMarkers:
+    """Return the mapped markers of a capture without the head's motion and without gaps.
+
+    neutral: as of `fba.capture.from_markers`. Raises ModelError where the head's motion cannot be found;
+    OptionError for frames that the capture has not. Warns (FbaWarning) of markers that are hardly ever seen,
+    which are left out, and of long gaps.
+    """
+    if not len(motion):
+        raise ModelError("the capture has no frames")
+    mapping.check_names(motion.names)
+    columns = [motion.names.index(name) for name in mapping.markers]
+    positions = motion.positions[:, columns]
+    often = (~np.isnan(positions[..., 0])).mean(axis=0) >= RARELY
+    names = tuple(name for name, kept in zip(mapping.markers, often, strict=True) if kept)
+    if len(names) < len(columns):
+        rare = [name for name in mapping.markers if name not in names]
+        warnings.warn(
+            f"seen in less than {RARELY:.0%} of the frames, and left out: {list_names(rare)}",
+            FbaWarning, stacklevel=4,
+        )  # fmt: skip
+    positions = positions[:, often]
+    fixed = [n for n, name in enumerate(names) if mapping.markers[name].fixed]
+    if len(fixed) < FEWEST_FIXED:
+        raise ModelError(
+            f"the head's motion needs {FEWEST_FIXED} fixed markers (hairline, ears, bridge of the nose, a "
+            f"cap); the mapping has {len(fixed)}: mark more of them as fixed"
+        )
+    if len(fixed) == len(names):
+        raise ModelError("all markers of the mapping are fixed: nothing would move")
+    rotation, shift = follow_head(positions[:, fixed], motion.times)
+    rest = neutral_frames(remove_poses(rotation, shift, positions), motion.times, neutral)
+    rotation, shift = relate_poses(rotation, shift, rest)
+    local, filled = fill_gaps(names, remove_poses(rotation, shift, positions), motion.times)
+    warn_of_gaps(filled)
+    still = np.median(local[rest], axis=0)
+    return SteadyMarkers(names, local, rotation, shift, still, (rest.start, rest.stop))
+
+
+def perform(
+    motion: MarkerMotion, head: MarkedHead, mapping: MarkerMapping, neutral: Neutral = "auto"
+) -> MarkerPerformance:
+    """Return a head moved by a capture.
+
+    The capture is laid onto the head: turned so that its neutral markers are where the virtual ones are, and
+    scaled by the distance of two fixed ones. neutral: the frames in which the head looks as its file has it.
+
+    Raises ModelError for a mapping that fits neither head nor capture, and where the head's motion or the
+    scale cannot be found. Warns (FbaWarning) of what is odd or repaired.
+    """
+    mapping.check(head)
+    return perform_steady(motion, head, mapping, steady(motion, mapping, neutral))
+
+
+def perform_steady(
+    motion: MarkerMotion, head: MarkedHead, mapping: MarkerMapping, markers: SteadyMarkers
+) -> MarkerPerformance:
+    """Return a head moved by a capture whose markers are steady already: `perform` for a checked mapping."""
+    placed = [n for n, name in enumerate(markers.names) if mapping.markers[name].vertex is not None]
+    names = [markers.names[n] for n in placed]
+    vertices = [mapping.markers[name].vertex for name in names]
+    centres = head.vertices[np.array(vertices, dtype=np.intp)]
+    fit = align(markers.neutral[placed], centres)
+    if fit.mirrored:
+        warnings.warn("the capture is mirrored: x is turned round", FbaWarning, stacklevel=3)
+    scale = _measure_scale(head, mapping, markers, fit.scale)
+    turn = fit.rotation * fit.mirror  # from the capture's axes to the head's
+    local = np.einsum("ij,tkj->tki", scale * turn, markers.local[:, placed] - markers.neutral[placed])
+    columns = {name: n for n, name in enumerate(names)}
+    kept = mapping.centres
+    displacements = np.zeros((len(motion), len(kept), 3))
+    for n, (name, marker) in enumerate(kept.items()):
+        if not marker.fixed and name in columns:  # one that was left out stays where it is
+            displacements[:, n] = local[:, columns[name]]
+    # the head's motion about the point that the neutral markers' middle is laid onto
+    middle, there = markers.neutral[placed].mean(axis=0), centres.mean(axis=0)
+    rotation = turn @ markers.rotation @ turn.T
+    from_middle = np.einsum("tij,j->ti", markers.rotation, middle) + markers.shift - middle
+    shift = there - np.einsum("tij,j->ti", rotation, there) + scale * from_middle @ turn.T
+    cloud = np.einsum("ij,tkj->tki", scale * turn, motion.positions - middle) + there
+    return MarkerPerformance(
+        head, mapping, motion.rate, motion.times, displacements, rotation, shift, scale, cloud,
+        find_weights(head, mapping),
+    )  # fmt: skip
+
+
+def _measure_scale(head: MarkedHead, mapping: MarkerMapping, markers: SteadyMarkers, usual: float) -> float:
+    """Return the head's units per metre of the capture, by two fixed markers. usual: what all markers say."""
+    pair = [name for name in mapping.scale if name in markers.names]
+    if len(pair) < 2:
+        pair = list(_farthest_fixed(head, mapping, markers))
+    own = [markers.neutral[markers.names.index(name)] for name in pair]
+    there = [head.vertices[mapping.markers[name].vertex or 0] for name in pair]
+    apart, wanted = (float(np.linalg.norm(a - b)) for a, b in (own, there))
+    for length, points, what, unit in (
+        (apart, markers.neutral, "markers", " m in the capture"),
+        (wanted, head.vertices, "vertices", f" on {head.name}"),
+    ):
+        if not length > TOGETHER * float(np.ptp(points, axis=0).max()):
+            raise ModelError(
+                f"the {what} of {pair[0]!r} and {pair[1]!r}, which tell the scale, are at one place "
+                f"({length:.3g}{unit} apart): choose two fixed markers far from each other"
+            )
+    scale = wanted / apart
+    if not 1 / ODD_SCALE < scale / usual < ODD_SCALE:
+        warnings.warn(
+            f"by {pair[0]} and {pair[1]} the head is {scale:.3g} times as large as the actor's, by all "
+            f"markers {usual:.3g} times: are they where the mapping says?", FbaWarning, stacklevel=4,
+        )  # fmt: skip
+    return scale
+
+
+def _farthest_fixed(head: MarkedHead, mapping: MarkerMapping, markers: SteadyMarkers) -> tuple[str, str]:
+    """Return the two fixed markers whose vertices are farthest apart."""
+    names = [name for name in mapping.fixed if name in markers.names and name in mapping.centres]
+    if len(names) < 2:
+        raise ModelError(
+            f"the scale needs two fixed markers with a vertex; the mapping has {len(names)}: give a fixed "
+            "one a vertex"
+        )
+    places = head.vertices[[mapping.markers[name].vertex or 0 for name in names]]
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    one, other = divmod(int(apart.argmax()), len(names))
+    return names[one], names[other]

@@ -1,0 +1,128 @@
+"""A first mapping, made from what is known of both: places of the markers, feature points of the head."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fba.arrays import Float64
+from fba.capture.markers.marker_maps import find_map
+from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers.targets import HEAD, RIGID, target_points
+from fba.capture.virtual_markers.alignment import align
+from fba.capture.virtual_markers.heads import MarkedHead
+from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
+from fba.errors import ModelError
+from fba.face.feature_points import row_of
+
+FEWEST = 6
+"""Markers whose places the head has, from which others are placed."""
+ASTRAY = 0.03
+"""Metres from the skin at which a marker without a place is left out."""
+NEIGHBOURS, REACH = 3, 1.2
+"""The radius reaches this much beyond so many of the nearest other markers."""
+RADII = (0.010, 0.045)
+"""Smallest and largest radius that is proposed, metres on a head of natural size."""
+LIDS = ("3.1", "3.2", "3.3", "3.4")
+LID_RADIUS = 0.016
+"""Half the width of an eye."""
+
+
+def propose_mapping(
+    motion: MarkerMotion, head: MarkedHead, places: Mapping[str, str] | None = None
+) -> MarkerMapping:
+    """Return virtual markers for a capture and a head.
+
+    places: marker -> place on the face, as of `fba.capture.from_markers`; None to find them by names, or by
+    the cloud's shape. A marker at a feature point that the head has gets its vertex; one that the face does
+    not move is fixed. Others are laid onto the nearest skin between them. The radius reaches just beyond the
+    third nearest of the other markers.
+
+    Raises ModelError where too few places are known.
+    """
+    places = find_map(motion)[0] if places is None else dict(places)
+    targets = _known_targets(head)
+    at = {name: targets[place] for name, place in places.items() if place in targets}
+    if len(at) < FEWEST:
+        raise ModelError(
+            f"no mapping can be proposed: of {len(places)} markers with a place on the face, {head.name} has "
+            f"the feature points of {len(at)}, and {FEWEST} are needed. Choose vertices by hand, or give the "
+            "head's feature points"
+        )
+    rows = row_of()
+    vertices: dict[str, int] = {}
+    for name, place in at.items():
+        bound = int(head.bound[rows[places[name]]]) if places[name] in rows else -1
+        vertex = bound if bound >= 0 and _on_skin(head, bound) else head.nearest(place)[0]
+        if vertex not in vertices.values():
+            vertices[name] = vertex
+    fixed = {name for name, place in places.items() if place in RIGID}
+    caps = [name for name, place in places.items() if place == HEAD]
+    others = [name for name in motion.names if name not in places]
+    vertices |= _lay_others(motion, head, vertices, others)
+    radii = _radii(head, vertices, {name for name in at if places[name] in LIDS})
+    markers = {
+        name: VirtualMarker(vertices[name], radii[name], radii[name], name in fixed)
+        for name in motion.names
+        if name in vertices
+    }
+    markers |= {name: VirtualMarker(None, fixed=True) for name in caps}
+    return MarkerMapping(markers).for_head(head)
+
+
+def _known_targets(head: MarkedHead) -> dict[str, Float64]:
+    """Return where the places of markers are on a head, as far as it has them."""
+    return {name: at for name, at in target_points(head.points).items() if np.isfinite(at).all()}
+
+
+def _on_skin(head: MarkedHead, vertex: int) -> bool:
+    return bool(np.isin(vertex, head.face))
+
+
+def _lay_others(
+    motion: MarkerMotion, head: MarkedHead, vertices: Mapping[str, int], others: list[str]
+) -> dict[str, int]:
+    """Return vertices for markers without a place, by where they are among those that have one."""
+    from scipy.interpolate import RBFInterpolator
+
+    frame = _fullest_frame(motion, list(vertices))
+    cloud = dict(zip(motion.names, motion.positions[frame], strict=True))
+    known = [name for name in vertices if np.isfinite(cloud[name]).all()]
+    others = [name for name in others if np.isfinite(cloud[name]).all()]
+    if not others or len(known) < FEWEST:
+        return {}
+    there = head.vertices[[vertices[name] for name in known]]
+    own = np.array([cloud[name] for name in known])
+    fit = align(own, there)
+    laid = fit.place(own)
+    field = RBFInterpolator(laid, there - laid, kernel="linear", degree=0)
+    wanted = fit.place(np.array([cloud[name] for name in others]))
+    wanted = wanted + field(wanted)
+    result: dict[str, int] = {}
+    for name, place in zip(others, wanted, strict=True):
+        vertex, away = head.nearest(place)
+        if away < ASTRAY / head.metres and vertex not in (*vertices.values(), *result.values()):
+            result[name] = vertex
+    return result
+
+
+def _fullest_frame(motion: MarkerMotion, names: list[str]) -> int:
+    """Return the first frame in which most of these markers are seen."""
+    columns = [motion.names.index(name) for name in names]
+    return int(motion.seen[:, columns].sum(axis=1).argmax())
+
+
+def _radii(head: MarkedHead, vertices: Mapping[str, int], lids: set[str]) -> dict[str, float]:
+    """Return a radius for each marker, in the head's unit."""
+    from scipy.spatial import cKDTree
+
+    names = list(vertices)
+    places = head.vertices[list(vertices.values())]
+    away = cKDTree(places).query(places, k=min(NEIGHBOURS + 1, len(names)))[0]
+    low, high = (size / head.metres for size in RADII)
+    radii = np.clip(REACH * away[:, -1], low, high)
+    return {
+        name: round(min(float(radius), LID_RADIUS / head.metres) if name in lids else float(radius), 6)
+        for name, radius in zip(names, radii, strict=True)
+    }
