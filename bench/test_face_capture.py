@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -11,19 +10,14 @@ from typing import Any
 import pytest
 
 import fba
+from fba_conformance.captures import face_files
 
-HELPERS = Path(__file__).parents[1] / "tests/helpers/files"
 SECONDS, RATE = 600, 60
 
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """All 52 shapes and nine angles move all the time."""
-    sys.path.insert(0, str(HELPERS))
-    try:
-        import face_files
-    finally:
-        sys.path.remove(str(HELPERS))
     count = SECONDS * RATE
     columns = {**face_files.face_weights(count), **face_files.face_angles(count)}
     path = tmp_path_factory.mktemp("faces") / "face.csv"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,23 +11,15 @@ import pytest
 
 import fba
 from fba.face import FaceModel
+from fba_conformance.captures import marked_actor, marker_files
 
-HELPERS = Path(__file__).parents[1] / "tests/helpers"
 SECONDS, RATE = 60, 100
 
 
 @pytest.fixture(scope="module")
 def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file: the built-in head talks and turns."""
-    folders = [str(HELPERS / folder) for folder in ("files", "figures")]
-    sys.path[:0] = folders
-    try:
-        import marker_actor
-        import marker_files
-    finally:
-        for folder in folders:
-            sys.path.remove(folder)
-    motion = marker_actor.perform(FaceModel.default(), SECONDS * RATE, RATE).motion
+    motion = marked_actor.perform(FaceModel.default(), SECONDS * RATE, RATE).motion
     return marker_files.write(tmp_path_factory.mktemp("markers"), "float.c3d", motion)
 
 

@@ -17,8 +17,11 @@ ROOT = Path(__file__).parents[1]
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files", "figures")]
 
-import marker_files  # noqa: E402
-from face_files import (  # noqa: E402
+from fba.cache import load_or_make  # noqa: E402
+from fba.capture import MarkerMotion  # noqa: E402
+from fba.face import feature_point_names, neutral_points  # noqa: E402
+from fba_conformance.captures import marker_files  # noqa: E402
+from fba_conformance.captures.face_files import (  # noqa: E402
     beat,
     face_angles,
     face_weights,
@@ -29,9 +32,6 @@ from face_files import (  # noqa: E402
     openface_csv,
     pyfeat_csv,
 )
-from fba.cache import load_or_make  # noqa: E402
-from fba.capture import MarkerMotion  # noqa: E402
-from fba.face import feature_point_names, neutral_points  # noqa: E402
 from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from mesh_files import ply  # noqa: E402

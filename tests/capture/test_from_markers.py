@@ -26,7 +26,7 @@ from fba.face.authoring import author
 from fba.face.feature_points import row_of
 from fba.limits import Limits
 from fba.parameters import faps
-from marker_actor import NAMES, Take, perform
+from fba_conformance.captures.marked_actor import NAMES, Take, perform
 from small_head import adult_points, small_head
 
 TURNED = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from test_marker_files import cloud
 
-import marker_files
 from fba.errors import FbaWarning, FormatError
 from fba.formats.c3d.reader import read_markers
+from fba_conformance.captures import marker_files
 
 METRES = {"mm": 1e-3, "m": 1.0, "": 1e-3}
 SAMPLES = ("BTS", "C3DRotationExample", "FP_Type1", "Optotrak", "Qualisys", "Vicon", "read_NOTworking2")

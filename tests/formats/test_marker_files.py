@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import fba
-import marker_files
 from fba.capture.markers.motion import MarkerMotion
 from fba.errors import FbaError, FbaWarning, FormatError, LimitError
 from fba.formats import format_of
 from fba.limits import Limits
+from fba_conformance.captures import marker_files
 
 RATE = Fraction(50)
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import fba
-import marker_files
 from fba.face import FaceModel
-from marker_actor import Take, perform
+from fba_conformance.captures import marker_files
+from fba_conformance.captures.marked_actor import Take, perform
 
 Run = Callable[..., Any]
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import fba
-from face_files import openface_csv, pyfeat_csv
 from fba import rotations
 from fba.arrays import Float64
 from fba.capture import ActionUnitMotion, from_action_units
@@ -18,6 +17,7 @@ from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats import format_of
 from fba.formats.face_tables import openface, pyfeat
 from fba.parameters import fap_numbers
+from fba_conformance.captures.face_files import openface_csv, pyfeat_csv
 
 ROWS = 30
 WAVE = 0.5 - 0.5 * np.cos(np.linspace(0, 6, ROWS))

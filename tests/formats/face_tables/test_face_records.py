@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 import fba
-from face_files import (
+from fba.capture import ShapeMotion
+from fba.errors import FbaWarning, FormatError, UnsupportedError
+from fba.formats import format_of
+from fba.formats.face_tables import ifacialmocap, shapes_json
+from fba.formats.face_tables import livelink_csv as tables
+from fba.formats.face_tables import livelink_udp as packets
+from fba_conformance.captures.face_files import (
     STEP,
     beat,
     camel,
@@ -22,12 +28,6 @@ from face_files import (
     livelink_udp,
     mediapipe_frames,
 )
-from fba.capture import ShapeMotion
-from fba.errors import FbaWarning, FormatError, UnsupportedError
-from fba.formats import format_of
-from fba.formats.face_tables import ifacialmocap, shapes_json
-from fba.formats.face_tables import livelink_csv as tables
-from fba.formats.face_tables import livelink_udp as packets
 
 ROWS = 40
 WEIGHTS = face_weights(ROWS)

@@ -8,11 +8,19 @@ import numpy as np
 import pytest
 
 import fba
-from face_files import ANGLES, STEP, UDP_ORDER, camel, face_angles, face_weights, livelink_csv
 from fba.arrays import Float64
 from fba.errors import FbaWarning, FormatError, LimitError, OptionError
 from fba.formats.face_tables.livelink_csv import read_face
 from fba.parameters import fap_numbers
+from fba_conformance.captures.face_files import (
+    ANGLES,
+    STEP,
+    UDP_ORDER,
+    camel,
+    face_angles,
+    face_weights,
+    livelink_csv,
+)
 
 ROWS = 90
 WEIGHTS = face_weights(ROWS)

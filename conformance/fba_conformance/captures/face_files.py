@@ -145,13 +145,13 @@ def openface_csv(
     """Return a table as OpenFace 2 writes it; units: 0 to 5. pose (T, 3): radians; gaze (T, 6): both eyes."""
     count = len(pose)
     columns: dict[str, Float64] = {
-        "frame": np.arange(1, count + 1), "face_id": np.zeros(count), "timestamp": np.arange(count) / rate,
+        "frame": np.arange(1.0, count + 1), "face_id": np.zeros(count), "timestamp": np.arange(count) / rate,
         "confidence": np.full(count, 0.98), "success": np.ones(count),
     }  # fmt: skip
     columns |= {f"gaze_{eye}_{axis}": gaze[:, 3 * eye + n] for eye in (0, 1) for n, axis in enumerate("xyz")}
     columns |= {f"pose_R{axis}": pose[:, n] for n, axis in enumerate("xyz")}
     columns |= {f"AU{unit:02}_r": values for unit, values in units.items()}
-    columns |= {f"AU{unit:02}_c": values > 1 for unit, values in units.items()}
+    columns |= {f"AU{unit:02}_c": (values > 1).astype(float) for unit, values in units.items()}
     columns |= extra or {}
     lines = [f",{blank}".join(columns)]
     rows = zip(*(np.asarray(values, dtype=float).tolist() for values in columns.values()), strict=True)
