@@ -25,8 +25,8 @@ from fba.capture.virtual_markers.weights import find_weights
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import Deformer, FaceModel
 from fba.face.model import Part
-from marker_actor import Take
-from marker_actor import perform as act
+from fba_conformance.captures.marked_actor import Take
+from fba_conformance.captures.marked_actor import perform as act
 
 EXAMPLE = np.array([
     (0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 6), (0, 6, 7), (0, 7, 1), (1, 2, 10), (1, 10, 9), (1, 9, 7),

@@ -486,7 +486,7 @@ NAMES = '[{"t":-1,"jawOpen":0,"mouthClose":0,"eyeBlinkLeft":0,"eyeBlinkRight":0,
 
 
 def _faces() -> dict[str, HostileFile]:
-    from face_files import datagram, face_weights, livelink_csv
+    from fba_conformance.captures.face_files import datagram, face_weights, livelink_csv
 
     def frames(size: int) -> bytes:
         return b"".join(datagram([0.2] * 61, 2 + number / 60) for number in range(size // 320))
@@ -537,8 +537,9 @@ def read_markers(path: Path) -> object:
 
 
 def _markers() -> dict[str, HostileFile]:
-    from fba.capture.markers.motion import MarkerMotion
     from marker_files import c3d, qualisys, trc
+
+    from fba.capture.markers.motion import MarkerMotion
 
     def take(markers: int, frames: int) -> MarkerMotion:
         positions = np.full((frames, markers, 3), 0.5)
