@@ -108,6 +108,7 @@ LEG_IK = "fba/capture/limbs/_leg_ik.py"
 READ_AHEAD = "player/fba_player/sound/_read_ahead.py"
 PLAUSIBILITY = "fba/body/plausibility.py"
 ROUND_ANGLES = "fba/body/_round_angles.py"
+SLIDING = "fba/body/_sliding.py"
 HEAD_TURNS = "fba/body/_head_turns.py"
 MARK = "fba/codec/_stream/mark.py"
 STREAM_READER = "fba/codec/_stream_reader.py"
@@ -151,10 +152,12 @@ MIXER_TEST = "tests/player/sound/test_sound_mixer.py"
 DEVICE_CLOCK_TEST = "tests/player/sound/test_sound_clock.py"
 CAPTURE_RULES_TEST = "tests/capture/test_capture_rules.py"
 AUDIO_TEST = "tests/player/sound/test_audio.py -k in_advance"
-PLAUSIBLE_TEST = "tests/body/test_plausibility.py -k 'limits or twenty or carry or underground'"
+PLAUSIBLE_TEST = "tests/body/test_plausibility.py -k 'limits or twenty or carry or underground or slide'"
 MOMENT_TEST = "tests/body/test_plausibility.py -k moment"
 JUMP_TEST = "tests/body/test_plausibility.py -k jump"
 STEP_CHOICE_TEST = "tests/formats/test_step_choice.py -k 'round or coarse'"
+SLIDE_TEST = "tests/formats/test_step_choice.py -k 'slide or sways'"
+ORIGIN_TEST = "tests/formats/test_step_choice.py -k origin"
 TRANSPARENCY_TEST = "tests/player/gl/test_transparency.py"
 HEAD_TURN_TEST = "tests/formats/test_step_choice.py -k head"
 MEASURED_TEST = "tests/body/gait/test_measured.py"
@@ -461,6 +464,13 @@ MUTANTS = (
     Mutant(PLAUSIBILITY, "STANDS = 0.15", "STANDS = 0.17", PLAUSIBLE_TEST),
     Mutant(PLAUSIBILITY, "SUNK = -2.0", "SUNK = -1.8", PLAUSIBLE_TEST),
     Mutant(PLAUSIBILITY, "SUNK = -2.0", "SUNK = -2.2", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "SLIDES = 0.06", "SLIDES = 0.07", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "other.travel < SWAY", "other.travel < 9", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "AWAY, NEAR = 25.0", "AWAY, NEAR = 23.0", ORIGIN_TEST),
+    Mutant(PLAUSIBILITY, "AWAY, NEAR = 25.0", "AWAY, NEAR = 27.0", ORIGIN_TEST),
+    Mutant(SLIDING, "STILL = 0.02", "STILL = 0.1", SLIDE_TEST),
+    Mutant(SLIDING, "np.minimum(ahead, back)", "np.maximum(ahead, back)", SLIDE_TEST),
+    Mutant(SLIDING, "_to_and_fro(root[run]) - quantum", "_to_and_fro(root[run])", SLIDE_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 0.9", JUMP_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 1.1", JUMP_TEST),
     Mutant("player/fba_player/gl/_mesh_renderer.py", "CORE = 0.9", "CORE = 1.0", TRANSPARENCY_TEST),
@@ -474,7 +484,7 @@ MUTANTS = (
     Mutant(HEAD_TURNS, "TOO_FAR = -1.8", "TOO_FAR = -2.0", HEAD_TURN_TEST),
     Mutant(HEAD_TURNS, "TOO_FAR = -1.8", "TOO_FAR = -1.6", HEAD_TURN_TEST),
     Mutant(HEAD_TURNS, "TOO_FAR <= then[1] <= ENOUGH", "then[1] <= ENOUGH", HEAD_TURN_TEST),
-    Mutant(ROUND_ANGLES, "axis=None) != 1", "axis=None) < 1", STEP_CHOICE_TEST),
+    Mutant(ROUND_ANGLES, "(np.gcd.reduce(levels[:, columns], axis=None))", "(1)", STEP_CHOICE_TEST),
     Mutant(MARK, "position = start\n", "position = start + 99\n", MARK_TEST),
     Mutant(OBJECT_BORDERS, "mark.begin <= byte < mark.end", "byte < mark.end", MARK_TEST),
     Mutant(OBJECT_BORDERS, "        self.mark = None\n", "", MARK_TEST),

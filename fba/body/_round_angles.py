@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Bool, Int64
-from fba.body.solve.limits import DEGREES, widest_limits
+from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
 from fba.body.solve.pose_loops import UNIT
 from fba.parameters import BAP_STEP_TABLES, bap_steps
 
@@ -45,9 +45,11 @@ def find_rounder_table(levels: Int64, used: str) -> tuple[str, str] | None:
     """
     turning = widest_limits().any(axis=1) & (bap_steps(BAP_STEP_TABLES[0]) != bap_steps(BAP_STEP_TABLES[1]))
     columns = np.flatnonzero(turning & levels.any(axis=0))
-    if np.gcd.reduce(levels[:, columns], axis=None) != 1:
-        return None  # coarse quantisers make round angles of their own
-    found = {table: _roundness(levels[:, columns], bap_steps(table)[columns]) for table in BAP_STEP_TABLES}
+    quantiser = max(int(np.gcd.reduce(levels[:, columns], axis=None)), 1)
+    found = {
+        table: _roundness(levels[:, columns] // quantiser, bap_steps(table)[columns] * quantiser)
+        for table in BAP_STEP_TABLES
+    }
     best = max(found, key=lambda table: found[table].score)
     least = EVERY_LEAST if found[best].every and not found[used].every else ROUND_LEAST
     clear = found[best].score > least and found[best].score > ROUND_MORE * found[used].score
@@ -80,11 +82,18 @@ def _count_round(levels: Int64, counted: Bool, steps: Int64, unit: float) -> tup
     """Return how many different angles other than 0 there are, how many are round, and how many by chance."""
     count, hits, expected = 0, 0, 0.0
     for column, chosen, step in zip(levels.T, counted.T, steps.tolist(), strict=True):
-        angles = np.unique(np.abs(column[chosen & (column != 0)])) * step
-        count += len(angles)
-        hits += int((np.abs(angles - unit * np.rint(angles / unit)) <= step / 2).sum())
-        expected += len(angles) * step / unit
+        used = np.unique(np.abs(column[chosen & (column != 0)]))
+        possible = np.arange(1, max(FULL_TURN / DEGREES / step, 2))
+        count += len(used)
+        hits += int(_round(used * step, step, unit).sum())
+        expected += len(used) * float(_round(possible * step, step, unit).mean())
     return count, hits, expected
+
+
+def _round(angles: Int64, step: int, unit: float) -> Bool:
+    """Return bool (K,): which angles are multiples of unit, as near as the quantiser step allows."""
+    near: Bool = np.abs(angles - unit * np.rint(angles / unit)) <= step / 2
+    return near
 
 
 def _improbability(hits: int, expected: float) -> float:

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from fba.arrays import Bool, Float64, Int64
 from fba.body._head_turns import head_turns_too_far
 from fba.body._round_angles import find_rounder_table
+from fba.body._sliding import slide_on_resting_legs
 from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
@@ -48,6 +49,10 @@ STRIDING = 0.2
 """Metres a second from which the legs certainly walk."""
 STANDS = 0.15
 """Share of the legs' speed below which the root counts as staying where it is."""
+SLIDES = 0.06
+"""Metres that a body on such legs may slide along the ground, beyond what a quantiser step explains."""
+AWAY, NEAR = 25.0, 0.1
+"""Metres from the origin of a capture at which nobody stands who stays within that share of them."""
 JUMP = 1.0
 """Metres that the root's height may change by jumping, crouching and lying down, which count as no travel."""
 SUNK = -2.0
@@ -64,7 +69,10 @@ class Motion:
     a second that the root goes, without jumps (see `JUMP`); along: on the ground alone. carried: metres a
     second that the lowest foot moves against the root, which is how fast the legs carry it. jump: metres, the
     longest way of the root from a frame to the next. hops: whether one of these ways is more than a quantiser
-    step long. height: metres, median of the root's height over that of the default posture.
+    step long. slid: metres that the body slides to and fro along the ground while its legs rest, less the
+    quantiser step that rounding alone moves it. away: metres along the ground from the origin of a body that
+    stays there (see `NEAR`), else 0. height: metres, median of the root's height over that of the
+    default posture.
     """
 
     beyond: float
@@ -73,6 +81,8 @@ class Motion:
     carried: float
     jump: float
     hops: bool
+    slid: float
+    away: float
     height: float
 
     @property
@@ -151,6 +161,8 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
     feet = _feet(values)
     lowest = np.argmin(feet[pairs, :, 1], axis=1)
     swing = feet[pairs + 1, lowest] - feet[pairs, lowest]
+    ahead = values.copy()
+    ahead[:, bap_numbers()["HumanoidRoot_rt_body_turn"] - 1] = 0  # legs that turn with the body rest, too
     seconds = len(pairs) / float(rate) or 1.0
     return Motion(
         beyond=float(_beyond(values).mean()),
@@ -159,6 +171,8 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
         carried=float(np.linalg.norm(swing[:, [0, 2]], axis=1).sum() / seconds),
         jump=float(lengths.max(initial=0.0)),
         hops=bool((ways > quantum).any()),
+        slid=slide_on_resting_legs(root[:, 1:], _feet(ahead), index),
+        away=_distance(root[:, 1:]) * MILLIMETRE,
         height=float(np.median(root[:, 0])) * MILLIMETRE,
     )
 
@@ -166,6 +180,12 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
 def _root_columns() -> list[int]:
     """Return the columns of the root's translation: up, sideways, ahead."""
     return [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in _ROOT]
+
+
+def _distance(ground: Int64) -> float:
+    """Return how far from the origin (T, 2), in mm, along the ground, keep; 0 if they go far themselves."""
+    distance = float(np.linalg.norm(np.median(ground, axis=0)))
+    return distance if np.ptp(ground, axis=0).max() < NEAR * distance else 0.0
 
 
 def _new_faults(now: Motion, other: Motion) -> tuple[str, ...]:
@@ -181,6 +201,10 @@ def _new_faults(now: Motion, other: Motion) -> tuple[str, ...]:
     striding = now.carried > STRIDING and other.carried > STRIDING
     if striding and now.along < STANDS * now.carried and 0.5 < other.along / other.carried < SLACK:
         findings.append(f"the root stays where it is while the legs carry it {now.carried:.1f} m/s")
+    if now.slid > SLIDES > other.slid and other.travel < SWAY:
+        findings.append(f"the body slides {now.slid:.1f} m to and fro on legs that rest")
+    if now.away > AWAY > other.away:
+        findings.append(f"the body stands {now.away:.0f} m away from the origin")
     if now.height < SUNK < other.height:
         findings.append(f"the body {-now.height:.0f} m under the ground")
     wrong = (other.runs_away and other.hops) or other.height < SUNK or other.beyond - now.beyond > BEYOND

@@ -73,8 +73,8 @@ def open_file(
         close = stack.pop_all().close
         live = LiveAnimation(source, head=head, name=name, bap_steps=bap_steps, at_end=close)  # type: ignore[arg-type]
     wait_for(live, lambda text: click.echo(f"fba: {text}", err=True))
-    if live.steps_reason:
-        click.echo(f"fba: {name}: BAP steps {live.bap_steps}: {live.steps_reason}", err=True)
+    if live.steps_explanation:
+        click.echo(f"fba: {name}: BAP steps {live.steps_explanation}", err=True)
     return live, True
 
 

@@ -27,8 +27,7 @@ def explain_choice(data: bytes, asked: str, limits: Limits = DEFAULT_LIMITS) -> 
 
     if asked != BAP_STEPS_AUTO:
         return f"{asked}: as given"
-    choice = choose_steps(data, limits=limits)
-    return f"{choice.table}: {choice.reason}" if choice.reason else ""
+    return choose_steps(data, limits=limits).explanation
 
 
 def table_to_read(

@@ -21,17 +21,33 @@ FRAMES_CHECKED = 2048
 FRAMES_SEARCHED = 1 << 14
 """Frames among which a body is looked for."""
 _CHUNK = 1 << 14
+CERTAIN, LIKELY, UNSURE = "certain", "likely", "unsure"
+"""How sure a choice is."""
 
 
 @dataclass(frozen=True)
 class StepChoice:
-    """A table of BAP steps. reason: in words, why it was chosen; "" where the table makes no difference."""
+    """A table of BAP steps.
+
+    reason: in words, why it was chosen; "" where the table makes no difference. confidence: "certain" where
+    the stream names the table, "likely" where its motion looks wrong with the other one, and "unsure" where
+    nothing tells.
+    """
 
     table: str
     reason: str
+    confidence: str = CERTAIN
 
     def __str__(self) -> str:
-        return f"BAP steps {self.table}: {self.reason}"
+        return f"BAP steps {self.explanation}"
+
+    @property
+    def explanation(self) -> str:
+        """The table, how sure that is, and why: "visage (likely): ..."; "" if it makes no difference."""
+        if not self.reason:
+            return ""
+        unproved = "" if self.confidence == CERTAIN else f" ({self.confidence})"
+        return f"{self.table}{unproved}: {self.reason}"
 
 
 def choose_steps(data: bytes | bytearray | memoryview, *, limits: Limits = DEFAULT_LIMITS) -> StepChoice:
@@ -50,10 +66,11 @@ def choose_steps(data: bytes | bytearray | memoryview, *, limits: Limits = DEFAU
 
     doubt = find_doubt(moving.body, moving.index, moving.rate, BAP_STEPS_DEFAULT)
     if doubt is not None:
-        return StepChoice(
-            doubt.likely, f"the stream does not say, and with {BAP_STEPS_DEFAULT} {doubt.findings[0]}"
-        )
-    return StepChoice(BAP_STEPS_DEFAULT, "the stream does not say, and with these nothing looks wrong")
+        reason = f"the stream does not say, and with {BAP_STEPS_DEFAULT} {doubt.findings[0]}"
+        return StepChoice(doubt.likely, reason, LIKELY)
+    return StepChoice(
+        BAP_STEPS_DEFAULT, "the stream does not say, and with these nothing looks wrong", UNSURE
+    )
 
 
 def first_frames(

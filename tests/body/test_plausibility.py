@@ -127,7 +127,9 @@ def test_frames_without_a_body_do_not_count_as_jumps() -> None:
     assert doubt(Animation(30, animation.index, None, BodyTrack(values, mask)), "iso") is None
 
 
-CALM = plausibility.Motion(beyond=0.0, travel=0.0, along=0.0, carried=0.0, jump=0.0, hops=False, height=0.0)
+CALM = plausibility.Motion(
+    beyond=0.0, travel=0.0, along=0.0, carried=0.0, jump=0.0, hops=False, slid=0.0, away=0.0, height=0.0
+)
 
 
 def is_doubted(other: plausibility.Motion = CALM, /, **now: float) -> bool:
@@ -171,6 +173,15 @@ def test_legs_that_walk_carry_the_root() -> None:
     assert not is_doubted(walks, carried=0.19, along=0.0)
     assert not is_doubted(replace(walks, carried=0.19), carried=0.21)
     assert not is_doubted(replace(walks, along=0.1), carried=0.21)  # the other reading stands still, too
+
+
+def test_bodies_do_not_slide_on_legs_that_rest() -> None:
+    """Six centimetres, where the other reading has them sway as people who stand do: by 8 cm a second."""
+    assert is_doubted(slid=0.065)
+    assert not is_doubted(slid=0.055)
+    assert is_doubted(replace(CALM, travel=0.075), slid=0.5)
+    assert not is_doubted(replace(CALM, travel=0.085), slid=0.5)
+    assert not is_doubted(replace(CALM, slid=0.065), slid=0.5)
 
 
 def test_a_jump_is_no_travel_of_the_root() -> None:

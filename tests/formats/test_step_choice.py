@@ -14,7 +14,7 @@ import fba
 from fba import Animation, BodyTrack, EncoderOptions
 from fba.body.plausibility import find_doubt
 from fba.formats import step_choice
-from fba.formats.step_choice import StepChoice, choose_steps
+from fba.formats.step_choice import LIKELY, UNSURE, StepChoice, choose_steps
 from fba.parameters import bap_numbers
 from tests.helpers.made_streams import made_streams
 
@@ -28,7 +28,7 @@ def test_made_streams() -> None:
     for made in made_streams(16):
         assert choose_steps(made.marked) == StepChoice(made.table, "the stream says so")
         choice = choose_steps(made.unmarked)
-        assert choice.table == made.table or "nothing looks wrong" in choice.reason, made.kind
+        assert choice.table == made.table or choice.confidence == UNSURE, made.kind
         seen.add((made.table, choice.table))
     assert seen == {("iso", "iso"), ("visage", "visage"), ("visage", "iso")}
 
@@ -50,19 +50,21 @@ def test_foreign_streams(shared: Path) -> None:
     assert (checked, wrong) == (70, UNTOLD)
 
 
-def keyed(degrees: list[float]) -> bytes:
+def keyed(degrees: list[float], quant: int = 1) -> bytes:
     """Both elbows go straight from key to key, half a second each, in the steps of "visage"."""
     times = np.arange(15 * (len(degrees) - 1) + 1) / 15
     values = np.zeros((len(times), 296), dtype=np.int32)
     values[:, [37, 38]] = np.rint(np.radians(np.interp(times, range(len(degrees)), degrees)) * 1e5)[:, None]
     body = BodyTrack(values, values.any(axis=0) | np.zeros((len(times), 1), bool))
-    return fba.encode(Animation(30, range(len(times)), None, body), EncoderOptions(bap_steps="visage"))  # type: ignore[arg-type]
+    options = EncoderOptions(bap_steps="visage", bap_quant=quant)
+    return fba.encode(Animation(30, range(len(times)), None, body), options)  # type: ignore[arg-type]
 
 
 def test_round_angles_tell_the_table() -> None:
     assert choose_steps(keyed([0, 90, 35, 60, 5, 75])) == StepChoice(
         "visage",
         "the stream does not say, and with iso angles are odd that visage makes multiples of 5 degrees",
+        LIKELY,
     )
     assert choose_steps(keyed([0, 88, 33, 61, 7, 73])).table == "iso"
 
@@ -79,6 +81,59 @@ def test_angles_may_be_round_in_radians() -> None:
     chosen = choose_steps(keyed(np.degrees([0, 0.7, 1.3, 0.2]).tolist()))
     assert chosen.table == "visage"
     assert chosen.reason.endswith("with iso angles are odd that visage makes multiples of 0.1 rad")
+
+
+def test_of_coarse_quantisers_only_what_they_do_not_explain_counts() -> None:
+    """With bap_quant 4, steps are 5 times as long: 0.49 degrees, and 0.18 with the other table."""
+    rng = np.random.default_rng(1)
+    five = keyed((5.0 * rng.permutation(30)).tolist(), quant=4)
+    assert choose_steps(five).table == "visage"
+    assert choose_steps(keyed(rng.uniform(0, 145, 30).tolist(), quant=4)).confidence == UNSURE
+
+
+def swaying(millimetres: float, *, legs: float = 0.0, seconds: float = 4.0, steps: str = "visage") -> bytes:
+    """A body that sways sideways, one way and back in `seconds`, while its hips swing by `legs` degrees."""
+    wave = np.sin(2 * np.pi * np.arange(121) / 30 / seconds)
+    values = np.zeros((121, 296), dtype=np.int32)
+    values[:, bap_numbers()["HumanoidRoot_tr_lateral"] - 1] = np.rint(millimetres * wave)
+    values[:, [bap_numbers()[f"{side}_hip_flexion"] - 1 for side in "lr"]] = np.rint(
+        np.radians(legs * wave)[:, None] * 1e5
+    )
+    body = BodyTrack(values, np.broadcast_to(values.any(axis=0), values.shape))
+    return fba.encode(Animation(30, range(121), None, body), EncoderOptions(bap_steps=steps))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("sway", "told"),
+    [
+        (swaying(6), True),  # 3 steps each way: 192 mm on legs that rest
+        (swaying(2.5), False),  # 1 step each way, as rounding may move a root that stands
+        (swaying(6, legs=4), False),  # the feet move by 6 cm against the root
+        (swaying(6, seconds=8), True),
+        (swaying(6, seconds=16), False),  # glides one way
+    ],
+)
+def test_who_stands_does_not_slide_to_and_fro(sway: bytes, told: bool) -> None:
+    chosen = choose_steps(sway)
+    assert ("slides" in chosen.reason) == told
+    assert (chosen.table, chosen.confidence) == (("visage", LIKELY) if told else ("iso", UNSURE))
+
+
+@pytest.mark.parametrize("sway", [50, 100, 190])
+def test_who_sways_by_the_standards_steps_is_not_doubted(sway: float) -> None:
+    assert choose_steps(swaying(sway, legs=sway / 15, steps="iso")).table == "iso"
+
+
+@pytest.mark.parametrize(("metres", "told"), [(0.5, False), (0.74, False), (0.8, True), (3.0, True)])
+def test_nobody_stands_far_from_the_origin(metres: float, told: bool) -> None:
+    """32 times as far with the other table: 24 m, 26 m."""
+    values = np.zeros((40, 296), dtype=np.int32)
+    values[:, bap_numbers()["HumanoidRoot_tr_frontal"] - 1] = int(metres * 1000)
+    body = BodyTrack(values, values != 0)
+    chosen = choose_steps(
+        fba.encode(Animation(30, range(40), None, body), EncoderOptions(bap_steps="visage"))
+    )  # type: ignore[arg-type]
+    assert (chosen.table == "visage") == told
 
 
 def turning(head: float, *, amount: float = 0.1, still: bool = True) -> Animation:

@@ -19,7 +19,7 @@ import fba
 from fba import Animation, BodyTrack, EncoderOptions
 from fba.body import gait
 from fba.codec import encode_with_statistics
-from fba.formats.step_choice import choose_steps
+from fba.formats.step_choice import UNSURE, choose_steps
 from fba.parameters import bap_numbers
 
 KINDS = ("walk", "capture", "gesture", "idle", "keyed", "seated", "jump", "turn")
@@ -124,7 +124,7 @@ def main(count: int) -> None:
     for made in made_streams(count):
         marked["right" if choose_steps(made.marked).table == made.table else "wrong"] += 1
         choice = choose_steps(made.unmarked)
-        told = "nothing looks wrong" not in choice.reason
+        told = choice.confidence != UNSURE
         right = choice.table == made.table
         unmarked[
             f"{made.kind}: {'right' if right else 'WRONG' if told else 'not told, the standard taken'}"

@@ -49,7 +49,7 @@ class LiveAnimation:
     `CHOOSE_BAP_STEPS_AFTER` seconds of a body, for which nothing is shown. at_end: called when nothing more
     is read, to close the source.
 
-    `bap_steps` is then the table used, `steps_reason` says why, and is "" where it makes no difference.
+    `bap_steps` is then the table used; `steps_explanation` says why, or is "" where it makes no difference.
 
     After damage, decoding goes on at the next I plane behind a start code. `message` says in a few words what
     is wrong, `details` gives the full error; both are "" where nothing is. `doubt` is set once
@@ -76,7 +76,7 @@ class LiveAnimation:
         self._source = source
         self._at_end = at_end
         self.bap_steps = BAP_STEPS_DEFAULT if bap_steps == BAP_STEPS_AUTO else bap_steps
-        self.steps_reason = ""
+        self.steps_explanation = ""
         # What came until they are chosen:
         self._held: bytearray | None = bytearray() if bap_steps == BAP_STEPS_AUTO else None
         self._held_blocks: list[Block] = []
@@ -225,7 +225,7 @@ class LiveAnimation:
         held, blocks = bytes(self._held), self._held_blocks
         self._held, self._held_blocks = None, []
         choice = choose_steps(held)
-        self.steps_reason = choice.reason
+        self.steps_explanation = choice.explanation
         if choice.table != self.bap_steps:
             self.bap_steps = choice.table
             self._decoder = Decoder(bap_steps=choice.table, on_error="salvage")

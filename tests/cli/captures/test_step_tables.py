@@ -18,7 +18,7 @@ from fba.codec import marked_table
 
 Run = Callable[..., Any]
 
-CHOSEN = "BAP steps visage: the stream does not say, and with iso the root goes "
+CHOSEN = "BAP steps visage (likely): the stream does not say, and with iso the root goes "
 WARNED = "BAPs look implausible with the BAP steps 'iso' (the root goes "
 ASKED = "; made with --bap-steps visage?\n"
 
@@ -138,7 +138,7 @@ def test_every_reader_finds_the_steps(run: Run, tmp_path: Path, walk: Path) -> N
         for path, said in (
             (walk, CHOSEN),
             (marked, "BAP steps visage: the stream says so\n"),
-            (iso, "BAP steps iso: the stream does not say, and with these nothing looks wrong\n"),
+            (iso, "BAP steps iso (unsure): the stream does not say, and with these nothing looks wrong\n"),
         ):
             out.unlink(missing_ok=True)
             done = run(command[0], path, *command[1:])
@@ -149,7 +149,7 @@ def test_every_reader_finds_the_steps(run: Run, tmp_path: Path, walk: Path) -> N
                 table = "iso" if path == iso else "visage"
                 assert fba.read(out).body == fba.read(path, bap_steps=table).body
     shown = run("info", walk).out
-    assert "  steps    visage: the stream does not say, and with iso the root goes " in shown
+    assert "  steps    visage (likely): the stream does not say, and with iso the root goes " in shown
     assert "  steps    visage: the stream says so\n" in run("info", marked).out
     assert json.loads(run("info", "--json", marked).out)["bap_steps"] == "visage"
 
