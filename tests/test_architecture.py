@@ -66,6 +66,7 @@ fba.capture.limbs
 fba.capture.comparison
 fba.capture.blendshapes
 fba.capture.action_units
+fba.capture.points
 fba.capture
 fba.formats
 fba.formats.text

@@ -1,5 +1,5 @@
 """Motion capture to BAPs: matched joints, aligned rest poses, turned bones, planted feet, measured errors.
-Captured faces to FAPs: blendshapes, action units, markers.
+Captured faces to FAPs: blendshapes, action units, markers, tracked points.
 
 May use: parameters, face and body, and the modules of `fba` itself.
 """
@@ -10,6 +10,7 @@ from fba.capture.blendshapes import ShapeMotion, from_blendshapes, to_blendshape
 from fba.capture.markers.faces import from_markers
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.motion import SkeletonMotion
+from fba.capture.points import PointMotion, from_points
 from fba.capture.skeleton import from_skeleton
 
 __all__ = [
@@ -17,12 +18,14 @@ __all__ = [
     "BoneError",
     "FeetError",
     "MarkerMotion",
+    "PointMotion",
     "RetargetReport",
     "ShapeMotion",
     "SkeletonMotion",
     "from_action_units",
     "from_blendshapes",
     "from_markers",
+    "from_points",
     "from_skeleton",
     "retarget_report",
     "to_blendshapes",

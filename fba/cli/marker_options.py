@@ -19,9 +19,29 @@ from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.capture.markers.motion import MarkerMotion
+    from fba.capture.points import PointMotion
 
 Neutral = str | int | tuple[float, float]
 WORDS = ("auto", "first")
+LEAST_ASPECT, MOST_ASPECT = 0.1, 10.0
+
+
+class AspectType(click.ParamType["float"]):
+    """Width to height of a picture: 16:9, 1920x1080, or 1.78."""
+
+    name = "aspect"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        if isinstance(value, float):
+            return value
+        number = r"(\d{1,6}(?:\.\d{1,6})?)"
+        match = re.fullmatch(rf"{number}(?:[:x/]{number})?", str(value), re.ASCII)
+        ratio = float(match[1]) / (float(match[2] or 1) or 1e-9) if match else 0.0
+        if not LEAST_ASPECT <= ratio <= MOST_ASPECT:
+            self.fail(
+                f"{value!r} is no width and height of a picture, as 16:9, 1920x1080 or 1.78", param, ctx
+            )
+        return ratio
 
 
 class NeutralType(click.ParamType["Neutral"]):
@@ -53,20 +73,26 @@ def marker_options(command: Decorated) -> Decorated:
         default="auto",
         show_default=True,
         metavar="auto|first|N|FROM-TO",
-        help="Markers: the neutral face is found, the first moment, frame N, or between two times.",
+        help="Markers, points: the neutral face is found, the first moment, frame N, or between two times.",
     )
     gaze = options.choice_option(
         "--gaze",
-        "Markers: eyes stay still in the head, or keep looking at the camera.",
+        "Markers, points: eyes turn as their pupils say, if these are there, or keep looking at the camera.",
         "none",
         "camera",
+    )
+    aspect = click.option(
+        "--aspect",
+        type=AspectType(),
+        metavar="W:H",
+        help="Points: width and height of the picture, 16:9 or 1920x1080; default: what makes them a face.",
     )
     path = click.option(
         "--head-path/--no-head-path",
         default=None,
         help="Markers: where the head goes moves the body; default: unless another file has a body.",
     )
-    decorated: Any = path(command)
+    decorated: Any = aspect(path(command))
     decorated = gaze(decorated)
     return neutral(decorated)  # type: ignore[no-any-return]
 
@@ -78,6 +104,8 @@ def read_places(
     if not maps:
         return None
     from fba.capture.markers.marker_maps import change_map, check_map, read_map
+    from fba.capture.points import PointMotion
+    from fba.capture.points.places import change_places
 
     saved = [each for each in maps if isinstance(each, Path)]
     pairs = dict(each for each in maps if not isinstance(each, Path))
@@ -87,34 +115,44 @@ def read_places(
     if not pairs:
         return base
     try:
-        changed = change_map(read_markers(captures[0], format, limits), base, pairs)
+        capture = read_capture(captures[0], format, limits)
+        if isinstance(capture, PointMotion):
+            return change_places(capture.count, base, pairs)
+        changed = change_map(capture, base, pairs)
         check_map(changed)
     except OptionError as error:
         raise click.UsageError(f"--map: {error}") from error
     return changed
 
 
-def write_places(
+def write_used_places(
     target: Path, places: dict[str, str] | None, capture: Path, format: str | None, limits: Limits
 ) -> int:
-    """Write the map that was used for a capture; return the number of its markers."""
+    """Write the map that was used for a capture; return the number of its markers or points."""
     from fba.capture.markers.marker_maps import find_map, write_map
+    from fba.capture.points import PointMotion
+    from fba.capture.points.places import point_places, write_places
 
-    motion = read_markers(capture, format, limits)
+    motion = read_capture(capture, format, limits)
+    if isinstance(motion, PointMotion):
+        taken = point_places(motion.count) if places is None else places
+        write_places(target, taken, motion.count)
+        return len(taken)
     used = places if places is not None else find_map(motion)[0]
     write_map(target, used, motion)
     return len(used)
 
 
-def read_markers(path: Path, format: str | None, limits: Limits) -> MarkerMotion:
-    """Return the markers of a capture, without the warnings that reading it a second time would repeat."""
+def read_capture(path: Path, format: str | None, limits: Limits) -> MarkerMotion | PointMotion:
+    """Return the markers or points of a capture, without warnings, which reading it again would repeat."""
     from fba.capture.markers.motion import MarkerMotion
+    from fba.capture.points import PointMotion
     from fba.formats import format_of
 
     with input_file(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
         reader = format_of(file, format)
-        assert reader.read_face is not None  # the caller names captures of markers only
+        assert reader.read_face is not None  # the caller names captures of markers and points only
         motion = reader.read_face(file, limits=limits)
-        assert isinstance(motion, MarkerMotion)
+        assert isinstance(motion, MarkerMotion | PointMotion)
         return motion

@@ -78,7 +78,7 @@ class Format:
     file with this beginning (up to 64 KiB) and this lower-case suffix has this format. read, write: file to
     Animation and back; write is None if there is no writer. carries: the parts that a file can hold.
     read_motion: reads the motion of a skeleton, for formats of motion capture; `read` retargets it.
-    read_face: reads a captured face as it is, markers among them; `read` makes FAPs of it.
+    read_face: reads a captured face as it is, markers and points among them; `read` makes FAPs of it.
     list_clips: describes the animations of a file, for formats that hold several; `read` takes one as `clip`.
     describe_person: describes the person in a file without an animation. written: description of a written
     file, if `description` says more than the writer can do.
@@ -104,7 +104,7 @@ class Format:
 
     @property
     def has_markers(self) -> bool:
-        """Whether files hold markers, whose places on the face a map can give."""
+        """Whether files hold markers or points, whose places on the face a map can give."""
         return "markers" in self.read_options
 
     @property
@@ -173,6 +173,11 @@ def formats() -> tuple[Format, ...]:
             "pyfeat", (".csv",), "action units of py-feat",
             lazy("face_tables.pyfeat", "sniff"), lazy("face_tables.pyfeat", "read"), None, ("face",),
             read_face=lazy("face_tables.pyfeat", "read_face"),
+        ),
+        Format(
+            "points", (".csv",), "points of a tracked face: MediaPipe's 478, iBUG's 68",
+            lazy("face_tables.points_csv", "sniff"), lazy("face_tables.points_csv", "read"), None,
+            read_face=lazy("face_tables.points_csv", "read_points"),
         ),
         Format(
             "livelink-udp", (".udp",), "recorded datagrams of Live Link Face",

@@ -17,11 +17,12 @@ from fba.capture.markers.gaps import RARELY, Filled, fill_gaps, warn_of_gaps
 from fba.capture.markers.marker_maps import check_map, find_map, list_names
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.neutral import neutral_frames
+from fba.capture.markers.pupils import find_gaze
 from fba.capture.markers.registration import GIVE_MAP, Registration, complete_points, register
 from fba.capture.markers.responses import measure_responses
 from fba.capture.markers.solving import choose_unknowns, solve
 from fba.capture.markers.stabilisation import follow_head, relate_poses, remove_poses
-from fba.capture.markers.targets import RIGID
+from fba.capture.markers.targets import PUPILS, RIGID
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel, Fapu
 from fba.face.feature_points import row_of
@@ -41,6 +42,31 @@ LIDS = {"3.1": "3.3", "3.2": "3.4"}
 """Upper lids, and the lower lid of the same eye."""
 LARGEST_GAZE = 0.6
 """Radians that an eye turns at most."""
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What is known of the points of a source, apart from where they are.
+
+    still: names of those that the head alone moves; None: their places tell. depth: whether it was measured
+    how far forward they are; otherwise no FAP in that direction is told. confused: whether points may take
+    each other's names, as optical markers do.
+    """
+
+    still: frozenset[str] | None = None
+    depth: bool = True
+    confused: bool = True
+
+    def find_still(self, places: Mapping[str, str]) -> list[int]:
+        """Return numbers of the points in a map, name -> place, that the head alone moves."""
+        known = self.still
+        return [
+            n for n, (name, place) in enumerate(places.items())
+            if (place in RIGID if known is None else name in known)
+        ]  # fmt: skip
+
+
+MARKERS = Traits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +101,7 @@ def from_markers(
     gaze: str = "none",
     head_path: bool = True,
     model: FaceModel | None = None,
+    traits: Traits = MARKERS,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the FAPs of a face with markers, and the path of its head as BAPs 181 to 183.
@@ -84,7 +111,7 @@ def from_markers(
     cloud's shape. neutral: the frames in which all FAPs are 0: "auto", "first", a frame, or (from, to) in
     seconds. gaze: "none", or "camera": eyes turn against the head, so that they keep looking where they did.
     head_path: whether the path of the head goes into the stream, too. model: the face whose motions tell
-    FAPs apart; None for the built-in head.
+    FAPs apart; None for the built-in head. traits: what is known of the points if they are not markers.
 
     FAPs are relative to the actor's own FAPU, measured on the neutral face. Lids and lips that no marker
     tells are left to the decoder, except that the inner lips do as the outer.
@@ -102,7 +129,9 @@ def from_markers(
         f"the capture at {float(rate):g} frames/s",
         source=motion.positions.nbytes,
     )
-    face = find_face(motion, markers=markers, neutral=neutral, gaze=gaze, model=model, limits=limits)
+    face = find_face(
+        motion, markers=markers, neutral=neutral, gaze=gaze, model=model, traits=traits, limits=limits
+    )
     at = motion.times[0] + np.arange(count) / float(rate)
     columns = np.array(face.sent) - 1
     values = np.zeros((count, FAP_COUNT), dtype=np.int32)
@@ -128,9 +157,13 @@ def find_face(
     neutral: str | int | tuple[float, float] = "auto",
     gaze: str = "none",
     model: FaceModel | None = None,
+    traits: Traits = MARKERS,
     limits: Limits = DEFAULT_LIMITS,
 ) -> MarkerFace:
-    """Return the face in a capture and its motion; options and errors as for `from_markers`."""
+    """Return the face in a capture and its motion; options and errors as for `from_markers`.
+
+    traits: what is known of the points if they are not markers.
+    """
     if gaze not in GAZES:
         raise OptionError(f"gaze must be one of {', '.join(GAZES)}, not {gaze!r}")
     if not len(motion):
@@ -154,9 +187,10 @@ def find_face(
     places = _without_rare(motion, places)
     names = tuple(places)
     positions = motion.positions[:, [motion.names.index(name) for name in names]]
-    positions, exchanges = undo_exchanges(names, positions)
-    _tell_exchanges(exchanges)
-    fixed = [n for n, name in enumerate(names) if places[name] in RIGID]
+    if traits.confused:
+        positions, exchanges = undo_exchanges(names, positions)
+        _tell_exchanges(exchanges)
+    fixed = traits.find_still(places)
     if len(fixed) < 3:
         raise ModelError(
             "the head's motion needs three markers that the face does not move (hairline, ears, bridge of "
@@ -180,11 +214,11 @@ def find_face(
         positions[:, [a, b]] = positions[:, [b, a]]
     kept = [n for n, name in enumerate(names) if name not in where.astray]
     names = tuple(names[n] for n in kept)
-    mapped, places = places, {name: places[name] for name in names}
+    before, places = tuple(places), {name: places[name] for name in names}
     positions = positions[:, kept]
     changed = {name for pair in where.swapped for name in pair} | set(where.astray)
-    if any(target in RIGID for name, target in mapped.items() if name in changed):
-        fixed = [n for n, name in enumerate(names) if places[name] in RIGID]
+    if changed & {before[n] for n in fixed}:
+        fixed = traits.find_still(places)
         rotation, shift = follow_head(positions[:, fixed], motion.times)
     else:
         basis = where.axes * mirror
@@ -206,7 +240,8 @@ def find_face(
     for n, name in enumerate(names):
         if places[name] in rows:
             moved[:, rows[places[name]]] = local[:, n] - neutral_local[n]
-    unknowns = choose_unknowns([place for place in places.values() if place in rows and place not in RIGID])
+    told = [place for place in places.values() if place in rows and place not in (*RIGID, *PUPILS)]
+    unknowns = choose_unknowns(told, traits.depth)
     values = np.zeros((len(motion), FAP_COUNT))
     sent: tuple[int, ...] = ()
     if unknowns.faps:
@@ -214,12 +249,16 @@ def find_face(
         sent = (*unknowns.faps, *unknowns.mates)
     values[:, [HEAD_PITCH - 1, HEAD_YAW - 1, HEAD_ROLL - 1]] = _head_angles(rotation) / fapu.AU
     sent = (*sent, HEAD_PITCH, HEAD_YAW, HEAD_ROLL)
+    eyes = find_gaze(moved, set(places.values()), where.scale)
+    if eyes is not None and gaze == "none":
+        sent = (*sent, *YAW_EYE, *PITCH_EYE)
+        values[:, [fap - 1 for fap in (*YAW_EYE, *PITCH_EYE)]] = eyes / fapu.AU
     if gaze == "camera":
         sent = (*sent, *YAW_EYE, *PITCH_EYE)
         values[:, [fap - 1 for fap in YAW_EYE]] = -values[:, [HEAD_YAW - 1]]
         values[:, [fap - 1 for fap in PITCH_EYE]] = -values[:, [HEAD_PITCH - 1]]
-        eyes = [fap - 1 for fap in (*YAW_EYE, *PITCH_EYE)]
-        values[:, eyes] = np.clip(values[:, eyes], -LARGEST_GAZE / fapu.AU, LARGEST_GAZE / fapu.AU)
+        turned = [fap - 1 for fap in (*YAW_EYE, *PITCH_EYE)]
+        values[:, turned] = np.clip(values[:, turned], -LARGEST_GAZE / fapu.AU, LARGEST_GAZE / fapu.AU)
     spine = points[rows["7.1"]]
     path = np.einsum("tcd,d->tc", rotation, spine) + shift - spine
     return MarkerFace(

@@ -11,7 +11,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.registration import FACTORS, GIVE_MAP, SIZES
-from fba.capture.markers.targets import HEAD, target_points
+from fba.capture.markers.targets import HEAD, PUPILS, target_points
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.rotations import axis_matrices
@@ -58,7 +58,7 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
             "no built-in set has the names of these markers, and their shape is not that of a face "
             f"(best fit {1000 * error:.0f} mm off)"
         ).with_remedies(GIVE_MAP)
-    places = target_points(model.points)
+    places = _skin_points(model)
     names = [name for name in places if name not in SELDOM]
     apart = np.linalg.norm(laid[:, None] - np.array([places[name] for name in names])[None], axis=2)
     markers, targets = linear_sum_assignment(np.minimum(apart, NEAR))
@@ -77,6 +77,11 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
     return {name: result[name] for name in motion.names if name in result}
 
 
+def _skin_points(model: FaceModel) -> dict[str, Float64]:
+    """Return where markers can be on a face: each target that is on its skin."""
+    return {name: point for name, point in target_points(model.points).items() if name not in PUPILS}
+
+
 def _lay_onto(cloud: Float64, model: FaceModel, up: str) -> tuple[Float64, float]:
     """Return the cloud on the head, float64 (M, 3), and the root mean square distance, metres."""
     from scipy.spatial import cKDTree
@@ -84,7 +89,7 @@ def _lay_onto(cloud: Float64, model: FaceModel, up: str) -> tuple[Float64, float
     skin = np.concatenate([part.vertices for part in model.of_kind("skin")]).astype(np.float64)
     skin = skin[(skin[:, 2] > FRONT) & (skin[:, 1] > model.points[:, 1].min() - 0.02)]
     tree = cKDTree(skin)
-    key = np.array(list(target_points(model.points).values()))
+    key = np.array(list(_skin_points(model).values()))
     size = float(np.sqrt(((cloud - cloud.mean(axis=0)) ** 2).sum(axis=1).mean()))
     usual = float(np.sqrt(((key - key.mean(axis=0)) ** 2).sum(axis=1).mean()))
     factor = min((1.0, *FACTORS), key=lambda each: abs(np.log(each * size / usual)))

@@ -44,8 +44,12 @@ class Unknowns:
     rows: tuple[tuple[int, int], ...]
 
 
-def choose_unknowns(points: Sequence[str]) -> Unknowns:
-    """Return which FAPs markers on these feature points tell, and along which axes."""
+def choose_unknowns(points: Sequence[str], depth: bool = True) -> Unknowns:
+    """Return which FAPs markers on these feature points tell, and along which axes.
+
+    depth: whether it is known how far forward the markers are; without it, FAPs in that direction are not
+    told.
+    """
     given = set(points)
     solved: list[int] = []
     mates: dict[int, int] = {}
@@ -54,7 +58,7 @@ def choose_unknowns(points: Sequence[str]) -> Unknowns:
         axis = _axis(fap.positive)
         owner = next((point for point in fap.feature_points if point in given), None)
         inner = next((outer for outer, point in INNER.items() if point in fap.feature_points), None)
-        if axis is None or fap.unit == "AU":
+        if axis is None or fap.unit == "AU" or (axis == 2 and not depth):
             continue
         if owner is not None:
             solved.append(fap.number)

@@ -21,7 +21,9 @@ MEASURED = ("2.1", "2.10", "3.1", "3.2", "3.3", "3.4", "4.1", "4.2", "4.3", "4.4
 PLACED = ("2.11", "2.12", "2.13", "2.14", "3.7", "3.8", "3.9", "3.10", "3.11", "3.12", "3.13", "3.14", "8.9",
           "8.10", "9.4", "9.5", "9.13", "9.14", "9.15")  # fmt: skip
 """Other points on the skin: they say how large the face is, and where."""
-TARGETS = (*RIGID, *MEASURED, *PLACED)
+PUPILS = ("3.5", "3.6")
+"""Left and right pupil, which a tracker of pictures sees: the gaze is measured there."""
+TARGETS = (*RIGID, *MEASURED, *PLACED, *PUPILS)
 
 
 def target_points(points: Float64) -> dict[str, Float64]:

@@ -32,7 +32,8 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.codec import ClampedParameter
 
-CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "swap", "face", "neutral", "gaze", "head_path")
+CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "swap", "face", "neutral", "gaze", "head_path",
+           "aspect")  # fmt: skip
 """Options that say how a capture becomes BAPs and FAPs: those that its reader takes count."""
 
 
@@ -260,7 +261,7 @@ def command(
     if map_out is not None:
         with outputs.file(map_out) as file:
             if marked:
-                mapped = marker_options.write_places(file, places, marked[0], format, limit)
+                mapped = marker_options.write_used_places(file, places, marked[0], format, limit)
             else:
                 mapped = joint_options.write_joints(file, joints, captures[0], format, clip, limit)
         what = f"markers of {marked[0]}" if marked else f"joints of {captures[0]}"

@@ -212,6 +212,9 @@ def _print_capture(capture: Mapping[str, Any] | None) -> None:
     """Print what is in the capture of a face, as its reader describes it."""
     if capture is None:
         return
+    if capture["kind"] == "points":
+        _print_points(capture)
+        return
     count, still = len(capture["shapes"]), len(capture["still"])
     moving = f", {still} of which never move" if still else ""
     unseen = f", {capture['unseen']} of them without a face" if capture["unseen"] else ""
@@ -219,6 +222,16 @@ def _print_capture(capture: Mapping[str, Any] | None) -> None:
     turns = [what for what, turns in capture["angles"].items() if turns]
     click.echo(f"  capture  {capture['rows']} rows{unseen}, {capture['seconds']:.2f} s{start}")
     click.echo(f"  {capture['kind']:8} {count}{moving}; angles of {' and '.join(turns) or 'nothing'}")
+    for finding in capture["findings"]:
+        click.echo(f"  found    {finding}")
+
+
+def _print_points(capture: Mapping[str, Any]) -> None:
+    """Print what is in a capture of tracked points."""
+    unseen = f", {capture['unseen']} of them without a face" if capture["unseen"] else ""
+    click.echo(f"  capture  {capture['rows']} rows{unseen}, {capture['seconds']:.2f} s")
+    depth = {"none": "without depth", "relative": "with depth", "metres": "in three dimensions, in metres"}
+    click.echo(f"  points   {capture['points']} {depth[capture['depth']]}")
     for finding in capture["findings"]:
         click.echo(f"  found    {finding}")
 

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float64, Int64
+from fba.arrays import Bool, Float64, Int64
 from fba.capture.action_units import ActionUnitMotion, from_action_units
 from fba.capture.sampling import find_gaps, find_rate
 from fba.errors import FbaWarning, FormatError, ModelError, Remedy
@@ -19,6 +19,8 @@ from fba.formats.face_tables._times import check_order
 from fba.limits import Limits
 from fba.source import Path, naming_file
 
+CONFIDENT = 0.5
+"""Confidence below which numbers of a row mean nothing."""
 USUAL = 30
 """Rate of a single picture."""
 PICTURES = 500
@@ -55,6 +57,16 @@ def choose_rows(table: Table, ids: Sequence[str], face: str | None) -> Int64:
             Remedy("face", "choose one with {}", repr(counts.most_common(1)[0][0]))
         )
     return np.flatnonzero([not one or face is None or one == face for one in ids])
+
+
+def tracked_rows(table: Table, column: dict[str, int]) -> Bool:
+    """Return whether each row (T,) has a face, and is sure of it. column: names -> numbers of columns."""
+    seen = np.ones(len(table.rows), dtype=bool)
+    if "success" in column:
+        seen &= table.numbers([column["success"]])[:, 0] > 0
+    if "confidence" in column:
+        seen &= table.numbers([column["confidence"]])[:, 0] >= CONFIDENT
+    return seen
 
 
 def row_times(

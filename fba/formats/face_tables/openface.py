@@ -15,7 +15,7 @@ import numpy as np
 
 from fba import rotations
 from fba.animation import Animation
-from fba.arrays import Bool, Float64, Int64
+from fba.arrays import Float64, Int64
 from fba.capture.action_units import ActionUnitMotion
 from fba.errors import FormatError
 from fba.formats.face_tables._faces import (
@@ -25,6 +25,7 @@ from fba.formats.face_tables._faces import (
     head_angles,
     row_times,
     to_animation,
+    tracked_rows,
 )
 from fba.formats.face_tables._tables import Table, header_names, read_table
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -35,8 +36,6 @@ PRESENCE = re.compile(r"AU(\d\d)_c")
 STRONGEST = 5.0
 """Intensity of an action unit that is as strong as can be."""
 LARGEST = 20.0
-CONFIDENT = 0.5
-"""Confidence below which numbers of a row mean nothing."""
 VERSION_3 = {1: 1, 2: 6, 3: 12, 4: 15, 5: 17, 6: 2, 7: 9, 8: 10}
 """Action units that the eight columns of version 3 mean."""
 POSE = ("pose_Rx", "pose_Ry", "pose_Rz")
@@ -101,7 +100,7 @@ def read_face(
             "an action unit is stronger than 20; intensities go from 0 to 5",
             path=path, line=table.lines[rows[row]],
         )  # fmt: skip
-    seen = _seen(table, column)[rows]
+    seen = tracked_rows(table, column)[rows]
     intensities = np.where(seen[:, None], np.clip(strengths / STRONGEST, 0.0, 1.0), np.nan)
     turns = _turns(table, column)
     turns = None if turns is None else turns[rows]
@@ -111,16 +110,6 @@ def read_face(
         head=None if turns is None else head_angles(turns), eyes=_eyes(table, column, rows, turns),
         name=FilePath(path).stem, findings=tuple(findings),
     )  # fmt: skip
-
-
-def _seen(table: Table, column: dict[str, int]) -> Bool:
-    """Return whether each row (T,) has a face, and is sure of it."""
-    seen = np.ones(len(table.rows), dtype=bool)
-    if "success" in column:
-        seen &= table.numbers([column["success"]])[:, 0] > 0
-    if "confidence" in column:
-        seen &= table.numbers([column["confidence"]])[:, 0] >= CONFIDENT
-    return seen
 
 
 def _turns(table: Table, column: dict[str, int]) -> Float64 | None:

@@ -1,0 +1,125 @@
+"""`from_points`: tracked points of a face as FAPs."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from fractions import Fraction
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Float64
+from fba.capture.markers.faces import MarkerFace, Traits, find_face, from_markers
+from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers.targets import HEAD, target_points
+from fba.capture.points.lifting import lift
+from fba.capture.points.motion import PointMotion
+from fba.capture.points.picture import upright_points
+from fba.capture.points.places import check_places, find_still, point_places, take_points
+from fba.capture.points.sizes import even_sizes
+from fba.capture.sampling import find_gaps
+from fba.errors import FbaWarning, ModelError
+from fba.face import FaceModel
+from fba.limits import DEFAULT_LIMITS, Limits
+
+
+def from_points(
+    motion: PointMotion,
+    rate: Fraction | int | str | None = None,
+    *,
+    markers: Mapping[str, str] | None = None,
+    neutral: str | int | tuple[float, float] = "auto",
+    gaze: str = "none",
+    head_path: bool = True,
+    aspect: float | None = None,
+    model: FaceModel | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> Animation:
+    """Return the FAPs of a face whose points a tracker found, and for points in metres its path as BAPs.
+
+    markers: points -> place on the face, such as {"37+38": "3.2"}; None for the tracker's own, which
+    `fba.capture.points.places.point_places` returns. aspect: of the picture, width / height, for points that
+    are shares of it; None for the motion's own, or what makes the points a face. The other options, and what
+    is done once pose and size are removed, are those of `fba.capture.from_markers`; pupils, where there are
+    any, turn the eyes.
+
+    Points without depth do not tell FAPs 14, 16 and 17, nor 27 and 28, and none is made up. Raises ModelError
+    where there is no face; OptionError; LimitError. Warns (FbaWarning) of everything that was repaired.
+    """
+    taken, places, traits = prepare(motion, markers=markers, aspect=aspect, model=model)
+    return from_markers(
+        taken, motion.rate if rate is None else rate, markers=places, neutral=neutral, gaze=gaze,
+        head_path=head_path and motion.metric, model=model, traits=traits, limits=limits,
+    )  # fmt: skip
+
+
+def find_point_face(
+    motion: PointMotion,
+    *,
+    markers: Mapping[str, str] | None = None,
+    neutral: str | int | tuple[float, float] = "auto",
+    gaze: str = "none",
+    aspect: float | None = None,
+    model: FaceModel | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> MarkerFace:
+    """Return the face that points show and its motion; options and errors as for `from_points`."""
+    taken, places, traits = prepare(motion, markers=markers, aspect=aspect, model=model)
+    return find_face(
+        taken, markers=places, neutral=neutral, gaze=gaze, model=model, traits=traits, limits=limits
+    )
+
+
+def prepare(
+    motion: PointMotion,
+    *,
+    markers: Mapping[str, str] | None = None,
+    aspect: float | None = None,
+    model: FaceModel | None = None,
+) -> tuple[MarkerMotion, dict[str, str], Traits]:
+    """Return points as if they were markers, in metres and of one size; their places; what is known of them.
+
+    Options and errors as for `from_points`. Frames without a face are left out.
+    """
+    model = FaceModel.default() if model is None else model
+    places = dict(point_places(motion.count) if markers is None else markers)
+    check_places(places, motion.count)
+    if motion.flat:  # a point somewhere on the head has a depth that nobody knows
+        places = {name: place for name, place in places.items() if place != HEAD}
+    names = tuple(places)
+    still = find_still(places, motion.count)
+    seen = motion.seen
+    if not seen.any():
+        raise ModelError(f"no face is seen in any of the {len(motion)} frames; there is nothing to encode")
+    _tell_unseen(motion)
+    times = motion.times[seen]
+    points = take_points(motion.positions[seen], names)
+    template = _template(places, model)
+    points = upright_points(points, names, places, template, motion.share, aspect or motion.aspect)
+    fixed = [n for n, name in enumerate(names) if name in still]
+    if motion.flat:
+        points = lift(points, names, places, template, fixed)
+    elif not motion.metric:
+        points = even_sizes(points, template, fixed)
+    taken = MarkerMotion(names, points, times, motion.rate, "m", "+y", motion.name)
+    return taken, places, Traits(still=still, depth=not motion.flat, confused=False)
+
+
+def _template(places: Mapping[str, str], model: FaceModel) -> Float64:
+    """Return where points are on a known face: float64 (M, 3); NaN for those somewhere on the head."""
+    known = target_points(model.points)
+    nowhere = np.full(3, np.nan)
+    return np.array([nowhere if place == HEAD else known[place] for place in places.values()])
+
+
+def _tell_unseen(motion: PointMotion) -> None:
+    """Warn of frames without a face."""
+    seen = motion.seen
+    if seen.all():
+        return
+    longest = max((length for _, length in find_gaps(motion.times[seen], motion.rate)), default=0.0)
+    warnings.warn(
+        f"{int((~seen).sum())} of {len(seen)} frames have no face; they are bridged, {longest:.2f} s at most",
+        FbaWarning, stacklevel=4,
+    )  # fmt: skip

@@ -1,0 +1,109 @@
+"""Points of a picture the right way round: its aspect, mirror images, y and z that count the other way."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+
+from fba.arrays import Float64
+from fba.capture.points.poses import fit_poses
+from fba.errors import FbaWarning, ModelError
+
+ASPECTS = {"16:9": 16 / 9, "4:3": 4 / 3, "1:1": 1.0, "3:4": 3 / 4, "9:16": 9 / 16}
+"""Pictures that cameras take, width / height."""
+SAMPLES = 60
+"""Frames, about, that tell which way round points are."""
+SURE = 0.8
+"""The best aspect leaves less than this share of what the next one leaves of the face's shape."""
+DIRECTIONS = np.array([1.0, -1.0, -1.0])
+"""From axes of a picture (right, down, away from the camera) to those of a face that looks into it."""
+
+
+def upright_points(
+    points: Float64,
+    names: tuple[str, ...],
+    places: Mapping[str, str],
+    template: Float64,
+    share: bool,
+    aspect: float | None,
+) -> Float64:
+    """Return points to the right, up and towards the camera, in one unit: float64 (T, M, 2 or 3).
+
+    points: to the right, down and away, as a `PointMotion` has them. template: (M, 3), where they are on a
+    known face, NaN where unknown. share: whether they are shares of the picture. aspect: its width / height;
+    None if it must be found. Warns of what is the wrong way round, and of an aspect that is found.
+    """
+    where = {places[name]: n for n, name in enumerate(names)}
+    points = points * DIRECTIONS[: points.shape[2]]
+    points = _turn_round(points, where)
+    if share:
+        ratio = _find_aspect(points, template) if aspect is None else aspect
+        points = points * np.array([ratio, 1.0, ratio])[: points.shape[2]]
+    return points
+
+
+def _turn_round(points: Float64, where: Mapping[str, int]) -> Float64:
+    """Return points (T, M, D) that are not mirrored; where: place -> number. Warns of what was turned."""
+    needed = ("3.7", "3.12", "8.3", "8.4")
+    if not all(place in where for place in needed):
+        return points
+    left, right, *corners = (np.nanmedian(points[:, where[place]], axis=0) for place in needed)
+    mouth = np.mean(corners, axis=0)
+    across, down = left - right, mouth - (left + right) / 2
+    if across[0] * down[1] - across[1] * down[0] > 0:  # seen from behind
+        axis = 0 if down[1] < 0 else 1
+        said = (
+            "mirrored: x is turned round"
+            if axis == 0
+            else "upside down: y counts upwards, and is turned round"
+        )
+        warnings.warn(f"the points are {said}", FbaWarning, stacklevel=6)
+        points = points * np.where(np.arange(points.shape[2]) == axis, -1.0, 1.0)
+    if points.shape[2] == 3 and "9.3" in where:
+        tip = np.nanmedian(
+            points[:, where["9.3"], 2] - points[:, [where["3.7"], where["3.12"]], 2].mean(axis=1)
+        )
+        if tip < 0:
+            warnings.warn(
+                "the nose is behind the eyes: depth counts towards the camera, and is turned round",
+                FbaWarning, stacklevel=6,
+            )  # fmt: skip
+            points = points * np.array([1.0, 1.0, -1.0])
+    return points
+
+
+def _misfit(points: Float64, shape: Float64) -> float:
+    """Return how far points (T, K, D) are from a shape (K, 3), metres, in the middle."""
+    if points.shape[2] == 2:
+        poses = fit_poses(shape, points)
+        off = (poses.project(shape) - points) / poses.scale[:, None, None]
+        return float(np.median(np.linalg.norm(off, axis=2)))
+    middle, own = points.mean(axis=1, keepdims=True), shape - shape.mean(axis=0)
+    left, sizes, right = np.linalg.svd(np.einsum("tkc,kd->tcd", points - middle, own))
+    flip = np.ones_like(sizes)
+    flip[:, 2] = np.sign(np.linalg.det(left @ right))
+    back = np.einsum("tcd,tkc->tkd", (left * flip[:, None]) @ right, points - middle)
+    factor = (sizes * flip).sum(axis=1) / (back**2).sum(axis=(1, 2))
+    return float(np.median(np.linalg.norm(factor[:, None, None] * back - own, axis=2)))
+
+
+def _find_aspect(points: Float64, template: Float64) -> float:
+    """Return the aspect of the picture that makes points (T, M, D), shares of it, most like a face."""
+    known = ~np.isnan(template[:, 0])
+    whole = ~np.isnan(points[:, known]).any(axis=(1, 2))
+    some = points[whole][:: max(1, int(whole.sum()) // SAMPLES)][:, known]
+    if not len(some):
+        raise ModelError("no frame has all points of the face; give the aspect of the picture")
+    left = {}
+    for name, ratio in ASPECTS.items():
+        left[name] = _misfit(some * np.array([ratio, 1.0, ratio])[: some.shape[2]], template[known])
+    best, next_best = sorted(left, key=lambda name: left[name])[:2]
+    sure = "" if left[best] < SURE * left[next_best] else f", or {next_best}"
+    warnings.warn(
+        f"the points are shares of a picture of unknown size: taken as {best}{sure}, which makes them a "
+        "face; --aspect says it",
+        FbaWarning, stacklevel=6,
+    )  # fmt: skip
+    return ASPECTS[best]

@@ -1,0 +1,106 @@
+"""Where on a face the points of a tracker are: a table, corrected by hand, in TOML files.
+
+A place is told by one point, "152", or by the middle of several, "37+38".
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from fba.arrays import Float64
+from fba.capture.markers.marker_maps import check_map, check_target
+from fba.capture.markers.targets import HEAD, RIGID
+from fba.errors import OptionError
+from fba.name_maps import write_names
+from fba.source import Path
+
+PARTS = {68: (68,), 70: (68, 70), 468: (468,), 478: (468, 478)}
+"""Rows of the table that count for each number of points."""
+MOST = 8
+"""Most points whose middle is a place."""
+TABLE = "markers"
+
+
+@cache
+def point_places(count: int) -> dict[str, str]:
+    """Return points -> place on the face, for a tracker with this number of points."""
+    return {row["points"]: row["place"] for row in _rows() if int(row["tracker"]) in PARTS[count]}
+
+
+@cache
+def still_points(count: int) -> frozenset[str]:
+    """Return the points that the head alone moves."""
+    return frozenset(row["points"] for row in _rows() if int(row["tracker"]) in PARTS[count] and row["still"])
+
+
+def find_still(places: Mapping[str, str], count: int) -> frozenset[str]:
+    """Return which points of a map the head alone moves: those of the table, and those at still places."""
+    known = {place for points, place in point_places(count).items() if points in still_points(count)}
+    still = (known | set(RIGID)) - {HEAD}
+    return frozenset(points for points, place in places.items() if place in still or place == HEAD)
+
+
+@cache
+def _rows() -> tuple[dict[str, str], ...]:
+    text = (files(__package__) / "point_places.csv").read_text(encoding="utf-8")
+    return tuple(csv.DictReader(text.splitlines()))
+
+
+def check_places(places: Mapping[str, str], count: int) -> None:
+    """Raise OptionError for points that a tracker has not, and for places that markers cannot have."""
+    check_map(dict(places))
+    for points in places:
+        numbers_of(points, count)
+
+
+def numbers_of(points: str, count: int) -> tuple[int, ...]:
+    """Return the numbers in "37+38"; OptionError for something else, or a point beyond the last."""
+    if not re.fullmatch(r"\d{1,4}(\+\d{1,4})*", points, re.ASCII):
+        raise OptionError(f"{points!r} is no point; expected a number, or several as in 37+38")
+    numbers = tuple(map(int, points.split("+")))
+    if max(numbers) >= count or len(numbers) > MOST:
+        raise OptionError(f"there is no point {points}; the tracker has points 0 to {count - 1}")
+    return numbers
+
+
+def change_places(count: int, base: Mapping[str, str] | None, pairs: Mapping[str, str]) -> dict[str, str]:
+    """Return a map with some points given by hand.
+
+    base: the map that is changed, None for the table's. pairs: points -> place, or "" to leave them out.
+    Other points that had the same place lose it. OptionError for unknown points or places.
+    """
+    result = dict(point_places(count) if base is None else base)
+    for points, place in pairs.items():
+        numbers_of(points, count)
+        check_target(place, allow_none=True)
+        result = {
+            each: taken
+            for each, taken in result.items()
+            if each != points and (taken != place or place == HEAD)
+        }
+        if place:
+            result[points] = place
+    check_places(result, count)
+    return result
+
+
+def write_places(path: Path, places: Mapping[str, str], count: int) -> None:
+    """Write a map as TOML, which `fba.capture.markers.marker_maps.read_map` reads."""
+    heading = (
+        f"Points of a tracker with {count} of them, and where they are on the face: feature points of",
+        "ISO/IEC 14496-2, l_tragion and r_tragion in front of the ears, or head for one on the skull.",
+        "37+38 is the middle of two points. Change it and give it to `fba encode --map`.",
+    )
+    write_names(path, TABLE, places, heading, {})
+
+
+def take_points(positions: Float64, names: tuple[str, ...]) -> Float64:
+    """Return what is at each of these points, or in their middle: positions (T, N, D) to (T, M, D)."""
+    count = positions.shape[1]
+    return np.stack([positions[:, list(numbers_of(name, count))].mean(axis=1) for name in names], axis=1)

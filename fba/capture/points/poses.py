@@ -1,0 +1,97 @@
+"""Heads in pictures: where a face of known shape is seen, turned, and how large (scaled orthography)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.arrays import Float64
+
+PASSES = 8
+"""Steps of the fit, each with less weight for points that the one before left far off."""
+LEAST_SCALE = 2e-4
+"""Metres by which every point may be off without losing weight."""
+RIDGE = 1e-3
+"""Weight of the turn before a step, against steps into turns that the points hardly tell."""
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """How a head is seen in each frame.
+
+    scale: (T,), units of the picture for a metre. rotation: (T, 3, 3), from the head's axes (left, up, front)
+    to the camera's (right, up, towards it). shift: (T, 2), in the picture, of the middle of the shape.
+    """
+
+    scale: Float64
+    rotation: Float64
+    shift: Float64
+
+    def project(self, shape: Float64) -> Float64:
+        """Return where points (N, 3) or (T, N, 3) of the head are in the picture: (T, N, 2)."""
+        shape = np.broadcast_to(shape, (len(self.scale), *shape.shape[-2:]))
+        turned = np.einsum("tdc,tnc->tnd", self.rotation[:, :2], shape)
+        return np.asarray(self.scale[:, None, None] * turned + self.shift[:, None])
+
+
+def fit_poses(shape: Float64, picture: Float64) -> Poses:
+    """Return how a head is seen.
+
+    shape: float64 (K, 3), metres, its points, around their middle. picture: float64 (T, K, 2), where these
+    are, x to the right, y up.
+    """
+    middle = shape.mean(axis=0)
+    body = shape - middle
+    seen = picture - picture.mean(axis=1, keepdims=True)
+    first, second = np.swapaxes(np.linalg.pinv(body) @ seen, 1, 2).swapaxes(0, 1)
+    left, sizes, right = np.linalg.svd(np.stack([first, second], axis=1), full_matrices=False)
+    rows = left @ right
+    rotation = np.concatenate([rows, np.cross(rows[:, 0], rows[:, 1])[:, None]], axis=1)
+    scale = sizes.mean(axis=1)
+    weights = np.ones(picture.shape[:2])
+    shift = picture.mean(axis=1)
+    for _ in range(PASSES):
+        poses, off = _step(body, picture, Poses(scale, rotation, shift), weights)
+        scale, rotation, shift = poses.scale, poses.rotation, poses.shift
+        usual = np.maximum(np.median(off, axis=1), LEAST_SCALE)
+        weights = 1 / (1 + (off / (2 * usual[:, None])) ** 2) ** 2
+    return Poses(scale, rotation, shift - scale[:, None] * (rotation[:, :2] @ middle))
+
+
+def _step(body: Float64, picture: Float64, poses: Poses, weights: Float64) -> tuple[Poses, Float64]:
+    """Return poses after a Gauss-Newton step, and how far each point is off then, metres (T, K)."""
+    scale, rotation, shift = poses.scale, poses.rotation, poses.shift
+    turned = np.einsum("tdc,kc->tkd", rotation, body)
+    count = len(picture)
+    slopes = np.zeros((count, len(body), 2, 6))
+    x, y, z = np.moveaxis(turned, 2, 0)
+    slopes[:, :, 0, 1], slopes[:, :, 0, 2] = z, -y  # a small turn w moves a point by w x point
+    slopes[:, :, 1, 0], slopes[:, :, 1, 2] = -z, x
+    slopes[:, :, :, 3] = turned[:, :, :2]
+    slopes[:, :, 0, 4] = slopes[:, :, 1, 5] = 1.0
+    off = (picture - shift[:, None]) / scale[:, None, None] - turned[:, :, :2]
+    weighted = slopes * weights[:, :, None, None]
+    normal = np.einsum("tkda,tkdb->tab", weighted, slopes)
+    right = np.einsum("tkda,tkd->ta", weighted, off)
+    total = np.einsum("taa->t", normal[:, :3, :3])
+    normal[:, range(3), range(3)] += RIDGE * total[:, None] + 1e-18
+    change = np.linalg.solve(normal, right[..., None])[..., 0]
+    rotation = _small_turns(change[:, :3]) @ rotation
+    shift = shift + scale[:, None] * change[:, 4:]
+    scale = scale * np.exp(np.clip(change[:, 3], -0.5, 0.5))
+    turned = np.einsum("tdc,kc->tkd", rotation, body)
+    off = (picture - shift[:, None]) / scale[:, None, None] - turned[:, :, :2]
+    return Poses(scale, rotation, shift), np.asarray(np.linalg.norm(off, axis=2))
+
+
+def _small_turns(vectors: Float64) -> Float64:
+    """Return rotations (T, 3, 3) about vectors (T, 3) by their lengths, radians."""
+    angle = np.linalg.norm(vectors, axis=1)
+    axis = vectors / np.maximum(angle, 1e-12)[:, None]
+    cross = np.zeros((len(vectors), 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
+    cross -= cross.swapaxes(1, 2)
+    sine, cosine = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    result: Float64 = np.eye(3) + sine * cross + (1 - cosine) * (cross @ cross)
+    return result

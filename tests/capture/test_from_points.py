@@ -1,0 +1,118 @@
+"""Tracked points of faces whose FAPs are known: these come back from other heads, and from damaged tracks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fba.capture.markers.faces import MarkerFace
+from fba.capture.points import from_points
+from fba.capture.points.conversion import find_point_face
+from fba.errors import FbaWarning
+from fba.face import FaceModel
+from fba.face.authoring import author
+from fba.parameters import faps
+from fba_conformance.captures.tracked_actor import PointTake, film
+from small_head import small_head
+
+PER_MILLE = 1024 / 1000
+
+
+@cache
+def actor() -> FaceModel:
+    """Another head than the built-in one, by whose motions the encoder tells FAPs apart."""
+    head = small_head()
+    return author(head.parts, head.points, bound=head.bound)
+
+
+@cache
+def deep_take() -> PointTake:
+    return film(actor(), 478, share=True)
+
+
+def errors(face: MarkerFace, take: PointTake) -> dict[int, float]:
+    """Root mean square error of each FAP that is sent, thousandths of its FAPU; of angles, in degrees."""
+    off = face.faps - take.faps
+    result = {}
+    for fap in face.sent:
+        error = float(np.sqrt((off[:, fap - 1] ** 2).mean()))
+        result[fap] = float(np.degrees(error * 1e-5)) if faps()[fap - 1].unit == "AU" else error / PER_MILLE
+    return result
+
+
+def check(take: PointTake, most: dict[int, float], usual: float, degrees: float) -> MarkerFace:
+    """most: thousandths of FAPU that single FAPs may be off; usual: the others."""
+    face = find_point_face(take.motion, neutral="first", aspect=16 / 9)
+    angles = {fap.number for fap in faps() if fap.unit == "AU"}
+    worse = {
+        fap: round(error, 2)
+        for fap, error in errors(face, take).items()
+        if error > (degrees if fap in angles else most.get(fap, usual))
+    }
+    assert not worse
+    return face
+
+
+def test_478_points_of_another_head() -> None:
+    face = check(deep_take(), {3: 35, 14: 25, 18: 70}, 12, 0.3)
+    assert {3, 4, 5, 14, 15, 16, 17, 19, 21, 23, 26, 31, 37, 41, 51, 59, 61, 63} <= set(face.sent)
+    assert not {27, 29, 39, 40, 43, 65} & set(face.sent)  # nothing is made up
+
+
+def test_68_points_in_metres() -> None:
+    check(film(actor(), 68, metric=True), {3: 40, 14: 40}, 25, 0.4)
+
+
+def test_points_without_depth_tell_nothing_of_depth() -> None:
+    take = film(actor(), 70, flat=True)
+    face = find_point_face(take.motion, neutral="first")
+    assert not {14, 16, 17, 27, 28} & set(face.sent)
+    assert {23, 24, 25, 26} <= set(face.sent)
+
+
+def test_a_head_that_turns_does_not_smile() -> None:
+    take = film(actor(), 68, flat=True, without=tuple(range(3, 48)) + tuple(range(51, 69)))
+    face = find_point_face(take.motion, neutral="first")
+    lips = [fap - 1 for fap in face.sent if 51 <= fap <= 60]
+    assert np.abs(face.faps[:, 48]).max() > 30_000  # 17 degrees
+    assert np.abs(face.faps[:, lips]).max() < 40
+
+
+def test_the_aspect_of_the_picture_is_found() -> None:
+    with pytest.warns(FbaWarning, match="taken as 16:9"):
+        found = find_point_face(deep_take().motion, neutral="first")
+    given = find_point_face(deep_take().motion, neutral="first", aspect=16 / 9)
+    np.testing.assert_array_equal(found.faps, given.faps)
+    upright = film(actor(), 478, frames=30, share=True, aspect=9 / 16)
+    with pytest.warns(FbaWarning, match="taken as 9:16"):
+        find_point_face(upright.motion)
+
+
+@pytest.mark.parametrize(
+    ("turned", "message"),
+    [
+        ((-1, 1, 1), "the points are mirrored: x is turned round"),
+        ((1, -1, 1), "the points are upside down: y counts upwards"),
+        ((1, 1, -1), "depth counts towards the camera"),
+    ],
+)
+def test_axes_that_count_the_other_way(turned: tuple[int, int, int], message: str) -> None:
+    take = deep_take()
+    motion = replace(take.motion, positions=take.motion.positions * turned, aspect=16 / 9)
+    with pytest.warns(FbaWarning, match=message):
+        face = find_point_face(motion, neutral="first")
+    assert np.abs(face.faps[:, 50] - take.faps[:, 50]).max() < 10
+    np.testing.assert_allclose(face.faps[:, 48], take.faps[:, 48], atol=1000)
+
+
+def test_frames_without_a_face_are_bridged() -> None:
+    positions = deep_take().motion.positions.copy()
+    positions[60:75] = np.nan
+    motion = replace(deep_take().motion, positions=positions, aspect=16 / 9)
+    with pytest.warns(FbaWarning, match=r"15 of 240 frames have no face; they are bridged, 0\.53 s at most"):
+        animation = from_points(motion)
+    assert len(animation) == 240
+    assert animation.body is None
