@@ -44,9 +44,9 @@ POINTS = (
     "id",
 )
 SIZES = (("width", "height"), ("image_width", "image_height"), ("frame_width", "frame_height"))
-PREFERRED = ("", "landmark", "lm", "face", "point", "p", "pt")
-"""Words before the numbers of columns, of which those of the face are read."""
-NOT_POINTS = ("eye_lmk", "pose", "hand", "gaze", "left_hand", "right_hand", "body")
+WORDS = ("", "landmark", "landmarks", "lm", "lmk", "face", "facelandmark", "point", "points", "p", "pt", "kp",
+         "keypoint", "facepoint", "mesh", "facemesh")  # fmt: skip
+"""What may stand before the numbers of columns, in small letters."""
 MILLIMETRE = 0.001
 
 
@@ -134,8 +134,8 @@ def _find_sets(names: Sequence[str]) -> dict[str, dict[str, dict[int, int]]]:
             before, number, axis = match[1], match[2], match[3]
         else:
             continue
-        word = before.lower().strip(" _.-")
-        if word not in NOT_POINTS:
+        word = re.sub(r"[ _.\-]", "", before.lower())
+        if word in WORDS:
             result.setdefault(word, {}).setdefault(axis, {}).setdefault(int(number), column)
     return result
 
@@ -149,12 +149,11 @@ def _is_metric(names: Sequence[str]) -> bool:
 def _read_wide(table: Table, rows: Int64) -> Float64:
     """Return points (T, N, 2 or 3) of a table with a column for each coordinate."""
     sets = _find_sets(table.names)
-    words = [word for word in PREFERRED if word in sets] or sorted(sets, key=lambda word: -len(sets[word]))
-    if not words:
+    if not sets:
         raise FormatError(
             "no columns of points, such as x_0, y_0, z_0, x_1, ...", path=table.path, line=table.lines[0] - 1
         )
-    chosen = sets[max(words, key=lambda word: max(len(numbers) for numbers in sets[word].values()))]
+    chosen = max(sets.values(), key=lambda axes: max(len(numbers) for numbers in axes.values()))
     axes = "XYZ" if {"X", "Y", "Z"} <= set(chosen) else "xyz" if {"x", "y"} <= set(chosen) else "XYZ"
     if not set(axes[:2]) <= set(chosen):
         raise FormatError("has no columns of both x and y of its points", path=table.path, line=1)
