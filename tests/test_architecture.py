@@ -68,6 +68,7 @@ fba.capture.blendshapes
 fba.capture.action_units
 fba.capture.points
 fba.capture
+fba.capture.live
 fba.formats
 fba.formats.text
 fba.formats.epf
@@ -76,6 +77,8 @@ fba.formats.markers
 fba.formats.c3d
 fba.formats.gltf
 fba.formats.face_tables
+fba.live.protocols
+fba.live
 fba_conformance
 fba_conformance.fuzz
 fba_conformance.suite.definitions

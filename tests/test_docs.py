@@ -43,6 +43,7 @@ COMMAND = re.compile(r"^\s*(\$ |fba |\./dev|python3? |pip |cd |import |from \w+ 
 
 WINDOW = "opens a window, which stays until somebody closes it"
 ARRIVING = "waits for a stream that arrives over a network"
+SENT = "receives what a telephone sends"
 SYSTEM = "installs system packages"
 CHECKOUT = "sets up or tests the checkout, which .ci/run does"
 MISMATCH = "fba: walk.fba: BAP steps visage: the stream says so"
@@ -52,6 +53,9 @@ ILLUSTRATIONS = {
     ("README.md", ". .venv/bin/activate"): "chooses an environment",
     ("README.md", "pip install ."): "makes an environment; .ci/run installs the wheel and runs the demo",
     ("CONTRIBUTING.md", "./dev setup"): CHECKOUT,
+    ("docs/capture-live.md", "fba capture livelink --play -o face.fba"): WINDOW,
+    ("docs/capture-live.md", "fba capture livelink -o face.fba"): SENT,
+    ("docs/capture-live.md", "fba capture livelink -o - | fba play -"): WINDOW,
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",
     (

@@ -19,6 +19,7 @@ from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare
 from fba.errors import FbaWarning, ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.tracks import BodyTrack
 
 ORIGINS = ("source", "start", "middle")
 GROUNDS = ("floor", "source", "none")
@@ -143,6 +144,13 @@ def from_skeleton(
         centre = root[0] if origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
         root[:, [0, 2]] -= (centre - solver.skeleton.centres[0])[[0, 2]]
 
+    track = solve_targets(turned, root, solver)
+    return Animation(motion.rate, np.arange(len(root)), None, track, motion.name)
+
+
+def solve_targets(turned: Mapping[str, Float64], root: Float64, solver: BapSolver) -> BodyTrack:
+    """Return the BAPs of targets: joint -> rotations (T, 3, 3) in the world, and the root's path (T, 3)."""
+
     def matrices(rows: slice) -> Float64:
         frames = np.zeros((rows.stop - rows.start, len(solver.skeleton), 4, 4))
         frames[:, :, range(4), range(4)] = 1.0
@@ -151,8 +159,7 @@ def from_skeleton(
         frames[:, 0, :3, 3] = root[rows]
         return frames
 
-    track = solve_track(solver, turned, len(root), matrices)
-    return Animation(motion.rate, np.arange(len(root)), None, track, motion.name)
+    return solve_track(solver, turned, len(root), matrices)
 
 
 def check_memory(limits: Limits, frames: int, joints: int, what: str, source: int) -> None:

@@ -131,10 +131,24 @@ class Encoder:
         self._encode(self._pending, int(self._pending.index[0]) + 1)
         self._finished = True
         self._writer.end_object()
+        return self._writer.take_bytes() + self._mark()
+
+    def ending(self) -> bytes:
+        """Return what would end the stream behind the bytes returned so far; b"" before the first.
+
+        With it behind them, they are a complete stream of all frames but the last one pushed. The encoder
+        goes on as if it had not been asked.
+        """
+        if self._finished or not self._writer.planes:
+            return b""
+        return self._writer.ending() + self._mark()
+
+    def _mark(self) -> bytes:
+        """Return the mark behind the end of a stream; b"" where there is none."""
         marked = (
             self.options.mark and self.options.bap_quant and self._writer.settings_in_force(slots.BODY_BIT)
         )
-        return self._writer.take_bytes() + (write_mark(self.options.bap_steps) if marked else b"")
+        return write_mark(self.options.bap_steps) if marked else b""
 
     def _encode(self, frames: Animation, following: int) -> None:
         """Encode frames. following: index of the frame after them, which determines the last skip."""

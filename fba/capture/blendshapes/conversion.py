@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -55,24 +56,41 @@ def from_blendshapes(
     )
     head = turns.pop(0) if motion.head is not None else None
     eyes = turns.pop(0) if motion.eyes is not None else None
-    values = np.zeros((len(index), FAP_COUNT))
+    track = convert_rows(motion.names, weights, _recorded(head), _recorded(eyes))
+    return Animation(rate, index, track, name=motion.name)
+
+
+def convert_rows(
+    names: Sequence[str], weights: Float64, head: Float64 | None, eyes: Float64 | None
+) -> FaceTrack:
+    """Return FAPs of rows of weights (T, N), and of angles (T, 3) and (T, 4) as `ShapeMotion` has them.
+
+    head, eyes: None where the source does not record them; then the shapes that look aside turn the eyes.
+    Each row counts for itself. Raises ModelError if no shape is known and there are no angles.
+    """
+    values = np.zeros((len(weights), FAP_COUNT))
     turned = np.zeros(FAP_COUNT, dtype=bool)
     _turn(head, HEAD, values, turned)
     _turn(eyes, EYES, values, turned)
-    amounts, moved = combine(dict(zip(motion.names, weights.T, strict=True)), len(index), but=turned)
+    amounts, moved = combine(dict(zip(names, weights.T, strict=True)), len(weights), but=turned)
     if not (moved | turned).any():
-        names = ", ".join(map(repr, motion.names[:6]))
-        raise ModelError(f"no name of a shape is known here: {names}; expected ARKit's, such as 'jawOpen'")
+        listed = ", ".join(map(repr, names[:6]))
+        raise ModelError(f"no name of a shape is known here: {listed}; expected ARKit's, such as 'jawOpen'")
     values += amounts
     part_lids(values)
     rounded = np.rint(np.clip(values, -LARGEST, LARGEST)).astype(np.int32)
     sent = with_mates(moved | turned)
-    return Animation(rate, index, FaceTrack(rounded, np.broadcast_to(sent, rounded.shape)), name=motion.name)
+    return FaceTrack(rounded, np.broadcast_to(sent, rounded.shape))
+
+
+def _recorded(angles: Float64 | None) -> Float64 | None:
+    """Return angles, but None where all are 0, as where a source records none."""
+    return None if angles is None or not angles.any() else angles
 
 
 def _turn(angles: Float64 | None, faps: tuple[str, ...], values: Float64, turned: Bool) -> None:
-    """Add angles (T, n), radians, to FAPs (T, 68), unless all are 0, as where a source records none."""
-    if angles is None or not angles.any():
+    """Add angles (T, n), radians, to FAPs (T, 68), and note which FAPs these are."""
+    if angles is None:
         return
     columns = [fap_numbers()[fap] - 1 for fap in faps]
     values[:, columns] += angles * RADIAN

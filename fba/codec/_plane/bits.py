@@ -55,6 +55,12 @@ class BitWriter:
         self.data[first:last] |= np.frombuffer(shifted.to_bytes(last - first, "big"), dtype=np.uint8)
         self.bit += count
 
+    def copy(self) -> BitWriter:
+        """Return a writer that goes on from here on its own."""
+        other = BitWriter()
+        other.data, other.bit = self.data.copy(), self.bit
+        return other
+
     def align(self) -> None:
         """Write stuffing up to the byte boundary: a 0, then 1s; a whole byte if already aligned."""
         count = 8 - (self.bit & 7)

@@ -58,6 +58,15 @@ class PlaneWriter:
         """Write alignment and end code."""
         self._write_aligned_code(syntax.END_CODE)
 
+    def ending(self) -> bytes:
+        """Return what would end the object behind the bytes taken so far; it goes on as if not asked."""
+        writer, before = self._writer, self._before
+        self._writer = writer.copy()
+        self.end_object()
+        taken = self.take_bytes()
+        self._writer, self._before = writer, before
+        return taken
+
     def settings_in_force(self, part: int) -> PartSettings | None:
         """Return the settings of the last I plane with this part, or None."""
         return self._settings.get(part)

@@ -5,23 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
 
 import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.capture.blendshapes import ShapeMotion, from_blendshapes
-from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_gaps
-from fba.errors import FbaWarning, FormatError, OptionError
-from fba.face.shape_names import arkit_names, arkit_of
+from fba.errors import FbaWarning, OptionError
+from fba.face.shape_names import arkit_names
 from fba.formats.face_tables._tables import named
+from fba.formats.face_tables.shape_weights import check_weights, shape_of
 from fba.limits import Limits
 from fba.source import Path, naming_file
 
-LARGEST = 4.0
-"""Largest weight; more is no share of a shape."""
+__all__ = ["check_weights", "find_lacks", "find_swap", "shape_of", "to_animation"]
+
 SWAPS = ("auto", "yes", "no")
 SWAPPED = (("mouthLeft", "mouthRight"), ("jawLeft", "jawRight"))
 """Labels that Live Link Face's tables have the wrong way round."""
@@ -31,17 +30,6 @@ MOST_GAPS = 3
 """Gaps that a warning names."""
 MOVES = 0.01
 """Standard deviation from which on a difference of weights says something."""
-
-
-@cache
-def shape_of(name: str) -> str | None:
-    """Return ARKit's name of a shape, from a name in any case; None if it is none of the 52."""
-    return _shapes().get(key_of(name)) or arkit_of(name)
-
-
-@cache
-def _shapes() -> dict[str, str]:
-    return {key_of(name): name for name in arkit_names()}
 
 
 def to_animation(
@@ -57,24 +45,6 @@ def to_animation(
         warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=warn)
     with naming_file(path):
         return from_blendshapes(motion, rate, limits=limits)
-
-
-def check_weights(
-    weights: Float64, names: Sequence[str], path: Path, lines: Sequence[int] | None = None
-) -> None:
-    """Raise FormatError for weights (T, N) that are no shares of 1. lines: (T,), where the file has lines."""
-    far = np.abs(weights) > LARGEST
-    if not far.any():
-        return
-    row, column = np.argwhere(far)[0]
-    value = float(weights[row, column])
-    hint = "; are these percent?" if np.nanmax(np.abs(weights)) <= 100 else ""
-    place = f"frame {row}: " if lines is None else ""
-    raise FormatError(
-        f"{place}{names[column]} has the weight {value:g}; expected 0 to 1{hint}",
-        path=path,
-        line=None if lines is None else lines[row],
-    )
 
 
 def find_lacks(names: Sequence[str], weights: Float64, times: Float64, rate: Fraction) -> list[str]:

@@ -68,17 +68,10 @@ def read_face(
     data = read_whole(path)
     text = data.decode("utf-8-sig", errors="replace")
     limits.check_bytes(RECORD_BYTES * text.count("|"), f"{path}: the records", source=len(data))
-    records, strange = _read_records(text, path)
+    records, strange = read_records(text, path)
     limits.check_frames(len(records), f"{path}: the recording")
-    names = list(dict.fromkeys(name for record in records for name in record if name not in TURNS))
-    shapes = [name for name in names if name != STATUS]
-    if len(shapes) < FEWEST:
-        raise FormatError(
-            f"{len(shapes)} blendshapes in the records; expected at least {FEWEST} of ARKit's", path=path
-        )
-    weights = np.array([[record.get(name, [np.nan])[0] for name in shapes] for record in records]) / 100
-    lost = np.array([record.get(STATUS, [1.0])[0] == 0 for record in records])
-    weights[lost] = np.nan
+    shapes = find_shapes(records, path)
+    weights, head, eyes = convert_records(records, shapes)
     times = np.arange(len(records)) / float(Fraction(fps or RATE))
     findings = [] if fps is not None else [f"the records have no times; taken as {RATE} in a second"]
     if strange:
@@ -86,9 +79,33 @@ def read_face(
     findings += find_lacks(shapes, weights, times, Fraction(fps or RATE))
     return ShapeMotion(
         tuple(shapes), weights, times, Fraction(fps or RATE),
-        head=_angles(records, "head", [0, 1, 2]), eyes=_eyes(records),
+        head=head, eyes=eyes,
         name=FilePath(path).stem, findings=tuple(findings),
     )  # fmt: skip
+
+
+def find_shapes(records: list[Record], path: Path) -> list[str]:
+    """Return the names of the shapes of which records have weights. Raises FormatError for too few."""
+    names = dict.fromkeys(name for record in records for name in record if name not in TURNS)
+    shapes = [name for name in names if name != STATUS]
+    if len(shapes) < FEWEST:
+        raise FormatError(
+            f"{len(shapes)} blendshapes in the records; expected at least {FEWEST} of ARKit's", path=path
+        )
+    return shapes
+
+
+def convert_records(
+    records: list[Record], shapes: list[str]
+) -> tuple[Float64, Float64 | None, Float64 | None]:
+    """Return weights (T, N) of shapes, angles of the head (T, 3) and of the eyes (T, 4), as in `ShapeMotion`.
+
+    Rows without a face, or without one of the shapes, are NaN; angles are None where no record has them.
+    """
+    weights = np.array([[record.get(name, [np.nan])[0] for name in shapes] for record in records]) / 100
+    lost = np.array([record.get(STATUS, [1.0])[0] == 0 for record in records])
+    weights[lost] = np.nan
+    return weights, _angles(records, "head", [0, 1, 2]), _eyes(records)
 
 
 def _eyes(records: list[Record]) -> Float64 | None:
@@ -108,7 +125,7 @@ def _angles(records: list[Record], part: str, columns: list[int]) -> Float64 | N
     return angles
 
 
-def _read_records(text: str, path: Path) -> tuple[list[Record], set[str]]:
+def read_records(text: str, path: Path) -> tuple[list[Record], set[str]]:
     """Return all records, and names that mean nothing. Raises FormatError for other words."""
     records: list[Record] = []
     strange: set[str] = set()

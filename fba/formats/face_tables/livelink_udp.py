@@ -35,8 +35,12 @@ PACKET_BYTES = 700
 """Memory of a datagram while it is read."""
 
 
-class _Packet(NamedTuple):
-    """seconds: time of day. values: 61 numbers, NaN where no face is seen."""
+class Packet(NamedTuple):
+    """A datagram.
+
+    sender: the device's id and the subject's name. seconds: time of day. values: 61 numbers, NaN where no
+    face is seen.
+    """
 
     sender: tuple[bytes, bytes]
     seconds: float
@@ -84,65 +88,105 @@ def read_face(
     times, order = _order(packets, findings)
     limits.check_frames(len(order), f"{path}: the recording")
     values = np.array([packets[number].values for number in order])
-    weights = values[:, : len(ARKIT_ORDER)]
+    weights, head, eyes = divide_values(values)
     check_weights(weights, ARKIT_ORDER, path)
-    yaw, pitch, roll, left_yaw, left_pitch, _, right_yaw, right_pitch, _ = values[:, len(ARKIT_ORDER) :].T
     findings += find_lacks(ARKIT_ORDER, weights, times - times[0], rate)
     motion = ShapeMotion(
         ARKIT_ORDER, weights, times - times[0], rate,
-        head=np.stack([-pitch, yaw, roll], axis=1),  # up and left are positive there
-        eyes=np.stack([-left_yaw, -right_yaw, left_pitch, right_pitch], axis=1),  # right and down
+        head=head, eyes=eyes,
         start=float(times[0]), name=FilePath(path).stem, findings=tuple(findings),
     )  # fmt: skip
     return find_swap(motion, swap, expected=False)
 
 
-def _read_packets(data: bytes, path: Path) -> tuple[list[_Packet], list[str]]:
+def _read_packets(data: bytes, path: Path) -> tuple[list[Packet], list[str]]:
     """Return all datagrams, and what was odd. Raises FormatError with the place of what is none."""
-    packets: list[_Packet] = []
+    packets: list[Packet] = []
     findings = []
-    missing = np.full(VALUES, np.nan)
     position = 0
     while position < len(data):
-        start = position
-        if data[position] != VERSION:
-            _refuse(data, position, path)
-        texts = []
-        position += 1
-        for _ in range(2):
-            length = int.from_bytes(data[position : position + 4], "big")
-            if len(data) >= position + 4 and not 0 < length <= MOST_TEXT:
-                _refuse(data, start, path)
-            texts.append(data[position + 4 : position + 4 + length])
-            position += 4 + length
-        end = position + TIME.size
-        with_face = len(data) > end and data[end] != VERSION
-        if with_face and data[end] != VALUES:
-            raise UnsupportedError(
-                f"{path}: byte {end}: a datagram with {data[end]} values; expected {VALUES}",
-                what="other datagrams of Live Link Face",
-            )
-        stop = end + (1 + 4 * VALUES if with_face else 0)
-        if len(data) < stop or len(data) < end:
+        packet, position = read_packet(data, position, path)
+        if packet is None:
             findings.append("the last datagram is incomplete; it is left out")
             break
-        frame, part, over, under = TIME.unpack_from(data, position)
-        if not (over > 0 and under > 0 and over <= LARGEST_RATE * under and frame >= 0 and 0 <= part < 2):
-            raise FormatError(
-                f"byte {position}: frame {frame} and {part:g}, {over}/{under} frames/s: no time", path=path
-            )
-        rate = Fraction(over, under)
-        values = missing
-        if with_face:
-            with np.errstate(invalid="ignore"):  # NaNs that signal
-                values = np.frombuffer(data, ">f4", VALUES, end + 1).astype(np.float64)
-            if not np.isfinite(values).all():
-                values = missing
-        packets.append(_Packet((texts[0], texts[1]), (frame + part) / float(rate), rate, values))
-        position = stop
+        packets.append(packet)
     if not packets:
         raise FormatError("holds no complete datagram of Live Link Face", path=path)
     return packets, findings
+
+
+def read_packet(data: bytes, start: int, path: Path) -> tuple[Packet | None, int]:
+    """Return the datagram that begins at byte `start`, and where the next one does; None if it is incomplete.
+
+    There is at least one byte. Raises FormatError for what is no datagram, UnsupportedError for one of
+    another version.
+    """
+    if data[start] != VERSION:
+        _refuse(data, start, path)
+    texts = []
+    position = start + 1
+    for _ in range(2):
+        length = int.from_bytes(data[position : position + 4], "big")
+        if len(data) >= position + 4 and not 0 < length <= MOST_TEXT:
+            _refuse(data, start, path)
+        texts.append(data[position + 4 : position + 4 + length])
+        position += 4 + length
+    end = position + TIME.size
+    with_face = len(data) > end and data[end] != VERSION
+    if with_face and data[end] != VALUES:
+        raise UnsupportedError(
+            f"{path}: byte {end}: a datagram with {data[end]} values; expected {VALUES}",
+            what="other datagrams of Live Link Face",
+        )
+    stop = end + (1 + 4 * VALUES if with_face else 0)
+    if len(data) < stop or len(data) < end:
+        return None, len(data)
+    frame, part, over, under = TIME.unpack_from(data, position)
+    if not (over > 0 and under > 0 and over <= LARGEST_RATE * under and frame >= 0 and 0 <= part < 2):
+        raise FormatError(
+            f"byte {position}: frame {frame} and {part:g}, {over}/{under} frames/s: no time", path=path
+        )
+    rate = Fraction(over, under)
+    values = np.full(VALUES, np.nan)
+    if with_face:
+        with np.errstate(invalid="ignore"):  # NaNs that signal
+            sent = np.frombuffer(data, ">f4", VALUES, end + 1).astype(np.float64)
+        values = sent if np.isfinite(sent).all() else values
+    return Packet((texts[0], texts[1]), (frame + part) / float(rate), rate, values), stop
+
+
+def divide_values(values: Float64) -> tuple[Float64, Float64, Float64]:
+    """Return weights (T, 52), angles of the head (T, 3) and of the eyes (T, 4) of values (T, 61).
+
+    Angles are as in `ShapeMotion`.
+    """
+    yaw, pitch, roll, left_yaw, left_pitch, _, right_yaw, right_pitch, _ = values[:, len(ARKIT_ORDER) :].T
+    head = np.stack([-pitch, yaw, roll], axis=1)  # up and left are positive there
+    eyes = np.stack([-left_yaw, -right_yaw, left_pitch, right_pitch], axis=1)  # right and down
+    return values[:, : len(ARKIT_ORDER)], head, eyes
+
+
+def join_values(motion: ShapeMotion) -> Float64:
+    """Return values (T, 61) of a motion with ARKit's shapes and angles: the inverse of `divide_values`."""
+    assert motion.names == ARKIT_ORDER
+    assert motion.head is not None
+    assert motion.eyes is not None
+    pitch, yaw, roll = motion.head.T
+    left_yaw, right_yaw, left_pitch, right_pitch = motion.eyes.T
+    still = np.zeros(len(motion))
+    angles = [yaw, -pitch, roll, -left_yaw, left_pitch, still, -right_yaw, right_pitch, still]
+    values: Float64 = np.concatenate([motion.weights, np.stack(angles, axis=1)], axis=1)
+    values[values == 0] = 0.0  # no "-0"
+    return values
+
+
+def write_packet(subject: str, device: str, seconds: float, rate: Fraction, values: Float64) -> bytes:
+    """Return a datagram. seconds: time of day; values (61,), NaN where no face is seen."""
+    texts = b"".join(len(one.encode()).to_bytes(4, "big") + one.encode() for one in (device, subject))
+    frame, part = divmod(seconds * float(rate), 1)
+    time = TIME.pack(int(frame), part, rate.numerator, rate.denominator)
+    numbers = b"" if np.isnan(values).any() else bytes([VALUES]) + values.astype(">f4").tobytes()
+    return bytes([VERSION]) + texts + time + numbers
 
 
 def _refuse(data: bytes, position: int, path: Path) -> None:
@@ -178,7 +222,7 @@ def _version_of(head: bytes) -> str:
     return ""
 
 
-def _choose(packets: list[_Packet], face: str | None, path: Path) -> list[_Packet]:
+def _choose(packets: list[Packet], face: str | None, path: Path) -> list[Packet]:
     """Return the datagrams of one sender; FormatError where it is not clear which."""
     subjects: dict[str, set[tuple[bytes, bytes]]] = {}
     for packet in packets:
@@ -197,7 +241,7 @@ def _choose(packets: list[_Packet], face: str | None, path: Path) -> list[_Packe
     return packets
 
 
-def _order(packets: list[_Packet], findings: list[str]) -> tuple[Float64, Int64]:
+def _order(packets: list[Packet], findings: list[str]) -> tuple[Float64, Int64]:
     """Return times (T,), increasing, and the numbers (T,) of their datagrams."""
     times = np.array([packet.seconds for packet in packets])
     if np.ptp(times) > NOON:  # midnight

@@ -9,6 +9,7 @@ from fba.arrays import Float64
 from fba.atomic import atomic
 from fba.capture.blendshapes import to_blendshapes
 from fba.errors import FormatError, ModelError
+from fba.formats.face_tables.livelink_udp import join_values
 from fba.source import Path
 
 ANGLES = (
@@ -35,14 +36,7 @@ def write(path: Path, animation: Animation) -> None:
         motion = to_blendshapes(animation)
     except ModelError as error:
         raise FormatError(error.finding, path=path) from error
-    assert motion.head is not None
-    assert motion.eyes is not None
-    pitch, yaw, roll = motion.head.T
-    left_yaw, right_yaw, left_pitch, right_pitch = motion.eyes.T
-    still = np.zeros(len(motion))
-    angles = [yaw, -pitch, roll, -left_yaw, left_pitch, still, -right_yaw, right_pitch, still]
-    rows: Float64 = np.concatenate([motion.weights, np.stack(angles, axis=1)], axis=1)
-    rows[rows == 0] = 0.0  # no "-0"
+    rows = join_values(motion)
     names = [name[0].upper() + name[1:] for name in motion.names]
     rate = int(animation.rate) if animation.rate in COUNTED else 60
     codes = _time_codes(motion.times + (motion.start or 0.0), rate)

@@ -13,6 +13,7 @@ from fba.atomic import PathLike
 from fba_player.export.render import as_scene
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.scene import Scene
+from fba_player.session.newest import Newest, follow_newest
 from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.view.camera import Camera
@@ -40,6 +41,7 @@ def play(
     bap_steps: str = "iso",
     warnings: tuple[str, ...] = (),
     panels: tuple[str, ...] = (),
+    newest: Newest | None = None,
 ) -> tuple[Path, ...]:
     """Play an animation in a window; returns when it is closed, with the files dropped onto it.
 
@@ -51,8 +53,8 @@ def play(
     first frame (earlier if negative); the picture then follows the clock of the sound device. file: where the
     animation was read from, with bap_steps, for the panels about the file. warnings: those given while it was
     read; the window shows them for some seconds, and the file panel lists them. panels: names of those open
-    at first ("file", "view", "camera", "help"). F1 shows the keys. Motion follows the clock: a slow machine
-    shows fewer pictures, not slower ones.
+    at first ("file", "view", "camera", "help"). newest: of a live capture, see `follow_newest`. F1 shows the
+    keys. Motion follows the clock: a slow machine shows fewer pictures, not slower ones.
 
     Raises DisplayError if there is no display or no OpenGL 3.3, or OpenGL stops working, saying what to do;
     ValueError for an impossible speed or size or an unknown preset; FormatError for a sound file that cannot
@@ -70,6 +72,8 @@ def play(
         window.transport.set_speed(speed)
         window.transport.interpolate = interpolate
         window.session.open |= set(panels)
+        if newest is not None:
+            follow_newest(window.session, newest)
         for text in warnings:
             window.session.say(text, "warning", WARNING_SECONDS)
         with contextlib.ExitStack() as stack:

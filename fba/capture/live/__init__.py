@@ -1,0 +1,8 @@
+"""Captures that arrive moment by moment: the conversions of whole captures, a frame at a time.
+
+May use: all of `fba.capture`.
+"""
+
+from fba.capture.live.blendshapes import LiveBlendshapes
+
+__all__ = ["LiveBlendshapes"]

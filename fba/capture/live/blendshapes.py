@@ -1,0 +1,90 @@
+"""`LiveBlendshapes`: what `from_blendshapes` does, for rows that come one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from math import ceil, floor
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Float64
+from fba.capture.blendshapes.conversion import convert_rows
+from fba.capture.sampling import SLACK, interpolate
+from fba.limits import DEFAULT_LIMITS
+from fba.tracks import FaceTrack
+
+CHUNK = 4096
+"""Frames that are made at once, which limits the memory for those of a long gap."""
+
+Row = tuple[float, list[Float64]]
+"""A time, and what is there then: weights (N,), angles of the head (3,) and of the eyes (4,)."""
+
+
+class LiveBlendshapes:
+    """Turns rows of weights into frames as they come.
+
+    names: of the N shapes, as in `ShapeMotion`. rate: frames per second. Frames are those that
+    `from_blendshapes` makes of all rows in which a face is seen: each is complete once a row at its time, or
+    a later one, has come. Angles of the head and of the eyes turn them from the first row on in which they
+    are not all 0.
+    """
+
+    def __init__(self, names: Sequence[str], rate: Fraction) -> None:
+        self.names = tuple(names)
+        self.rate = Fraction(rate)
+        self._before: Row | None = None
+        self._next = 0  # number of the next frame
+        self._frames_made = False
+        self._recorded = [False, False]  # head, eyes
+
+    def push(self, time: float, weights: Float64, head: Float64, eyes: Float64) -> Iterator[Animation]:
+        """Add a row, later than the one before; yield the frames that are now complete.
+
+        time: seconds from the first row of the capture, also one without a face. weights (N,), head (3,) and
+        eyes (4,) as in `ShapeMotion`; 0 for angles that the source does not have. The row counts once all
+        frames have been taken.
+        """
+        row = (float(time), [weights, head, eyes])
+        self._note_angles(head, eyes)
+        frames = float(self.rate)
+        if self._before is None:
+            self._next = ceil(time * frames - SLACK)
+        last = floor(time * frames) + 1
+        while last / frames > time:
+            last -= 1
+        yield from self._frames(row, last)
+        self._before = row
+
+    def finish(self) -> Iterator[Animation]:
+        """Yield the frames at the end that are only complete when no other row comes: one at most."""
+        if self._before is not None:
+            last = floor(self._before[0] * float(self.rate) + SLACK)
+            yield from self._frames(self._before, last if self._frames_made else max(last, self._next))
+
+    def show(self, weights: Float64, head: Float64, eyes: Float64) -> FaceTrack:
+        """Return the FAPs of a row as it is, between frames: a track of one frame."""
+        self._note_angles(head, eyes)
+        return self._convert([weights[None], head[None], eyes[None]])
+
+    def _note_angles(self, head: Float64, eyes: Float64) -> None:
+        for number, angles in enumerate((head, eyes)):
+            self._recorded[number] |= bool(angles.any())
+
+    def _frames(self, row: Row, last: int) -> Iterator[Animation]:
+        """Yield the frames up to number `last`, between the row before and this one."""
+        rows = [row] if self._before is None else [self._before, row]
+        times = np.array([time for time, _ in rows])
+        values = [np.stack(parts) for parts in zip(*(parts for _, parts in rows), strict=True)]
+        while self._next <= last:
+            index = np.arange(self._next, min(last + 1, self._next + CHUNK))
+            self._next += len(index)
+            self._frames_made = True
+            track = self._convert(interpolate(times, values, index / float(self.rate), DEFAULT_LIMITS))
+            yield Animation(self.rate, index, track)
+
+    def _convert(self, values: list[Float64]) -> FaceTrack:
+        weights, head, eyes = values
+        with_head, with_eyes = self._recorded
+        return convert_rows(self.names, weights, head if with_head else None, eyes if with_eyes else None)

@@ -1,0 +1,270 @@
+"""`fba capture`: receive, show and record what a telephone or a program sends."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli import options
+from fba.cli.clamped_values import clamped_lines
+from fba.cli.command import Command, examples
+from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.printing import rate_text, seconds_text
+from fba.errors import FbaError
+
+if TYPE_CHECKING:
+    from fba.live import Capture, Receiver, StreamRecorder, Summary
+    from fba.live.recording import Target
+
+KINDS = ("livelink", "ifacialmocap", "vtube")
+LONGEST_NEUTRAL = 60.0
+
+
+@click.command(
+    cls=Command,
+    epilog=examples(
+        "fba capture livelink -o face.fba",
+        "fba capture livelink --play --subject Anna",
+        "fba capture ifacialmocap --ask 192.168.0.20 -o face.fba --seconds 60",
+        "fba capture vtube --ask 192.168.0.20 --play",
+    ),
+)
+@click.argument("kind", type=click.Choice(KINDS), metavar=f"[{'|'.join(KINDS)}]")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT.fba",
+    type=OutputType(),
+    help="Stream to write while it comes; - for standard output.",
+)
+@options.no_clobber_option
+@click.option("--play", is_flag=True, help="Show it in a window.")
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65_535),
+    help="UDP port to listen on; 0: any that is free. Default: 11111 for livelink, 49983 for ifacialmocap, "
+    "11125 for vtube.",
+)
+@click.option(
+    "--host", default="", metavar="ADDRESS", help="Own address to listen on. Default: all of this computer's."
+)
+@click.option(
+    "--ask",
+    metavar="ADDRESS[:PORT]",
+    help="Telephone to ask for data: vtube needs it; ifacialmocap can be told our address in the app.",
+)
+@click.option(
+    "--sender",
+    "--subject",
+    "sender",
+    metavar="NAME",
+    help="Of several senders, the one to use: its subject's name or its address. Default: the first.",
+)
+@click.option(
+    "--seconds", type=options.PeriodType(), metavar="SECONDS", help="Stop after that; default: on Ctrl-C."
+)
+@options.fps_option("Frame rate of the stream. Default: the sender's own, or 60.")
+@click.option(
+    "--neutral",
+    type=click.FloatRange(0, LONGEST_NEUTRAL, min_open=True),
+    metavar="SECONDS",
+    help="The first seconds show the neutral face: their median is subtracted. Default: weights as sent.",
+)
+@click.option("--swap", is_flag=True, help="MouthLeft and MouthRight, JawLeft and JawRight change places.")
+@click.option(
+    "--quant",
+    type=click.IntRange(0, 31),
+    default=1,
+    show_default=True,
+    help="Quantiser of FAPs (fap_quant); 0: unquantised.",
+)
+@click.option(
+    "--model",
+    type=click.Path(exists=True, path_type=Path),
+    metavar="FILE",
+    help="With --play, the face that is shown. Default: the built-in head.",
+)
+@options.json_option
+def command(
+    kind: str,
+    output: Path | None,
+    no_clobber: bool,
+    play: bool,
+    port: int | None,
+    host: str,
+    ask: str | None,
+    sender: str | None,
+    seconds: Fraction | None,
+    fps: Fraction | None,
+    neutral: float | None,
+    swap: bool,
+    quant: int,
+    model: Path | None,
+    as_json: bool,
+) -> None:
+    """Receive a captured face over the network, show it, and record it as an FBA stream.
+
+    livelink is Live Link Face, ifacialmocap also Facemotion3d, vtube VTube Studio on a telephone. The file is
+    complete at any moment, whatever happens to this program. Ctrl-C ends it and prints what was received,
+    and what was left out.
+    """
+    if output is None and not play:
+        raise click.UsageError("give -o OUT.fba to record, --play to see it, or both")
+    if model is not None and not play:
+        raise click.UsageError("--model goes with --play")
+    outputs = Outputs([] if output is None else [Output("-o", output)], no_clobber=no_clobber)
+    if play:
+        from fba import player
+
+        player.check_display()  # before anything that takes long
+    from fba.codec import EncoderOptions
+    from fba.live import Capture, Receiver, StreamRecorder, find_kind
+    from fba.live.recording import warm_up
+
+    found = find_kind(kind)
+    if ask is not None and not found.asked_port:
+        raise click.UsageError(f"--ask: {found.description} sends by itself; enter our address in the app")
+    warm_up()
+    targets, stream = _targets(output, play=play)
+    recorder = StreamRecorder(
+        targets, EncoderOptions(fap_quant=quant, clamp=True, bap_steps="visage", mark=True)
+    )
+    capture = Capture(
+        found, recorder.push, sender=sender, rate=fps, swap=swap, neutral=neutral,
+        say=lambda text: click.echo(f"fba: {text}", err=True),
+    )  # fmt: skip
+    with Receiver(capture, host=host, port=port, ask=ask) as receiver:
+        click.echo(f"fba: listening for {found.description} on UDP port {receiver.port}", err=True)
+        limit = None if seconds is None else float(seconds)
+        try:
+            if stream is None:
+                with _stopping(receiver.stop):
+                    receiver.run(limit)
+            else:
+                _play(stream, receiver, capture, recorder, limit, model)
+        finally:
+            summary = capture.finish()
+            recorder.finish()
+    if not summary.frames:
+        raise FbaError(_nothing(summary, capture, receiver))
+    _report(outputs, output, recorder, summary, fps, as_json=as_json)
+
+
+def _targets(output: Path | None, *, play: bool) -> tuple[list[Target], Any]:
+    """Return where the stream goes, and of these the queue of the window, or None."""
+    from fba.live import StreamFile
+    from fba.live.recording import StreamPipe
+
+    targets: list[Target] = []
+    if output is not None:
+        targets.append(StreamPipe(sys.stdout.buffer) if output == STANDARD else StreamFile(output))
+    if not play:
+        return targets, None
+    from fba.cli.live_window import StreamQueue
+
+    stream = StreamQueue()
+    return [*targets, stream], stream
+
+
+@contextmanager
+def _stopping(stop: Callable[[], None]) -> Iterator[None]:
+    """Let Ctrl-C, `kill` and a closed terminal stop the capture; a second one interrupts as usual."""
+    before: dict[int, Any] = {}
+
+    def handle(number: int, _frame: object) -> None:
+        signal.signal(number, before[number])
+        stop()
+
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if (
+            number is not None
+            and threading.current_thread() is threading.main_thread()
+            and signal.getsignal(number) is not signal.SIG_IGN
+        ):
+            before[number] = signal.getsignal(number)
+            signal.signal(number, handle)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _play(
+    stream: Any, receiver: Receiver, capture: Capture, recorder: StreamRecorder, limit: float | None,
+    model: Path | None,
+) -> None:  # fmt: skip
+    """Receive in a thread, and show the stream in a window until that is closed."""
+    from fba.cli.live_window import show
+
+    failures: list[Exception] = []
+
+    def receive() -> None:
+        try:
+            receiver.run(limit)
+        except Exception as error:  # raised again below, in the main thread
+            failures.append(error)
+        stream.close()
+
+    thread = threading.Thread(target=receive, name="fba capture", daemon=True)
+    thread.start()
+    try:
+        show(stream, receiver, capture, recorder, model)
+    except KeyboardInterrupt:
+        click.echo("fba: stopped", err=True)
+    except FbaError:
+        if capture.summary.frames:
+            raise
+    finally:
+        receiver.stop()
+        thread.join()
+    if failures:
+        raise failures[0]
+
+
+def _nothing(summary: Summary, capture: Capture, receiver: Receiver) -> str:
+    """Return why there is nothing to write."""
+    if not summary.received:
+        return (
+            f"no datagram came on UDP port {receiver.port}; check that {capture.kind.description} sends to "
+            "an address of this computer and to this port, and that no firewall is between them"
+        )
+    return "no face came: " + "; ".join(summary.lines())
+
+
+def _report(
+    outputs: Outputs, output: Path | None, recorder: StreamRecorder, summary: Summary, fps: Fraction | None,
+    *, as_json: bool,
+) -> None:  # fmt: skip
+    """Print what was received and written."""
+    clamped = recorder.encoder.statistics.clamped_parameters
+    rate = recorder.rate
+    seconds = Fraction(summary.frames) / rate
+    if as_json:
+        written = {"output": None if output is None else str(output), "size": recorder.size}
+        outputs.print_json(
+            {**written, "rate": str(rate), "kbit_per_second": _kbit(recorder, seconds), **summary.values()}
+        )
+        return
+    for line in summary.lines():
+        outputs.say(f"fba: {line}")
+    if output is not None:
+        outputs.say(
+            f"{display_name(output)}: {summary.frames} frames, {seconds_text(seconds)} at "
+            f"{rate_text(rate)} frames/s, {recorder.size} bytes, {_kbit(recorder, seconds):.2f} kbit/s"
+        )
+    for line in clamped_lines(clamped):
+        outputs.say(line)
+
+
+def _kbit(recorder: StreamRecorder, seconds: Fraction) -> float:
+    return round(8 * recorder.size / float(seconds) / 1000, 3)

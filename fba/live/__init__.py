@@ -1,0 +1,17 @@
+"""Live captures: datagrams from telephones and programs to a stream that grows.
+
+    capture = Capture(find_kind("livelink"), StreamRecorder([StreamFile("face.fba")]).push)
+    with Receiver(capture) as receiver:
+        receiver.run(seconds=10)
+    print(capture.finish())
+
+May use: capture, codec and formats. Knows no window and no command line.
+"""
+
+from fba.live.capture import Capture
+from fba.live.protocols.kinds import KINDS, Kind, find_kind
+from fba.live.receiver import Receiver
+from fba.live.recording import StreamFile, StreamRecorder
+from fba.live.summary import Summary
+
+__all__ = ["KINDS", "Capture", "Kind", "Receiver", "StreamFile", "StreamRecorder", "Summary", "find_kind"]

@@ -1,0 +1,136 @@
+"""`Receiver`: a UDP port whose datagrams a `Capture` takes."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+
+from fba.errors import FbaError
+from fba.live.capture import Capture
+
+LONGEST = 65_536
+"""Bytes of the longest datagram that there can be."""
+BUFFER = 4 << 20
+"""Bytes that the system is asked to keep while we are busy."""
+WAIT = 0.1
+"""Seconds after which it is checked whether to stop."""
+AT_ONCE = 256
+"""Datagrams that are taken before that is checked again."""
+
+
+class Receiver:
+    """Receives datagrams and asks the sender for them; a context manager.
+
+    host: address of ours to listen on; "" for all. port: None for the kind's own, 0 for any that is free.
+    ask: address of a telephone that only sends to whom asks, with or without ":port". clock: seconds from
+    any origin, never going back.
+
+    Raises FbaError, on entering, where the port cannot be opened.
+    """
+
+    def __init__(
+        self,
+        capture: Capture,
+        *,
+        host: str = "",
+        port: int | None = None,
+        ask: str | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.capture = capture
+        self.port = capture.kind.port if port is None else port
+        self._host = host
+        self._ask = ask
+        self._clock = clock
+        self._socket: socket.socket | None = None
+        self._next_ask = 0.0
+        self._stop = threading.Event()
+
+    def __enter__(self) -> Receiver:
+        family = socket.AF_INET6 if ":" in self._host else socket.AF_INET
+        opened = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            opened.bind((self._host, self.port))
+        except (OSError, OverflowError) as error:
+            opened.close()
+            where = f"{self._host or 'any address'}, UDP port {self.port}"
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            raise FbaError(
+                f"{where}: cannot be listened on: {reason}; close the program that uses it, or give another "
+                "port here and in the sender"
+            ) from error
+        with contextlib.suppress(OSError):  # a smaller buffer will do
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+        opened.setblocking(False)
+        self._socket = opened
+        self.port = int(opened.getsockname()[1])
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def run(self, seconds: float | None = None) -> None:
+        """Receive until `stop` is called, or so many seconds have passed."""
+        begun = self._clock()
+        while not self._stop.is_set():
+            left = WAIT if seconds is None else min(WAIT, begun + seconds - self._clock())
+            if left <= 0:
+                return
+            self._ask_sender()
+            if self._socket is None:
+                return
+            with contextlib.suppress(ValueError):  # closed meanwhile
+                select.select([self._socket], [], [], left)
+            self.drain()
+
+    def drain(self) -> None:
+        """Take what has arrived, without waiting; the player does so before each picture."""
+        opened = self._socket
+        for _ in range(AT_ONCE):
+            try:
+                if opened is None:
+                    return
+                data, address = opened.recvfrom(LONGEST)
+            except ConnectionError:  # what we asked is not there: Windows says so here
+                continue
+            except OSError:
+                return
+            self.capture.receive(data, str(address[0]), self._clock())
+
+    def stop(self) -> None:
+        """End `run`; from any thread, or a signal."""
+        self._stop.set()
+
+    def _ask_sender(self) -> None:
+        """Ask the sender for data, where it wants to be asked, now and then."""
+        kind, now = self.capture.kind, self._clock()
+        if self._ask is None or not kind.asked_port or now < self._next_ask or self._socket is None:
+            return
+        self._next_ask = now + kind.ask_every
+        host, port = split_address(self._ask, kind.asked_port)
+        try:
+            self._socket.sendto(kind.ask(self.port), (host, port))
+        except OSError as error:
+            raise FbaError(
+                f"{self._ask}: cannot be asked for data: {error.strerror or error}; give the address that "
+                "the app shows, such as 192.168.0.20"
+            ) from error
+
+
+def split_address(text: str, port: int) -> tuple[str, int]:
+    """Return host and port of "host" or "host:port"; FbaError for a port that is none."""
+    host, mark, number = text.rpartition(":")
+    if not mark or ":" in host:
+        return text, port
+    if not number.isdecimal() or not 0 < int(number) < 65_536:
+        raise FbaError(f"{text}: {number!r} is no port; expected 1 to 65535")
+    return host, int(number)

@@ -1,0 +1,134 @@
+"""Record a live stream: a file that is complete at any moment, whatever happens to the program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import BinaryIO, Protocol
+
+from fba.animation import Animation
+from fba.atomic import PathLike, check_target, write_error
+from fba.codec import Encoder, EncoderOptions
+
+
+class Target(Protocol):
+    """Where a stream goes."""
+
+    def write(self, data: bytes, ending: bytes) -> None:
+        """Add bytes. ending: what ends the stream behind them, for now; more bytes take its place."""
+
+    def close(self) -> None:
+        """Write what is left, and close it."""
+
+
+class StreamFile:
+    """A file that always ends as a stream should: each write puts new frames in the place of the old end.
+
+    The file is made, or overwritten, with the first bytes. A pipe or a device is written once it ends.
+
+    Raises FormatError where it cannot be written.
+    """
+
+    def __init__(self, path: PathLike) -> None:
+        self.path = path
+        self._in_place = not check_target(path).direct
+        self._file: BinaryIO | None = None
+        self._size = 0  # without the end
+        self._ending = b""
+
+    def write(self, data: bytes, ending: bytes) -> None:
+        """Add bytes; see `Target`."""
+        if not data and ending == self._ending:
+            return
+        try:
+            if self._file is None:
+                self._file = open(self.path, "wb", buffering=0)  # noqa: SIM115 - open for as long as it lasts
+            if self._in_place:
+                self._file.seek(self._size)
+                _write_all(self._file, data + ending)
+                if len(data) + len(ending) < len(self._ending):
+                    self._file.truncate()
+            else:
+                _write_all(self._file, data)
+        except OSError as error:
+            raise write_error(self.path, error) from error
+        self._size += len(data)
+        self._ending = ending
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+
+
+class StreamPipe:
+    """A stream for a program that reads it while it comes: an open binary file, flushed with every frame."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+
+    def write(self, data: bytes, ending: bytes) -> None:
+        """Add bytes; see `Target`."""
+        if data:
+            self._file.write(data)
+            self._file.flush()
+
+    def close(self) -> None:
+        """Leave the file open: it belongs to somebody else."""
+
+
+class StreamRecorder:
+    """Encodes frames as they come and writes them to targets at once.
+
+    frames, size: written so far. rate: frames per second; 0 before the first. options: by default those of
+    captures: values that no plane carries are brought as near as can be, and a body's steps are the finer
+    ones, named behind the end.
+    """
+
+    def __init__(self, targets: Sequence[Target], options: EncoderOptions | None = None) -> None:
+        self.options = options or EncoderOptions(clamp=True, bap_steps="visage", mark=True)
+        self.frames = self.size = 0
+        self.rate = Fraction(0)
+        self.encoder = Encoder(self.options)
+        self._targets = tuple(targets)
+
+    def push(self, animation: Animation) -> None:
+        """Add frames. Raises FormatError where a target cannot be written."""
+        self.frames += len(animation)
+        self.rate = animation.rate
+        self._write(self.encoder.push_animation(animation), self.encoder.ending())
+
+    def finish(self) -> None:
+        """End the stream, if it has any frame, and close the targets."""
+        if self.frames:
+            self._write(self.encoder.finish(), b"")
+        for target in self._targets:
+            target.close()
+
+    def _write(self, data: bytes, ending: bytes) -> None:
+        self.size += len(data)
+        for target in self._targets:
+            target.write(data, ending)
+
+
+def _write_all(file: BinaryIO, data: bytes) -> None:
+    """Write bytes to an unbuffered file, which may take them in parts."""
+    view = memoryview(data)
+    while view:
+        view = view[file.write(view) :]
+
+
+def warm_up() -> None:
+    """Compile what encodes a face, before datagrams come: they would wait, and be lost, meanwhile."""
+    import numpy as np
+
+    from fba.tracks import FaceTrack
+
+    values = np.zeros((3, 68), np.int32)
+    values[1, 2:] = 100
+    values[2, 2:] = 30_000
+    face = FaceTrack(values, np.broadcast_to(np.arange(68) > 1, values.shape))
+    recorder = StreamRecorder([])
+    for frame in range(3):
+        recorder.push(Animation(Fraction(60), np.array([frame]), face[frame : frame + 1]))
+    recorder.finish()

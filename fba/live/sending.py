@@ -1,0 +1,61 @@
+"""Send a face as Live Link Face does, at its own pace, to whatever receives that."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+
+from fba.animation import Animation
+from fba.capture import to_blendshapes
+from fba.errors import FbaError
+from fba.formats.face_tables.livelink_udp import DAY, join_values, write_packet
+
+DEVICE = "00000000-0000-0000-0000-000000000000"
+"""In place of the id of a telephone."""
+
+
+def make_datagrams(animation: Animation, subject: str, start: float = 0.0) -> Iterator[tuple[float, bytes]]:
+    """Yield a datagram for each frame, and when it is due: seconds from the first one.
+
+    subject: the name under which the receiver shows the face. start: time of day of the first frame, seconds.
+    Raises ModelError for an animation without a face.
+    """
+    motion = to_blendshapes(animation)
+    for at, values in zip(motion.times.tolist(), join_values(motion), strict=True):
+        yield at, write_packet(subject, DEVICE, (start + at) % DAY, motion.rate, values)
+
+
+def send(
+    animation: Animation,
+    address: tuple[str, int],
+    *,
+    subject: str = "fba",
+    loop: bool = False,
+    seconds: float | None = None,
+    clock: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> int:
+    """Send a face to an address, a datagram for each frame when it is due; return how many there were.
+
+    loop: again and again. seconds: after which it ends. Raises ModelError for an animation without a face,
+    FbaError for an address that nothing can be sent to.
+    """
+    begun, passed, count = clock(), 0.0, 0
+    with socket.socket(socket.AF_INET6 if ":" in address[0] else socket.AF_INET, socket.SOCK_DGRAM) as opened:
+        while True:
+            for at, data in make_datagrams(animation, subject, passed):
+                if seconds is not None and passed + at >= seconds:
+                    return count
+                sleep(max(begun + passed + at - clock(), 0.0))
+                try:
+                    opened.sendto(data, address)
+                except OSError as error:
+                    raise FbaError(
+                        f"{address[0]}: nothing can be sent there: {error.strerror or error}; give the "
+                        "address of a computer, such as 192.168.0.20"
+                    ) from error
+                count += 1
+            passed += float(animation.duration)
+            if not loop:
+                return count

@@ -1,0 +1,162 @@
+"""`fba capture` and `fba send` over the loopback, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fba
+from face_files import datagram
+
+LOCAL = "127.0.0.1"
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind((LOCAL, 0))
+        return int(one.getsockname()[1])
+
+
+@contextmanager
+def telephone(port: int, rows: int = 400, junk: bytes = b"junk") -> Iterator[None]:
+    """Send a face again and again to a port, at 200 datagrams a second, with junk between."""
+    over = threading.Event()
+
+    def send() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for row in range(rows):
+                sender.sendto(datagram([0.01 * (row % 90)] * 61, 100 + row / 60), (LOCAL, port))
+                sender.sendto(junk, (LOCAL, port))
+                if over.wait(0.005):
+                    return
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def test_a_face_is_recorded_and_what_was_left_out_is_said(run: Callable[..., Any], tmp_path: Path) -> None:
+    path, port = tmp_path / "a.fba", free_port()
+    with telephone(port):
+        said = run("capture", "livelink", "--port", port, "--host", LOCAL, "-o", path, "--seconds", 0.4)
+    assert said.code == 0
+    assert f"listening for Live Link Face on UDP port {port}" in said.err
+    assert "receiving from 'iPhone' (127.0.0.1)" in said.err
+    assert "no datagrams of Live Link Face" in said.out
+    frames = len(fba.read(path))
+    assert frames > 10
+    assert f"a.fba: {frames} frames" in said.out
+    with telephone(port):
+        said = run("capture", "livelink", "--port", port, "-o", path, "--seconds", 0.3, "--json", "--fps", 25)
+    values = json.loads(said.out)
+    assert values["rate"] == "25"
+    assert values["frames"] == len(fba.read(path))
+    assert values["size"] == path.stat().st_size
+    assert values["sender"] == "'iPhone' (127.0.0.1)"
+
+
+def test_interruptions_end_it_with_the_file_complete(run: Callable[..., Any], tmp_path: Path) -> None:
+    path, port = tmp_path / "a.fba", free_port()
+    before = signal.getsignal(signal.SIGINT)
+    with telephone(port):
+        stopper = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+        stopper.start()
+        begin = time.monotonic()
+        said = run("capture", "livelink", "--port", port, "-o", path, "--seconds", 20)
+    assert time.monotonic() - begin < 10
+    assert said.code == 0
+    assert f"{len(fba.read(path))} frames" in said.out
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_what_sends_is_received(run: Callable[..., Any], face: fba.Animation, tmp_path: Path) -> None:
+    source, path, port = tmp_path / "face.fba", tmp_path / "a.fba", free_port()
+    fba.write(source, face)
+    from fba.live.sending import make_datagrams
+
+    sent = list(make_datagrams(face, "Anna"))
+    assert [round(at * 25) for at, _ in sent] == list(range(50))
+    thread = threading.Thread(target=lambda: [time.sleep(0.1), *(_send(port, one) for _, one in sent)])
+    thread.start()
+    assert run("capture", "livelink", "--port", port, "-o", path, "--seconds", 0.8).code == 0
+    thread.join()
+    back = fba.read(path)
+    assert (back.rate, len(back)) == (25, 50)
+    assert back.face is not None
+    assert face.face is not None
+    assert abs(back.face.values[:, 47] - face.face.values[:, 47]).max() <= 85  # half a step of head_pitch
+    said = run("send", source, f"{LOCAL}:{port}", "--seconds", 0.2)
+    assert said.out == f"5 frames sent to {LOCAL}, UDP port {port}\n"
+
+
+def _send(port: int, data: bytes) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.sendto(data, (LOCAL, port))
+    time.sleep(0.002)
+
+
+def test_a_telephone_is_asked(run: Callable[..., Any], tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as phone:
+        phone.bind((LOCAL, 0))
+        phone.settimeout(5)
+        ask = f"{LOCAL}:{phone.getsockname()[1]}"
+        options = ["--port", free_port(), "--seconds", 0.15, "-o", tmp_path / "a.fba", "--ask", ask]
+        said = run("capture", "vtube", *options)
+        assert said.code == 1
+        assert "no datagram came on UDP port" in said.err
+        asked = json.loads(phone.recv(1000))
+        assert (asked["messageType"], asked["ports"]) == ("iOSTrackingDataRequest", [options[1]])
+        assert 0.5 <= asked["time"] <= 10
+        assert 1 <= len(asked["sentBy"]) <= 32
+        assert run("capture", "ifacialmocap", *options).code == 1
+        assert phone.recv(1000).startswith(b"iFacialMocap_sahuasouryya9218sauhuiayeta91555dy3719")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        (["livelink"], 2, "give -o OUT.fba to record, --play to see it, or both"),
+        (["livelink", "-o", "a.fba", "--model", "."], 2, "--model goes with --play"),
+        (["livelink", "-o", "a.fba", "--ask", "10.0.0.2"], 2, "Live Link Face sends by itself"),
+        (["vtube", "-o", "a.fba", "--ask", "10.0.0.2:x", "--seconds", "0.1"], 1, "'x' is no port"),
+        (
+            ["livelink", "-o", "a.fba", "--host", "203.0.113.9", "--seconds", "0.1"],
+            1,
+            "cannot be listened on",
+        ),
+        (["nothing", "-o", "a.fba"], 2, "is not one of"),
+    ],
+)
+def test_what_is_refused(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], code: int,
+    text: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    said = run("capture", *arguments, "--port", free_port())
+    assert said.code == code
+    assert text in said.err
+
+
+def test_nobody_but_another_sender_comes(run: Callable[..., Any], tmp_path: Path) -> None:
+    port = free_port()
+    with telephone(port):
+        said = run("capture", "livelink", "--port", port, "-o", tmp_path / "a.fba", "--seconds", 0.3,
+                   "--sender", "Bo")  # fmt: skip
+    assert said.code == 1
+    assert "no face came" in said.err
+    assert "'iPhone' (127.0.0.1)" in said.err
+    assert not (tmp_path / "a.fba").exists()

@@ -1,0 +1,222 @@
+"""Faces that arrive live: the stream is that of the same capture in a file, and what is wrong is counted."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from face_files import STEP, camel, datagram, face_angles, face_weights, ifacialmocap_records, livelink_udp
+from fba.capture import from_blendshapes
+from fba.formats.face_tables import ifacialmocap
+from fba.formats.face_tables import livelink_udp as recorded
+from live_senders import at_rate, captured, vtube_objects
+
+ROWS = 60
+WEIGHTS, ANGLES = face_weights(ROWS), face_angles(ROWS)
+SENT = livelink_udp({**WEIGHTS, **ANGLES})
+
+
+def from_file(folder: Path, data: bytes, rate: int | None = None) -> fba.Animation:
+    """Return the face of recorded datagrams of Live Link Face."""
+    path = folder / "a.udp"
+    path.write_bytes(data)
+    return from_blendshapes(recorded.read_face(path, swap="no"), rate)
+
+
+def divided(data: bytes) -> list[bytes]:
+    """Return the datagrams of a recording."""
+    result, position = [], 0
+    while position < len(data):
+        _, stop = recorded.read_packet(data, position, "a.udp")
+        result.append(data[position:stop])
+        position = stop
+    return result
+
+
+def check_same(live: fba.Animation | None, expected: fba.Animation, off: int = 0) -> None:
+    """Two animations but for their names. off: by how much values may differ."""
+    assert live is not None
+    assert live.face is not None
+    assert expected.face is not None
+    assert live.rate == expected.rate
+    np.testing.assert_array_equal(live.index, expected.index)
+    np.testing.assert_array_equal(live.face.mask, expected.face.mask)
+    np.testing.assert_allclose(live.face.values, expected.face.values, atol=off)
+
+
+@pytest.mark.parametrize("rate", [None, 25, 100])
+def test_the_recorded_capture_gives_the_stream_that_its_file_gives(
+    shared: Path, tmp_path: Path, rate: int | None
+) -> None:
+    data = (shared / "data/capture/livelink_capture.udp").read_bytes()
+    live, summary = captured("livelink", at_rate(divided(data)), rate=rate and Fraction(rate))
+    check_same(live, from_file(tmp_path, data, rate))
+    assert (summary.received, summary.used, summary.unseen, summary.gaps) == (567, 560, 7, 1)
+    assert summary.lines() == [
+        "567 datagrams from 'Test_iPhone_X' (10.0.0.2): 560 used, 7 without a face",
+        "a gap of 0.13 s is bridged",
+    ]
+
+
+def test_out_of_order_doubled_lost_and_without_a_face(tmp_path: Path) -> None:
+    sent = [one for row, one in enumerate(SENT) if row not in (20, 21, 30)]
+    sent[5] = datagram(None, 18_000 + 5 * STEP)
+    sent[10], sent[11], sent[12] = sent[12], sent[10], sent[11]
+    sent.insert(40, sent[39])
+    late = [*sent, SENT[50]]
+    live, summary = captured("livelink", at_rate(late))
+    check_same(live, from_file(tmp_path, b"".join(sent)))
+    assert (summary.reordered, summary.doubled, summary.unseen) == (2, 2, 1)
+    live, summary = captured("livelink", at_rate([*SENT[:4], *SENT[5:9], SENT[4], *SENT[9:]]))
+    assert summary.late == 1  # three were before it
+    assert live is not None
+    assert len(live) == ROWS
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"\x05" + SENT[0][1:], "of another kind: Live Link Face, version 5"),
+        (b"\0\1\0\4face" + bytes(60), "of another kind: Live Link Face, version 1 of the MetaHuman mode"),
+        (SENT[0][:100], "cut short"),
+        (SENT[0] + b"more", "longer than a datagram of Live Link Face"),
+        (b"garbage", "no datagrams of Live Link Face"),
+        (b"", "empty"),
+        (SENT[0] + bytes(3000), "longer than 2048 bytes"),
+        (datagram([50.0] * 61, 1.0), "with weights that are no shares of 1"),
+        (datagram([0.1] * 61, 1.0, rate=900), "with more than 240 frames in a second"),
+    ],
+)
+def test_what_is_no_datagram_of_the_capture_is_counted(data: bytes, reason: str, tmp_path: Path) -> None:
+    live, summary = captured("livelink", at_rate([data, *SENT[:20], data, *SENT[20:], data]))
+    check_same(live, from_file(tmp_path, b"".join(SENT)))
+    assert dict(summary.refused) == {reason: 3}
+    assert f"left out: 3 {reason}" in summary.lines()
+
+
+def test_of_two_senders_the_first_or_the_one_that_is_named() -> None:
+    other = livelink_udp({**face_weights(ROWS, seed=9), **ANGLES}, name="Bo", device="E" * 36)
+    mixed = at_rate([one for pair in zip(SENT, other, strict=True) for one in pair], rate=120.0)
+    said: list[str] = []
+    first, summary = captured("livelink", mixed, say=said.append)
+    assert first == captured("livelink", at_rate(SENT))[0]
+    assert dict(summary.other_senders) == {"'Bo' (10.0.0.2)": ROWS}
+    assert said == [
+        "receiving from 'iPhone' (10.0.0.2)",
+        "'Bo' (10.0.0.2) sends, too, and is left out; --sender chooses one",
+    ]
+    named, _ = captured("livelink", mixed, sender="Bo")
+    assert named == captured("livelink", at_rate(other))[0]
+    assert captured("livelink", mixed, sender="Cy")[0] is None
+    by_address, _ = captured(
+        "livelink", [*at_rate(other), *at_rate(SENT, host="10.0.0.9")], sender="10.0.0.9"
+    )
+    assert by_address == first
+
+
+def test_a_thousand_senders_cost_no_memory() -> None:
+    sent = [(0.01 * n, f"10.0.{n // 200}.{n % 200}", datagram([0.1] * 61, 1.0, name=f"n{n}"))
+            for n in range(1000)]  # fmt: skip
+    _, summary = captured("livelink", sent)
+    assert len(summary.other_senders) <= 21
+    assert dict(summary.refused) == {"of more than 32 addresses": 968}
+
+
+def test_clocks_that_jump() -> None:
+    stray = datagram([0.1] * 61, 40_000.0)
+    live, summary = captured("livelink", at_rate([*SENT[:30], stray, *SENT[30:]]))
+    assert live == captured("livelink", at_rate(SENT))[0]
+    assert summary.strayed == 1
+    again = livelink_udp({**WEIGHTS, **ANGLES}, start=500.0)  # the telephone was set to another time
+    live, summary = captured("livelink", at_rate([*SENT, *again]))
+    assert live is not None
+    assert summary.jumps == 1
+    assert len(live) == pytest.approx(2 * ROWS, abs=2)
+    paused = [*at_rate(SENT), *((now + 100, host, one) for now, host, one in at_rate(
+        livelink_udp({**WEIGHTS, **ANGLES}, start=18_100.0)))]  # fmt: skip
+    live, summary = captured("livelink", paused)
+    assert live is not None
+    assert (summary.jumps, summary.gaps) == (0, 1)
+    assert len(live) == pytest.approx(60 * 101, abs=3)  # the face holds still meanwhile
+
+
+def test_over_midnight() -> None:
+    sent = [datagram([0.1] * 61, (86_399.9 + row / 60) % 86_400) for row in range(30)]
+    live, summary = captured("livelink", at_rate(sent))
+    assert live is not None
+    assert (len(live), summary.jumps, summary.strayed) == (30, 0, 0)
+
+
+def test_the_neutral_face_of_the_first_seconds_is_subtracted() -> None:
+    rows = [[0.2] * 61] * 30 + [[0.5] * 61] * 30
+    sent = [datagram(row, 18_000 + number / 60) for number, row in enumerate(rows)]
+    live, summary = captured("livelink", at_rate(sent), neutral=0.4)
+    plain, _ = captured("livelink", at_rate([datagram([0.3] * 61, 18_000 + n / 60) for n in range(60)]))
+    assert live is not None
+    assert plain is not None
+    assert live.face is not None
+    assert plain.face is not None
+    assert not live.face.values[:29].any()
+    np.testing.assert_allclose(live.face.values[40], plain.face.values[40], atol=1)
+    assert summary.notes == ["the median of the first 0.40 s is the neutral face, subtracted"]
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_records_of_ifacialmocap(version: int, tmp_path: Path) -> None:
+    head = np.stack([10 * np.sin(np.arange(ROWS) / 9 + n) for n in range(6)], axis=1)
+    records = ifacialmocap_records(WEIGHTS, head, head, version=version)
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(records))
+    sent = at_rate([record.encode() for record in records])
+    live, summary = captured("ifacialmocap", [*sent, (2.0, "10.0.0.2", b"StartStreaming")])
+    check_same(live, from_blendshapes(ifacialmocap.read_face(path, fps=60)), off=1)
+    assert summary.refused == {"no records of iFacialMocap": 1}
+    lost = records[10].replace("jawOpen", "jawShut").encode()
+    _, summary = captured("ifacialmocap", [*sent[:10], (10 / 60, "10.0.0.2", lost), *sent[11:]])
+    assert (summary.used, summary.unseen) == (ROWS - 1, 1)
+
+
+def test_records_that_arrive_in_bursts_count_at_a_steady_rate() -> None:
+    clock = ifacial_clock = None
+    from fba.live.protocols.ifacialmocap import SteadyClock
+
+    clock, ifacial_clock = SteadyClock(1 / 60), SteadyClock(1 / 60)
+    random = np.random.default_rng(3)
+    steady = [clock.time(row / 60) for row in range(200)]
+    np.testing.assert_allclose(np.diff(steady), 1 / 60, atol=1e-9)
+    arrived = np.maximum.accumulate(np.arange(600) / 30 + random.exponential(0.01, 600))
+    times = np.array([ifacial_clock.time(float(now)) for now in arrived])
+    assert np.diff(times).min() > 0
+    assert np.diff(times[300:]).std() < 0.3 * np.diff(arrived[300:]).std()
+    assert np.abs(times[300:] - arrived[300:]).max() < 0.06
+    assert ifacial_clock.time(100.0) == 100.0  # it was away
+
+
+def test_objects_of_vtube_studio() -> None:
+    head = np.stack([10 * np.sin(np.arange(ROWS) / 9 + n) for n in range(3)], axis=1)
+    objects = vtube_objects(WEIGHTS, head)
+    unseen = objects[7].replace(b'"FaceFound": true', b'"FaceFound": false')
+    bad = [
+        b"{}", b"[1]", b'{"FaceFound": 1}', b"\xff\xfe", b"[" * 9000,
+        objects[0].replace(b'"Timestamp"', b'"Time"'), objects[0].replace(b'"k"', b'"key"'),
+    ]  # fmt: skip
+    live, summary = captured("vtube", at_rate([*bad, *objects[:7], unseen, *objects[8:]]))
+    seen = np.delete(np.arange(ROWS), 7)
+    motion = fba.capture.ShapeMotion(
+        tuple(camel(name) for name in WEIGHTS),
+        np.stack(list(WEIGHTS.values()), axis=1)[seen],
+        np.rint(1000 * seen / 60) / 1000,
+        Fraction(60),
+        head=np.radians(head[seen]),
+    )
+    assert live is not None
+    assert live.face is not None
+    expected = from_blendshapes(motion).face
+    assert expected is not None
+    np.testing.assert_allclose(live.face.values, expected.values[: len(live)], atol=1)
+    assert (summary.used, summary.unseen) == (ROWS - 1, 1)
+    assert dict(summary.refused) == {"no objects of VTube Studio": 6, "without a time": 1}

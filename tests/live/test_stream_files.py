@@ -1,0 +1,96 @@
+"""Files that are written live: complete at any moment, also where the program is killed."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from face_files import datagram
+from fba.animation import Animation
+from fba.errors import FormatError
+from fba.live import StreamFile, StreamRecorder
+from fba.tracks import BodyTrack, FaceTrack
+
+FRAMES = 40
+
+
+def performance(seed: int = 2) -> Animation:
+    """A face and a body that move so much that ranges grow on the way."""
+    rows = np.random.default_rng(seed).integers(-400, 400, (FRAMES, 68)).astype(np.int32)
+    rows[FRAMES // 2 :] *= 20
+    rows[:, :2] = 0
+    mask = np.broadcast_to(np.arange(68) > 1, rows.shape)
+    turns = np.zeros((FRAMES, 296), np.int32)
+    turns[:, :20] = rows[:, 2:22] * 10
+    return Animation(
+        30, np.arange(FRAMES) * 2, FaceTrack(rows, mask), BodyTrack(turns, turns != 0 * turns + 7)
+    )
+
+
+@pytest.mark.parametrize("parts", [("face",), ("body",), ("face", "body")])
+def test_a_file_holds_all_frames_but_the_last_at_any_moment(parts: tuple[str, ...], tmp_path: Path) -> None:
+    whole = performance()
+    whole = Animation(whole.rate, whole.index, *(getattr(whole, one) if one in parts else None
+                                                  for one in ("face", "body")))  # fmt: skip
+    path = tmp_path / "a.fba"
+    recorder = StreamRecorder([StreamFile(path)])
+    for frame in range(FRAMES):
+        recorder.push(whole[frame : frame + 1])
+        assert path.exists() == (frame > 0)
+        if frame:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")  # as for one that was cut off
+                assert len(fba.read(path)) == frame
+    recorder.finish()
+    at_once = fba.Encoder(recorder.options)
+    assert path.read_bytes() == at_once.push_animation(whole) + at_once.finish()
+    assert recorder.size == path.stat().st_size
+
+
+def test_an_older_file_stays_until_there_are_frames(tmp_path: Path) -> None:
+    path = tmp_path / "a.fba"
+    path.write_bytes(b"x" * 100_000)
+    recorder = StreamRecorder([StreamFile(path)])
+    recorder.finish()
+    assert path.stat().st_size == 100_000
+    recorder = StreamRecorder([StreamFile(path)])
+    recorder.push(performance()[:3])
+    assert len(fba.read(path)) == 2
+    recorder.finish()
+    with pytest.raises(FormatError, match="cannot be written"):
+        StreamFile(tmp_path / "no/folder.fba")
+
+
+SENDS = 200
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_a_killed_program_leaves_a_stream_of_all_frames_but_the_last(tmp_path: Path) -> None:
+    sent = [datagram([0.01 * (row % 90)] * 61, 18_000 + row / 60) for row in range(SENDS)]
+    path, count = tmp_path / "a.fba", random.randint(30, SENDS)
+    command = [sys.executable, "-m", "fba", "capture", "livelink", "--port", "0", "--host", "127.0.0.1"]
+    with subprocess.Popen([*command, "-o", str(path)], stderr=subprocess.PIPE, text=True) as program:
+        assert program.stderr is not None
+        port = int(program.stderr.readline().split()[-1])
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for one in sent[:count]:
+                sender.sendto(one, ("127.0.0.1", port))
+                time.sleep(0.001)
+        until = time.monotonic() + 20
+        while time.monotonic() < until and not (path.exists() and len(fba.read(path)) == count - 1):
+            time.sleep(0.02)
+        program.send_signal(signal.SIGKILL)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # as for a file that was cut off
+        assert len(fba.read(path)) == count - 1
