@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import statistics
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,19 +11,14 @@ from typing import Any
 import pytest
 
 from fba.live import Capture, StreamFile, StreamRecorder, find_kind
+from fba_conformance.captures import face_files
 
-HELPERS = Path(__file__).parents[1] / "tests/helpers/files"
 COUNT = 1200
 
 
 @pytest.fixture(scope="module")
 def datagrams() -> list[bytes]:
     """Twenty seconds of Live Link Face at 60 Hz; all 52 shapes and nine angles move."""
-    sys.path.insert(0, str(HELPERS))
-    try:
-        import face_files
-    finally:
-        sys.path.remove(str(HELPERS))
     return face_files.livelink_udp({**face_files.face_weights(COUNT), **face_files.face_angles(COUNT)})
 
 

@@ -9,10 +9,18 @@ import numpy as np
 import pytest
 
 import fba
-from face_files import STEP, camel, datagram, face_angles, face_weights, ifacialmocap_records, livelink_udp
 from fba.capture import from_blendshapes
 from fba.formats.face_tables import ifacialmocap
 from fba.formats.face_tables import livelink_udp as recorded
+from fba_conformance.captures.face_files import (
+    STEP,
+    camel,
+    datagram,
+    face_angles,
+    face_weights,
+    ifacialmocap_records,
+    livelink_udp,
+)
 from live_senders import at_rate, captured, vtube_objects
 
 ROWS = 60

@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 import fba
-from face_files import datagram
 from fba.animation import Animation
 from fba.errors import FormatError
 from fba.live import StreamFile, StreamRecorder
 from fba.tracks import BodyTrack, FaceTrack
+from fba_conformance.captures.face_files import datagram
 
 FRAMES = 40
 

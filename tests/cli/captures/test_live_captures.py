@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 import fba
-from face_files import datagram
+from fba_conformance.captures.face_files import datagram
 
 LOCAL = "127.0.0.1"
 
