@@ -10,7 +10,7 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 from fba.capture import _standing as standing
-from fba.capture.motion import SkeletonMotion
+from fba.capture.motion import SkeletonMotion, read_axis
 
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
 CLEAR_UP = 0.75
@@ -20,22 +20,31 @@ FLOOR_NEAR = 0.12
 
 
 def find_up_axis(
-    positions: Float64, mapped: Mapping[str, int], at_rest: standing.Stance, up: str, by_format: str
+    motion: SkeletonMotion,
+    positions: Float64,
+    mapped: Mapping[str, int],
+    at_rest: standing.Stance,
+    up: str,
 ) -> tuple[str, float, str]:
     """Return the axis that points up, the confidence, and a reason.
 
-    positions: (T, J, 3), of the source. up: as given. by_format: what the file's format says, or "".
+    positions: (T, J, 3), of the source. up: as given.
     """
     if up != "auto":
         return up, 1.0, f"{up} as given"
+    if motion.up and motion.declared:  # VRM: such files are not turned on the way
+        return motion.up, 1.0, f"{motion.up}, as the format says"
     stance = standing.measure(positions, mapped)
     weight = np.exp(-((stance.distance / 20.0) ** 2)) + 0.02
     mean = (stance.up * weight[:, None]).sum(axis=0) / weight.sum()
     axis = nearest_axis(mean)
     clear = float(mean @ axis)
+    stands = bool((stance.angles.get("thigh", np.zeros(1)) <= standing.MOST["thigh"]).any())
     own = nearest_axis(at_rest.up[0]) if bool(at_rest.possible[0]) else None
-    own = read_axis(by_format) if by_format else own
-    source = "as the format says" if by_format else "as in the rest pose"
+    own = read_axis(motion.up) if motion.up else own
+    source = "as the format says" if motion.up else "as in the rest pose"
+    if own is None and not stands and axis[0] != 0:
+        return _name(axis), 0.4, f"perhaps {_name(axis)}: trunks point along it, but nobody ever stands"
     if own is None or (own == axis).all():
         if clear >= CLEAR_UP or (own is not None and clear > 0):
             agrees = f", {source}" if own is not None else ""
@@ -44,11 +53,11 @@ def find_up_axis(
             )  # fmt: skip
         return _name(axis), clear * 0.6, f"perhaps {_name(axis)}: the body is upright for little of the time"
     floors = [_stands_on_zero(positions, candidate) for candidate in (own, axis)]
-    if clear >= CLEAR_UP and (floors[1] or not floors[0]):
+    if stands and clear >= CLEAR_UP and (floors[1] or not floors[0]):
         return _name(axis), 0.8, (
             f"{_name(axis)}: the body stands along it while it moves, not along {_name(own)}, {source}"
         )  # fmt: skip
-    sure = 0.7 if clear < CLEAR_UP or floors[0] else 0.4
+    sure = 0.7 if not stands or clear < CLEAR_UP or floors[0] else 0.4
     return _name(own), sure, f"{_name(own)}, {source}; the body hardly stands upright"
 
 
@@ -74,12 +83,6 @@ def turn_axes(motion: SkeletonMotion, turn: Float64) -> SkeletonMotion:
         end_offsets=motion.end_offsets @ turn.T,
         axes=rotations.quaternions(turn @ rotations.matrices(motion.axes)),
     )
-
-
-def read_axis(name: str) -> Float64:
-    axis = np.zeros(3)
-    axis["xyz".index(name[1])] = 1.0 if name[0] == "+" else -1.0
-    return axis
 
 
 def nearest_axis(direction: Float64) -> Float64:

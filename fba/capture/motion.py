@@ -140,3 +140,10 @@ class SkeletonMotion:
             if parent >= 0:
                 positions[joint] += positions[parent]
         return positions
+
+
+def read_axis(name: str) -> Float64:
+    """Return the unit vector (3,) of an axis such as "-z"."""
+    axis = np.zeros(3)
+    axis["xyz".index(name[1])] = 1.0 if name[0] == "+" else -1.0
+    return axis

@@ -18,9 +18,9 @@ from fba.capture import matching
 from fba.capture._rest_choice import choose_rest
 from fba.capture._rest_correction import correct_rest
 from fba.capture._rest_from_motion import rest_from_motion, with_rest
-from fba.capture._up_axis import UPS, find_up_axis, nearest_axis, read_axis, turn_axes
+from fba.capture._up_axis import UPS, find_up_axis, nearest_axis, turn_axes
 from fba.capture.bones import find_bones, joints_remedy, refuse_swapped_sides
-from fba.capture.motion import SkeletonMotion
+from fba.capture.motion import SkeletonMotion, read_axis
 from fba.errors import ModelError, Remedy
 
 LEAST = 0.5
@@ -82,7 +82,7 @@ def prepare(
     few = _few(motion)
     quaternions, positions = few.world()
     at_rest = standing.measure(motion.rest()[None], mapped)
-    axis, confidence["up"], reasons["up"] = find_up_axis(positions, mapped, at_rest, up, motion.up)
+    axis, confidence["up"], reasons["up"] = find_up_axis(motion, positions, mapped, at_rest, up)
     turn = rotations.between(read_axis(axis), np.array([0.0, 1.0, 0.0]))
     level = motion if axis == "+y" else turn_axes(motion, turn)
     if joints is None:

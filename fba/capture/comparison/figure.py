@@ -10,12 +10,15 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Array, Float64
 from fba.body import BapSolver
-from fba.capture.motion import SkeletonMotion
+from fba.body.skeleton import ROOT
+from fba.capture.motion import SkeletonMotion, read_axis
 
 SIDES = ("l", "r")
 FINGERS = ("index", "middle", "ring", "pinky")
 LEVEL = 0.6
 """Length of the mean direction from feet to head along an axis from which on a person stands along it."""
+STRAIGHT = 0.9
+"""Distance from feet to head, of that by way of the hips, from which on a person stands, or lies."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,20 +92,32 @@ def result_figure(solver: BapSolver, baps: Array) -> Figure:
 def find_up(motion: SkeletonMotion, mapped: Mapping[str, int]) -> Float64:
     """Return (3, 3), the rotation of the source's frame that brings up what is up in its motion.
 
-    That is the axis along which the person stands for most of the time, or else that of the rest pose.
+    That is the axis along which the person stands; where nobody does, the one that the format names, else the
+    one from feet to head in most frames, else that of the rest pose.
     """
     top = [mapped[j] for j in ("skullbase", "vc7", "l_shoulder", "r_shoulder") if j in mapped]
     low = [mapped[j] for j in ("l_ankle", "r_ankle", "l_knee", "r_knee") if j in mapped]
     if not top or not low:
         return np.eye(3)
+    if motion.up and motion.declared:
+        return rotations.between(read_axis(motion.up), np.array([0.0, 1.0, 0.0]))
     _, positions = motion.world()
     rest = motion.rest()[None]
+    middle = [mapped[j] for j in ("l_hip", "r_hip") if j in mapped] or [mapped[ROOT]]
+    head, hips, feet = (positions[:, joints].mean(axis=1) for joints in (top, middle, low))
+    reach = np.linalg.norm(head - hips, axis=1) + np.linalg.norm(hips - feet, axis=1)
+    straight = np.linalg.norm(head - feet, axis=1) > STRAIGHT * reach
     axis = np.array([0.0, 1.0, 0.0])
-    for places in (positions, rest):
-        stands = unit(places[:, top].mean(axis=1) - places[:, low].mean(axis=1)).mean(axis=0)
-        strongest = int(np.argmax(np.abs(stands)))
-        if abs(stands[strongest]) > LEVEL:
-            axis = np.eye(3)[strongest] * np.sign(stands[strongest])
+    for stands in (
+        unit(head - feet)[straight],
+        read_axis(motion.up)[None] if motion.up else np.zeros((0, 3)),
+        unit(head - feet),
+        unit(rest[:, top].mean(axis=1) - rest[:, low].mean(axis=1)),
+    ):
+        mean = stands.mean(axis=0) if len(stands) else np.zeros(3)
+        strongest = int(np.argmax(np.abs(mean)))
+        if abs(mean[strongest]) > LEVEL:
+            axis = np.eye(3)[strongest] * np.sign(mean[strongest])
             break
     return rotations.between(axis, np.array([0.0, 1.0, 0.0]))
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 
 from fba import rotations
-from fba.body.skeleton import ROOT
+from fba.body.skeleton import ROOT, Skeleton
 from fba.capture import SkeletonMotion, matching
+from fba.capture.bones import find_bones
 from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._pose import BindPose, find_bind_pose
 from fba.formats.gltf.humanoid import Humanoid, find_humanoid
@@ -19,6 +20,8 @@ from fba.gltf import Gltf
 from fba.mesh.names import UniqueNames
 
 MAX_JOINTS = 4096
+TURNED = 1e-3
+"""Change of a part of a quaternion from which on a joint turns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +30,8 @@ class Joints:
 
     nodes: those of the joints and of all above them, parents first. parents: position of each one's parent in
     nodes, -1 for the root. bind: how they rest. used: positions in nodes of the hips and all below them.
-    humanoid: what the file declares, or None.
+    humanoid: what the file declares, or None. posed: whether the rest pose is that of the nodes, which may be
+    any.
     """
 
     nodes: list[int]
@@ -35,6 +39,7 @@ class Joints:
     bind: BindPose
     used: list[int]
     humanoid: Humanoid | None
+    posed: bool
 
     def resting(self, gltf: Gltf) -> SkeletonMotion:
         """Return the joints that are used, at rest: a motion without frames, at 1 frame/s."""
@@ -56,7 +61,7 @@ class Joints:
             },
             axes=rotations.quaternions(self.bind.rotations[self.used]),
             up="+y",
-            posed=not declared and not any(node in skin.joints for skin in gltf.skins for node in self.nodes),
+            posed=self.posed,
         )
 
 
@@ -73,22 +78,35 @@ def find_joints(gltf: Gltf) -> Joints:
         raise ModelError(f"{gltf.file}: the skeleton has {len(nodes)} joints, more than {MAX_JOINTS}")
     place = {node: number for number, node in enumerate(nodes)}
     parents = [-1 if (p := gltf.nodes[node].parent) is None else place.get(p, -1) for node in nodes]
-    bind = find_bind_pose(gltf, nodes, parents, skins=not declared)  # a declared person rests in a T pose
+    # a declared person rests in a T pose
+    skinned = not declared and not _turn_outside_skins(gltf, nodes, parents)
+    bind = find_bind_pose(gltf, nodes, parents, skins=skinned)
+    everything = Joints(
+        nodes, parents, bind, list(range(len(nodes))), humanoid, posed=not declared and not skinned
+    )
     hips = [number for number, node in enumerate(nodes) if declared.get(node) == ROOT]
-    root = hips[0] if hips else _find_root([gltf.nodes[node].name for node in nodes])
-    return Joints(nodes, parents, bind, _descendants(parents, root), humanoid)
+    root = hips[0] if hips else _find_hips(everything.resting(gltf))
+    return replace(everything, used=_descendants(parents, root))
 
 
 def _skeleton(gltf: Gltf) -> list[int]:
     """Return the nodes of the skeleton, parents first, with one root.
 
-    They are the joints of skins, or else the animated nodes and their children, and all nodes above. Of
-    several skeletons, the one with most known joints; warns (FbaWarning) of the others.
+    They are the joints of skins and the animated nodes that hang among them, as of a file with the head's skin
+    alone; or else all animated nodes and their children; and all nodes above. Of several skeletons, the one
+    with most known joints; warns (FbaWarning) of the others.
     """
-    wanted = {joint for skin in gltf.skins for joint in skin.joints}
-    if not wanted:
-        wanted = {channel.node for clip in gltf.animations for channel in clip.channels}
-        wanted |= {number for number, node in enumerate(gltf.nodes) if node.parent in wanted}
+    skinned = {joint for skin in gltf.skins for joint in skin.joints}
+    moved = {channel.node for clip in gltf.animations for channel in clip.channels}
+    if skinned:
+        tops = {_find_top(gltf, joint, skinned | moved) for joint in skinned}
+        inside: set[int] = set()
+        for number in gltf.order:
+            if number in tops or gltf.nodes[number].parent in inside:
+                inside.add(number)
+        wanted = skinned | (moved & inside)
+    else:
+        wanted = moved | {number for number, node in enumerate(gltf.nodes) if node.parent in moved}
     if not wanted:
         raise ModelError(
             f"{gltf.file}: has neither a skin with joints nor an animation; there is no skeleton"
@@ -117,6 +135,36 @@ def _skeleton(gltf: Gltf) -> list[int]:
     return best
 
 
+def _turn_outside_skins(gltf: Gltf, nodes: list[int], parents: list[int]) -> bool:
+    """Whether joints of the body turn that no skin has, so that skins do not tell how the whole body rests.
+
+    The body begins where the nodes first fork; those above only move all of it.
+    """
+    skinned = {joint for skin in gltf.skins for joint in skin.joints}
+    if skinned.isdisjoint(nodes):
+        return True
+    turning = {
+        channel.node
+        for clip in gltf.animations
+        for channel in clip.channels
+        if channel.path == "rotation" and np.ptp(channel.values, axis=0).max(initial=0) > TURNED
+    }
+    children = np.bincount([parent for parent in parents if parent >= 0], minlength=len(nodes))
+    body = next((number for number in range(len(nodes)) if children[number] != 1), 0)
+    return any(
+        nodes[number] in turning and nodes[number] not in skinned and children[number] > 0
+        for number in _descendants(parents, body)
+    )
+
+
+def _find_top(gltf: Gltf, node: int, among: Set[int]) -> int:
+    """Return the topmost node of some among one and all above it."""
+    top, above = node, gltf.nodes[node].parent
+    while above is not None:
+        top, above = (above if above in among else top), gltf.nodes[above].parent
+    return top
+
+
 def _declared_skeleton(gltf: Gltf, declared: Mapping[int, str]) -> list[int]:
     """Return the nodes of the bones that a file declares, and all above them, parents first.
 
@@ -137,12 +185,19 @@ def _declared_skeleton(gltf: Gltf, declared: Mapping[int, str]) -> list[int]:
     return nodes
 
 
-def _find_root(names: list[str]) -> int:
-    """Return the position of the hips, or 0. Nodes above them (an armature, a game's root) only move all."""
+def _find_hips(motion: SkeletonMotion) -> int:
+    """Return the joint of the hips that carry both legs, or 0.
+
+    Joints above them (an armature, a game's root) only move all. A name that one maker gives to the hips is
+    another's for the back.
+    """
     try:
-        return matching.match(names)[1]["HumanoidRoot"]
+        mapped = find_bones(motion, None, Skeleton.default())[1]
     except ModelError:
         return 0
+    hips = mapped.get(ROOT, 0)
+    below = _descendants(motion.parents.tolist(), hips)
+    return hips if all(mapped.get(f"{side}_hip") in below for side in "lr") else 0
 
 
 def _descendants(parents: list[int], root: int) -> list[int]:

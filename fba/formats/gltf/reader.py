@@ -16,7 +16,9 @@ import numpy as np
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
+from fba.body.skeleton import Skeleton
 from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture.bones import find_bones
 from fba.capture.skeleton import MOST_FRAMES, check_memory
 from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._own_files import find_note, read_note
@@ -96,7 +98,8 @@ def read(
                     spine=spine, rest=rest, up=up, limits=limits,
                 )  # fmt: skip
         except ModelError:
-            if joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
+            person = _moves_person(gltf, clip, rate, limits)  # whose pose is not clear
+            if person or joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
                 raise
             return _read_face_alone(gltf, face_clip, rate, limits)
         for each in said:  # not what concerns a skeleton that turned out to be none
@@ -144,6 +147,19 @@ class _Sampled:
     motion: SkeletonMotion
     clip: Clip
     start: float
+
+
+def _moves_person(
+    gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None, limits: Limits
+) -> bool:
+    """Whether a clip turns the joints of a person with known limbs."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)
+            find_bones(_sample(gltf, clip, rate, limits).motion, None, Skeleton.default())
+    except ModelError:
+        return False
+    return True
 
 
 def _clip_of_face_alone(gltf: Gltf, clip: str | int | None) -> Clip | None:

@@ -339,3 +339,36 @@ def test_a_message_names_the_file_once(tmp_path: Path) -> None:
         fba.read(path)
     assert str(caught.value).count("bad.glb") == 1
     assert str(caught.value).startswith(f"{path}: header: the file ends after 11 bytes")
+
+
+def test_a_skin_of_the_upper_body_alone(tmp_path: Path) -> None:
+    """Animated joints that no skin has are the body's, too; then the nodes' own pose is the rest pose."""
+
+    def upper_body(document: dict[str, Any]) -> None:
+        skin = document["skins"][0]
+        skin["joints"] = [joint for joint in skin["joints"] if "Arm" in document["nodes"][joint]["name"]]
+        bound = document["accessors"][skin["inverseBindMatrices"]]
+        bound["count"] = len(skin["joints"])
+
+    motion = read_motion(changed(tmp_path, upper_body))
+    assert set(NAMES) <= set(motion.names)
+    assert motion.posed
+    np.testing.assert_allclose(places_of(motion), reference().world()[1], atol=1e-5)
+
+
+def test_hips_carry_both_legs(tmp_path: Path) -> None:
+    """What one family calls the hips is the back of a file whose own hips carry the legs."""
+
+    def renamed(document: dict[str, Any]) -> None:
+        words = {"Arm": "upperarm", "ForeArm": "lowerarm", "Hand": "hand", "UpLeg": "upperleg",
+                 "Leg": "lowerleg", "Foot": "foot", "ToeBase": "toes"}  # fmt: skip
+        for node in document["nodes"][1:]:
+            for side in ("Left", "Right"):
+                if (word := node["name"].removeprefix(side)) in words and word != node["name"]:
+                    node["name"] = f"{words[word]}.{side[0].lower()}"
+            node["name"] = {"Hips": "hips", "Spine": "spine", "Spine1": "chest", "Head": "head"}.get(
+                node["name"], node["name"]
+            )
+
+    motion = read_motion(changed(tmp_path, renamed))
+    assert {"upperleg.l", "lowerleg.r", "foot.l"} <= set(motion.names)
