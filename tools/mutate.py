@@ -62,6 +62,7 @@ SOLES = "fba/capture/limbs/soles.py"
 TOES = "fba/capture/limbs/toes.py"
 RENDER = "player/fba_player/export/render.py"
 GLTF_READER = "fba/formats/gltf/reader.py"
+GLTF_SKELETONS = "fba/formats/gltf/_skeletons.py"
 BODIES, OWN_HEADS = "fba/formats/gltf/bodies.py", "fba/formats/gltf/_own_heads.py"
 OWN_HEAD = "fba/body/own_head.py"
 FACE_MOTION, HUMANOID = "fba/formats/gltf/face_motion.py", "fba/formats/gltf/humanoid.py"
@@ -132,6 +133,7 @@ FULL_TURNS_TEST = "tests/codec/test_full_turns.py"
 COMPARISON_TEST = "tests/capture/test_comparison.py"
 RANGES_TEST = "tests/codec/test_codec_rules.py tests/codec/test_limits.py"
 BVH_TEST = "tests/formats/bvh/test_bvh_rates.py"
+BVH_READING_TEST = "tests/formats/bvh/test_bvh.py"
 TEXT_TEST = "tests/formats/text/test_frame_rates.py"
 RECOGNITION_TEST = "tests/test_recognition.py"
 CAPTURE_TEST = (
@@ -261,7 +263,7 @@ MUTANTS = (
         RANGES_TEST,
     ),
     Mutant(RANGES, "np.maximum(held, wanted)", "wanted", RANGES_TEST),
-    Mutant(FIGURE, "(positions, rest)", "(rest, positions)", COMPARISON_TEST),
+    Mutant(FIGURE, "unit(head - feet)[straight],", "unit(head - feet)[:0],", PREPARATION_TEST),
     Mutant(MEASURES, "between @ mean_rotation(between).T", "between", COMPARISON_TEST),
     Mutant(MEASURES, "np.maximum(ours - most, 0.0)", "np.maximum(ours - 9 * most, 0.0) * 0", COMPARISON_TEST),
     Mutant(MEASURES, "np.median(own)) if level is None else level", "np.median(own))", COMPARISON_TEST),
@@ -356,6 +358,13 @@ MUTANTS = (
     Mutant(REST_CHOICE, "if turn > most:", "if turn > 9 * most:", ZOO_TEST),
     Mutant(BONES, "BACKWARDS = -0.5", "BACKWARDS = -2.0", ZOO_TEST),
     Mutant(UP_AXIS, "CLEAR_UP = 0.75", "CLEAR_UP = 1.1", PREPARATION_TEST),
+    Mutant(UP_AXIS, "if stands and clear >= CLEAR_UP", "if clear >= CLEAR_UP", PREPARATION_TEST),
+    Mutant(UP_AXIS, "not stands and axis[0] != 0", "False", PREPARATION_TEST),
+    Mutant(FIGURE, "STRAIGHT = 0.9", "STRAIGHT = 0.5", PREPARATION_TEST),
+    Mutant(BVH, "CARRIED = 5.0", "CARRIED = 1.0", BVH_READING_TEST),
+    Mutant(BVH, "CARRIED = 5.0", "CARRIED = 500.0", BVH_READING_TEST),
+    Mutant(BVH, "return from_offset < away", "return False", BVH_READING_TEST),
+    Mutant(GLTF_SKELETONS, "wanted = skinned | (moved & inside)", "wanted = skinned", GLTF_TEST),
     Mutant(FOUND_REST, "LOW_ARM = 0.6", "LOW_ARM = 2.0", PREPARATION_TEST),
     Mutant(REST_CORRECTION, "OWN_CLAVICLE = 5.0", "OWN_CLAVICLE = 90.0", PREPARATION_TEST),
     Mutant(BVH, "MOST_OF_BODY = 0.75", "MOST_OF_BODY = 2.0", ZOO_TEST),

@@ -12,6 +12,8 @@ from capture_bodies import motion
 from fba.body import BapSolver, Skeleton
 from fba.capture import from_skeleton
 from fba.capture._bone_words import read
+from fba.capture.bones import find_bones
+from fba.capture.comparison import find_up
 from fba.capture.preparation import prepare
 from fba.errors import ModelError
 
@@ -48,6 +50,57 @@ def test_the_motion_says_which_way_is_up() -> None:
     assert ready.up == "+z"
     assert ready.motion.positions[0] == pytest.approx([0, 1, 0])
     assert prepare(captured, SKELETON, up="+y").up == "+y"
+
+
+LEAP = {"Hips": Rotation.from_euler("x", 90, degrees=True),
+        "LeftUpLeg": Rotation.from_euler("x", -100, degrees=True),
+        "RightUpLeg": Rotation.from_euler("x", -100, degrees=True)}  # fmt: skip
+"""Somebody who lies in the air, on the belly, with legs that hang down."""
+
+
+def test_only_somebody_who_stands_overrules_the_file() -> None:
+    """One pose of a dancer, whose trunk lies level, does not say that the rest pose lies."""
+    captured = motion("T", 1, turns=LEAP)
+    captured = replace(captured, positions=np.array([[0.0, 0.0, 1.0]]))
+    assert prepare(captured, SKELETON).up == "+y"
+    assert prepare(replace(captured, up="+y"), SKELETON, rest="file").up == "+y"
+    mapped = prepare(captured, SKELETON, up="+y").mapped
+    assert find_up(replace(captured, up="+y"), mapped) == pytest.approx(np.eye(3))
+
+
+def test_the_report_finds_up_by_those_who_stand() -> None:
+    """A downward dog reaches from feet to head along the floor, and says nothing; who stands does."""
+    dog = {"Hips": Rotation.from_euler("x", 130, degrees=True),
+           "LeftUpLeg": Rotation.from_euler("x", -80, degrees=True),
+           "RightUpLeg": Rotation.from_euler("x", -80, degrees=True)}  # fmt: skip
+    stretched = replace(motion("T", 3, turns=dog), up="+y")
+    mapped = find_bones(stretched, None, SKELETON)[1]
+    assert find_up(stretched, mapped) == pytest.approx(np.eye(3))
+    lain = motion("T", 1, turns={"Hips": Rotation.from_euler("x", -90, degrees=True)})
+    both = replace(stretched, rotations=np.concatenate([stretched.rotations, lain.rotations]),
+                   positions=np.concatenate([stretched.positions, lain.positions]))  # fmt: skip
+    assert find_up(both, mapped)[1] == pytest.approx([0, 0, -1])
+
+
+def test_what_a_format_declares_is_not_overruled() -> None:
+    """Somebody whom a VRM animation lays down lies."""
+    lying = motion("T", 3, turns={"Hips": Rotation.from_euler("x", 90, degrees=True)})
+    assert prepare(replace(lying, up="+y"), SKELETON).up == "+z"
+    names = prepare(lying, SKELETON).mapped.items()
+    declared = replace(lying, up="+y", declared={lying.names[number]: joint for joint, number in names})
+    assert prepare(declared, SKELETON).up == "+y"
+    assert find_up(declared, dict(names)) == pytest.approx(np.eye(3))
+
+
+def test_nobody_stands_up_along_x() -> None:
+    """An animal on four legs, whose trunk a guess would put upright: no program's people stand along x."""
+    on_four = {name: turn for name, turn in LEAP.items() if name != "Hips"}
+    turned = {"Hips": Rotation.from_euler("z", -90, degrees=True)} | on_four
+    captured = motion("T", 3, turns=turned)
+    heap = np.array(captured.offsets)
+    heap[[captured.names.index(name) for name in ("LeftLeg", "RightLeg")]] *= [1, -1, 1]  # no rest pose
+    with pytest.raises(ModelError, match="nobody ever stands"):
+        prepare(replace(captured, offsets=heap), SKELETON)
 
 
 def test_shoulders_rest_where_arms_hang() -> None:

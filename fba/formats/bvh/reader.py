@@ -43,6 +43,11 @@ MOST_OF_BODY = 0.75
 """Share of all joints below one that carries the body's motion in place of the root."""
 STRETCH = 1e-3
 """Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
+CARRIED = 5.0
+"""How many times as far as the joints below it a joint moves that carries the body: in files of markers
+all joints move relative to their parents."""
+FEW = 3
+"""Joints below it that must move, too, for that comparison: faces and toys move by themselves."""
 
 
 @dataclass
@@ -374,13 +379,15 @@ def _motion(
     positions = np.tile(offsets[0], (frames, 1))
     size = float(np.abs(offsets).sum(axis=1).max()) or 1.0
     moved: dict[int, Float64] = {}  # positions relative to the parent, where they vary
+    from_offset = _count_from_offset(tree, numbers)
     column = 0
     for joint, channels in enumerate(tree.channels):
         translation = np.tile(offsets[joint], (frames, 1))
         for channel in channels:
             axis = "xyz".index(channel[0])
             if channel.endswith("position"):
-                translation[:, axis] = numbers[:, column]
+                start = offsets[joint, axis] if from_offset and joint else 0.0
+                translation[:, axis] = start + numbers[:, column]
             else:
                 turn = rotations.axis_quaternions(axis, np.deg2rad(numbers[:, column]))
                 turned[:, joint] = rotations.multiply(turned[:, joint], turn)
@@ -427,16 +434,38 @@ def _motion(
     )
 
 
+def _count_from_offset(tree: _Hierarchy, numbers: Float64) -> bool:
+    """Whether positions of joints below the root count from their OFFSET, as MakeHuman's do.
+
+    Others contain it. numbers: (T, channels).
+    """
+    away = from_offset = 0.0
+    column = 0
+    for joint, channels in enumerate(tree.channels):
+        for channel in channels:
+            if joint and channel.endswith("position"):
+                value = float(np.median(numbers[:, column])) if len(numbers) else 0.0
+                away += abs(value - tree.offsets[joint]["xyz".index(channel[0])])
+                from_offset += abs(value)
+            column += 1
+    return from_offset < away
+
+
 def _moving_body(parents: list[int], moved: dict[int, Float64]) -> int:
     """Return the joint below the root that moves with most of the body, such as hips under a scene's root.
 
     moved: joints whose positions vary relative to their parents. 0, the root, where there is none.
     """
+    reach = {joint: float(np.ptp(positions, axis=0).max()) for joint, positions in moved.items()}
     size = [1] * len(parents)
     for joint in range(len(parents) - 1, 0, -1):
         size[parents[joint]] += size[joint]
-    bodies = [joint for joint in moved if size[joint] >= MOST_OF_BODY * len(parents)]
-    return bodies[0] if bodies else 0
+    for joint in moved:
+        below = [reach[other] for other in _subtree(parents, joint)[1:] if other in reach]
+        usual = float(np.median(below)) if len(below) >= FEW else 0.0
+        if size[joint] >= MOST_OF_BODY * len(parents) and reach[joint] > CARRIED * usual:
+            return joint
+    return 0
 
 
 def _subtree(parents: list[int], root: int) -> list[int]:

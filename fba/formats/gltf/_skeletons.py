@@ -92,9 +92,9 @@ def find_joints(gltf: Gltf) -> Joints:
 def _skeleton(gltf: Gltf) -> list[int]:
     """Return the nodes of the skeleton, parents first, with one root.
 
-    They are the joints of skins and the animated nodes that hang among them, as of a file with the head's skin
-    alone; or else all animated nodes and their children; and all nodes above. Of several skeletons, the one
-    with most known joints; warns (FbaWarning) of the others.
+    They are the joints of skins and the animated nodes that hang among them, as in a file of the head's skin
+    alone; without skins, all animated nodes and their children; and all nodes above. Of several skeletons,
+    the one with most known joints; warns (FbaWarning) of the others.
     """
     skinned = {joint for skin in gltf.skins for joint in skin.joints}
     moved = {channel.node for clip in gltf.animations for channel in clip.channels}

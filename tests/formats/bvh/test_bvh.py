@@ -243,3 +243,35 @@ def test_real_file_through_the_registry(shared: Path) -> None:
     assert animation.rate == 30
     assert len(animation) == 86  # 344 frames at 120: the last one lies beyond the last sample
     assert animation.body is not None
+
+
+def test_positions_of_joints_may_count_from_their_offsets() -> None:
+    """MakeHuman writes 0 for a joint in its place; most others write its OFFSET."""
+    head = HEAD.replace("CHANNELS 3 Yrotation", "CHANNELS 6 Xposition Yposition Zposition Yrotation")
+    for place in ("0 10 0", "0 0 0"):
+        motion = reader.parse(text(head, f"0 0 0 0 0 0 {place} 0 0 0\n" * 2))
+        assert motion.offsets[1].tolist() == [0, 10, 0], place
+
+
+def test_only_what_moves_more_than_its_parts_carries_the_body() -> None:
+    """A back that was solved from markers slides along the hips like all joints; it is not the hips."""
+    spine = "".join(
+        f"JOINT {name}\n{{\nOFFSET 0 10 0\n"
+        "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
+        for name in ("Spine", "Chest", "Neck", "Head")
+    )
+    head = (
+        "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\n"
+        "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
+        f"{spine}End Site\n{{\nOFFSET 0 5 0\n}}\n{'}' * 5}\n"
+    )
+
+    def row(*heights: float) -> str:
+        return " ".join(f"0 {height} 0 0 0 0" for height in (90, *heights)) + "\n"
+
+    with pytest.warns(FbaWarning, match="Spine, Chest, Neck, Head"):
+        solved = reader.parse(text(head, row(10, 10, 10, 10) + row(10.2, 10.1, 10.2, 10.1)))
+    assert solved.names[0] == "Hips"
+    with pytest.warns(FbaWarning, match="varies keep the median of it: Chest, Neck, Head"):
+        carried = reader.parse(text(head, row(10, 10, 10, 10) + row(12, 10.1, 10.2, 10.1)))
+    assert carried.names[0] == "Spine"
