@@ -20,8 +20,9 @@ from fba.face.feature_points import row_of
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
+from fba.face.importers.assembly._joining import join_pieces
 from fba.face.importers.assembly._winding import turn_outward
-from fba.face.importers.assembly.pieces import _join, assemble
+from fba.face.importers.assembly.pieces import assemble
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.repair import repair_tables
 from fba.face.importers.assembly.symmetry import asymmetry, mirror_points, mirror_tables, stand_upright
@@ -201,7 +202,7 @@ def test_hands_of_an_avatar_do_not_turn_its_head_inside_out() -> None:
         np.array([(-0.6, -0.8, 0), (0.6, -0.8, 0), (0, -0.8, 0.9)], dtype=np.float32),
         np.array([(0, 2, 1)], dtype=np.int32),
     )
-    skin = _join([Piece(head), Piece(hand)], "skin", "skin")
+    skin = join_pieces([Piece(head), Piece(hand)], "skin", "skin")
     centre = np.array([0.0, 0.0, -0.09])
     assert turn_outward([skin], centre)[1] > 0
     assert turn_outward([skin], centre, 0.155)[1] == 0

@@ -15,8 +15,9 @@ import numpy.typing as npt
 from fba.arrays import Bool, Float32, Float64
 from fba.errors import ModelError, OptionError
 from fba.face.eyeball import flat_width
+from fba.face.importers.assembly._joining import join_pieces
 from fba.face.importers.assembly.polygon_parts import Piece, vertex_components
-from fba.face.model import PART_KINDS, Part
+from fba.face.model import PART_KINDS
 from fba.mesh.names import UniqueNames
 
 DROPPED = "none"
@@ -157,7 +158,7 @@ def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[P
 
     def add(kind: str, name: str, own: Sequence[Piece]) -> None:
         if own:
-            result.append(_join(own, name, kind))
+            result.append(join_pieces(own, name, kind))
 
     def of_kind(kind: str) -> list[Piece]:
         return [piece for piece, each in pieces if each == kind]
@@ -244,53 +245,6 @@ def _cut(piece: Piece, mask: Bool, name: str) -> Piece:
     origin = piece.origin[mask] if len(piece.origin) else piece.origin
     morphs = {shape: morph[mask] for shape, morph in piece.morphs.items()}
     return replace(piece, part=cut, origin=origin, morphs=morphs)
-
-
-def _join(pieces: Sequence[Piece], name: str, kind: str) -> Piece:
-    """Several pieces as one part; the largest gives the texture, the others' colours become vertices'."""
-    if len(pieces) == 1:
-        return replace(pieces[0], part=replace(pieces[0].part, name=name, kind=kind))
-    parts = [piece.part for piece in pieces]
-    main = max(parts, key=lambda part: len(part.vertices))
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    same_colour = all(part.colours is None and part.material.colour == main.material.colour for part in parts)
-    joined = Part(
-        name,
-        kind,
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.triangles + start for part, start in zip(parts, starts[:-1], strict=True)]),
-        np.concatenate([part.normals for part in parts if part.normals is not None]),
-        None if main.texcoords is None else np.concatenate([_texcoords(part, main) for part in parts]),
-        None if same_colour else np.concatenate([_colours(part) for part in parts]),
-        main.material if same_colour else replace(main.material, colour=(1.0, 1.0, 1.0)),
-    )
-    origins = [
-        piece.origin if len(piece.origin) else np.full(len(piece.part.vertices), -1, dtype=np.int32)
-        for piece in pieces
-    ]
-    morphs = {
-        shape: np.concatenate(
-            [piece.morphs.get(shape, np.zeros_like(piece.part.vertices)) for piece in pieces]
-        )
-        for shape in sorted({shape for piece in pieces for shape in piece.morphs})
-    }
-    return Piece(joined, pieces[0].material, np.concatenate(origins), morphs)
-
-
-def _texcoords(part: Part, main: Part) -> Float32:
-    """(V, 2) texture coordinates of a part, 0 where it has another texture than the main part."""
-    if part.texcoords is None or part.material.texture != main.material.texture:
-        return np.zeros((len(part.vertices), 2), np.float32)
-    return part.texcoords
-
-
-def _colours(part: Part) -> Float32:
-    """(V, 4) colours of a part's vertices times those of its material."""
-    own = np.ones((len(part.vertices), 4), np.float32) if part.colours is None else part.colours.copy()
-    own[:, :3] *= np.array(part.material.colour, dtype=np.float32)
-    if part.colours is None:
-        own[:, 3] = 1.0 - part.material.roughness
-    return own
 
 
 def part_names(taken: Iterable[str] = ()) -> UniqueNames:
