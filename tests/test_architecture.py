@@ -101,6 +101,7 @@ fba_player.window
 fba_player
 fba.player
 fba.cli
+fba.cli.recordings
 fba.cli.commands
 fba.__main__
 """

@@ -68,7 +68,11 @@ OWN_HEAD = "fba/body/own_head.py"
 FACE_MOTION, HUMANOID = "fba/formats/gltf/face_motion.py", "fba/formats/gltf/humanoid.py"
 SHAPE_TABLE = "fba/capture/blendshapes/shape_table.py"
 COMBINATION = "fba/capture/blendshapes/combination.py"
-LIVELINK, TIMES = "fba/formats/face_tables/_shape_rows.py", "fba/formats/face_tables/_times.py"
+LIVELINK = "fba/formats/face_tables/_shape_rows.py"
+TIME_CODES, TIME_CODES_TEST = "fba/formats/time_codes.py", "tests/formats/test_time_codes.py"
+SYNCHRONISATION = "fba/formats/synchronisation.py"
+SYNCHRONISATION_TEST = "tests/formats/test_synchronisation.py"
+VOICE_TEST = "tests/cli/captures/test_face_body_voice.py"
 FACES, OPENFACE = "fba/formats/face_tables/_faces.py", "fba/formats/face_tables/openface.py"
 UDP = "fba/formats/face_tables/livelink_udp.py"
 ACTION_UNITS_TEST = "tests/formats/face_tables/test_action_units.py"
@@ -430,14 +434,25 @@ MUTANTS = (
     ),
     Mutant(LIVELINK, "correlation < 0", "correlation > 0", LIVELINK_TEST),
     Mutant(LIVELINK, "wrong = expected if", "wrong = False if", LIVELINK_TEST),
-    Mutant(TIMES, "np.diff(seconds, prepend=seconds[0]) < -NOON", "seconds < 0", LIVELINK_TEST),
+    Mutant(TIME_CODES, "np.diff(seconds, prepend=seconds[0]) < -NOON", "seconds < 0", LIVELINK_TEST),
+    Mutant(TIME_CODES, "30: 2, 60: 4", "30: 3, 60: 4", TIME_CODES_TEST),
+    Mutant(TIME_CODES, "minutes - minutes // 10", "minutes", TIME_CODES_TEST),
+    Mutant(TIME_CODES, "+ NOON) % DAY - NOON", ") % DAY", TIME_CODES_TEST),
+    Mutant(TIME_CODES, "hours % 12 +", "hours +", TIME_CODES_TEST),
+    Mutant(SYNCHRONISATION, "(-later, 0.0) if", "(0.0, later) if", SYNCHRONISATION_TEST),
+    Mutant(SYNCHRONISATION, "STRAIGHT = 0.02", "STRAIGHT = 0.5", SYNCHRONISATION_TEST),
+    Mutant(SYNCHRONISATION, "max(first.animation.rate", "min(first.animation.rate", SYNCHRONISATION_TEST),
+    Mutant(SYNCHRONISATION, 'if without or sync == "offset"', "if without", SYNCHRONISATION_TEST),
+    Mutant(
+        "player/fba_player/sound/sound_clip.py", "int(reference) and stream.rate", "stream.rate", VOICE_TEST
+    ),
     Mutant(INVERSION, "+ SHARED**2 * np.eye(len(shapes))", "", SHAPES_BACK_TEST),
     Mutant(LIVELINK_CSV, "* rate > SPARSE", "* rate < 0", SHAPES_BACK_TEST),
     Mutant(FACES, "times = times - times[0]", "pass", ACTION_UNITS_TEST),
     Mutant(OPENFACE, ">= CONFIDENT", ">= 0", ACTION_UNITS_TEST),
     Mutant(OPENFACE, "set(columns) == set(VERSION_3)", "False", ACTION_UNITS_TEST),
     Mutant(UDP, "times = np.where(times < NOON, times + DAY, times)", "pass", RECORDS_TEST),
-    Mutant(TIMES, "if largest < rate", "if largest <= rate", LIVELINK_TEST),
+    Mutant(TIME_CODES, "if largest < rate", "if largest <= rate", LIVELINK_TEST),
     Mutant(SAMPLING, "np.where(length > BRIDGED, RETURN, length)", "length", LIVELINK_TEST),
     Mutant(SHAPE_TABLE, "            result[fap.number - 1] = True", "            pass", FACES_TEST),
     Mutant(HUMANOID, '"ThumbProximal": "ThumbMetacarpal"', '"ThumbProximal": "ThumbProximal"', DECLARED_TEST),

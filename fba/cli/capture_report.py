@@ -83,18 +83,20 @@ def compare_captures(
     format: str | None = None,
     clip: str | None = None,
     options: Mapping[str, Any] | None = None,
+    lead: int = 0,
 ) -> list[CaptureReport]:
     """Return reports of captures.
 
     animation, decoded: before coding and after. clamped: what the encoder clamped. ground: the value of
     `--ground`. detailed: compare all frames, and bones before coding. clip: the animation that was read of a
     file with several, by name or number. options: those with which captures were read, of which joints, rest
-    and up count.
+    and up count. lead: frames of a capture that are before the animation's first one.
     """
     from fba.body import Skeleton
     from fba.capture import retarget_report
     from fba.capture.bones import find_bones
     from fba.capture.comparison import compare
+    from fba.capture.comparison.measurement import rows_of
     from fba.formats import format_of
 
     given = {name: value for name, value in (options or {}).items() if name in ("joints", "rest", "up")}
@@ -104,6 +106,8 @@ def compare_captures(
         assert reader.read_motion is not None  # the caller names captures only
         try:
             motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": clip}))
+            if lead:
+                motion = rows_of(motion.resample(animation.rate), slice(lead, None))
             _, mapped, _, _ = find_bones(motion, given.get("joints"), Skeleton.default())
         except FbaError:  # the file has a face alone, and the body comes from another
             if detailed:

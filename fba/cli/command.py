@@ -26,6 +26,8 @@ OPTIONS = {
     "replace": "replace",
     "limits": "limit",
     "clip": "clip",
+    "sync": "sync",
+    "offset": "offset",
     "joints": "maps",
     "markers": "maps",
     "rest": "rest",

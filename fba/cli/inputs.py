@@ -213,17 +213,32 @@ def has_markers(path: Path, format: str | None) -> bool:
 
 
 def read_face(
-    path: Path, fps: Fraction | None, format: str | None, limits: Limits
+    path: Path, fps: Fraction | None, format: str | None, limits: Limits, *, face: str | None = None
 ) -> tuple[str, FaceCapture] | None:
     """Return the name of the format and the captured face as it is in a file; None for other files.
 
-    fps: of a file without times.
+    fps: of a file without times. face: the one to read of several.
     """
     reader = _find_format(path, format)
     if reader.read_face is None:
         return None
-    options = {"fps": fps} if fps is not None and "fps" in reader.read_options else {}
+    options = _taken(reader, {"fps": fps, "face": face})
     return reader.name, reader.read_face(path, limits=limits, **options)
+
+
+def read_face_quietly(
+    path: Path, fps: Fraction | None, format: str | None, limits: Limits, *, face: str | None = None
+) -> FaceCapture | None:
+    """Return the same face without the warnings that reading it again would repeat.
+
+    None for standard input, too, which can be read only once.
+    """
+    if str(path) == "-":
+        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)
+        capture = read_face(path, fps, format, limits, face=face)
+    return None if capture is None else capture[1]
 
 
 def check_capture_options(given: Mapping[str, str], files: Iterable[Path], format: str | None) -> None:

@@ -11,6 +11,7 @@ import os
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
@@ -41,6 +42,10 @@ class FaceCapture(Protocol):
     @property
     def start(self) -> float | None:
         """Time of day of its first row, in seconds; None where the file does not say."""
+
+    @property
+    def rate(self) -> Fraction:
+        """Rows in a second, as the file counts them."""
 
     def __len__(self) -> int: ...
 

@@ -22,11 +22,17 @@ from fba.cli.inputs import (
     has_skeleton,
     input_file,
     is_capture,
-    read_input,
 )
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, rate_text, seconds_text
-from fba.errors import FormatError
+from fba.cli.recordings import voice
+from fba.cli.recordings.inputs import (
+    Moment,
+    read_inputs,
+    sync_options,
+    together_lines,
+    together_values,
+)
 from fba.limits import Limits
 
 if TYPE_CHECKING:
@@ -59,6 +65,7 @@ class _EncodeCommand(Command):
         "fba encode talk.fap -o again.fba --epf talk.epf",
         "fba encode walk.bvh -o walk.fba --report --limits report",
         "fba encode face.c3d -o face.fba --fps 25 --map-out markers.toml",
+        "fba encode face.csv body.bvh -o both.fba --offset 2.4 --audio speech.wav",
     ),
 )
 @click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=EXISTING)
@@ -165,6 +172,8 @@ class _EncodeCommand(Command):
 )  # fmt: skip
 @click.option("--face", metavar="NAME", help="Captures of several faces: the one to read, by its name.")
 @marker_options.marker_options
+@sync_options
+@voice.audio_options
 @options.choice_option(
     "--limits",
     "Report where joints exceed normal human motion, or clamp them to it.",
@@ -193,6 +202,11 @@ def command(
     epf: Path | None,
     maps: tuple[Path | joint_options.Pair, ...],
     map_out: Path | None,
+    sync: str | None,
+    offset: Moment | None,
+    trim: bool,
+    audio: Path | None,
+    audio_offset: float | None,
     limits: str,
     report: str | None,
     salvage: bool,
@@ -204,9 +218,10 @@ def command(
 ) -> None:
     """Encode FAP and BAP files, motion capture or captured faces as an FBA stream.
 
-    A face file and a body file together become one stream. Ranges fit the data. A value that no range
-    can carry is an error; --clamp limits it to the codable range. With --epf, only what that file says is
-    written, and no mark unless you ask for one.
+    A face file and a body file together become one stream: captures by their time codes where both have
+    them, else from the start on (--sync, --offset). Ranges fit the data. A value that no range can carry is
+    an error; --clamp limits it to the codable range. With --epf, only what that file says is written, and no
+    mark unless you ask for one.
     """
     if epf is not None:
         _refuse_beside_epf()
@@ -214,8 +229,9 @@ def command(
     page = _report_file(report)
     written = [Output("--output", output), *([Output("--report", page)] if page is not None else [])]
     saved = [] if map_out is None else [Output("--map-out", map_out, True)]
-    read = [*inputs, epf, *(each for each in maps if isinstance(each, Path))]
-    outputs = Outputs([*written, *saved], read, no_clobber=no_clobber)
+    sounds = voice.check_audio(audio, audio_offset, output)
+    read = [*inputs, epf, audio, *(each for each in maps if isinstance(each, Path))]
+    outputs = Outputs([*written, *saved, *sounds], read, no_clobber=no_clobber)
     captures = [path for path in inputs if has_skeleton(path, format)]
     marked = [path for path in inputs if has_markers(path, format)]
     typed = {name: f"--{name.replace('_', '-')}" for name in CAPTURE if not _is_left_open(name)}
@@ -232,12 +248,12 @@ def command(
     capture = {option: settings.pop(option) for option in CAPTURE} | {"joints": joints, "markers": places}
     if capture["head_path"] is None:
         capture["head_path"] = len(inputs) == 1  # of two files, the other has a body
-    tables: list[str] = []
-    with Progress("reading", len(inputs)) as step:
-        animation = _read_all(
-            inputs, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, step=step,
-            capture=capture, format=format, clip=clip, limits=limit, tables=tables,
-        )  # fmt: skip
+    taken = read_inputs(
+        inputs, capture=capture, sync=sync, offset=offset, trim=trim, fps=fps, format=format, limits=limit,
+        timed=audio is not None, name=name, bap_steps=bap_steps, salvage=salvage, clip=clip,
+    )  # fmt: skip
+    animation = taken.animation
+    spoken = voice.place_voice(audio, audio_offset, taken, sounds[0].path) if audio is not None else None
     if report is not None and (animation.body is None or not captures):
         raise click.UsageError(
             "--report compares motion capture with its result, and there is no body to compare"
@@ -247,7 +263,7 @@ def command(
         settings["clamp"] = any(is_capture(path, format) for path in inputs)
     mark = mark if mark is not None else epf is None
     table = step_tables.table_to_write(
-        bap_steps, made=bool(captures or marked), marked=mark, read=tables[0] if tables else None
+        bap_steps, made=bool(captures or marked), marked=mark, read=taken.tables[0] if taken.tables else None
     )
     settings |= {"bap_steps": table, "mark": mark}
     if captures and _is_left_open("origin"):
@@ -258,6 +274,8 @@ def command(
         )
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
+    if spoken is not None:
+        voice.write_voice(outputs, spoken)
     if map_out is not None:
         with outputs.file(map_out) as file:
             if marked:
@@ -270,10 +288,11 @@ def command(
     reports = []
     if captures and animation.body is not None:
         with Progress("comparing", None):
-            decoded = _decode(coded.data, bap_steps=table)
+            source, lead = taken.body_of(animation)
+            decoded, _ = taken.body_of(_decode(coded.data, bap_steps=table))
             reports = capture_report.compare_captures(
-                captures, animation, decoded, coded.clamped, ground=str(capture["ground"]), detailed=detailed,
-                format=format, clip=clip, options=capture,
+                captures, source, decoded, coded.clamped, ground=str(capture["ground"]), detailed=detailed,
+                format=format, clip=clip, options=capture, lead=lead,
             )  # fmt: skip
             if page is not None:
                 draw = capture_report.write_page if page.suffix == ".html" else capture_report.draw_report
@@ -287,10 +306,16 @@ def command(
         if detailed:
             said["captures"] = [capture_report.report_values(one) for one in reports]
         figures = _figures(coded, animation)
+        if taken.together is not None:
+            figures |= together_values(inputs, taken.together)
+        if spoken is not None:
+            figures |= voice.voice_values(spoken)
         outputs.print_json({"output": str(output), **figures, **used, **said, **limit_values})
         return
     for line in (
         _summary(output, coded, animation),
+        *(together_lines(inputs, taken.together) if taken.together is not None else ()),
+        *((voice.voice_line(spoken),) if spoken is not None else ()),
         *clamped_lines(coded.clamped),
         *(line for one in reports if detailed for line in capture_report.report_lines(one)),
         *capture_report.limit_lines(limit_values),
@@ -416,49 +441,3 @@ def _summary(output: Path, coded: _Encoded, animation: Animation) -> str:
     )
     count = coded.clamped_count
     return f"{text}; {count} value{'s' if count != 1 else ''} clamped" if count else text
-
-
-def _read_all(
-    inputs: tuple[Path, ...],
-    *,
-    fps: Fraction | None,
-    name: str | None,
-    bap_steps: str,
-    salvage: bool,
-    step: Progress,
-    capture: Mapping[str, object],
-    format: str | None,
-    clip: str | None,
-    limits: Limits,
-    tables: list[str],
-) -> Animation:
-    """Return face and body of all inputs as one animation."""
-    from fba.formats import merge
-
-    result: Animation | None = None
-    for path in inputs:
-        animation = read_input(
-            path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture, format=format,
-            clip=clip, limits=limits, tables=tables,
-        )  # fmt: skip
-        step.advance()
-        if not len(animation):
-            raise FormatError("the file holds no frames; there is nothing to encode", path=path)
-        if result is None:
-            result = animation
-            continue
-        if (result.face is not None and animation.face is not None) or (
-            result.body is not None and animation.body is not None
-        ):
-            raise click.UsageError(
-                f"{path} is a second {'face' if animation.face is not None else 'body'} file; "
-                "encode one face and one body file at most"
-            )
-        if animation.rate != result.rate:
-            raise click.UsageError(
-                f"{path} has {rate_text(animation.rate)} frames/s, the file before it "
-                f"{rate_text(result.rate)}; bring them to one rate with --fps"
-            )
-        result = merge(result, animation) if result.face is not None else merge(animation, result)
-    assert result is not None
-    return result

@@ -27,7 +27,8 @@ from fba.formats.face_tables._shape_rows import (
     to_animation,
 )
 from fba.formats.face_tables._tables import Table, header_names, named, read_table
-from fba.formats.face_tables._times import check_order, read_time_codes, seconds_of
+from fba.formats.face_tables._times import check_order, seconds_of
+from fba.formats.time_codes import read_time_codes
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 

@@ -108,8 +108,12 @@ def build_motion(
     name: str,
     path: Path,
     lines: list[int],
+    start: float | None = None,
 ) -> MarkerMotion:
-    """Return the motion; metres: of the file's unit. lines: of each frame, for errors. FormatError."""
+    """Return the motion; metres: of the file's unit. lines: of each frame, for errors. FormatError.
+
+    start: time of day of the first frame, in seconds.
+    """
     back = np.flatnonzero(np.diff(times) <= 0)
     if len(back):
         frame = int(back[0]) + 1
@@ -127,6 +131,7 @@ def build_motion(
             unit=unit,
             up=up,
             name=name,
+            start=start,
         )
     except ModelError as error:
         raise FormatError(error.finding, path=path) from error

@@ -8,18 +8,21 @@ from __future__ import annotations
 import csv
 import re
 import warnings
+from contextlib import suppress
 from fractions import Fraction
 from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
 
+from fba.arrays import Float64
 from fba.capture.markers.motion import METRES, MarkerMotion
 from fba.errors import FbaWarning, FormatError
 from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines
 from fba.formats.markers.encoding import read_face
 from fba.formats.markers.names import without_subject
 from fba.formats.markers.options import file_rate, rate_of_times
+from fba.formats.time_codes import parse_time_of_day, read_time_codes
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -74,7 +77,36 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
         without_subject([label for label, _ in chosen]), rows[:, places], own_times(times, rate), rate,
         metres=METRES.get(unit, 1.0), unit=unit, up="+y",
         name=settings.get("take name", "") or FilePath(path).stem, path=path, lines=numbers,
+        start=_find_start(settings, columns, lines, numbers, times, path),
     )  # fmt: skip
+
+
+def _find_start(
+    settings: dict[str, str],
+    columns: list[str],
+    lines: list[str],
+    numbers: list[int],
+    times: Float64,
+    path: Path,
+) -> float | None:
+    """Return the time of day of the first frame, in seconds; None where the file does not say.
+
+    That is its time code, else the start of the take and the frame's time in it. numbers: of the lines of
+    frames, from 1 on.
+    """
+    place = _code_column(columns)
+    if place is not None:
+        codes = ["".join(lines[number - 1].split(",")[place : place + 1]).strip() for number in numbers]
+        if codes[0]:
+            filled = [code or codes[0] for code in codes]
+            with suppress(FormatError):  # codes of another kind
+                return read_time_codes(filled, numbers, path)[2]
+    begun = parse_time_of_day(settings.get("capture start time", ""))
+    return None if begun is None else begun + float(np.nan_to_num(times[0]))
+
+
+def _code_column(columns: list[str]) -> int | None:
+    return next((n for n, cell in enumerate(columns) if cell.lower() == "timecode"), None)
 
 
 def _find_markers(rows: list[list[str]], columns: list[str], path: Path) -> list[tuple[str, int]]:
@@ -109,7 +141,7 @@ def _find_markers(rows: list[list[str]], columns: list[str], path: Path) -> list
 
 def _without_codes(lines: list[str], first: int, columns: list[str]) -> list[str]:
     """Return lines whose time code, which is no number, is emptied."""
-    place = next((n for n, cell in enumerate(columns) if cell.lower() == "timecode"), None)
+    place = _code_column(columns)
     if place is None:
         return lines
     result = lines[:first]

@@ -17,6 +17,7 @@ from fba.errors import FormatError
 from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines, warn_if_cut
 from fba.formats.markers.encoding import read_face
 from fba.formats.markers.options import file_rate
+from fba.formats.time_codes import parse_time_of_day
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -40,7 +41,7 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
     first = 0
     while first < min(len(lines), HEADER_LINES) and re.match(r"\s*[A-Z][A-Z_]{3,}(\t|\s*$)", lines[first]):
         key, *values = lines[first].strip().split("\t")
-        settings[key.strip()] = [value.strip() for value in values]
+        settings.setdefault(key.strip(), [value.strip() for value in values])  # a second time is of an export
         first += 1
     labels = [label for label in settings.get("MARKER_NAMES", ()) if label]
     if not labels:
@@ -66,9 +67,10 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
     positions = rows[:, leading:].reshape(len(rows), -1, 3)
     positions[(positions == 0).all(axis=2)] = np.nan
     times = own_times(rows[:, 1], rate) if leading == 2 else regular_times(len(rows), rate)
+    begun = parse_time_of_day(" ".join(settings.get("TIME_STAMP", ())[:1]))
     return build_motion(
         labels, positions, times, rate, metres=0.001, unit="mm", up="+z", name=FilePath(path).stem, path=path,
-        lines=numbers,
+        lines=numbers, start=None if begun is None else begun + float(times[0]),
     )  # fmt: skip
 
 

@@ -1,0 +1,229 @@
+"""The inputs of `fba encode`, read and put on one clock: `--sync`, `--offset` and `--trim`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.animation import Animation
+from fba.cli.command import STANDARD_INPUT, Decorated
+from fba.cli.inputs import is_capture, read_face_quietly, read_input
+from fba.cli.printing import Progress, rate_text
+from fba.errors import FormatError, OptionError
+from fba.formats import merge
+from fba.formats.synchronisation import SYNCS, Recording, Together, join
+from fba.formats.time_codes import parse_time_code, parse_time_of_day
+from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.formats.registry import FaceCapture
+
+
+SLOWEST = 60
+"""Most rows in a second of captures whose rows are those that their time codes count."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When the second of two recordings begins, as it was typed.
+
+    seconds: after the first one; None where a time of day says it.
+    """
+
+    text: str
+    seconds: float | None
+
+
+class OffsetType(click.ParamType[Moment]):
+    """Seconds, or a time of day: 2.4, 18:48:59:39, 18:48:59.65."""
+
+    name = "offset"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Moment:
+        text = str(value)
+        if ":" in text:
+            if parse_time_code(text) is None and parse_time_of_day(text) is None:
+                self.fail(f"{text!r} is no time of day; write 18:48:59:39, or 18:48:59.65", param, ctx)
+            return Moment(text, None)
+        try:
+            seconds = float(text)
+        except ValueError:
+            seconds = math.nan
+        if not math.isfinite(seconds):
+            self.fail(f"{text!r} is neither a number of seconds nor a time code HH:MM:SS:FF", param, ctx)
+        return Moment(text, seconds)
+
+
+def sync_options(command: Decorated) -> Decorated:
+    """Add the options that say how two recordings go together."""
+    sync = click.option(
+        "--sync",
+        type=click.Choice(SYNCS),
+        help="A face and a body: by the times of day at which they were recorded, or both from the start on; "
+        "default: time codes where both have them.",
+    )
+    offset = click.option(
+        "--offset",
+        type=OffsetType(),
+        metavar="SECONDS|HH:MM:SS:FF",
+        help="When the second input begins: seconds after the first, or the time code of its first frame.",
+    )
+    trim = click.option(
+        "--trim", is_flag=True, help="Leave out what only one of the two inputs covers; else it is kept."
+    )
+    decorated: Any = sync(offset(trim(command)))
+    return decorated  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What was read.
+
+    animation: of all inputs. start: time of day at its index 0, in seconds; None where unknown. together: how
+    two inputs with a capture among them were put together; None for others. tables: see `read_input`."""
+
+    animation: Animation
+    start: float | None
+    together: Together | None
+    tables: tuple[str, ...]
+
+    def body_of(self, animation: Animation) -> tuple[Animation, int]:
+        """Return the frames of an animation of the same rows that a captured body covers.
+
+        Also how many frames of the capture are before them.
+        """
+        if self.together is None:
+            return animation, 0
+        return animation[self.together.body_rows], self.together.body_lead
+
+
+def read_inputs(
+    files: tuple[Path, ...],
+    *,
+    capture: Mapping[str, object],
+    sync: str | None,
+    offset: Moment | None,
+    trim: bool,
+    fps: Fraction | None,
+    format: str | None,
+    limits: Limits,
+    timed: bool = False,
+    **options: Any,
+) -> Inputs:
+    """Return face and body of one or two files as one animation. options: further ones of `read_input`.
+
+    timed: find out when a single file was recorded.
+
+    Raises click.UsageError for two faces, two bodies, and rates that differ where nothing was captured.
+    """
+    _check_sync(files, sync, offset, trim)
+    tables: list[str] = []
+    recordings: list[Recording] = []
+    faces: list[FaceCapture | None] = []
+    chosen = None if capture.get("face") is None else str(capture["face"])
+    with Progress("reading", len(files)) as step:
+        for path in files:
+            animation = read_input(
+                path, fps=fps, format=format, capture=capture, limits=limits, tables=tables, **options
+            )
+            step.advance()
+            if not len(animation):
+                raise FormatError("the file holds no frames; there is nothing to encode", path=path)
+            _check_parts(path, animation, [one.animation for one in recordings])
+            again = timed or len(files) > 1
+            faces.append(read_face_quietly(path, fps, format, limits, face=chosen) if again else None)
+            name = STANDARD_INPUT if str(path) == "-" else str(path)
+            recordings.append(Recording(name, animation, None if faces[-1] is None else faces[-1].start))
+    if len(recordings) == 1:
+        return Inputs(recordings[0].animation, recordings[0].start, None, tuple(tables))
+    first, second = recordings
+    if sync is None and offset is None and not any(is_capture(path, format) for path in files):
+        return Inputs(_merge(first, second), None, None, tuple(tables))
+    try:
+        together = join(
+            first,
+            second,
+            sync="offset" if offset is not None and offset.seconds is not None else sync,
+            offset=0.0 if offset is None or offset.seconds is None else offset.seconds,
+            begins=None if offset is None or offset.seconds is not None else _time_of_day(offset, faces[0]),
+            trim=trim,
+            limits=limits,
+        )
+    except OptionError as error:
+        raise click.UsageError(str(error)) from error
+    return Inputs(together.animation, together.start, together, tuple(tables))
+
+
+def together_lines(files: tuple[Path, ...], together: Together) -> list[str]:
+    """Return when each of two recordings begins and ends, and what was done to them."""
+    (first, _), (second, _) = together.spans
+    how = "by their time codes" if together.how == "timecode" else "both from the start on"
+    if together.how == "offset" and first != second:
+        how = "by --offset"
+    spans = ", ".join(
+        f"{path} {begin:.2f} to {end:.2f} s" for path, (begin, end) in zip(files, together.spans, strict=True)
+    )
+    low, high = together.common
+    lines = [f"together, {how}: {spans}; both from {low:.2f} to {high:.2f} s"]
+    lines += [
+        f"{name}: {rate_text(rate)} frames/s, interpolated at {rate_text(together.animation.rate)}"
+        for name, rate in together.resampled.items()
+    ]
+    return lines
+
+
+def together_values(files: tuple[Path, ...], together: Together) -> dict[str, Any]:
+    """Return the same for programs."""
+    parts = [
+        {"file": str(path), "begins": round(begin, 6), "ends": round(end, 6)}
+        for path, (begin, end) in zip(files, together.spans, strict=True)
+    ]
+    return {"sync": together.how, "parts": parts}
+
+
+def _time_of_day(offset: Moment, first: FaceCapture | None) -> float:
+    """Return a time of day in seconds. first: the capture beside which it counts frames."""
+    seconds = parse_time_of_day(offset.text)
+    if seconds is None and first is not None and first.rate <= SLOWEST:
+        seconds = parse_time_code(offset.text, first.rate)
+    if seconds is None:
+        raise click.UsageError(
+            f"--offset {offset.text}: the first input's time codes do not count such frames; write parts of "
+            "a second, as 18:48:59.65"
+        )
+    return seconds
+
+
+def _check_sync(files: tuple[Path, ...], sync: str | None, offset: Moment | None, trim: bool) -> None:
+    """Raise click.UsageError for options that contradict each other or the number of files."""
+    typed = [f"--{name}" for name, value in (("sync", sync), ("offset", offset), ("trim", trim)) if value]
+    if typed and len(files) != 2:
+        raise click.UsageError(f"{typed[0]} is for two inputs, a face and a body; there is {len(files)}")
+    if offset is not None and sync is not None and (offset.seconds is None) != (sync == "timecode"):
+        raise click.UsageError(f"--sync {sync} and --offset {offset.text} contradict each other")
+
+
+def _check_parts(path: Path, animation: Animation, before: list[Animation]) -> None:
+    """Raise click.UsageError for a second face or a second body."""
+    for part in ("face", "body"):
+        if getattr(animation, part) is not None and any(getattr(one, part) is not None for one in before):
+            raise click.UsageError(
+                f"{path} is a second {part} file; encode one face and one body file at most"
+            )
+
+
+def _merge(first: Recording, second: Recording) -> Animation:
+    """Return files of FAPs and BAPs as one animation, joined by frame number."""
+    one, other = first.animation, second.animation
+    if one.rate != other.rate:
+        raise click.UsageError(
+            f"{second.name} has {rate_text(other.rate)} frames/s, the file before it {rate_text(one.rate)}; "
+            "bring them to one rate with --fps"
+        )
+    return merge(one, other) if one.face is not None else merge(other, one)

@@ -1,0 +1,132 @@
+"""`--audio` of `fba encode`: the part of a sound that goes with the stream, as a WAV file beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.animation import Animation
+from fba.cli import options
+from fba.cli.command import Decorated
+from fba.cli.outputs import STANDARD, Output, Outputs
+from fba.cli.printing import clock_text, seconds_text
+from fba.errors import FormatError
+
+if TYPE_CHECKING:
+    from fba.cli.recordings.inputs import Inputs
+
+
+@dataclass(frozen=True)
+class Voice:
+    """A sound beside a stream.
+
+    source: the sound. target: the file beside the stream. begins: seconds from the stream's first frame to
+    the beginning of the sound. seconds: length of the stream. how: what says so.
+    """
+
+    source: Path
+    target: Path
+    begins: float
+    seconds: Fraction
+    how: str
+
+
+def audio_options(command: Decorated) -> Decorated:
+    """Add the options that put a sound beside the stream."""
+    audio = click.option(
+        "--audio",
+        type=click.Path(exists=True, dir_okay=False, path_type=Path),
+        metavar="FILE",
+        help="A sound that was recorded with the capture: the part that goes with the stream is written "
+        "beside it, OUT.wav, where fba play and fba render find it.",
+    )
+    offset = click.option(
+        "--audio-offset",
+        type=options.MomentType(),
+        metavar="SECONDS",
+        help="When the sound begins, after the first frame; default: by time codes where both have them, "
+        "else 0.",
+    )
+    decorated: Any = audio(offset(command))
+    return decorated  # type: ignore[no-any-return]
+
+
+def check_audio(audio: Path | None, offset: float | None, output: Path) -> list[Output]:
+    """Return the WAV file that will be written, or nothing; click.UsageError where it cannot be."""
+    if audio is None:
+        if offset is not None:
+            raise click.UsageError("--audio-offset needs a sound: give one with --audio")
+        return []
+    if output == STANDARD:
+        raise click.UsageError("--audio writes a sound beside the stream; give the stream a name with -o")
+    target = output.with_suffix(".wav")
+    if target.exists() and target.samefile(audio):
+        raise click.UsageError(
+            f"{audio} is beside {output} already: leave --audio out to play it from the first frame on, or "
+            "give the stream another name"
+        )
+    return [Output("--audio", target)]
+
+
+def place_voice(audio: Path, offset: float | None, taken: Inputs, target: Path) -> Voice:
+    """Return where a sound begins. Raises FormatError for a file that is no sound, or of another moment."""
+    from fba.formats.time_codes import seconds_between
+    from fba_player.sound.audio_file import SoundFile
+    from fba_player.sound.sound_clip import read_time_of_day
+
+    animation = taken.animation
+    recorded, first = read_time_of_day(audio), _first_moment(taken.start, animation)
+    begins, how = 0.0, "both from the start on"
+    if offset is not None:
+        begins, how = offset, "by --audio-offset"
+    elif recorded is not None and first is not None:
+        begins, how = seconds_between(first, recorded), "by time codes"
+    with SoundFile(audio) as sound:
+        length = sound.duration
+    if begins >= animation.duration or (length is not None and begins + length <= 0):
+        raise FormatError(
+            f"shares no moment with the stream: it {_span(begins, length, first, how)}, and the stream "
+            f"{_span(0.0, float(animation.duration), first, how)}; --audio-offset says when it begins",
+            path=audio,
+        )
+    return Voice(audio, target, begins, animation.duration, how)
+
+
+def write_voice(outputs: Outputs, voice: Voice) -> None:
+    """Write the part of the sound that goes with the stream."""
+    from fba.atomic import atomic
+    from fba_player.sound.sound_clip import write_clip
+
+    with outputs.file(voice.target) as name, atomic(name) as file:
+        write_clip(file, voice.source, -Fraction(voice.begins), voice.seconds)
+
+
+def voice_line(voice: Voice) -> str:
+    """Return what was written."""
+    silent = voice.begins > 0
+    place = f"after {voice.begins:.2f} s of silence" if silent else f"from {abs(voice.begins):.2f} s on"
+    return f"{voice.target}: {seconds_text(voice.seconds)} of {voice.source}, {place}, {voice.how}"
+
+
+def voice_values(voice: Voice) -> dict[str, Any]:
+    """Return the same for programs."""
+    return {"sound": {"file": str(voice.target), "begins": round(voice.begins, 6), "by": voice.how}}
+
+
+def _first_moment(start: float | None, animation: Animation) -> float | None:
+    """Return the time of day of the first frame, in seconds. start: that of index 0."""
+    return None if start is None else start + float(animation.index[0] / animation.rate)
+
+
+def _span(begins: float, length: float | None, first: float | None, how: str) -> str:
+    """Return when something begins and ends: by the clock where time codes count."""
+    shift = first if first is not None and how == "by time codes" else None
+    texts = [
+        seconds_text(moment) if shift is None else clock_text(shift + moment)
+        for moment in (begins, *([] if length is None else [begins + length]))
+    ]
+    return "lasts from " + " to ".join(texts)

@@ -1,0 +1,115 @@
+"""Time codes and times of day: when a recording was made, to the frame.
+
+SMPTE ST 12-1 says what codes count: frames that have numbers from 0 on in each second, and, where a
+semicolon stands before them (drop frame), without the numbers 0 and 1 (of 30) in minutes that are no whole
+tens, so that codes at 30000/1001 frames/s go with the clock.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from fba.arrays import Float64
+from fba.errors import FormatError
+from fba.source import Path
+
+DAY = 86_400.0
+NOON = DAY / 2
+TIME_CODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.])(\d{1,3}(?:\.\d{1,9})?))?")
+TIME_OF_DAY = re.compile(r"\b(\d{1,2})[:.](\d{2})[:.](\d{2}\.\d{1,9})\s*([AaPp])?[Mm]?")
+"""A clock's time with parts of a second; without these it is too coarse to put two recordings together."""
+EXPECTED = "expected HH:MM:SS:FF.fff, as 18:48:59:39.473"
+RATES = (24, 25, 30, 48, 50, 60, 120, 240)
+"""Frames that time codes count in a second."""
+USUAL = 60
+"""Frames in a second where a recording is too short to show it."""
+DROPPED = {30: 2, 60: 4, 120: 8}
+"""Numbers that drop-frame codes leave out in a minute, by frames in a second."""
+
+
+def read_time_codes(
+    cells: Sequence[str], lines: Sequence[int], path: Path
+) -> tuple[Float64, Fraction, float]:
+    """Return times (T,) of time codes, seconds from the first; frames a second; the first's time of day.
+
+    "18:48:59:39.473" is 39.473 frames after 18:48:59. Codes may pass midnight. lines: of each in the file.
+    Raises FormatError for text that is no time code, or a code that no clock shows.
+    """
+    parts = np.empty((len(cells), 4))
+    drop = False
+    for row, cell in enumerate(cells):
+        match = TIME_CODE.fullmatch(cell)
+        if match is None or int(match[1]) > 23 or int(match[2]) > 59 or int(match[3]) > 59:
+            what = "is no time code" if match is None else "is a time that no clock shows"
+            raise FormatError(f"this {what}; {EXPECTED}", path=path, line=lines[row], token=cell)
+        parts[row] = [float(part or 0) for part in (*match.groups()[:3], match[5])]
+        drop = drop or match[4] == ";"
+    counted = _counted_rate(parts)
+    drop = drop and counted in DROPPED
+    seconds = _drop_frame_seconds(parts, counted) if drop else _seconds(parts, counted)
+    midnights = np.cumsum(np.diff(seconds, prepend=seconds[0]) < -NOON) * DAY
+    rate = Fraction(counted * 1000, 1001) if drop else Fraction(counted)
+    return seconds + midnights - seconds[0], rate, float(seconds[0])
+
+
+def parse_time_code(text: str, rate: Fraction | None = None) -> float | None:
+    """Return the time of day, in seconds, of one time code; None for text that is none.
+
+    rate: of the frames that it counts; None for `USUAL`.
+    """
+    match = TIME_CODE.fullmatch(text.strip())
+    if match is None or int(match[1]) > 23 or int(match[2]) > 59 or int(match[3]) > 59:
+        return None
+    parts = np.array([[float(part or 0) for part in (*match.groups()[:3], match[5])]])
+    counted = USUAL if rate is None else -(-rate.numerator // rate.denominator)
+    if parts[0, 3] >= counted:
+        return None
+    drop = match[4] == ";" and counted in DROPPED
+    return float((_drop_frame_seconds(parts, counted) if drop else _seconds(parts, counted))[0])
+
+
+def parse_time_of_day(text: str) -> float | None:
+    """Return the time of day, in seconds, in a date and time such as "2018-05-18 12.06.28.340 PM".
+
+    None without one, or where it has whole seconds only.
+    """
+    match = TIME_OF_DAY.search(text)
+    if match is None or int(match[1]) > 23 or int(match[2]) > 59 or float(match[3]) >= 60:
+        return None
+    hours = int(match[1])
+    if match[4]:
+        hours = hours % 12 + (12 if match[4] in "Pp" else 0)
+    return 3600.0 * hours + 60 * int(match[2]) + float(match[3])
+
+
+def seconds_between(first: float, second: float) -> float:
+    """Return by how much a time of day is after another, in seconds: less than half a day either way."""
+    return (second - first + NOON) % DAY - NOON
+
+
+def _seconds(parts: Float64, counted: int) -> Float64:
+    """Return seconds (T,) of hours, minutes, seconds and frames (T, 4)."""
+    result: Float64 = parts @ np.array([3600.0, 60.0, 1.0, 1.0 / counted])
+    return result
+
+
+def _drop_frame_seconds(parts: Float64, counted: int) -> Float64:
+    """Return the same of codes that leave numbers out."""
+    minutes = parts[:, 0] * 60 + parts[:, 1]
+    frames = (minutes * 60 + parts[:, 2]) * counted + parts[:, 3]
+    frames -= DROPPED[counted] * (minutes - minutes // 10)
+    result: Float64 = frames * 1.001 / counted
+    return result
+
+
+def _counted_rate(parts: Float64) -> int:
+    """Return frames that a second has, from time codes (T, 4): the count before it starts again."""
+    changes = np.diff(parts[:, 2]) != 0
+    largest = int(parts[:, 3].max())
+    if not changes.any() and largest < USUAL:
+        return USUAL
+    return next((rate for rate in RATES if largest < rate), largest + 1)

@@ -1,0 +1,110 @@
+"""Time codes and times of day: what they count, midnight, drop frame, and what is none."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import marker_files
+from fba.capture.markers.motion import MarkerMotion, regular_times
+from fba.errors import FormatError
+from fba.formats import format_of
+from fba.formats.time_codes import (
+    parse_time_code,
+    parse_time_of_day,
+    read_time_codes,
+    seconds_between,
+)
+
+
+def times_of(*codes: str) -> tuple[list[float], Fraction, float]:
+    times, rate, start = read_time_codes(codes, range(2, 2 + len(codes)), "a.csv")
+    return times.tolist(), rate, start
+
+
+def test_drop_frame_goes_with_the_clock() -> None:
+    """Behind 00:00:59;29 comes 00:01:00;02, a 30000/1001th later; an hour of codes is 3599.9964 s."""
+    times, rate, start = times_of("00:00:59;29", "00:01:00;02", "00:01:00;03", "00:10:00;00", "01:00:00;00")
+    assert rate == Fraction(30000, 1001)
+    np.testing.assert_allclose(np.diff(times)[:2], 1001 / 30000, atol=1e-9)
+    assert start + times[3] == pytest.approx(17982 * 1001 / 30000)  # frames of ten minutes
+    assert start + times[4] == pytest.approx(3599.9964)
+
+
+def test_colons_count_every_frame() -> None:
+    times, rate, start = times_of("00:00:59:29", "00:01:00:00", "00:01:00:15.5")
+    assert (rate, start) == (30, pytest.approx(59 + 29 / 30))
+    np.testing.assert_allclose(times, [0, 1 / 30, 16.5 / 30], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("24:00:00:00", "a time that no clock shows"),
+        ("12:60:00:00", "a time that no clock shows"),
+        ("12:00:60:00", "a time that no clock shows"),
+        ("12:00", "no time code"),
+    ],
+)
+def test_no_time_codes(code: str, message: str) -> None:
+    with pytest.raises(FormatError, match=rf"a\.csv:3: this is {message}; expected HH:MM:SS:FF\.fff"):
+        times_of("12:00:00:00", code)
+    assert parse_time_code(code) is None
+
+
+def test_single_codes() -> None:
+    assert parse_time_code("18:48:59:30") == pytest.approx(67739.5)
+    assert parse_time_code("18:48:59:12", Fraction(24)) == pytest.approx(67739.5)
+    assert parse_time_code("01:00:00;00", Fraction(30000, 1001)) == pytest.approx(3599.9964)
+    assert parse_time_code("18:48:59:24", Fraction(24)) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [
+        ("2018-05-18 12.06.28.340 PM", 43588.34),
+        ("2018-05-18 12.06.28.340 AM", 388.34),
+        ("2018-05-18 01.06.28.340 PM", 47188.34),
+        ("2022-06-03, 10:47:36.627", 38856.627),
+        ("2022-06-03, 10:47:36", None),  # to the second: too coarse
+        ("2022-06-03, 25:47:36.5", None),
+        ("", None),
+    ],
+)
+def test_times_of_day(text: str, seconds: float | None) -> None:
+    found = parse_time_of_day(text)
+    assert found == (None if seconds is None else pytest.approx(seconds))
+
+
+def test_times_on_both_sides_of_midnight() -> None:
+    assert seconds_between(86399.0, 2.5) == pytest.approx(3.5)
+    assert seconds_between(2.5, 86399.0) == pytest.approx(-3.5)
+    assert seconds_between(100.0, 130.0) == pytest.approx(30.0)
+
+
+@pytest.mark.filterwarnings("ignore:.*without a label")
+def test_when_takes_of_markers_begin(tmp_path: Path) -> None:
+    positions = np.arange(60.0).reshape(5, 4, 3) / 100
+    motion = MarkerMotion(tuple("ABCD"), positions, regular_times(5, Fraction(25), 1.0), Fraction(25))
+
+    def start(name: str, *changes: tuple[bytes, bytes]) -> float | None:
+        path = marker_files.write(tmp_path, name, motion)
+        data = path.read_bytes()
+        for old, new in changes:
+            assert old in data
+            data = data.replace(old, new)
+        path.write_bytes(data)
+        reader = format_of(path)
+        assert reader.read_face is not None
+        return reader.read_face(path).start
+
+    stamp = (b"Take Name,smile", b"Take Name,smile,Capture Start Time,2018-05-18 12.06.28.340 PM")
+    assert start("motive.csv") is None
+    assert start("motive.csv", stamp) == pytest.approx(43589.34)  # its first frame is at 1.00 s
+    assert start("motive_code.csv", stamp) == pytest.approx(15 * 3600 + 26 * 60 + 46, abs=0.01)
+    assert start("motive_code.csv", stamp, (b"15:26:46", b"code")) == pytest.approx(43589.34)
+    assert start("qualisys.tsv") == pytest.approx(43200)
+    assert start("usual.trc") is None
