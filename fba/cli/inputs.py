@@ -213,21 +213,30 @@ def has_markers(path: Path, format: str | None) -> bool:
 
 
 def read_face(
-    path: Path, fps: Fraction | None, format: str | None, limits: Limits, *, face: str | None = None
+    path: Path,
+    fps: Fraction | None,
+    format: str | None,
+    limits: Limits,
+    capture: Mapping[str, object] | None = None,
 ) -> tuple[str, FaceCapture] | None:
     """Return the name of the format and the captured face as it is in a file; None for other files.
 
-    fps: of a file without times. face: the one to read of several.
+    fps: of a file without times. capture: further options of the readers of captures.
     """
     reader = _find_format(path, format)
     if reader.read_face is None:
         return None
-    options = _taken(reader, {"fps": fps, "face": face})
+    given: dict[str, Any] = {"fps": fps, **(capture or {})}
+    options = {name: given[name] for name in given if name in reader.face_options and given[name] is not None}
     return reader.name, reader.read_face(path, limits=limits, **options)
 
 
 def read_face_quietly(
-    path: Path, fps: Fraction | None, format: str | None, limits: Limits, *, face: str | None = None
+    path: Path,
+    fps: Fraction | None,
+    format: str | None,
+    limits: Limits,
+    capture: Mapping[str, object] | None = None,
 ) -> FaceCapture | None:
     """Return the same face without the warnings that reading it again would repeat.
 
@@ -237,7 +246,7 @@ def read_face_quietly(
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        capture = read_face(path, fps, format, limits, face=face)
+        capture = read_face(path, fps, format, limits, capture)
     return None if capture is None else capture[1]
 
 

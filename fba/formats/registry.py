@@ -118,6 +118,11 @@ class Format:
         return _option_names(self.read)
 
     @property
+    def face_options(self) -> tuple[str, ...]:
+        """Names of the keyword options of `read_face`; empty where there is none."""
+        return () if self.read_face is None else _option_names(self.read_face)
+
+    @property
     def write_options(self) -> tuple[str, ...]:
         """Names of the keyword options of `write`; empty where there is no writer."""
         return () if self.write is None else _option_names(self.write)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import marker_files
 from fba.capture.markers.motion import MarkerMotion, regular_times
 from fba.errors import FormatError
 from fba.formats import format_of
@@ -18,6 +17,7 @@ from fba.formats.time_codes import (
     read_time_codes,
     seconds_between,
 )
+from fba_conformance.captures import marker_files
 
 
 def times_of(*codes: str) -> tuple[list[float], Fraction, float]:

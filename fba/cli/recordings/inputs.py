@@ -126,7 +126,6 @@ def read_inputs(
     tables: list[str] = []
     recordings: list[Recording] = []
     faces: list[FaceCapture | None] = []
-    chosen = None if capture.get("face") is None else str(capture["face"])
     with Progress("reading", len(files)) as step:
         for path in files:
             animation = read_input(
@@ -137,7 +136,7 @@ def read_inputs(
                 raise FormatError("the file holds no frames; there is nothing to encode", path=path)
             _check_parts(path, animation, [one.animation for one in recordings])
             again = timed or len(files) > 1
-            faces.append(read_face_quietly(path, fps, format, limits, face=chosen) if again else None)
+            faces.append(read_face_quietly(path, fps, format, limits, capture) if again else None)
             name = STANDARD_INPUT if str(path) == "-" else str(path)
             recordings.append(Recording(name, animation, None if faces[-1] is None else faces[-1].start))
     if len(recordings) == 1:

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import fba
-from face_files import ANGLES, UDP_ORDER, livelink_csv
 from fba import Animation
+from fba_conformance.captures.face_files import ANGLES, UDP_ORDER, livelink_csv
 from sound_clicks import write_click
 
 Run = Callable[..., Any]
