@@ -17,12 +17,15 @@ from fba.codec._stream.damage import Damage
 from fba.codec._stream.mark import marked_table, write_mark
 from fba.codec._whole_stream import decode
 from fba.codec.block import Block
+from fba.codec.code_length import INTRA_BITS, code_lengths
 from fba.codec.frame_buffer import DecodedFrames, FrameBuffer
+from fba.codec.quantisation import coarsest_quantisers, quantise
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
 from fba.codec.stream_info import PartInfo, StreamInfo, probe_stream
 from fba.codec.verification import Verification, digest, verify_stream
 
 __all__ = [
+    "INTRA_BITS",
     "Block",
     "ClampedParameter",
     "Damage",
@@ -41,6 +44,8 @@ __all__ = [
     "StreamInfo",
     "TimeCode",
     "Verification",
+    "coarsest_quantisers",
+    "code_lengths",
     "decode",
     "digest",
     "encode",
@@ -48,6 +53,7 @@ __all__ = [
     "encode_with_statistics",
     "marked_table",
     "probe_stream",
+    "quantise",
     "verify_stream",
     "write_mark",
 ]

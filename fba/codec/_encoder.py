@@ -122,6 +122,21 @@ class Encoder:
             self._encode(animation[:-1], int(animation.index[-1]))
         return self._writer.take_bytes()
 
+    def push_segment(self, animation: Animation) -> bytes:
+        """Add consecutive frames that begin with an I plane, with ranges that fit them.
+
+        As `push_animation`, which goes on with what is in force; return the bytes that are complete.
+        """
+        first = self.push_animation(animation[:1])
+        self._ranges = fitting_ranges(animation, self.options)
+        self._resumable = set()  # as after a start code: the next plane is an I plane
+        return first + self._push_all(animation[1:])
+
+    def _push_all(self, animation: Animation) -> bytes:
+        """Add consecutive frames in pieces, so that memory stays bounded; return the complete bytes."""
+        starts = range(0, len(animation), _CHUNK)
+        return b"".join(self.push_animation(animation[start : start + _CHUNK]) for start in starts)
+
     def finish(self) -> bytes:
         """End the stream; return the last bytes: alignment, end code, mark. ValueError without a frame."""
         if self._finished:
@@ -378,7 +393,4 @@ def encode_with_statistics(
     """Return the result of `encode`, and what the encoder counted."""
     options = options or EncoderOptions()
     encoder = Encoder(options, ranges=fitting_ranges(animation, options))
-    starts = range(0, len(animation), _CHUNK)
-    chunks = [encoder.push_animation(animation[start : start + _CHUNK]) for start in starts]
-    chunks.append(encoder.finish())
-    return b"".join(chunks), encoder.statistics
+    return encoder._push_all(animation) + encoder.finish(), encoder.statistics

@@ -15,7 +15,7 @@ from importlib.resources import files
 import numpy as np
 
 from fba.arrays import Float32
-from fba.face._mates import fill
+from fba.face.mates import fill
 from fba.parameters import EXPRESSION_SELECT_MAX, FAP_COUNT, VISEME_SELECT_MAX, fap_numbers
 
 VISEME_NAMES = (

@@ -15,7 +15,7 @@ import numpy as np
 
 from fba.animation import FaceTrack
 from fba.arrays import Array, Bool, Float32, Int16, Int32, Intp
-from fba.face._mates import fill
+from fba.face.mates import fill
 from fba.face.expressions import Definitions
 from fba.face.interpolation.evaluate import evaluate
 from fba.face.interpolation.table import InterpolationTable
@@ -61,21 +61,27 @@ def resolve(track: FaceTrack, model: FaceSettings | None = None) -> Float32:
     return Resolver(model).push(track)
 
 
+def known_faps(track: FaceTrack) -> tuple[Int32, Bool]:
+    """Values in force of all low-level FAPs at every frame, and masks of those that what was sent determines.
+
+    int32 (T, 68) and bool (T, 68): as `resolve` without a model, before visemes and expressions are added.
+    """
+    values, sent, interpolated = _initial_state().hold_low_level(track)
+    if interpolated is not None:
+        sent = sent & ~interpolated
+        values = np.where(sent, values, np.int32(0))
+    filled, known = fill(values, sent)
+    known[:, :2] = False
+    return filled.astype(np.int32, copy=False), known
+
+
 class Resolver:
     """`resolve` for a track in pieces: remembers what earlier pieces sent."""
 
     def __init__(self, model: FaceSettings | None = None) -> None:
         self._definitions = Definitions.default() if model is None else model.definitions
         self._fit = None if model is None else model.fit
-        self._state = _State(
-            visemes=self._definitions.visemes,
-            expressions=self._definitions.expressions,
-            values=np.zeros(FAP_COUNT, dtype=np.int32),
-            sent=np.zeros(FAP_COUNT, dtype=bool),
-            interpolated=np.zeros(FAP_COUNT, dtype=bool),
-            viseme=np.zeros(4, dtype=np.int16),
-            expression=np.zeros(6, dtype=np.int16),
-        )
+        self._state = _initial_state(self._definitions)
 
     def copy(self) -> Resolver:
         """An independent resolver in the same state."""
@@ -184,6 +190,20 @@ class _State:
         expression = hold(track.expression, track.mask[:, 1:2], self.expression)
         self.viseme, self.expression = viseme[-1].copy(), expression[-1].copy()
         return viseme, expression
+
+
+def _initial_state(definitions: Definitions | None = None) -> _State:
+    """The state before the first frame: nothing was sent."""
+    definitions = definitions or Definitions.default()
+    return _State(
+        visemes=definitions.visemes,
+        expressions=definitions.expressions,
+        values=np.zeros(FAP_COUNT, dtype=np.int32),
+        sent=np.zeros(FAP_COUNT, dtype=bool),
+        interpolated=np.zeros(FAP_COUNT, dtype=bool),
+        viseme=np.zeros(4, dtype=np.int16),
+        expression=np.zeros(6, dtype=np.int16),
+    )
 
 
 def _share(amounts: Int16) -> Float32:

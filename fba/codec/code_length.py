@@ -1,0 +1,84 @@
+"""Code lengths: how many bits a parameter takes between two I planes, without coding it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fba.arrays import Float64, Int64
+from fba.codec._options import EncoderOptions
+from fba.codec._plane import quantiser, slots
+from fba.codec.quantisation import levels
+from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
+from fba.compiled import compiled
+from fba.tracks import BodyTrack, FaceTrack
+
+RANGE_BITS = 4 * 5
+"""Bits of the four range codes of a parameter."""
+INTRA_BITS = 64
+"""Bits of an I plane that no parameter pays for: its header, mask types, and the coder's flush."""
+UNCODABLE_BITS = 500
+"""What a difference counts that no P plane carries: about an I plane for it alone."""
+
+
+def code_lengths(track: FaceTrack | BodyTrack, cuts: Int64, options: EncoderOptions) -> Float64:
+    """Return the bits of each parameter from one cut to another: float64 (68 or 296, C, C).
+
+    The element (n, a, b) is what parameter n + 1 takes when frames cuts[a] to cuts[b] - 1 are an I plane and the
+    P planes after it, with ranges that fit them: its ranges, its first value, and the differences by
+    the adaptive model, whose length follows from how often each comes, in whatever order. 0 for a parameter
+    that is 0 throughout, which is better left out, and where b <= a. FAPs 1 and 2 count nothing.
+
+    cuts: int64 (C,), increasing, from 0 to the number of frames.
+    """
+    part = slots.BODY_BIT if isinstance(track, BodyTrack) else slots.FACE_BIT
+    scale = quantiser.scale(part, options.quant(part))
+    values = levels(track, options)
+    result = np.zeros((values.shape[1], len(cuts), len(cuts)))
+    symbols = 2 * RANGE_CODE_MAX * RANGE_UNIT + 1
+    logarithms = np.log2(np.maximum(np.arange(len(values) + symbols + 1, dtype=np.float64), 1))
+    factorials = np.cumsum(logarithms)
+    for column in np.flatnonzero(values.any(axis=0)).tolist():
+        one = np.ascontiguousarray(values[:, column])
+        _add_lengths(one, cuts, scale, logarithms, factorials, result[column])
+    return result
+
+
+@compiled
+def _add_lengths(
+    values: Int64, cuts: Int64, scale: int, logarithms: Float64, factorials: Float64, result: Float64
+) -> None:
+    """Fill in result (C, C) for one parameter. values: int64 (T,), levels.
+
+    logarithms, factorials: log2(n) and log2(n!) for n from 0 on.
+    """
+    largest = RANGE_CODE_MAX * RANGE_UNIT // scale
+    counts = np.zeros(2 * largest + 1, dtype=np.int64)
+    for first in range(len(cuts) - 1):
+        counts[:] = 0
+        learnt, coded, beyond, high, low = 0.0, 0, 0, 0, 0
+        start = int(cuts[first])
+        intra = RANGE_BITS + logarithms[_limit(abs(int(values[start])), scale) + 1]
+        frame = start
+        for last in range(first + 1, len(cuts)):
+            while frame < int(cuts[last]):
+                if frame > start:
+                    change = int(values[frame]) - int(values[frame - 1])
+                    if abs(change) > largest:
+                        beyond += 1
+                    else:
+                        counts[change + largest] += 1
+                        learnt += logarithms[counts[change + largest]]
+                        coded += 1
+                        high, low = max(high, change), max(low, -change)
+                frame += 1
+            # The counts of n symbols start at 1: the product of the shares is (n-1)! c1! c2! .. / (n-1+coded)!
+            others = _limit(high, scale) + _limit(low, scale)
+            differences = factorials[others + coded] - factorials[others] - learnt
+            result[first, last] = intra + differences + UNCODABLE_BITS * beyond
+
+
+@compiled
+def _limit(level: int, scale: int) -> int:
+    """Return the limit of the tightest range that holds a level from 0 up."""
+    code = min(-(-level * scale // RANGE_UNIT), RANGE_CODE_MAX)
+    return RANGE_UNIT * code // scale

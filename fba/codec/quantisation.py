@@ -1,0 +1,97 @@
+"""Quantised values: those that a decoder returns, and the coarsest quantisers that keep them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Int32, Int64
+from fba.codec._options import EncoderOptions
+from fba.codec._plane import quantiser, slots
+from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT
+from fba.tracks import BodyTrack, FaceTrack
+
+
+def levels(track: FaceTrack | BodyTrack, options: EncoderOptions) -> Int64:
+    """Return the levels of a track's values: int64 (T, 68) or (T, 296), values in quantiser steps.
+
+    0 for FAPs 1 and 2, which have fields instead of a value.
+    """
+    return quantiser.levels(track.values, _steps(track, options))
+
+
+def quantise(animation: Animation, options: EncoderOptions) -> Animation:
+    """Return an animation with every FAP and BAP as a decoder returns it: a multiple of its step.
+
+    A value keeps its own level, as in an I plane, so that equal values stay equal. Masks, visemes and
+    expressions stay as they are.
+    """
+    return replace(
+        animation,
+        face=None if animation.face is None else _quantised_face(animation.face, options),
+        body=None
+        if animation.body is None
+        else BodyTrack(_quantised(animation.body, options), animation.body.mask),
+    )
+
+
+def coarsest_quantisers(animation: Animation, options: EncoderOptions) -> EncoderOptions:
+    """Return options with the coarsest quantisers that keep every value of a quantised animation.
+
+    Ranges come in steps of 60 table steps, whatever the quantiser: the coarser it is, the fewer symbols
+    they have that never occur. Unquantised parts (fap_quant or bap_quant 0) stay so.
+    """
+    chosen = {}
+    for part, name, track in (
+        (slots.FACE_BIT, "fap_quant", animation.face),
+        (slots.BODY_BIT, "bap_quant", animation.body),
+    ):
+        own = options.quant(part)
+        if track is None or not own:
+            continue
+        divisor = int(np.gcd.reduce(levels(track, options), axis=None)) * quantiser.scale(part, own)
+        if part == slots.FACE_BIT:
+            assert animation.face is not None
+            divisor = int(np.gcd.reduce(_amounts(animation.face), initial=divisor))
+        largest = int(np.abs(levels(track, options)).max(initial=0)) * quantiser.scale(part, own)
+        chosen[name] = max(
+            quant
+            for quant in range(own, QUANT_MAX + 1)
+            if quant == own or _keeps(divisor, largest, quantiser.scale(part, quant))
+        )
+    return replace(options, **chosen)
+
+
+def _keeps(divisor: int, largest: int, scale: int) -> bool:
+    """Whether multiples of `divisor` table steps stay what they are with steps that are `scale` times as wide.
+
+    Differences between values may be twice as large as the largest, but then need an I plane anyway.
+    """
+    return divisor > 0 and divisor % scale == 0 and largest <= RANGE_CODE_MAX * RANGE_UNIT // scale * scale
+
+
+def _amounts(face: FaceTrack) -> Int64:
+    """Return the blends and intensities that are sent, which a FAP's quantiser rounds, too."""
+    fields = [face.viseme[face.mask[:, 0], 2:3], face.expression[face.mask[:, 1]][:, [1, 3]]]
+    amounts: Int64 = np.concatenate([one.ravel() for one in fields]).astype(np.int64)
+    return amounts
+
+
+def _steps(track: FaceTrack | BodyTrack, options: EncoderOptions) -> Int64:
+    """Return the quantiser steps of a track's columns."""
+    if isinstance(track, BodyTrack):
+        return quantiser.steps(slots.BODY_BIT, options.bap_quant, options.bap_steps)
+    steps = quantiser.steps(slots.FACE_BIT, options.fap_quant, options.bap_steps)
+    return np.concatenate([np.ones(2, dtype=np.int64), steps[slots.FAPS]])
+
+
+def _quantised(track: FaceTrack | BodyTrack, options: EncoderOptions) -> Int32:
+    """Return the values of a track as multiples of their steps, int32."""
+    values: Int32 = (levels(track, options) * _steps(track, options)).astype(np.int32)
+    return values
+
+
+def _quantised_face(face: FaceTrack, options: EncoderOptions) -> FaceTrack:
+    return FaceTrack(_quantised(face, options), face.mask, face.viseme, face.expression, face.interpolated)

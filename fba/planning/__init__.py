@@ -1,0 +1,8 @@
+"""Planning: what a stream need not send, and where I planes pay.
+
+May use: the codec, and the rules by which a face fills in what was not sent.
+"""
+
+from fba.planning.plan import Plan, plan_compact, plan_exact
+
+__all__ = ["Plan", "plan_compact", "plan_exact"]

@@ -1,0 +1,94 @@
+"""FAPs that a player derives from others, and which to send so that it derives them right.
+
+ISO/IEC 14496-2 leaves it to the decoder how unsent FAPs are interpolated; these are the rules that the
+standard suggests and `fba.face.resolve` follows (see `fba.face.mates`).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from fba.arrays import Bool, Float64, Int32
+from fba.face.mates import donors
+from fba.parameters import FAP_COUNT, fap_groups
+from fba.planning.segments import Cuts
+
+
+class Choice(NamedTuple):
+    """Which FAPs to send in a segment, for every pair of cuts.
+
+    sent: bool (68, C, C). bits: float64 (C, C), of all of them.
+    """
+
+    sent: Bool
+    bits: Float64
+
+
+@cache
+def related_faps() -> tuple[tuple[int, ...], ...]:
+    """Return the columns of low-level FAPs in sets of 1, 2 or 4 that can be derived from one another."""
+    sets = {frozenset([column, *(int(one[column]) for one in donors())]) for column in range(2, FAP_COUNT)}
+    return tuple(sorted(tuple(sorted(one)) for one in sets))
+
+
+def choose_faps(values: Int32, known: Bool, bits: Float64, cuts: Cuts) -> Choice:
+    """Return the FAPs to send, from one cut to another, that take the fewest bits and give all others.
+
+    values: int32 (T, 68), shown. known: bool (T, 68), those to be shown, the same from one needed cut to
+    the next, and either all FAPs of a related set or none. bits: float64 (68, C, C), of each FAP by itself.
+    """
+    sent = np.zeros(bits.shape, dtype=np.bool_)
+    total = np.zeros(bits.shape[1:])
+    starts = cuts.frames[:-1]
+    for related in related_faps():
+        shown = np.append(known[starts, related[0]], False)[:, None]
+        if not shown.any():
+            continue
+        least = np.full(bits.shape[1:], np.inf)
+        equal = _equal_pairs(values, related, cuts)
+        for few in (one for size in range(1, len(related) + 1) for one in combinations(related, size)):
+            own = np.where(_derive_others(related, few, equal), bits[list(few)].sum(axis=0), np.inf)
+            better = shown & (own < least)
+            least[better] = own[better]
+            for column in related:
+                sent[column][better] = column in few
+        total += np.where(shown, least, 0.0)
+    return Choice(sent, total)
+
+
+def interpolated_faps(sent: Bool, known: Bool) -> Bool:
+    """Return bool (T, 68): unsent FAPs of every group in which a known one is left to the player.
+
+    sent, known: bool (T, 68). A group's mask type says the same of all its unsent FAPs.
+    """
+    result = np.zeros_like(sent)
+    for group in fap_groups()[1:]:
+        columns = np.array(group) - 1
+        derives = (known[:, columns] & ~sent[:, columns]).any(axis=1)
+        result[:, columns] = derives[:, None] & ~sent[:, columns]
+    return result
+
+
+def _equal_pairs(values: Int32, related: tuple[int, ...], cuts: Cuts) -> dict[tuple[int, int], Bool]:
+    """Return for each pair of related FAPs whether they are equal from one cut to another: bool (C, C)."""
+    result = {}
+    for one, other in combinations(related, 2):
+        differences = np.append(0, np.cumsum(values[:, one] != values[:, other]))[cuts.frames]
+        result[one, other] = result[other, one] = differences[:, None] == differences[None]
+    return result
+
+
+def _derive_others(
+    related: tuple[int, ...], sent: tuple[int, ...], equal: dict[tuple[int, int], Bool]
+) -> Bool | np.bool_:
+    """Return bool (C, C): whether the sent FAPs give all related ones, from one cut to another."""
+    result: Bool | np.bool_ = np.True_
+    for column in related:
+        if column not in sent:
+            donor = next(int(one[column]) for one in donors() if int(one[column]) in sent)
+            result = result & equal[column, donor]
+    return result
