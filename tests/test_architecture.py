@@ -58,6 +58,7 @@ fba.body
 fba.body.builtin
 fba.body.gait
 fba.body.importers
+fba.planning
 fba.capture.markers
 fba.capture.virtual_markers
 fba.capture.motion

@@ -23,10 +23,10 @@ UNCODABLE_BITS = 500
 def code_lengths(track: FaceTrack | BodyTrack, cuts: Int64, options: EncoderOptions) -> Float64:
     """Return the bits of each parameter from one cut to another: float64 (68 or 296, C, C).
 
-    The element (n, a, b) is what parameter n + 1 takes when frames cuts[a] to cuts[b] - 1 are an I plane and the
-    P planes after it, with ranges that fit them: its ranges, its first value, and the differences by
-    the adaptive model, whose length follows from how often each comes, in whatever order. 0 for a parameter
-    that is 0 throughout, which is better left out, and where b <= a. FAPs 1 and 2 count nothing.
+    The element (n, a, b) is what parameter n + 1 takes when frames cuts[a] to cuts[b] - 1 are an I plane and
+    the P planes after it, with ranges that fit them: its ranges, its first value, and the differences. Their
+    length by the adaptive model follows from how often each comes, in whatever order. 0 for a parameter that
+    is 0 throughout, and where b <= a. FAPs 1 and 2 count nothing.
 
     cuts: int64 (C,), increasing, from 0 to the number of frames.
     """
@@ -71,7 +71,7 @@ def _add_lengths(
                         coded += 1
                         high, low = max(high, change), max(low, -change)
                 frame += 1
-            # The counts of n symbols start at 1: the product of the shares is (n-1)! c1! c2! .. / (n-1+coded)!
+            # Counts start at 1: the shares of all symbols multiply to others! c1! c2! .. / (others + coded)!
             others = _limit(high, scale) + _limit(low, scale)
             differences = factorials[others + coded] - factorials[others] - learnt
             result[first, last] = intra + differences + UNCODABLE_BITS * beyond

@@ -11,6 +11,7 @@ from fba.arrays import Int32, Int64
 from fba.codec._options import EncoderOptions
 from fba.codec._plane import quantiser, slots
 from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT
+from fba.parameters import INTENSITY_MAX
 from fba.tracks import BodyTrack, FaceTrack
 
 
@@ -25,8 +26,7 @@ def levels(track: FaceTrack | BodyTrack, options: EncoderOptions) -> Int64:
 def quantise(animation: Animation, options: EncoderOptions) -> Animation:
     """Return an animation with every FAP and BAP as a decoder returns it: a multiple of its step.
 
-    A value keeps its own level, as in an I plane, so that equal values stay equal. Masks, visemes and
-    expressions stay as they are.
+    A value keeps its own level, as in an I plane, so that equal values stay equal. Masks stay as they are.
     """
     return replace(
         animation,
@@ -43,7 +43,7 @@ def coarsest_quantisers(animation: Animation, options: EncoderOptions) -> Encode
     Ranges come in steps of 60 table steps, whatever the quantiser: the coarser it is, the fewer symbols
     they have that never occur. Unquantised parts (fap_quant or bap_quant 0) stay so.
     """
-    chosen = {}
+    chosen: dict[str, int] = {}
     for part, name, track in (
         (slots.FACE_BIT, "fap_quant", animation.face),
         (slots.BODY_BIT, "bap_quant", animation.body),
@@ -61,14 +61,11 @@ def coarsest_quantisers(animation: Animation, options: EncoderOptions) -> Encode
             for quant in range(own, QUANT_MAX + 1)
             if quant == own or _keeps(divisor, largest, quantiser.scale(part, quant))
         )
-    return replace(options, **chosen)
+    return replace(options, **chosen)  # type: ignore[arg-type]
 
 
 def _keeps(divisor: int, largest: int, scale: int) -> bool:
-    """Whether multiples of `divisor` table steps stay what they are with steps that are `scale` times as wide.
-
-    Differences between values may be twice as large as the largest, but then need an I plane anyway.
-    """
+    """Whether multiples of `divisor` table steps up to `largest` stay what they are with steps x `scale`."""
     return divisor > 0 and divisor % scale == 0 and largest <= RANGE_CODE_MAX * RANGE_UNIT // scale * scale
 
 
@@ -94,4 +91,9 @@ def _quantised(track: FaceTrack | BodyTrack, options: EncoderOptions) -> Int32:
 
 
 def _quantised_face(face: FaceTrack, options: EncoderOptions) -> FaceTrack:
-    return FaceTrack(_quantised(face, options), face.mask, face.viseme, face.expression, face.interpolated)
+    """Return a face with quantised values, and with its blend and intensities rounded as FAPs are."""
+    step = np.int64(max(options.fap_quant, 1))
+    viseme, expression = face.viseme.copy(), face.expression.copy()
+    for fields, columns in ((viseme, [2]), (expression, [1, 3])):
+        fields[:, columns] = quantiser.levels(np.clip(fields[:, columns], 0, INTENSITY_MAX), step) * step
+    return FaceTrack(_quantised(face, options), face.mask, viseme, expression, face.interpolated)

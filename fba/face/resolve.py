@@ -15,10 +15,10 @@ import numpy as np
 
 from fba.animation import FaceTrack
 from fba.arrays import Array, Bool, Float32, Int16, Int32, Intp
-from fba.face.mates import fill
 from fba.face.expressions import Definitions
 from fba.face.interpolation.evaluate import evaluate
 from fba.face.interpolation.table import InterpolationTable
+from fba.face.mates import fill
 from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps
 from fba.tracks import hold
 
@@ -73,6 +73,17 @@ def known_faps(track: FaceTrack) -> tuple[Int32, Bool]:
     filled, known = fill(values, sent)
     known[:, :2] = False
     return filled.astype(np.int32, copy=False), known
+
+
+def shown_faps(track: FaceTrack, model: FaceSettings | None = None) -> FaceTrack:
+    """Return a track that sends all that a face shows: low-level FAPs only, in whole units.
+
+    Those that are shown as 0 throughout and that nothing determines stay unsent. model: as for `resolve`.
+    """
+    shown = np.rint(resolve(track, model)).astype(np.int32)
+    mask = known_faps(track)[1] | shown.any(axis=0)
+    mask[:, :2] = False
+    return FaceTrack(shown, mask)
 
 
 class Resolver:

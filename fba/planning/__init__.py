@@ -3,6 +3,6 @@
 May use: the codec, and the rules by which a face fills in what was not sent.
 """
 
-from fba.planning.plan import Plan, plan_compact, plan_exact
+from fba.planning.plan import PRESETS, Plan, encode_planned, plan_compact, plan_exact
 
-__all__ = ["Plan", "plan_compact", "plan_exact"]
+__all__ = ["PRESETS", "Plan", "encode_planned", "plan_compact", "plan_exact"]

@@ -68,7 +68,7 @@ def interpolated_faps(sent: Bool, known: Bool) -> Bool:
     result = np.zeros_like(sent)
     for group in fap_groups()[1:]:
         columns = np.array(group) - 1
-        derives = (known[:, columns] & ~sent[:, columns]).any(axis=1)
+        derives = np.asarray((known[:, columns] & ~sent[:, columns]).any(axis=1))
         result[:, columns] = derives[:, None] & ~sent[:, columns]
     return result
 

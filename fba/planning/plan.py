@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +16,16 @@ from fba.codec import (
     EncoderStatistics,
     coarsest_quantisers,
     code_lengths,
+    encode_with_statistics,
     quantise,
 )
+from fba.errors import FbaWarning
 from fba.face.resolve import known_faps, resolve
 from fba.planning.derived_faps import Choice, choose_faps, interpolated_faps, related_faps
 from fba.planning.segments import Cuts, cheapest_segments, find_cuts
 from fba.tracks import BodyTrack, FaceTrack
+
+PRESETS = ("exact", "compact", "reference")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,28 @@ class Plan:
         chunks = [encoder.push_segment(self.animation[frames]) for frames in self.segments]
         chunks.append(encoder.finish())
         return b"".join(chunks), encoder.statistics
+
+
+def encode_planned(
+    animation: Animation, options: EncoderOptions | None = None, *, preset: str = "exact"
+) -> tuple[bytes, EncoderStatistics]:
+    """Return the shorter of the stream of a plan and that of `fba.encode`, and what the encoder counted.
+
+    preset: "exact" or "compact", the plan (see `plan_exact` and `plan_compact`); "reference", none.
+    Raises as `fba.codec.encode` does, ValueError for another preset.
+    """
+    if preset not in PRESETS:
+        raise ValueError(f"preset must be one of {', '.join(PRESETS)}, not {preset!r}")
+    if preset == "reference":
+        return encode_with_statistics(animation, options)
+    animation = quantise(animation, options or EncoderOptions())  # so that both have the same values
+    unplanned = encode_with_statistics(animation, options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)  # given above
+        planned = (plan_exact if preset == "exact" else plan_compact)(animation, options).encode()
+    # Plans rest on estimates, and on ranges that no value is limited by.
+    better = len(planned[0]) < len(unplanned[0]) and planned[1].clamped <= unplanned[1].clamped
+    return planned if better else unplanned
 
 
 def plan_exact(animation: Animation, options: EncoderOptions | None = None) -> Plan:
@@ -110,14 +137,17 @@ def _without_unmoved_faps(face: FaceTrack) -> FaceTrack:
     used = face.viseme.any(), face.expression.any()
     mask[:, :2] &= used
     if not any(used):
-        moves = face.values.any(axis=0)
+        moves = np.asarray(face.values.any(axis=0))
         for related in related_faps():
             mask[:, related] &= moves[list(related)].any()
-    return FaceTrack(face.values, mask, face.viseme, face.expression, face.interpolated)
+    interpolated = face.interpolated
+    if interpolated is not None:  # what is left out must not end the interpolation of its group
+        interpolated = interpolated_faps(mask, mask | interpolated)
+    return FaceTrack(face.values, mask, face.viseme, face.expression, interpolated)
 
 
 def _body_mask(animation: Animation) -> Bool:
-    """Return bool (T, 296 or 0): BAPs that are sent and move; one never sent is 0, too."""
+    """Return bool (T, 296), or (T, 0): BAPs that are sent and move; one never sent is 0, too."""
     if animation.body is None:
         return np.zeros((len(animation), 0), dtype=np.bool_)
     mask: Bool = animation.body.mask & animation.body.values.any(axis=0)

@@ -73,6 +73,11 @@ _FOLDER_OR_FILE = OutputType(folders=True)
     help="File for other programs, in the format of its suffix, or a folder with --to.",
 )
 @options.to_option
+@click.option(
+    "--shown",
+    is_flag=True,
+    help="Write what a face shows, as low-level FAPs: also those that a player derives from others.",
+)
 @options.no_clobber_option
 @writer_options.writer_options
 @options.bap_steps_option
@@ -86,6 +91,7 @@ def command(
     epf: Path | None,
     output: Path | None,
     to: str | None,
+    shown: bool,
     no_clobber: bool,
     bap_steps: str,
     salvage: bool,
@@ -121,7 +127,14 @@ def command(
             with each.file(path):
                 reports.append(
                     _decode(
-                        path, targets, outputs, settings, bap_steps=bap_steps, salvage=salvage, limits=limit
+                        path,
+                        targets,
+                        outputs,
+                        settings,
+                        bap_steps=bap_steps,
+                        salvage=salvage,
+                        shown=shown,
+                        limits=limit,
                     )
                 )
             step.advance()
@@ -198,6 +211,7 @@ def _decode(
     *,
     bap_steps: str,
     salvage: bool,
+    shown: bool,
     limits: Limits,
 ) -> dict[str, Any]:
     """Decode a stream to its files; return a report. settings: for the writer of `--output`."""
@@ -213,6 +227,10 @@ def _decode(
     )
     if bap_steps != BAP_STEPS_AUTO:
         step_tables.warn_of_doubt(path, animation, table)
+    if shown and animation.face is not None:
+        from fba.face.resolve import shown_faps
+
+        animation = replace(animation, face=shown_faps(animation.face))
     parts = {"face": "FAPs", "body": "BAPs"}
     for target in targets:
         held = parts if target.writing is None else target.writing.carries

@@ -117,8 +117,11 @@ class _EncodeCommand(Command):
 @options.written_bap_steps_option
 @options.mark_option
 @options.choice_option(
-    "--preset", "Ranges of the arithmetic coder: the reference encoder's, which fit the data.", "reference"
-)
+    "--preset",
+    "What is sent: all values, but not parameters that never move (exact); only FAPs that players do not "
+    "derive from others (compact); all that is given (reference). auto: compact for captures, else exact.",
+    "auto", "exact", "compact", "reference",
+)  # fmt: skip
 @options.choice_option("--unsent", "What a player shows for FAPs that are not sent.", "keep", "interpolate")
 @click.option(
     "--gender",
@@ -214,6 +217,7 @@ def command(
     limit: Limits,
     mark: bool | None,
     bap_steps: str,
+    preset: str,
     **settings: Any,
 ) -> None:
     """Encode FAP and BAP files, motion capture or captured faces as an FBA stream.
@@ -269,9 +273,10 @@ def command(
     if captures and _is_left_open("origin"):
         animation = bring_near(animation, table, settings["bap_quant"])
     with Progress("encoding", None):
-        coded = (
-            _encode(animation, settings) if epf is None else _encode_as_epf(epf, animation, settings, limit)
-        )
+        if epf is not None:
+            coded = _encode_as_epf(epf, animation, settings, limit)
+        else:
+            coded = _encode(animation, settings, _preset(preset, inputs, format))
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
     if spoken is not None:
@@ -358,11 +363,19 @@ class _Encoded(NamedTuple):
         return sum(one.count for one in self.clamped.values())
 
 
-def _encode(animation: Animation, settings: Mapping[str, Any]) -> _Encoded:
-    """Return the stream of an animation. settings: fields of EncoderOptions."""
-    from fba.codec import EncoderOptions, encode_with_statistics
+def _preset(preset: str, inputs: tuple[Path, ...], format: str | None) -> str:
+    """Return the preset, of "auto" the one that suits the input."""
+    if preset != "auto":
+        return preset
+    return "compact" if all(is_capture(path, format) for path in inputs) else "exact"
 
-    data, statistics = encode_with_statistics(animation, EncoderOptions(**settings))
+
+def _encode(animation: Animation, settings: Mapping[str, Any], preset: str) -> _Encoded:
+    """Return the stream of an animation. settings: fields of EncoderOptions."""
+    from fba.codec import EncoderOptions
+    from fba.planning import encode_planned
+
+    data, statistics = encode_planned(animation, EncoderOptions(**settings), preset=preset)
     return _Encoded(
         data,
         statistics.planes,

@@ -1,0 +1,296 @@
+"""Plans: nothing that is sent or shown changes, and streams become smaller."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
+from fba.codec import coarsest_quantisers, code_lengths, quantise
+from fba.face.resolve import resolve, shown_faps
+from fba.parameters import bap_steps, fap_groups, faps
+from fba.planning import encode_planned, plan_compact, plan_exact
+from fba.planning.segments import Cuts, cheapest_segments, find_cuts
+
+LENGTH = 120
+MATES = [
+    (one.number - 1, one.left_right_mate - 1) for one in faps() if (one.left_right_mate or 0) > one.number
+]
+LIPS = [(one.number - 1, one.lip_mate - 1) for one in faps() if one.lip_mate and one.group == 2]
+
+
+def made_face(rng: np.random.Generator, length: int = LENGTH) -> FaceTrack:
+    """Return FAPs as captures and editors make them: equal for a while, still, or of their own."""
+    step = np.array([1, 1, *(one.step for one in faps()[2:])])
+    motion = np.cumsum(rng.integers(-2, 3, (length, 68)) * (rng.random((length, 68)) < 0.6), axis=0)
+    motion[:, rng.random(68) < 0.3] = 0
+    values = (motion * step).astype(np.int32)
+    for pairs in (LIPS, MATES):
+        for one, other in pairs:
+            start, stop = sorted(rng.integers(0, length + 1, 2)) if rng.random() < 0.5 else (0, length)
+            values[start:stop, other] = values[start:stop, one]
+    values[:, :2] = 0
+    mask = np.tile(rng.random(68) < 0.85, (length, 1))
+    mask[:, :2] = False
+    if rng.random() < 0.5:
+        start, stop = sorted(rng.integers(1, length, 2))
+        mask[start:stop] &= rng.random(68) < 0.7
+    viseme, expression = np.zeros((length, 4), np.int16), np.zeros((length, 6), np.int16)
+    if rng.random() < 0.4:
+        mask[:, 0] = True
+        viseme[:, 0], viseme[:, 2] = rng.integers(0, 15, length), 63
+        mask[:, 1] = rng.random() < 0.5
+        expression[:, 0], expression[:, 1] = 3, 40
+        expression[:, 4] = rng.random() < 0.5
+        viseme[:, 3] = rng.random(length) < (0.05 if rng.random() < 0.3 else 0)
+    asked = None
+    if rng.random() < 0.3:  # of whole groups, as a mask type says it
+        asked = np.zeros((length, 68), dtype=bool)
+        for group in fap_groups()[1:]:
+            asked[:, np.array(group) - 1] = rng.random() < 0.5
+    return FaceTrack(values, mask, viseme, expression, asked)
+
+
+def made_animation(seed: int) -> Animation:
+    rng = np.random.default_rng(seed)
+    index = np.append(0, np.cumsum(rng.choice([1, 1, 1, 4], LENGTH - 1)))
+    body = None
+    if rng.random() < 0.5:
+        walk = np.cumsum(rng.integers(-3, 4, (LENGTH, 296)), axis=0)
+        moving = rng.random(296) < 0.2
+        body = BodyTrack(
+            (walk * bap_steps("iso") * moving).astype(np.int32), np.tile(rng.random(296) < 0.5, (LENGTH, 1))
+        )
+    return Animation(Fraction(25), index, made_face(rng), body)
+
+
+def held(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    last = np.maximum.accumulate(np.where(mask, np.arange(1, len(mask) + 1)[:, None], 0), axis=0)
+    return np.take_along_axis(np.concatenate([np.zeros_like(values[:1]), values]), last, axis=0)
+
+
+@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("preset", ["exact", "compact"])
+def test_a_face_shows_the_same_and_a_body_holds_the_same(seed: int, preset: str) -> None:
+    animation = made_animation(seed)
+    rng = np.random.default_rng(seed)
+    options = EncoderOptions(
+        fap_quant=int(rng.choice([1, 1, 3])),
+        bap_quant=int(rng.choice([1, 4])),
+        intra_period=float(rng.choice([0.5, 2])) if rng.random() < 0.3 else None,
+        start_codes=bool(rng.random() < 0.3),
+        clamp=True,
+    )
+    expected = quantise(animation, options)
+    assert animation.face is not None
+    assert expected.face is not None
+    data, _ = encode_planned(animation, options, preset=preset)
+    decoded = fba.decode(data)
+    assert decoded.face is not None
+    assert np.array_equal(decoded.index - decoded.index[0], animation.index - animation.index[0])
+    assert np.array_equal(resolve(decoded.face), resolve(expected.face))
+    if preset == "exact":
+        sent = decoded.face.mask
+        assert np.array_equal(decoded.face.values[sent], expected.face.values[sent])
+        assert not expected.face.values[animation.face.mask & ~sent].any()
+    if expected.body is not None:
+        assert decoded.body is not None
+        assert np.array_equal(
+            held(decoded.body.values, decoded.body.mask), held(expected.body.values, expected.body.mask)
+        )
+    assert len(data) <= len(fba.encode(animation, options))
+
+
+def test_what_a_player_derives_is_not_sent() -> None:
+    values = np.zeros((50, 68), dtype=np.int32)
+    smile = np.arange(50) % 7 * 8
+    for number in (12, 13, 59, 60):
+        values[:, number - 1] = smile
+    values[:, 19 - 1] = np.arange(50) % 5 * 16  # the left lid alone
+    values[:25, 20 - 1] = values[:25, 19 - 1]
+    mask = np.ones((50, 68), dtype=bool)
+    mask[:, :2] = False
+    plan = plan_compact(Animation(25, np.arange(50), FaceTrack(values, mask)))
+    assert plan.animation.face is not None
+    sent = plan.animation.face.mask
+    assert sent[0].sum() == sent[0, [11, 12, 58, 59]].sum() + sent[0, [18, 19]].sum() == 3
+    assert sent[-1, [18, 19]].all()
+    decoded = fba.decode(plan.encode()[0]).face
+    assert decoded is not None
+    assert np.array_equal(shown_faps(decoded).values, values)
+
+
+def test_sides_that_part_late_are_worth_an_i_plane() -> None:
+    rng = np.random.default_rng(3)
+    values = np.zeros((600, 68), dtype=np.int32)
+    for one, other in MATES:
+        values[:, one] = np.cumsum(rng.integers(-1, 2, 600)) * faps()[one].step
+        values[:300, other] = values[:300, one]
+        values[300:, other] = -values[300:, one]
+    mask = np.tile(values.any(axis=0), (600, 1))
+    plan = plan_compact(Animation(25, np.arange(600), FaceTrack(values, mask)))
+    assert len(plan.segments) == 2
+    assert abs(plan.segments[1].start - 300) <= 15
+    assert plan.animation.face is not None
+    assert plan.animation.face.mask[200].sum() * 2 == plan.animation.face.mask[400].sum()
+
+
+def test_a_still_side_beside_one_that_moves_is_sent() -> None:
+    values = np.zeros((20, 68), dtype=np.int32)
+    values[:, 31 - 1] = np.arange(20) * 4  # raise_l_i_eyebrow
+    mask = np.zeros((20, 68), dtype=bool)
+    mask[:, [30, 31]] = True
+    for make in (plan_exact, plan_compact):
+        track = make(Animation(25, np.arange(20), FaceTrack(values, mask))).animation.face
+        assert track is not None
+        assert track.mask[:, [30, 31]].all()
+
+
+def test_a_fap_held_at_0_against_a_viseme_is_sent() -> None:
+    mask = np.zeros((20, 68), dtype=bool)
+    mask[:, [0, 2]] = True  # the viseme, and open_jaw
+    viseme = np.tile(np.array([10, 0, 63, 0], dtype=np.int16), (20, 1))
+    face = FaceTrack(np.zeros((20, 68), dtype=np.int32), mask, viseme)
+    for make in (plan_exact, plan_compact):
+        track = make(Animation(25, np.arange(20), face)).animation.face
+        assert track is not None
+        assert track.mask[:, [0, 2]].all()
+
+
+def test_a_viseme_that_shows_nothing_is_left_out() -> None:
+    mask = np.zeros((20, 68), dtype=bool)
+    mask[:, [0, 1, 30]] = True
+    values = np.zeros((20, 68), dtype=np.int32)
+    values[:, 30] = np.arange(20)
+    track = plan_exact(Animation(25, np.arange(20), FaceTrack(values, mask))).animation.face
+    assert track is not None
+    assert np.flatnonzero(track.mask.any(axis=0)).tolist() == [30]
+
+
+def test_estimated_lengths_are_those_of_the_coder() -> None:
+    rng = np.random.default_rng(5)
+    face = made_face(rng, 800)
+    sent = FaceTrack(face.values, np.broadcast_to(face.values.any(axis=0), face.values.shape))
+    options = EncoderOptions()
+    estimated = code_lengths(sent, np.array([0, 800]), options)[:, 0, 1].sum() / 8
+    planes = 799 * 6 / 8  # a header of 4 bits, and 2 that end the segment
+    length = len(fba.encode(Animation(25, np.arange(800), sent), options))
+    assert length == pytest.approx(estimated + planes, rel=0.01)
+
+
+def test_estimates_between_any_cuts_are_those_of_the_frames_alone() -> None:
+    rng = np.random.default_rng(6)
+    values = np.cumsum(rng.integers(-9, 10, (90, 296)), axis=0).astype(np.int32) * 128
+    values[:, 20:] = 0
+    cuts = np.array([0, 17, 40, 90])
+    options = EncoderOptions(bap_quant=3)
+    all_bits = code_lengths(BodyTrack(values, values != 0), cuts, options)
+    assert not all_bits[20:].any()
+    for a in range(3):
+        for b in range(a + 1, 4):
+            part = values[cuts[a] : cuts[b]]
+            alone = code_lengths(BodyTrack(part, part != 0), np.array([0, len(part)]), options)
+            assert alone[:20, 0, 1] == pytest.approx(all_bits[:20, a, b])
+
+
+def test_segments_are_the_cheapest_of_all() -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        bits = rng.integers(1, 40, (6, 6)).astype(float)
+        needed = rng.random(6) < 0.3
+        cuts = Cuts(np.arange(6), needed)
+        inner = [
+            [0, *(i for i in range(1, 5) if chosen >> i & 1), 5]
+            for chosen in range(0, 32, 2)
+            if all(chosen >> i & 1 for i in range(1, 5) if needed[i])
+        ]
+        least = min(sum(bits[a, b] for a, b in pairwise(one)) for one in inner)  # all ways to divide
+        assert sum(bits[a, b] for a, b in cheapest_segments(bits, cuts)) == least
+
+
+def test_cuts_are_where_they_must_be_and_few() -> None:
+    needed = np.zeros(100_000, dtype=bool)
+    needed[[7, 77_777]] = True
+    cuts = find_cuts(needed)
+    assert cuts is not None
+    assert {0, 7, 77_777, 100_000} <= set(cuts.frames.tolist())
+    assert len(cuts.frames) < 60
+    assert cuts.frames[cuts.needed].tolist() == [0, 7, 77_777]
+    assert find_cuts(np.ones(1000, dtype=bool)) is None
+
+
+def test_masks_that_change_all_the_time_are_coded_as_they_are() -> None:
+    rng = np.random.default_rng(8)
+    face = made_face(rng)
+    flickering = FaceTrack(face.values, face.mask & (rng.random(face.mask.shape) < 0.5))
+    animation = Animation(25, np.arange(LENGTH), flickering)
+    for preset in ("exact", "compact"):
+        decoded = fba.decode(encode_planned(animation, preset=preset)[0]).face
+        assert decoded is not None
+        assert np.array_equal(resolve(decoded), resolve(flickering))
+
+
+def test_quantisers_are_as_coarse_as_the_values() -> None:
+    values = np.zeros((40, 68), dtype=np.int32)
+    values[:, [30, 31]] = np.arange(40)[:, None] % 9 * 12
+    mask = np.tile(np.arange(68) == 30, (40, 1))
+    animation = Animation(25, np.arange(40), FaceTrack(values, mask))
+    options = EncoderOptions()
+    assert coarsest_quantisers(animation, options).fap_quant == 6  # of steps of 2
+    planned = encode_planned(animation, options)[0]
+    assert np.array_equal(shown_faps(fba.decode(planned).face).values, values)  # type: ignore[arg-type]
+    assert len(planned) <= len(fba.encode(animation, EncoderOptions(fap_quant=6)))
+    with_viseme = replace(
+        animation,
+        face=FaceTrack(
+            values,
+            mask | (np.arange(68) == 0),
+            np.tile(np.array([1, 2, 63, 0], dtype=np.int16), (40, 1)),
+        ),
+    )
+    assert coarsest_quantisers(with_viseme, options).fap_quant == 3  # 63 = 21 x 3
+
+
+@pytest.mark.parametrize("make", [plan_exact, plan_compact])
+def test_no_frames_and_one(make) -> None:  # type: ignore[no-untyped-def]
+    empty = Animation(25, np.zeros(0, dtype=np.int64), FaceTrack.empty(0))
+    with pytest.raises(ValueError, match="no frame to encode"):
+        make(empty)
+    one = Animation(25, np.arange(1), FaceTrack.empty(1))
+    assert len(fba.decode(make(one).encode()[0])) == 1
+
+
+def test_unknown_preset() -> None:
+    with pytest.raises(ValueError, match="preset must be one of exact, compact, reference, not 'best'"):
+        encode_planned(made_animation(1), preset="best")
+
+
+def test_real_streams(shared: Path) -> None:
+    options = EncoderOptions(bap_steps="visage")
+    before = exact = seconds = compact = 0
+    for path in sorted((shared / "vectors/real").glob("*.fba")):
+        data = path.read_bytes()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            animation = fba.decode(data, bap_steps="visage")
+        planned = encode_planned(animation, options)[0]
+        assert len(planned) <= len(data)
+        before, exact = before + len(data), exact + len(planned)
+        if animation.face is None or not animation.face.values.any():
+            continue
+        face = Animation(animation.rate, animation.index, animation.face)
+        small = encode_planned(face, options, preset="compact")[0]
+        decoded = fba.decode(small).face
+        assert decoded is not None
+        assert np.array_equal(resolve(decoded), resolve(animation.face))
+        seconds += len(animation) / float(animation.rate)
+        compact += 8 * len(small)
+    assert exact <= 0.32 * before
+    assert compact <= 1830 * seconds
