@@ -180,7 +180,18 @@ SURFACE_TEST = "tests/face/importers/test_head_surface.py"
 PLACEMENT_TEST = "tests/player/scene/test_point_placement.py"
 VERDICT_TEST = "tests/cli/test_model.py -k verdicts"
 
+PLANS_TEST = "tests/planning/test_plans.py"
+
 MUTANTS = (
+    Mutant("fba/planning/plan.py", "    if not any(used):", "    if True:", PLANS_TEST),
+    Mutant("fba/planning/plan.py", "moves[list(related)].any()", "moves[list(related)]", PLANS_TEST),
+    Mutant("fba/planning/plan.py", "bits + INTRA_BITS, cuts)\n    face", "bits, cuts)\n    face", PLANS_TEST),
+    Mutant("fba/planning/segments.py", "            earliest = last", "            pass", PLANS_TEST),
+    Mutant(
+        "fba/planning/derived_faps.py", "better = shown & (own < least)", "better = own < least", PLANS_TEST
+    ),
+    Mutant("fba/codec/code_length.py", "2 * RANGE_CODE_MAX * RANGE_UNIT + 1", "RANGE_CODE_MAX", PLANS_TEST),
+    Mutant("fba/codec/quantisation.py", "divisor % scale == 0 and", "", PLANS_TEST),
     Mutant("fba/face/importers/assembly/landmarks.py", "UNLIKE = 1.3", "UNLIKE = 1.4", SURFACE_TEST),
     Mutant(
         "fba/face/importers/assembly/landmarks.py",

@@ -92,7 +92,7 @@ def _quantised(track: FaceTrack | BodyTrack, options: EncoderOptions) -> Int32:
 
 def _quantised_face(face: FaceTrack, options: EncoderOptions) -> FaceTrack:
     """Return a face with quantised values, and with its blend and intensities rounded as FAPs are."""
-    step = np.int64(max(options.fap_quant, 1))
+    step = np.array(max(options.fap_quant, 1), dtype=np.int64)
     viseme, expression = face.viseme.copy(), face.expression.copy()
     for fields, columns in ((viseme, [2]), (expression, [1, 3])):
         fields[:, columns] = quantiser.levels(np.clip(fields[:, columns], 0, INTENSITY_MAX), step) * step

@@ -25,7 +25,7 @@ from fba.planning.derived_faps import Choice, choose_faps, interpolated_faps, re
 from fba.planning.segments import Cuts, cheapest_segments, find_cuts
 from fba.tracks import BodyTrack, FaceTrack
 
-PRESETS = ("exact", "compact", "reference")
+PRESETS = ("exact", "compact")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +53,11 @@ def encode_planned(
 ) -> tuple[bytes, EncoderStatistics]:
     """Return the shorter of the stream of a plan and that of `fba.encode`, and what the encoder counted.
 
-    preset: "exact" or "compact", the plan (see `plan_exact` and `plan_compact`); "reference", none.
+    preset: "exact" or "compact", the plan (see `plan_exact` and `plan_compact`).
     Raises as `fba.codec.encode` does, ValueError for another preset.
     """
     if preset not in PRESETS:
         raise ValueError(f"preset must be one of {', '.join(PRESETS)}, not {preset!r}")
-    if preset == "reference":
-        return encode_with_statistics(animation, options)
     animation = quantise(animation, options or EncoderOptions())  # so that both have the same values
     unplanned = encode_with_statistics(animation, options)
     with warnings.catch_warnings():

@@ -142,6 +142,17 @@ def test_sides_that_part_late_are_worth_an_i_plane() -> None:
     assert plan.animation.face.mask[200].sum() * 2 == plan.animation.face.mask[400].sum()
 
 
+def test_what_comes_later_is_not_sent_before() -> None:
+    rng = np.random.default_rng(4)
+    values = np.cumsum(rng.integers(-1, 2, (200, 68)), axis=0).astype(np.int32) * 2
+    values[:, :2] = 0
+    mask = np.zeros((200, 68), dtype=bool)
+    mask[:, 4 - 1] = mask[100:, 14 - 1] = True
+    track = plan_compact(Animation(25, np.arange(200), FaceTrack(values, mask))).animation.face
+    assert track is not None
+    assert np.array_equal(track.mask, mask)
+
+
 def test_a_still_side_beside_one_that_moves_is_sent() -> None:
     values = np.zeros((20, 68), dtype=np.int32)
     values[:, 31 - 1] = np.arange(20) * 4  # raise_l_i_eyebrow
@@ -268,7 +279,7 @@ def test_no_frames_and_one(make) -> None:  # type: ignore[no-untyped-def]
 
 
 def test_unknown_preset() -> None:
-    with pytest.raises(ValueError, match="preset must be one of exact, compact, reference, not 'best'"):
+    with pytest.raises(ValueError, match="preset must be one of exact, compact, not 'best'"):
         encode_planned(made_animation(1), preset="best")
 
 

@@ -118,9 +118,9 @@ class _EncodeCommand(Command):
 @options.mark_option
 @options.choice_option(
     "--preset",
-    "What is sent: all values, but not parameters that never move (exact); only FAPs that players do not "
-    "derive from others (compact); all that is given (reference). auto: compact for captures, else exact.",
-    "auto", "exact", "compact", "reference",
+    "What is sent: all that is given (reference); not what never moves (exact); of the FAPs only those that "
+    "players do not derive from others (compact).",
+    "reference", "exact", "compact",
 )  # fmt: skip
 @options.choice_option("--unsent", "What a player shows for FAPs that are not sent.", "keep", "interpolate")
 @click.option(
@@ -276,7 +276,7 @@ def command(
         if epf is not None:
             coded = _encode_as_epf(epf, animation, settings, limit)
         else:
-            coded = _encode(animation, settings, _preset(preset, inputs, format))
+            coded = _encode(animation, settings, preset)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
     if spoken is not None:
@@ -363,19 +363,17 @@ class _Encoded(NamedTuple):
         return sum(one.count for one in self.clamped.values())
 
 
-def _preset(preset: str, inputs: tuple[Path, ...], format: str | None) -> str:
-    """Return the preset, of "auto" the one that suits the input."""
-    if preset != "auto":
-        return preset
-    return "compact" if all(is_capture(path, format) for path in inputs) else "exact"
-
-
 def _encode(animation: Animation, settings: Mapping[str, Any], preset: str) -> _Encoded:
     """Return the stream of an animation. settings: fields of EncoderOptions."""
-    from fba.codec import EncoderOptions
-    from fba.planning import encode_planned
+    from fba.codec import EncoderOptions, encode_with_statistics
 
-    data, statistics = encode_planned(animation, EncoderOptions(**settings), preset=preset)
+    options = EncoderOptions(**settings)
+    if preset == "reference":
+        data, statistics = encode_with_statistics(animation, options)
+    else:
+        from fba.planning import encode_planned
+
+        data, statistics = encode_planned(animation, options, preset=preset)
     return _Encoded(
         data,
         statistics.planes,
