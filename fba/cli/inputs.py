@@ -246,8 +246,8 @@ def read_face_quietly(
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        capture = read_face(path, fps, format, limits, capture)
-    return None if capture is None else capture[1]
+        found = read_face(path, fps, format, limits, capture)
+    return None if found is None else found[1]
 
 
 def check_capture_options(given: Mapping[str, str], files: Iterable[Path], format: str | None) -> None:
