@@ -92,6 +92,8 @@ FACES_TEST = "tests/formats/gltf/test_face_motion.py"
 DECLARED_TEST = "tests/formats/gltf/test_declared_bones.py"
 FIGURE = "fba/capture/comparison/figure.py"
 MEASURES = "fba/capture/comparison/measures.py"
+NAMED_BONES = "fba/capture/_named_bones.py"
+STANDING = "fba/capture/_standing.py"
 MEASUREMENT = "fba/capture/comparison/measurement.py"
 VERDICT = "fba/capture/comparison/verdict.py"
 BOUNDS = "fba/capture/comparison/thresholds.csv"
@@ -377,6 +379,12 @@ MUTANTS = (
     Mutant(UP_AXIS, "CLEAR_UP = 0.75", "CLEAR_UP = 1.1", PREPARATION_TEST),
     Mutant(UP_AXIS, "if stands and clear >= CLEAR_UP", "if clear >= CLEAR_UP", PREPARATION_TEST),
     Mutant(UP_AXIS, "not stands and axis[0] != 0", "False", PREPARATION_TEST),
+    Mutant(
+        STANDING, '"clavicles": 75.0,\n}\n"""Largest', '"clavicles": 180.0,\n}\n"""Largest', PREPARATION_TEST
+    ),
+    Mutant(NAMED_BONES, 'f != "middle"', "True", PREPARATION_TEST),
+    Mutant(NAMED_BONES, "len(others) < len(legs)", "True", PREPARATION_TEST),
+    Mutant(MEASURES, 'rest.tips.get(f"{side}_wrist", 2', 'rest.tips.get("", 2', COMPARISON_TEST),
     Mutant(FIGURE, "STRAIGHT = 0.9", "STRAIGHT = 0.5", PREPARATION_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 1.0", BVH_READING_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 500.0", BVH_READING_TEST),

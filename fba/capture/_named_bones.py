@@ -44,6 +44,8 @@ def find(names: Sequence[str], parents: Int64, offsets: Float64, skeleton: Skele
     for side in "lr":
         for limb, parts in LIMBS.items():
             mapped |= _limb(side, limb, parts, meanings, parents, lengths)
+    if not any(f"{side}_shoulder" in mapped for side in "lr") and _has_four_legs(mapped, meanings, parents):
+        return {}
     if not all(f"{side}_{joint}" in mapped for side in "lr" for joint in ("hip", "knee", "ankle")):
         return {}
     hips = _common(_path(parents, mapped["l_hip"])[:-1], _path(parents, mapped["r_hip"])[:-1])
@@ -119,6 +121,23 @@ def _limb(
     return {f"{side}_{joint}": number for number, (_, joint) in zip(best[1], parts, strict=True)}
 
 
+def _has_four_legs(mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64) -> bool:
+    """Whether each side has another leg beside the one that was found, as animals have."""
+    legs = [part for part, _ in LIMBS["leg"]]
+    for side in "lr":
+        own = {mapped.get(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")}
+        others = {
+            part
+            for number, meaning in enumerate(meanings)
+            if meaning.side == side and not meaning.helper and own.isdisjoint(_path(parents, number))
+            for part in legs
+            if part in meaning.parts
+        }
+        if len(others) < len(legs):
+            return False
+    return True
+
+
 def _certain(meaning: Meaning) -> set[str]:
     return {part for part, value in meaning.parts.items() if value > 1}
 
@@ -184,7 +203,8 @@ def _fingers(
     chains: dict[str, list[int]] = {}
     for number in _below(parents, mapped[f"{side}_wrist"]):
         meaning = meanings[number]
-        finger = next((f for f in FINGERS if f in meaning.parts), None)
+        named = [finger for finger in FINGERS if finger in meaning.parts]
+        finger = next((f for f in named if f != "middle"), named[0] if named else None)  # "ring_mid"
         above = next((f for f, chain in chains.items() if int(parents[number]) in chain), None)
         if above is not None and (finger in (None, above)):
             finger = above
@@ -197,7 +217,7 @@ def _fingers(
         if "meta" in meaning.parts or "inhand" in names[number].lower():  # Rokoko: "LeftInHandIndex"
             continue
         chain = chains.setdefault(finger, [])
-        if chain and meanings[chain[-1]] == meaning:
+        if chain and _letters(names[chain[-1]]) == _letters(names[number]):
             chain[-1] = number  # DAZ: "__lthumb" above "lthumb" stands still
         else:
             chain.append(number)
@@ -208,6 +228,10 @@ def _fingers(
         for position, number in enumerate(chain[start : start + 3], 1):
             result[f"{side}_{finger}{position}"] = number
     return result
+
+
+def _letters(name: str) -> str:
+    return "".join(filter(str.isalnum, name)).lower()
 
 
 def _digit(number: int) -> int:

@@ -23,9 +23,11 @@ MOST = {
     "arms": 50.0,
     "elbow": 60.0,
     "toes": 100.0,
+    "clavicles": 75.0,
 }
 """Largest angles in degrees of a rest pose: thigh from straight down, bend of knees and elbows, back and neck
-from straight up, shoulders against hips, left limbs against the mirrored right ones, toes from ahead."""
+from straight up, shoulders against hips, left limbs against the mirrored right ones, toes from ahead,
+clavicles from the side."""
 FREE = {
     "thigh": 8.0,
     "knee": 8.0,
@@ -35,6 +37,7 @@ FREE = {
     "arms": 8.0,
     "elbow": 15.0,
     "toes": 35.0,
+    "clavicles": 75.0,
 }
 """Angles up to which a person stands as well as can be."""
 
@@ -135,6 +138,8 @@ def measure(positions: Float64, mapped: Mapping[str, int]) -> Stance:
                     foot * np.array([1.0, 0.0, 1.0]) + np.array([0.0, 0.0, 1e-9]), np.array([0.0, 0.0, 1.0])
                 ),
             )
+        if (clavicle := bone(f"{side}_sternoclavicular", f"{side}_shoulder")) is not None:
+            add("clavicles", between(clavicle, np.array([1.0 if side == "l" else -1.0, 0.0, 0.0])))
     for what, a in (("legs", "hip"), ("legs", "knee"), ("arms", "shoulder"), ("arms", "elbow")):
         one, other = limbs["l", a], limbs["r", a]
         if one is not None and other is not None:

@@ -261,6 +261,22 @@ def test_a_palm_that_is_off_all_the_time_is_seen_without_fingers(
     assert one.grade == "poor"
 
 
+def test_palms_of_hands_that_hang_at_rest_on_arms_that_do_not(mapped: dict[str, int]) -> None:
+    """The hand's own end shows how it rests: a hand along -y in a T-pose has its palm at the thigh's side."""
+    posed = motion("T", 3)
+    rotations = np.array(posed.rotations)
+    for side, turn in (("Left", 90), ("Right", -90)):
+        quaternion = Rotation.from_euler("z", turn, degrees=True).as_quat()[[3, 0, 1, 2]]
+        rotations[:, posed.names.index(f"{side}Hand")] = quaternion
+    hands = np.array([posed.names.index(f"{side}Hand") for side in ("Left", "Right")])
+    hanging = replace(
+        posed, rotations=rotations, end_parents=hands, end_offsets=np.array([[0.0, -0.15, 0.0]] * 2)
+    )
+    result = from_skeleton(hanging)
+    for side in ("left", "right"):
+        assert find(compare(hanging, result, mapped), "palm", f"{side} hand").worst < 10
+
+
 def test_a_wrung_forearm_is_seen_where_the_rest_pose_says_nothing(
     source: SkeletonMotion, result: Animation, mapped: dict[str, int]
 ) -> None:

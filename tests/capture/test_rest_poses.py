@@ -12,6 +12,7 @@ from capture_bodies import motion
 from fba.body import BapSolver, Skeleton
 from fba.capture import from_skeleton
 from fba.capture._bone_words import read
+from fba.capture._named_bones import _fingers
 from fba.capture.bones import find_bones
 from fba.capture.comparison import find_up
 from fba.capture.preparation import prepare
@@ -137,6 +138,53 @@ def test_a_motion_that_says_nothing_is_refused() -> None:
     heap = replace(captured, offsets=np.stack([lengths, 0 * lengths, 0 * lengths], axis=1))
     with pytest.raises(ModelError, match=r"not clear \(confidence 0\.\d\d, at least 0\.5 is needed\)"):
         prepare(heap, SKELETON)
+
+
+def test_nobody_rests_with_clavicles_along_the_neck() -> None:
+    """Arms and clavicles that point up at rest, with a T-pose as the first frame, as of Geno."""
+    captured = motion("T", 2)
+    offsets = np.array(captured.offsets)
+    raised = Rotation.from_euler("z", 90, degrees=True).as_matrix()
+    rotations = np.array(captured.rotations)
+    for side, up in (("Left", raised), ("Right", raised.T)):
+        for name in ("Arm", "ForeArm", "Hand"):
+            offsets[captured.names.index(f"{side}{name}")] @= up.T
+        rotations[:, captured.names.index(f"{side}Shoulder")] = Rotation.from_matrix(up.T).as_quat()[
+            [3, 0, 1, 2]
+        ]
+    ready = prepare(replace(captured, offsets=offsets, rotations=rotations), SKELETON)
+    assert ready.rest == "first"
+    assert "clavicles 9" in ready.reasons["rest"]
+
+
+def test_the_middle_of_a_finger_is_no_middle_finger() -> None:
+    names = ["L_hand_jnt"]
+    parents = [-1]
+    for finger in ("thumb", "index", "middle", "ring", "pinky"):
+        for number, part in enumerate(("base", "mid", "tip")):
+            parents.append(0 if not number else len(names) - 1)
+            names.append(f"L_{finger}_{part}_jnt")
+    meanings = [read(name) for name in names]
+    found = _fingers("l", {"l_wrist": 0}, names, meanings, np.array(parents))
+    assert {names[number] for joint, number in found.items() if "ring" in joint} == {
+        "L_ring_base_jnt", "L_ring_mid_jnt",
+    }  # fmt: skip
+    assert found["l_middle1"] == names.index("L_middle_base_jnt")
+    assert found["l_middle2"] == names.index("L_middle_mid_jnt")
+
+
+def test_an_animal_has_no_counterpart() -> None:
+    """Two pairs of legs and no arm, whose front pair stood for a person's."""
+    captured = motion("T", 2)
+    renamed = tuple(
+        name.replace("UpLeg", "_Back_Leg_Upper").replace("ForeArm", "_Front_Leg_Lower")
+        .replace("LeftLeg", "Left_Back_Leg_Lower").replace("RightLeg", "Right_Back_Leg_Lower")
+        .replace("Foot", "_Back_Foot").replace("ToeBase", "_Back_Toes")
+        .replace("Arm", "_Front_Leg_Upper").replace("Hand", "_Front_Foot").replace("Shoulder", "Blade")
+        for name in captured.names
+    )  # fmt: skip
+    with pytest.raises(ModelError, match=r"no known skeleton family|no arms or legs"):
+        prepare(replace(captured, names=renamed), SKELETON)
 
 
 def test_a_frame_that_is_not_there() -> None:

@@ -26,7 +26,8 @@ class Figure:
     """A moving person.
 
     points: joint of the standard -> (T, 3), metres, y up. frames: joint -> (T, 3, 3), rotations of its own
-    axes, whatever these are. tips: joint -> (T, 3), the end of its bone where no joint is: of heads and feet.
+    axes, whatever these are. tips: joint -> (T, 3), the end of its bone where no joint is: of heads,
+    hands and feet.
     """
 
     points: Mapping[str, Float64]
@@ -73,7 +74,7 @@ def source_figure(motion: SkeletonMotion, mapped: Mapping[str, int], up: Float64
     points = {joint: positions[:, number] for joint, number in mapped.items()}
     frames = {joint: up @ rotations.matrices(turned[:, number]) for joint, number in mapped.items()}
     tips = {}
-    for joint in ("l_ankle", "r_ankle", "skullbase"):
+    for joint in ("l_ankle", "r_ankle", "l_wrist", "r_wrist", "skullbase"):
         if joint in mapped and (ends := _ends(motion, mapped[joint], frames[joint], metres)):
             tips[joint] = points[joint] + np.mean(ends, axis=0)
     return Figure(points, frames, tips)

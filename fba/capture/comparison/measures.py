@@ -124,8 +124,10 @@ def palms(source: Figure, result: Figure, rest: Figure) -> Iterator[Row]:
         own = result.palm(side, (shown[0], shown[-1]))
         if axes is not None:
             inwards = axes[:, 0] * (-1.0 if side == "l" else 1.0)
-            forearm = unit(rest.points[f"{side}_wrist"] - rest.points[f"{side}_elbow"])
-            raised = rotations.between(np.array([0.0, -1.0, 0.0]), forearm[0])
+            wrist = rest.points[f"{side}_wrist"]
+            # a hand that hangs at rest, whatever the arm does, shows how hands hang
+            bone = rest.tips.get(f"{side}_wrist", 2 * wrist - rest.points[f"{side}_elbow"]) - wrist
+            raised = rotations.between(np.array([0.0, -1.0, 0.0]), unit(bone)[0])
             at_rest = rest.frames[f"{side}_wrist"][0].T @ raised @ inwards
             yield Row("palm", part, degrees_between(source.frames[f"{side}_wrist"] @ at_rest, own))
         else:
