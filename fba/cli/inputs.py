@@ -106,6 +106,7 @@ def read_input(
     capture: Mapping[str, object] | None = None,
     doubts: list[str] | None = None,
     tables: list[str] | None = None,
+    readers: list[Format] | None = None,
     format: str | None = None,
     clip: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
@@ -119,6 +120,7 @@ def read_input(
     replace a header that a file lacks. capture: options for the readers of motion capture. doubts: that
     warning is appended to it. clip: of several animations in the file, the one to read, by name or number;
     without effect where the format holds one. tables: the table of a stream with a body is appended to it.
+    readers: the format is appended to it, which of standard input nothing else says.
     """
     from fba.formats import read
 
@@ -130,6 +132,8 @@ def read_input(
         if reader.name == "fba":
             options["bap_steps"] = step_tables.table_to_read(path, read_whole(file), bap_steps, limits)
         animation = read(file, format=reader.name, **_taken(reader, options))
+    if readers is not None:
+        readers.append(reader)
     if reader.name == "fba" and animation.body is not None:
         (tables if tables is not None else []).append(str(options["bap_steps"]))
         if bap_steps != BAP_STEPS_AUTO and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
@@ -195,11 +199,6 @@ def _find_format(file: Path, format: str | None) -> Format:
         return format_of(file, format)
     except OptionError as error:
         raise click.BadParameter(str(error), param_hint="--from") from error
-
-
-def is_capture(path: Path, format: str | None) -> bool:
-    """Whether a file holds what was captured of somebody; False for standard input, read only once."""
-    return str(path) != "-" and _find_format(path, format).is_capture
 
 
 def has_skeleton(path: Path, format: str | None) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,6 +20,9 @@ from fba.cli.outputs import (
     find_writer,
 )
 from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.formats.registry import Format
 
 
 @click.command(
@@ -88,13 +91,14 @@ def command(
     elif not bodies_map:
         joints = joint_options.read_joints(maps, captures, format, clip, limit)
     tables: list[str] = []
+    readers: list[Format] = []
     animation = read_input(
         source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format, clip=clip,
-        tables=tables, capture={"joints": joints, "markers": places},
+        tables=tables, readers=readers, capture={"joints": joints, "markers": places},
     )  # fmt: skip
     marked = mark is not False
     if writing.name == "fba":
-        made = bool(captures) or with_markers
+        made = any(reader.is_capture for reader in readers)
         table = step_tables.table_to_write(bap_steps, made=made, marked=marked, read=next(iter(tables), None))
         step_tables.warn_of_coarse_steps(animation, table)
         extra |= {"bap_steps": table, "mark": marked}

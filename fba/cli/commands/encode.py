@@ -21,7 +21,6 @@ from fba.cli.inputs import (
     has_markers,
     has_skeleton,
     input_file,
-    is_capture,
 )
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, rate_text, seconds_text
@@ -264,10 +263,10 @@ def command(
         )
     animation, limit_values = capture_report.apply_limits(animation, limits)
     if settings["clamp"] is None:
-        settings["clamp"] = any(is_capture(path, format) for path in inputs)
+        settings["clamp"] = taken.is_captured
     mark = mark if mark is not None else epf is None
     table = step_tables.table_to_write(
-        bap_steps, made=bool(captures or marked), marked=mark, read=taken.tables[0] if taken.tables else None
+        bap_steps, made=taken.has_captured_body, marked=mark, read=taken.tables[0] if taken.tables else None
     )
     settings |= {"bap_steps": table, "mark": mark}
     if captures and _is_left_open("origin"):

@@ -13,7 +13,7 @@ import click
 
 from fba.animation import Animation
 from fba.cli.command import STANDARD_INPUT, Decorated
-from fba.cli.inputs import is_capture, read_face_quietly, read_input
+from fba.cli.inputs import read_face_quietly, read_input
 from fba.cli.printing import Progress, rate_text
 from fba.errors import FormatError, OptionError
 from fba.formats import merge
@@ -22,7 +22,7 @@ from fba.formats.time_codes import parse_time_code, parse_time_of_day
 from fba.limits import Limits
 
 if TYPE_CHECKING:
-    from fba.formats.registry import FaceCapture
+    from fba.formats.registry import FaceCapture, Format
 
 
 SLOWEST = 60
@@ -86,12 +86,25 @@ class Inputs:
     """What was read.
 
     animation: of all inputs. start: time of day at its index 0, in seconds; None where unknown. together: how
-    two inputs with a capture among them were put together; None for others. tables: see `read_input`."""
+    two inputs with a capture among them were put together; None for others. tables, readers: see
+    `read_input`.
+    """
 
     animation: Animation
     start: float | None
     together: Together | None
     tables: tuple[str, ...]
+    readers: tuple[Format, ...]
+
+    @property
+    def is_captured(self) -> bool:
+        """Whether a capture is among the inputs."""
+        return any(reader.is_capture for reader in self.readers)
+
+    @property
+    def has_captured_body(self) -> bool:
+        """Whether the body is, or may be, from a capture: from a skeleton, or from where a head went."""
+        return any(one.read_motion is not None or "head_path" in one.read_options for one in self.readers)
 
     def body_of(self, animation: Animation) -> tuple[Animation, int]:
         """Return the frames of an animation of the same rows that a captured body covers.
@@ -124,13 +137,15 @@ def read_inputs(
     """
     _check_sync(files, sync, offset, trim)
     tables: list[str] = []
+    readers: list[Format] = []
     recordings: list[Recording] = []
     faces: list[FaceCapture | None] = []
     with Progress("reading", len(files)) as step:
         for path in files:
             animation = read_input(
-                path, fps=fps, format=format, capture=capture, limits=limits, tables=tables, **options
-            )
+                path, fps=fps, format=format, capture=capture, limits=limits, tables=tables,
+                readers=readers, **options,
+            )  # fmt: skip
             step.advance()
             if not len(animation):
                 raise FormatError("the file holds no frames; there is nothing to encode", path=path)
@@ -140,10 +155,10 @@ def read_inputs(
             name = STANDARD_INPUT if str(path) == "-" else str(path)
             recordings.append(Recording(name, animation, None if faces[-1] is None else faces[-1].start))
     if len(recordings) == 1:
-        return Inputs(recordings[0].animation, recordings[0].start, None, tuple(tables))
+        return Inputs(recordings[0].animation, recordings[0].start, None, tuple(tables), tuple(readers))
     first, second = recordings
-    if sync is None and offset is None and not any(is_capture(path, format) for path in files):
-        return Inputs(_merge(first, second), None, None, tuple(tables))
+    if sync is None and offset is None and not any(reader.is_capture for reader in readers):
+        return Inputs(_merge(first, second), None, None, tuple(tables), tuple(readers))
     try:
         together = join(
             first,
@@ -156,7 +171,7 @@ def read_inputs(
         )
     except OptionError as error:
         raise click.UsageError(str(error)) from error
-    return Inputs(together.animation, together.start, together, tuple(tables))
+    return Inputs(together.animation, together.start, together, tuple(tables), tuple(readers))
 
 
 def together_lines(files: tuple[Path, ...], together: Together) -> list[str]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -108,3 +110,21 @@ def test_convert(run: Run, capture: Path, tmp_path: Path) -> None:
     face = fba.read(tmp_path / "a.fap").face
     assert face is not None
     assert len(face) == 200
+
+
+def test_standard_input_gives_the_same_stream(
+    run: Run, capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Steps of BAPs and clamping go by the content, of which the name "-" says nothing."""
+    from_file, from_input = tmp_path / "a.fba", tmp_path / "b.fba"
+    assert run("encode", capture, "-o", from_file).code == 0
+
+    class Stdin:
+        buffer = BytesIO(capture.read_bytes())
+
+    monkeypatch.setattr(sys, "stdin", Stdin)
+    done = run("encode", "-", "-o", from_input)
+    assert done.code == 0, done.err
+    assert from_input.read_bytes()[-40:] == from_file.read_bytes()[-40:]
+    mine, theirs = fba.read(from_input), fba.read(from_file)
+    assert mine == theirs
