@@ -113,7 +113,8 @@ class ExtrasRenderer:
         self._depths = None
         if size[1] >= SMALLEST:
             for dots in extras.dots:
-                self._draw_names(dots, matrix, camera.eye, size, scale)
+                if any(dots.names):
+                    self._draw_names(dots, matrix, camera.eye, size, scale)
         if extras.legend is not None and size[1] >= SMALLEST_WITH_LEGEND:
             self._draw_legend(extras.legend, size, max(scale, LEAST_LEGEND))
         gl.fbo.depth_mask = True

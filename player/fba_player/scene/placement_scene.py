@@ -124,7 +124,7 @@ class PlacementScene(Timed[Timeline]):
             normals = unit_rows(part.normals @ turn.T).astype(np.float32)
             light = np.tile(np.array(LIGHT, dtype=np.float32), (len(positions), 1))
             meshes.append(
-                FaceMesh(_shape(part), positions, normals, light, np.eye(4), np.zeros(3), np.zeros(3))
+                FaceMesh(plain_shape(part), positions, normals, light, np.eye(4), np.zeros(3), np.zeros(3))
             )
         return meshes
 
@@ -168,7 +168,8 @@ def _make_dots(points: Float64, names: tuple[str, ...], colour: Colour, kind: st
     return Dots(points.astype(np.float32), colour, RADII[kind], LIFT, names, facing)
 
 
-def _shape(part: Part) -> FaceShape:
+def plain_shape(part: Part) -> FaceShape:
+    """A part in its own colours, or as clay if it has none."""
     colours = part.colours
     if colours is None:
         is_plain = part.material.colour == Material().colour and part.material.texture is None

@@ -9,7 +9,7 @@ import math
 
 from fba_player.session.actions import act
 from fba_player.session.keys import by_name
-from fba_player.session.placing import KEPT_ACTIONS, click_on_head, placement_of, press_key
+from fba_player.session.pages import page_of
 from fba_player.session.session import Session
 
 BAR_HEIGHT = 52
@@ -19,7 +19,7 @@ ORBIT_SPEED = 0.35
 """Degrees per pixel."""
 ZOOM_STEP = 0.9
 CLICK = 4.0
-"""Pixels, at a display scale of 1, by which the mouse may move in a click where points are placed."""
+"""Pixels, at a display scale of 1, by which the mouse may move in a click on a page."""
 
 
 class Controls:
@@ -42,10 +42,11 @@ class Controls:
         """
         session = self.session
         row = by_name().get(name)
-        if placement_of(session) is not None:
-            if press_key(session, name):
+        page = page_of(session)
+        if page is not None:
+            if page.press_key(session, name):
                 return True
-            if row is None or row.action.split()[0] not in KEPT_ACTIONS:
+            if row is None or not page.keeps(row.action):
                 return False
         if row is not None:
             session.touched()
@@ -65,7 +66,7 @@ class Controls:
     def move(self, x: float, y: float) -> None:
         """Handle a move of the mouse."""
         right, down = x - self._last[0], y - self._last[1]
-        if not self._dragged and placement_of(self.session) is not None:
+        if not self._dragged and page_of(self.session) is not None:
             self._dragged = math.hypot(right, down) > CLICK * self.session.scale
             if not self._dragged:
                 return
@@ -81,11 +82,12 @@ class Controls:
             viewpoint.camera = viewpoint.camera.pan(-right / height, down / height)
 
     def release(self) -> None:
-        """Handle the mouse button going up: a click places a point, where points are placed."""
+        """Handle the mouse button going up: one that did not move is a click, on pages that have them."""
         clicked = self._held == "orbit" and not self._dragged
         self._held = None
-        if clicked and placement_of(self.session) is not None:
-            click_on_head(self.session, *self._last)
+        page = page_of(self.session)
+        if clicked and page is not None:
+            page.click(self.session, *self._last)
 
     @property
     def holding(self) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 from imgui_bundle import imgui, implot
 
 from fba_player.session.controls import Controls
-from fba_player.session.placing import placement_of
+from fba_player.session.pages import page_of
 from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui._bar import Bar
@@ -41,8 +41,10 @@ class Gui:
         theme.apply_theme()
         self._renderer = ImguiRenderer(context)
         self.bar = Bar(self._renderer)
-        self._placing = placement_of(session) is not None
-        self.panels = make_panels(placing=self._placing)
+        page = page_of(session)
+        self._page = page
+        self._plays = page is None or page.plays
+        self.panels = make_panels(page.panel if page is not None else "")
         self._panel_windows = PanelWindows()
         self._open: set[str] = set()
         self._cover()
@@ -125,11 +127,13 @@ class Gui:
         self._hide(io)
         below = self._bar_height(display)
         taken = draw_recording(session)
-        if self.shown > 0 and not self._placing:
+        if self.shown > 0 and self._plays:
             imgui.push_style_var(imgui.StyleVar_.alpha, self.shown)
             self.bar.draw(session, display)
             available = [panel for panel in self.panels if panel.available(session)]
-            draw_name(session, display, taken, draw_buttons(session, available, display) - 20)
+            left = draw_buttons(session, available, display)
+            if self._page is None:  # the title of a page's window says it
+                draw_name(session, display, taken, left - 20)
             imgui.pop_style_var()
         closed = self._open - session.open
         self._panel_windows.forget(closed)
@@ -144,8 +148,8 @@ class Gui:
         self._open = set(session.open)
 
     def _bar_height(self, display: tuple[float, float]) -> float:
-        """Height of the bar in points; a window in which points are placed has none."""
-        return 0.0 if self._placing else self.bar.height(display)
+        """Height of the bar in points; 0 in a window that plays nothing."""
+        return self.bar.height(display) if self._plays else 0.0
 
     def _hide(self, io: imgui.IO) -> None:
         session = self.session
@@ -168,7 +172,7 @@ class Gui:
                     self._button = button
                     controls.press(name, x, y)
                     break
-            if imgui.is_mouse_double_clicked(0) and not self._placing:
+            if imgui.is_mouse_double_clicked(0) and self._page is None:
                 self.session.viewpoint.reset()
             if io.mouse_wheel:
                 controls.scroll(io.mouse_wheel)

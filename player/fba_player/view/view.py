@@ -158,8 +158,8 @@ class Dots:
 
     positions: float32 (N, 3). colour: of all dots. radius: pixels in a picture 720 high; 0 for names
     alone. lift: as for lines; a dot hidden further shows through faintly. names: one for each dot, drawn if
-    few are in view. facing: float32 (N, 3), the direction from which a dot is visible; zeros for all. most:
-    largest radius of a dot (m), so that dots stay apart from afar.
+    few are in view; all "" for none. facing: float32 (N, 3), the direction from which a dot is visible; zeros
+    for all. most: largest radius of a dot (m), so that dots stay apart from afar.
     """
 
     positions: Float32

@@ -22,7 +22,7 @@ from fba_player.playback.live import LiveTimeline
 from fba_player.playback.transport import Transport
 from fba_player.session.captures import Captures, draw_screenshot, read_pixels
 from fba_player.session.controls import Controls
-from fba_player.session.placing import placement_of
+from fba_player.session.pages import page_of
 from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.view.camera import Camera
@@ -301,7 +301,7 @@ class Window:
         self.captures.screenshot(pixels, transparent=transparent)
 
     def _show_title(self) -> None:
-        if placement_of(self.session) is not None:
+        if page_of(self.session) is not None:
             text = self._title + (" (not saved)" if self.session.unsaved else "")
         else:
             text = f"{self._title} - frame {self.transport.frame + 1} / {self.session.scene.timeline.frames}"

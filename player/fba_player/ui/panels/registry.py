@@ -7,6 +7,7 @@ from fba_player.ui.panels._curves_panel import CurvesPanel
 from fba_player.ui.panels._differences_panel import DifferencesPanel
 from fba_player.ui.panels._file_panel import FilePanel
 from fba_player.ui.panels._help_panel import HelpPanel
+from fba_player.ui.panels._markers_panel import MarkersPanel
 from fba_player.ui.panels._points_panel import PointsPanel
 from fba_player.ui.panels._rate_panel import RatePanel
 from fba_player.ui.panels._view_panel import ViewPanel
@@ -25,6 +26,13 @@ PANELS: tuple[type[Panel], ...] = (
 )
 
 
-def make_panels(*, placing: bool = False) -> list[Panel]:
-    """Make one object of each panel. placing: the one for a window in which points are placed by hand."""
-    return [PointsPanel()] if placing else [kind() for kind in PANELS]
+PAGES: dict[str, tuple[type[Panel], ...]] = {
+    "points": (PointsPanel,),
+    "markers": (MarkersPanel, CameraPanel),
+}
+"""Panels of windows for one task, by the name of the page's own panel."""
+
+
+def make_panels(page: str = "") -> list[Panel]:
+    """Make one object of each panel. page: name of a page's panel, for a window of one task."""
+    return [kind() for kind in (PAGES[page] if page else PANELS)]

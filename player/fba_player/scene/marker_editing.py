@@ -1,0 +1,233 @@
+"""Virtual markers while they are made by hand: the current one, its vertex and reach, undoing, saving.
+
+It knows no picture and no mouse; a window shows it as a `MarkersScene`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from fba.arrays import Bool, Float64
+from fba.capture.markers.motion import MarkerMotion
+from fba.capture.virtual_markers import MarkedHead, MarkerMapping, MarkerPerformance, VirtualMarker
+from fba.capture.virtual_markers.influence import Influence, give_to_nearest
+from fba.capture.virtual_markers.mapping_files import write_mapping
+from fba.capture.virtual_markers.performance import Neutral, SteadyMarkers, perform_steady, steady
+from fba.errors import FbaError, FbaWarning, OptionError
+
+FIRST_RADIUS = 0.03
+"""Metres, on a head of natural size, that the first virtual marker reaches."""
+
+
+class MarkerEditing:
+    """The virtual markers of a capture and a head while they are made.
+
+    motion, head: what is brought together. mapping: as it is now. path: the file to write, None if none was
+    named. neutral: the frames in which the face is neutral. current: the name of the marker that the next
+    click on the head places. problem: why the head does not move yet, "" if it does. doubts: what was odd
+    about the capture or the mapping. beside: whether the cloud of markers is beside the head, not over it.
+    shows_weights: whether the head has the colours of the current marker's reach.
+    """
+
+    def __init__(
+        self,
+        motion: MarkerMotion,
+        head: MarkedHead,
+        mapping: MarkerMapping,
+        path: Path | None = None,
+        *,
+        neutral: Neutral = "auto",
+    ) -> None:
+        self.motion = motion
+        self.head = head
+        self.mapping = mapping
+        self.path = path
+        self.neutral = neutral
+        self.current = next((name for name in motion.names if name not in mapping.markers), motion.names[0])
+        self.problem = ""
+        self.doubts: tuple[str, ...] = ()
+        self.beside = True
+        self.shows_weights = True
+        self.written = False
+        self._saved = mapping
+        self._before: list[tuple[str, MarkerMapping]] = []
+        self._last_step: tuple[str, str] | None = None
+        self._steady: tuple[object, SteadyMarkers] | None = None
+        self._made: tuple[MarkerMapping, MarkerPerformance | None] | None = None
+        self._reach: tuple[object, Influence | None] | None = None
+
+    @property
+    def changed(self) -> bool:
+        """Whether there is something that was not saved."""
+        return self.mapping != self._saved
+
+    @property
+    def marker(self) -> VirtualMarker | None:
+        """The current marker's virtual one, None if it has none."""
+        return self.mapping.markers.get(self.current)
+
+    @property
+    def performance(self) -> MarkerPerformance | None:
+        """The head moved by the capture; None, and a `problem`, as long as the mapping does not suffice."""
+        if self._made is None or self._made[0] != self.mapping:
+            self._made = (self.mapping, self._perform())
+        return self._made[1]
+
+    @property
+    def influence(self) -> Influence | None:
+        """What the current marker moves, as vertices of the head's skin; None if it has no vertex."""
+        key = (self.mapping, self.current)
+        if self._reach is None or self._reach[0] != key:
+            self._reach = (key, self._find_influence())
+        return self._reach[1]
+
+    def choose(self, name: str) -> None:
+        """Make a marker the current one. Raises ValueError for one that the capture has not."""
+        if name not in self.motion.names:
+            raise ValueError(f"the capture has no marker {name!r}")
+        self.current = name
+
+    def step(self, by: int) -> None:
+        """Make the marker `by` places further in the capture the current one; it goes round."""
+        names = self.motion.names
+        self.current = names[(names.index(self.current) + by) % len(names)]
+
+    def next_missing(self) -> bool:
+        """Go to the next marker without a virtual one; returns False if there is none."""
+        names, at = self.motion.names, self.motion.names.index(self.current)
+        for name in (*names[at + 1 :], *names[: at + 1]):
+            if name not in self.mapping.markers:
+                self.current = name
+                return True
+        return False
+
+    def place(self, vertex: int) -> None:
+        """Put the current marker's centre on a vertex of the head."""
+        old = self.marker
+        radius = old.radius if old is not None and old.radius > 0 else self.first_radius
+        depth = old.depth if old is not None and old.depth > 0 else radius
+        fixed = old is not None and old.fixed
+        self._change(
+            "vertex", self.mapping.changed(self.current, VirtualMarker(vertex, radius, depth, fixed))
+        )
+
+    def resize(self, radius: float, depth: float) -> None:
+        """Give the current marker another reach, in the head's unit. Raises OptionError for none."""
+        if self.marker is not None and self.marker.vertex is not None:
+            marker = replace(self.marker, radius=radius, depth=depth)
+            self._change("size", self.mapping.changed(self.current, marker))
+
+    def fix(self, fixed: bool) -> None:
+        """Make the current marker fixed, or not; one without a vertex can only be fixed."""
+        old = self.marker
+        if old is None:
+            marker = VirtualMarker(None, fixed=True) if fixed else None
+        elif old.vertex is None and not fixed:
+            marker = None
+        else:
+            marker = replace(old, fixed=fixed)
+        self._change("fixed", self.mapping.changed(self.current, marker))
+
+    def assign(self, assignment: str) -> None:
+        """Set to whom vertices belong: "shared" or "exclusive"."""
+        self._change("assignment", replace(self.mapping, assignment=assignment))
+
+    def add_up(self, overlap: str) -> None:
+        """Set how displacements of shared vertices go together: "match" or "add"."""
+        self._change("overlap", replace(self.mapping, overlap=overlap))
+
+    def remove(self) -> None:
+        """Take away the current marker's virtual one."""
+        self._change("remove", self.mapping.changed(self.current, None))
+
+    def undo(self) -> bool:
+        """Take back the last change, and go to the marker that was current; False if there is none."""
+        if not self._before:
+            return False
+        self.current, self.mapping = self._before.pop()
+        self._last_step = None
+        return True
+
+    def save(self) -> None:
+        """Write the mapping, marked as made for this head. Raises OSError, FbaError where it cannot be."""
+        if self.path is None:
+            raise OptionError("no file was named for the mapping; give --map-out FILE.toml")
+        write_mapping(self.path, self.mapping.for_head(self.head))
+        self._saved = self.mapping
+        self.written = True
+
+    @cached_property
+    def seen(self) -> Bool:
+        """bool (T, M): whether each marker was seen in each frame."""
+        return self.motion.seen
+
+    @cached_property
+    def laid_out(self) -> Float64:
+        """float64 (T, M, 3): the capture upright and as large as the head, in its unit, around its middle.
+
+        For a mapping that does not suffice.
+        """
+        positions = self.motion.positions
+        if self.motion.up[1:] == "z":
+            positions = positions[..., [0, 2, 1]] * (1.0, 1.0, -1.0)
+        flat = positions.reshape(-1, 3)
+        low, high = np.nanmin(flat, axis=0), np.nanmax(flat, axis=0)
+        used = self.head.vertices[self.head.face]
+        size = float(np.ptp(used[:, 1])) / max(float(high[1] - low[1]), 1e-12)
+        result: Float64 = (positions - (low + high) / 2) * size + (used.min(axis=0) + used.max(axis=0)) / 2
+        return result
+
+    @property
+    def first_radius(self) -> float:
+        """The radius that a new virtual marker gets, in the head's unit: the middle one of all."""
+        radii = [marker.radius for marker in self.mapping.centres.values()]
+        return float(np.median(radii)) if radii else FIRST_RADIUS / self.head.metres
+
+    def _perform(self) -> MarkerPerformance | None:
+        doubts: list[str] = []
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always", FbaWarning)
+                self.mapping.check(self.head)
+                markers = self._steady_markers()
+                made = perform_steady(self.motion, self.head, self.mapping, markers)
+            doubts = [str(each.message) for each in caught if issubclass(each.category, FbaWarning)]
+            self.problem = ""
+        except FbaError as error:
+            made, self.problem = None, str(error)
+        self.doubts = tuple(doubts)
+        return made
+
+    def _steady_markers(self) -> SteadyMarkers:
+        """The markers without the head's motion, which depends on what is mapped and what is fixed alone."""
+        key = (tuple(self.mapping.markers), self.mapping.fixed)
+        if self._steady is None or self._steady[0] != key:
+            self._steady = (key, steady(self.motion, self.mapping, self.neutral))
+        return self._steady[1]
+
+    def _find_influence(self) -> Influence | None:
+        centres = self.mapping.centres
+        if self.current not in centres:
+            return None
+        number = self.head.skin.number
+        chosen = centres if self.mapping.assignment == "exclusive" else {self.current: centres[self.current]}
+        found = self.head.walked.walk(
+            [(int(number[each.vertex or 0]), each.radius, each.depth) for each in chosen.values()]
+        )
+        if self.mapping.assignment == "exclusive":
+            found = give_to_nearest(found)
+        return found[list(chosen).index(self.current)]
+
+    def _change(self, what: str, mapping: MarkerMapping) -> None:
+        if mapping == self.mapping:
+            return
+        step = (what, self.current)
+        if what != "size" or step != self._last_step:  # a slider that is dragged is one step
+            self._before.append((self.current, self.mapping))
+        self._last_step = step
+        self.mapping = mapping

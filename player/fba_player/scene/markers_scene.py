@@ -1,0 +1,343 @@
+"""A head that captured markers move, with their cloud, as a window and a film show it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fba.arrays import Float32, Float64, Intp
+from fba.mesh.meshes import vertex_normals
+from fba_player.figure.face import FaceFigure, build_figure
+from fba_player.mesh.textures import linear_light
+from fba_player.playback.capture_times import CaptureTimes
+from fba_player.scene._fap_heatmap import GLOSS, SHADES, heat_colours
+from fba_player.scene.marker_editing import MarkerEditing
+from fba_player.scene.placement_scene import LIGHT, plain_shape
+from fba_player.view.camera import Camera, Subject
+from fba_player.view.geometry import first_hit, ray_through, rotation_vector, translation, unit_rows
+from fba_player.view.protocols import Timed
+from fba_player.view.switches import Switches
+from fba_player.view.view import Colour, Dots, Extras, Eye, FaceMesh, FaceShape, Legend, Lines, View
+
+MOVING: Colour = (0.95, 0.62, 0.25, 1.0)
+FIXED: Colour = (0.62, 0.70, 0.80, 1.0)
+FREE: Colour = (0.93, 0.94, 0.96, 0.55)
+CURRENT: Colour = (0.25, 0.75, 1.0, 1.0)
+LINE: Colour = (0.25, 0.75, 1.0, 0.55)
+"""Moving, fixed and unmapped markers, the current one, and the line from it to its vertex."""
+RADIUS, CENTRE_RADIUS, CURRENT_RADIUS = 4.2, 2.6, 6.0
+"""Of dots, pixels in a picture 720 high."""
+LIFT = 0.006
+"""Metres of skin through which dots are seen."""
+GRAB = 10.0
+"""Pixels, in a picture 720 high, from a dot within which a click means it."""
+APART = 0.35
+"""Room between cloud and head, as a share of the head's width."""
+FOLLOWED = 0.3
+"""Metres that a head goes from which on the camera follows it."""
+
+
+class MarkersScene(Timed[CaptureTimes]):
+    """Shows the head of a `MarkerEditing`, the cloud beside it or over it, and finds what a mouse points at.
+
+    Moving markers are orange, fixed ones grey, those without a virtual marker pale, the current one is blue.
+    """
+
+    def __init__(self, editing: MarkerEditing, title: str = "") -> None:
+        self.editing = editing
+        self.timeline = CaptureTimes(editing.motion.times, editing.motion.rate)
+        self.switches = Switches()
+        self.title = title or editing.motion.name or "markers"
+        self.has_body = False
+        self.shows_cloud = True
+        self._painted: dict[object, list[FaceShape]] = {}
+
+    def show(self, name: str, on: object = True) -> None:
+        """Set a switch, as of every scene; of these, only the background changes this picture."""
+        self.switches.show(name, on)
+
+    def view_at(self, time: float) -> View:
+        """The head and the cloud at a time in seconds."""
+        frame, after, share = self.timeline.position(time)
+        vertices, pose = self._moved(frame, after, share)
+        faces, eyes = self._figure_meshes(vertices, pose) if self._figure else self._plain(vertices, pose)
+        background = (0.5, 0.5, 0.5) if self.switches["background"] == "grey" else None
+        cloud = self._cloud(frame, after, share)
+        dots, lines = self._annotations(cloud, vertices, pose)
+        return View(
+            faces=faces, eyes=eyes, background=background,
+            extras=Extras(dots=dots, lines=lines, legend=self._legend),
+        )  # fmt: skip
+
+    def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
+        """The camera of a preset, fitted to the head, and to the cloud if it is beside it."""
+        return Camera.preset("front" if preset in (None, "body") else str(preset), self._subject, aspect)
+
+    def travel(self, time: float) -> tuple[float, float, float]:
+        """How far the head has gone, metres; zeros for one that stays about where it is."""
+        made = self.editing.performance
+        if made is None or float(np.ptp(made.shift, axis=0).max()) * self.editing.head.metres < FOLLOWED:
+            return 0.0, 0.0, 0.0
+        frame, after, share = self.timeline.position(time)
+        middle = made.head.vertices[made.head.face].mean(axis=0)
+        pose = made.pose_between(frame, after, share)
+        x, y, z = ((pose[:3, :3] @ middle + pose[:3, 3] - middle) * made.head.metres).tolist()
+        return x, y, z
+
+    def head_travel(self, time: float) -> tuple[float, float, float]:
+        """The same."""
+        return self.travel(time)
+
+    def vertex_under(
+        self, camera: Camera, x: float, y: float, size: tuple[int, int], time: float
+    ) -> int | None:
+        """The vertex of the head that is nearest to what a pixel of a picture shows, or None."""
+        vertices, pose = self._moved(*self.timeline.position(time))
+        triangles = self.editing.head.triangles
+        corners = self.to_world(_posed(vertices, pose))[triangles]
+        hit = first_hit(*ray_through(camera, x, y, size), corners)
+        return None if hit is None else int(triangles[hit[0], int(hit[1].argmax())])
+
+    def marker_under(
+        self, camera: Camera, x: float, y: float, size: tuple[int, int], time: float
+    ) -> str | None:
+        """The marker whose dot, in the cloud or on the head, is at a pixel, or near to it; or None."""
+        frame, after, share = self.timeline.position(time)
+        vertices, pose = self._moved(frame, after, share)
+        names = list(self.editing.motion.names)
+        places = [self._cloud(frame, after, share)] if self.shows_cloud else []
+        found = names if self.shows_cloud else []
+        if self.editing.beside:
+            centres = {name: one.vertex or 0 for name, one in self.editing.mapping.centres.items()}
+            found = [*found, *centres]
+            places.append(self.to_world(_posed(vertices[list(centres.values())], pose)))
+        pixels = _pixels(np.concatenate(places), camera, size) if places else np.zeros((0, 2))
+        away = np.linalg.norm(pixels - (x, y), axis=1)
+        away[np.isnan(away)] = np.inf
+        reach = GRAB * size[1] / 720
+        if not len(away) or away.min() > reach:
+            return None
+        return found[int(away.argmin())]
+
+    def to_world(self, points: Float64) -> Float64:
+        """Points (..., 3) of the head in the world."""
+        world: Float64 = (points - self._middle) * self.editing.head.metres
+        return world
+
+    @cached_property
+    def _middle(self) -> Float64:
+        """(3,) what is the world's origin, in the head's unit: a face model's own, else the middle."""
+        if self.editing.head.model is not None:
+            return np.zeros(3)
+        used = self.editing.head.vertices[np.unique(self.editing.head.triangles)]
+        middle: Float64 = (used.min(axis=0) + used.max(axis=0)) / 2
+        return middle
+
+    @cached_property
+    def _figure(self) -> FaceFigure | None:
+        model = self.editing.head.model
+        return None if model is None else build_figure(model)
+
+    @cached_property
+    def _box(self) -> tuple[Float64, Float64]:
+        """Lowest and highest corner, (3,), of the part of the head that markers are on, metres."""
+        editing = self.editing
+        places = self.to_world(editing.head.vertices[editing.head.face])
+        known = editing.head.points[np.isfinite(editing.head.points).all(axis=1)]
+        if len(known) > 1:
+            low, high = self.to_world(known)[:, 1].min(), self.to_world(known)[:, 1].max()
+            near = (places[:, 1] > low) & (places[:, 1] < high)
+            places = places[near] if near.any() else places
+        return places.min(axis=0), places.max(axis=0)
+
+    @cached_property
+    def _beside(self) -> Float64:
+        """(3,) way from the head to the cloud beside it, metres."""
+        low, high = self._box
+        return np.array([-(1 + APART) * float(high[0] - low[0]), 0.0, 0.0])
+
+    @cached_property
+    def _rest_normals(self) -> Float32:
+        skin = self.editing.head.skin
+        return vertex_normals(skin.vertices, skin.triangles)
+
+    @cached_property
+    def _representatives(self) -> Intp:
+        """(S,) a vertex of the head for each of its skin."""
+        skin = self.editing.head.skin
+        rows = np.zeros(len(skin), dtype=np.intp)
+        rows[skin.number] = np.arange(len(skin.number))
+        return rows
+
+    def _moved(self, frame: int, after: int, share: float) -> tuple[Float64, Float64]:
+        """The head's vertices, float64 (N, 3), and its motion (4, 4), both in its unit."""
+        made = self.editing.performance
+        if made is None:
+            return self.editing.head.vertices, np.eye(4)
+        return made.vertices_between(frame, after, share), made.pose_between(frame, after, share)
+
+    def _normal_changes(self, vertices: Float64) -> Float64:
+        """float64 (N, 3): what is added to the normals of the head at rest."""
+        skin = self.editing.head.skin
+        now = vertex_normals(vertices[self._representatives], skin.triangles)
+        changes: Float64 = (now - self._rest_normals).astype(np.float64)[skin.number]
+        return changes
+
+    def _figure_meshes(self, vertices: Float64, pose: Float64) -> tuple[list[FaceMesh], list[Eye]]:
+        figure = self._figure
+        assert figure is not None
+        turn, centre = pose[:3, :3], figure.centre
+        place = translation(pose[:3, 3] + turn @ centre - centre)
+        positions = vertices.astype(np.float32)
+        light = figure.light.shade(positions, turn, np.eye(3))
+        axis, changes = rotation_vector(turn), self._normal_changes(vertices)
+        meshes = []
+        for name, shape in zip(figure.shapes, self._shapes(list(figure.shapes.values())), strict=True):
+            rows = figure.rows(name)
+            normals = figure.model.part(name).normals
+            assert normals is not None
+            bent = unit_rows(normals + changes[rows]).astype(np.float32)
+            meshes.append(FaceMesh(shape, positions[rows], bent, light[rows], place, axis, centre))
+        still = np.zeros(68, dtype=np.float32)
+        eyes = [
+            ball.pose(positions[figure.rows(part.name)], positions, still, pose)
+            for part, ball in figure.eyeballs
+        ]
+        return meshes, eyes
+
+    @cached_property
+    def _plain_shapes(self) -> list[FaceShape]:
+        return [plain_shape(part) for part in self.editing.head.parts]
+
+    def _plain(self, vertices: Float64, pose: Float64) -> tuple[list[FaceMesh], list[Eye]]:
+        head = self.editing.head
+        world = self.to_world(_posed(vertices, pose)).astype(np.float32)
+        changes = self._normal_changes(vertices)
+        meshes = []
+        for part, rows, shape in zip(head.parts, head.rows, self._shapes(self._plain_shapes), strict=True):
+            assert part.normals is not None
+            normals = unit_rows((part.normals + changes[rows]) @ pose[:3, :3].T).astype(np.float32)
+            light = np.tile(np.array(LIGHT, dtype=np.float32), (len(rows), 1))
+            meshes.append(FaceMesh(shape, world[rows], normals, light, np.eye(4), np.zeros(3), np.zeros(3)))
+        return meshes, []
+
+    def _shapes(self, plain: list[FaceShape]) -> list[FaceShape]:
+        """The shapes of all parts, in the colours of the current marker's reach if these are shown."""
+        editing = self.editing
+        if not editing.shows_weights or editing.influence is None:
+            return plain
+        key = editing.influence
+        if key not in self._painted:
+            self._painted = {key: self._paint(plain)}
+        return self._painted[key]
+
+    def _paint(self, plain: list[FaceShape]) -> list[FaceShape]:
+        editing, head = self.editing, self.editing.head
+        assert editing.influence is not None
+        on_skin = np.zeros(len(head.skin))
+        on_skin[editing.influence.vertices] = editing.influence.shares
+        shares = head.followers @ on_skin
+        rows: dict[str, Any] = {part.name: own for part, own in zip(head.parts, head.rows, strict=True)}
+        painted = []
+        for shape in plain:
+            colours = np.full((len(rows[shape.name]), 4), GLOSS, dtype=np.float32)
+            colours[:, :3] = linear_light(heat_colours(np.clip(shares[rows[shape.name]], 0.0, 1.0)))
+            painted.append(
+                replace(
+                    shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0), across=None,
+                    coarser=None,
+                )
+            )  # fmt: skip
+        return painted
+
+    @property
+    def _legend(self) -> Legend | None:
+        editing = self.editing
+        if not editing.shows_weights or editing.influence is None:
+            return None
+        stops = tuple(tuple(float(v) for v in row) for row in heat_colours(np.linspace(0, 1, SHADES)))
+        count = int((editing.influence.shares > 0).sum())
+        return Legend(editing.current, f"share of its way, {count} vertices", 1.0, stops)  # type: ignore[arg-type]
+
+    def _cloud(self, frame: int, after: int, share: float) -> Float64:
+        """float64 (M, 3): the markers in the world, beside the head or over it; NaN where one is not seen."""
+        made = self.editing.performance
+        positions = self.editing.laid_out if made is None else made.cloud
+        here = positions[frame] if share == 0 else positions[frame] * (1 - share) + positions[after] * share
+        world = self.to_world(here)
+        return world + self._beside if self.editing.beside else world
+
+    def _annotations(
+        self, cloud: Float64, vertices: Float64, pose: Float64
+    ) -> tuple[tuple[Dots, ...], tuple[Lines, ...]]:
+        editing = self.editing
+        names, markers = editing.motion.names, editing.mapping.markers
+        groups: list[tuple[Float64, Colour, float, str]] = []
+        at = {name: place for name, place in zip(names, cloud, strict=True) if np.isfinite(place).all()}
+        if self.shows_cloud:
+            for colour, chosen in (
+                (FREE, [name for name in at if name not in markers]),
+                (FIXED, [name for name in at if name in markers and markers[name].fixed]),
+                (MOVING, [name for name in at if name in markers and not markers[name].fixed]),
+            ):
+                places = np.array([at[name] for name in chosen if name != editing.current]).reshape(-1, 3)
+                groups.append((places, colour, RADIUS, ""))
+        world = self.to_world(_posed(vertices, pose))
+        lines: tuple[Lines, ...] = ()
+        if self.editing.beside or not self.shows_cloud:
+            for colour, fixed in ((FIXED, True), (MOVING, False)):
+                own = [
+                    one.vertex for name, one in editing.mapping.centres.items()
+                    if one.fixed == fixed and name != editing.current
+                ]  # fmt: skip
+                groups.append((world[np.array(own, dtype=np.intp)], colour, CENTRE_RADIUS, ""))
+        centre = editing.mapping.centres.get(editing.current)
+        if self.shows_cloud and editing.current in at:
+            groups.append((at[editing.current][None], CURRENT, CURRENT_RADIUS, editing.current))
+        if centre is not None and centre.vertex is not None:
+            groups.append((world[centre.vertex][None], CURRENT, CURRENT_RADIUS - 1, ""))
+            if self.shows_cloud and editing.current in at:
+                ends = np.stack([at[editing.current], world[centre.vertex]])[None]
+                lines = (Lines(ends.astype(np.float32), LINE, 1.2, LIFT),)
+        return tuple(_make_dots(*group) for group in groups if len(group[0])), lines
+
+    @property
+    def _subject(self) -> Subject:
+        """What the camera is fitted to: the head, and the cloud if it is beside it."""
+        figure = self._figure
+        if figure is not None:
+            subject = figure.subject
+        else:
+            low, high = self._box
+            x, y, z = ((low + high) / 2).tolist()
+            wide, tall, deep = ((high - low) / 2).tolist()
+            subject = Subject((x, y, z), tall * 1.05, max(wide, deep), deep)
+        if not (self.editing.beside and self.shows_cloud):
+            return subject
+        x, y, z = subject.centre
+        aside = float(self._beside[0]) / 2
+        return replace(subject, centre=(x + aside, y, z), half_width=subject.half_width - aside)
+
+
+def _posed(points: Float64, pose: Float64) -> Float64:
+    posed: Float64 = points @ pose[:3, :3].T + pose[:3, 3]
+    return posed
+
+
+def _pixels(points: Float64, camera: Camera, size: tuple[int, int]) -> Float64:
+    """float64 (N, 2): pixels from the upper left corner of a picture; NaN behind the camera."""
+    matrix = camera.projection_matrix(size[0] / size[1]) @ camera.view_matrix()
+    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    clip[clip[:, 3] < 1e-6] = np.nan
+    pixels: Float64 = (clip[:, :2] / clip[:, 3:] * (0.5, -0.5) + 0.5) * size
+    return pixels
+
+
+def _make_dots(points: Float64, colour: Colour, radius: float, name: str) -> Dots:
+    count = len(points)
+    facing = np.zeros((count, 3), dtype=np.float32)
+    names = (name,) * count
+    return Dots(points.astype(np.float32), colour, radius, LIFT, names, facing)

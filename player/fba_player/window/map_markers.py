@@ -1,0 +1,49 @@
+"""`map_markers`: a window in which captured markers are mapped onto a head, and play on it."""
+
+from __future__ import annotations
+
+from fba.errors import DisplayError
+from fba_player.gl.context import cure
+from fba_player.scene.marker_editing import MarkerEditing
+from fba_player.scene.markers_scene import MarkersScene
+from fba_player.window._window import Window
+from fba_player.window.display import check_display
+
+SECONDS = 8.0
+"""For which the window says what was found."""
+WITHOUT = (
+    "Without a window, -o FILE.png or .mp4 draws what the proposed mapping does, --map-out FILE.toml writes "
+    "it, and --map FILE.toml reads it after you have changed it"
+)
+"""What to do where no window can be opened."""
+
+
+def check_window() -> None:
+    """Raise DisplayError, which says how to do without, if the page cannot be shown."""
+    try:
+        import imgui_bundle  # noqa: F401 - the page is made with it
+    except ImportError as error:
+        raise DisplayError(
+            f"the page for markers needs imgui: {error}. {cure(error, 'imgui-bundle')}. {WITHOUT}"
+        ) from error
+    check_display(WITHOUT)
+
+
+def map_markers(editing: MarkerEditing, title: str, *, size: tuple[int, int] = (1280, 800)) -> None:
+    """Show a capture and a head in a window until it is closed; the user maps markers and saves them.
+
+    Raises DisplayError without a display, OpenGL or imgui.
+    """
+    with open_markers(editing, title, size=size) as window:
+        window.run()
+
+
+def open_markers(editing: MarkerEditing, title: str, *, size: tuple[int, int] = (1280, 800)) -> Window:
+    """The window for mapping markers, opened but not yet shown: `run` shows it until it is closed."""
+    window = Window(MarkersScene(editing, title), title=f"{title}: markers", size=size)
+    window.session.open.add("markers")
+    names = editing.motion.names
+    window.session.say(
+        f"{len(editing.mapping.markers)} of {len(names)} markers are on the head: check them", seconds=SECONDS
+    )
+    return window
