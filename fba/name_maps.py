@@ -45,7 +45,7 @@ def read_toml(path: Path, expected: str, limits: Limits) -> dict[str, Any]:
         return tomllib.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise FormatError(f"is not UTF-8 text (byte {error.start})", path=path) from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # a plain ValueError: a number of thousands of digits
         line = re.search(r"at line (\d+)", str(error))
         raise FormatError(
             f"is not TOML: {str(error)[:200]}; expected lines such as {expected}",

@@ -188,6 +188,25 @@ f -1//1 -2//1 \\
   -3//1
 f 1 2 4 3
 """
+MAPPING = """\
+[head]
+name = "head.obj"
+vertices = 9
+triangles = 8
+connectivity = "00ff"
+shape = "ff00"
+
+[settings]
+assignment = "exclusive"
+overlap = "add"
+scale = ["A", "B"]
+
+[virtual_markers]
+"A" = { vertex = 1, radius = 0.5, depth = 1e-3, fixed = true }
+"B" = { vertex = 2, radius = 2, fixed = true }
+"Cap" = { fixed = true }
+"Chin: low" = { vertex = 3, radius = 0.25 }
+"""
 MTL = "newmtl flesh\nKd 0.7 0.4 0.3\nNs 20\nd 0.9\nmap_Kd -s 1 1 1 skin.png\nnewmtl eye\nKd 1 1 1\nTr 0.5\n"
 VRML = """#VRML V2.0 utf8
 DEF one Shape { geometry IndexedFaceSet {
@@ -311,6 +330,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
         "capture": {**faces(), **markers()},
         "obj": {"triangles": OBJ.encode()},
         "mtl": {"two": MTL.encode()},
+        "mapping": {"all": MAPPING.encode()},
         "ply": meshes(),
         "vrml": {"two": VRML.encode()},
         "wfm": {"four": WFM.encode()},

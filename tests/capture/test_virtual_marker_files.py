@@ -47,6 +47,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
         ("[virtual_markers]\nChin = { vertex = 1, radius = nan }\n", "the radius must be a positive number"),
         ("[virtual_markers]\nChin = { vertex = 1, radius = 1, depth = inf }\n", "the depth must be"),
         (f"[virtual_markers]\nChin = {{ vertex = 1, radius = 1{400 * '0'} }}\n", "'Chin': int too large"),
+        (f"[virtual_markers]\nChin = {{ vertex = {5000 * '1'} }}\n", "is not TOML: Exceeds the limit"),
         ("[virtual_markers]\nChin = { vertex = 1 }\n", "'Chin' has no radius"),
         ("[virtual_markers]\nChin = { radius = 1 }\n", "'Chin' has no vertex; only fixed markers"),
         ("[virtual_markers]\nChin = { vertex = 1, raduis = 1 }\n", "'Chin': there is no 'raduis'; known are"),

@@ -19,6 +19,7 @@ import numpy as np
 import fba
 from fba.body.model import BodyModel
 from fba.cache import load_or_make
+from fba.capture.virtual_markers import read_mapping, write_mapping
 from fba.errors import FbaError, FbaWarning
 from fba.face.importers import import_model
 from fba.face.importers.points.points_file import read_points
@@ -118,6 +119,19 @@ def check_obj(data: bytes, folder: Path) -> Outcome:
 def check_mtl(data: bytes, folder: Path) -> Outcome:
     """Read the materials of an OBJ mesh."""
     return _check_file(data, folder / "input.mtl", lambda path: read_mtl(folder / "input.obj", path.name))
+
+
+def check_mapping(data: bytes, folder: Path) -> Outcome:
+    """Read a mapping of virtual markers; what was read is written, and read as the same."""
+
+    def read_twice(path: Path) -> None:
+        mapping = read_mapping(path)
+        again = folder / "again.toml"
+        write_mapping(again, mapping)
+        if read_mapping(again) != mapping:
+            raise ContractError("the mapping that was written is read as another")
+
+    return _check_file(data, folder / "input.toml", read_twice)
 
 
 def check_ply(data: bytes, folder: Path) -> Outcome:

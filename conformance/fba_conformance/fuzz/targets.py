@@ -89,6 +89,11 @@ def targets() -> tuple[Target, ...]:
             b'"points":',
             b"<fdp", b"<indices>", b"index=\"1\"", *_TEXT,
         ),
+        _reader(
+            "mapping", "mappings of virtual markers, written again", b"[head]\n", b"[settings]\n",
+            b"[virtual_markers]\n", b"vertex = 1, ", b"radius = nan, ", b"fixed = true", b"{ ",
+            b" }\n", *_TEXT,
+        ),
         _reader("import", "faces of any kind, imported", *_TEXT),
         _reader("any", "files of any kind, recognised", *_TEXT),
         _reader("cache", "files of the cache of slow results"),

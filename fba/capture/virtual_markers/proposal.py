@@ -18,12 +18,16 @@ from fba.face.feature_points import row_of
 
 FEWEST = 6
 """Markers whose places the head has, from which others are placed."""
+NEAR = 0.015
+"""Metres from its feature point up to which a vertex is at it: a mask has no ears."""
 ASTRAY = 0.03
 """Metres from the skin at which a marker without a place is left out."""
 NEIGHBOURS, REACH = 3, 1.2
 """The radius reaches this much beyond so many of the nearest other markers."""
 RADII = (0.010, 0.045)
 """Smallest and largest radius that is proposed, metres on a head of natural size."""
+FIRST_RADIUS = 0.03
+"""Metres, on a head of natural size, that the first virtual marker reaches."""
 LIDS = ("3.1", "3.2", "3.3", "3.4")
 LID_RADIUS = 0.016
 """Half the width of an eye."""
@@ -54,12 +58,16 @@ def propose_mapping(
     vertices: dict[str, int] = {}
     for name, place in at.items():
         bound = int(head.bound[rows[places[name]]]) if places[name] in rows else -1
-        vertex = bound if bound >= 0 and _on_skin(head, bound) else head.nearest(place)[0]
-        if vertex not in vertices.values():
+        vertex, away = (bound, 0.0) if bound >= 0 and _on_skin(head, bound) else head.nearest(place)
+        if vertex not in vertices.values() and away < NEAR / head.metres:
             vertices[name] = vertex
     fixed = {name for name, place in places.items() if place in RIGID}
-    caps = [name for name, place in places.items() if place == HEAD]
-    others = [name for name in motion.names if name not in places]
+    others = [name for name in motion.names if name not in vertices and name not in fixed]
+    others += [
+        name
+        for name in fixed
+        if name not in vertices and places[name] not in targets and places[name] != HEAD
+    ]
     vertices |= _lay_others(motion, head, vertices, others)
     radii = _radii(head, vertices, {name for name in at if places[name] in LIDS})
     markers = {
@@ -67,7 +75,10 @@ def propose_mapping(
         for name in motion.names
         if name in vertices
     }
-    markers |= {name: VirtualMarker(None, fixed=True) for name in caps}
+    # what is on a cap, or where this head has no skin, still tells how the head moves
+    markers |= {
+        name: VirtualMarker(None, fixed=True) for name in motion.names if name in fixed - set(vertices)
+    }
     return MarkerMapping(markers).for_head(head)
 
 
@@ -126,3 +137,9 @@ def _radii(head: MarkedHead, vertices: Mapping[str, int], lids: set[str]) -> dic
         name: round(min(float(radius), LID_RADIUS / head.metres) if name in lids else float(radius), 6)
         for name, radius in zip(names, radii, strict=True)
     }
+
+
+def usual_radius(mapping: MarkerMapping, head: MarkedHead) -> float:
+    """Return the radius that a new virtual marker gets, in the head's unit: the middle one of all."""
+    radii = [marker.radius for marker in mapping.centres.values()]
+    return float(np.median(radii)) if radii else FIRST_RADIUS / head.metres

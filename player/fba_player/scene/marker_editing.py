@@ -18,10 +18,8 @@ from fba.capture.virtual_markers import MarkedHead, MarkerMapping, MarkerPerform
 from fba.capture.virtual_markers.influence import Influence, give_to_nearest
 from fba.capture.virtual_markers.mapping_files import write_mapping
 from fba.capture.virtual_markers.performance import Neutral, SteadyMarkers, perform_steady, steady
+from fba.capture.virtual_markers.proposal import usual_radius
 from fba.errors import FbaError, FbaWarning, OptionError
-
-FIRST_RADIUS = 0.03
-"""Metres, on a head of natural size, that the first virtual marker reaches."""
 
 
 class MarkerEditing:
@@ -185,8 +183,7 @@ class MarkerEditing:
     @property
     def first_radius(self) -> float:
         """The radius that a new virtual marker gets, in the head's unit: the middle one of all."""
-        radii = [marker.radius for marker in self.mapping.centres.values()]
-        return float(np.median(radii)) if radii else FIRST_RADIUS / self.head.metres
+        return usual_radius(self.mapping, self.head)
 
     def _perform(self) -> MarkerPerformance | None:
         doubts: list[str] = []

@@ -36,6 +36,8 @@ GRAB = 10.0
 """Pixels, in a picture 720 high, from a dot within which a click means it."""
 APART = 0.35
 """Room between cloud and head, as a share of the head's width."""
+ROOM = 1.2
+"""Room beside head and cloud for a head that turns and moves, as a factor of the way between them."""
 FOLLOWED = 0.3
 """Metres that a head goes from which on the camera follows it."""
 
@@ -43,7 +45,8 @@ FOLLOWED = 0.3
 class MarkersScene(Timed[CaptureTimes]):
     """Shows the head of a `MarkerEditing`, the cloud beside it or over it, and finds what a mouse points at.
 
-    Moving markers are orange, fixed ones grey, those without a virtual marker pale, the current one is blue.
+    Moving markers are orange, fixed ones grey, those without a virtual marker pale, the current one is blue,
+    unless `shows_current` is False. shows_cloud: whether the cloud is there at all.
     """
 
     def __init__(self, editing: MarkerEditing, title: str = "") -> None:
@@ -53,7 +56,13 @@ class MarkersScene(Timed[CaptureTimes]):
         self.title = title or editing.motion.name or "markers"
         self.has_body = False
         self.shows_cloud = True
+        self.shows_current = True
         self._painted: dict[object, list[FaceShape]] = {}
+
+    def place_cloud(self, where: str) -> None:
+        """Show the cloud, and dots on the head: where is "beside" the head, "over" it, or "none"."""
+        self.shows_cloud = where != "none"
+        self.editing.beside = where == "beside"
 
     def show(self, name: str, on: object = True) -> None:
         """Set a switch, as of every scene; of these, only the background changes this picture."""
@@ -145,7 +154,7 @@ class MarkersScene(Timed[CaptureTimes]):
     def _box(self) -> tuple[Float64, Float64]:
         """Lowest and highest corner, (3,), of the part of the head that markers are on, metres."""
         editing = self.editing
-        places = self.to_world(editing.head.vertices[editing.head.face])
+        places = self.to_world(editing.head.vertices[np.unique(editing.head.triangles)])
         known = editing.head.points[np.isfinite(editing.head.points).all(axis=1)]
         if len(known) > 1:
             low, high = self.to_world(known)[:, 1].min(), self.to_world(known)[:, 1].max()
@@ -275,6 +284,7 @@ class MarkersScene(Timed[CaptureTimes]):
     ) -> tuple[tuple[Dots, ...], tuple[Lines, ...]]:
         editing = self.editing
         names, markers = editing.motion.names, editing.mapping.markers
+        current = editing.current if self.shows_current else ""
         groups: list[tuple[Float64, Colour, float, str]] = []
         at = {name: place for name, place in zip(names, cloud, strict=True) if np.isfinite(place).all()}
         if self.shows_cloud:
@@ -283,24 +293,24 @@ class MarkersScene(Timed[CaptureTimes]):
                 (FIXED, [name for name in at if name in markers and markers[name].fixed]),
                 (MOVING, [name for name in at if name in markers and not markers[name].fixed]),
             ):
-                places = np.array([at[name] for name in chosen if name != editing.current]).reshape(-1, 3)
+                places = np.array([at[name] for name in chosen if name != current]).reshape(-1, 3)
                 groups.append((places, colour, RADIUS, ""))
         world = self.to_world(_posed(vertices, pose))
         lines: tuple[Lines, ...] = ()
-        if self.editing.beside or not self.shows_cloud:
+        if self.editing.beside:
             for colour, fixed in ((FIXED, True), (MOVING, False)):
                 own = [
                     one.vertex for name, one in editing.mapping.centres.items()
-                    if one.fixed == fixed and name != editing.current
+                    if one.fixed == fixed and name != current
                 ]  # fmt: skip
                 groups.append((world[np.array(own, dtype=np.intp)], colour, CENTRE_RADIUS, ""))
-        centre = editing.mapping.centres.get(editing.current)
-        if self.shows_cloud and editing.current in at:
-            groups.append((at[editing.current][None], CURRENT, CURRENT_RADIUS, editing.current))
-        if centre is not None and centre.vertex is not None:
+        centre = editing.mapping.centres.get(current)
+        if self.shows_cloud and current in at:
+            groups.append((at[current][None], CURRENT, CURRENT_RADIUS, current))
+        if centre is not None and centre.vertex is not None and (editing.beside or editing.shows_weights):
             groups.append((world[centre.vertex][None], CURRENT, CURRENT_RADIUS - 1, ""))
-            if self.shows_cloud and editing.current in at:
-                ends = np.stack([at[editing.current], world[centre.vertex]])[None]
+            if self.shows_cloud and current in at:
+                ends = np.stack([at[current], world[centre.vertex]])[None]
                 lines = (Lines(ends.astype(np.float32), LINE, 1.2, LIFT),)
         return tuple(_make_dots(*group) for group in groups if len(group[0])), lines
 
@@ -319,7 +329,7 @@ class MarkersScene(Timed[CaptureTimes]):
             return subject
         x, y, z = subject.centre
         aside = float(self._beside[0]) / 2
-        return replace(subject, centre=(x + aside, y, z), half_width=subject.half_width - aside)
+        return replace(subject, centre=(x + aside, y, z), half_width=subject.half_width - ROOM * aside)
 
 
 def _posed(points: Float64, pose: Float64) -> Float64:

@@ -1,0 +1,391 @@
+"""`fba markers`: virtual markers, by which a capture moves any head."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fba.cli import options
+from fba.cli.command import Command, examples, usage_errors
+from fba.cli.joint_options import MapType, Pair
+from fba.cli.marker_options import NeutralType
+from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.printing import Progress
+from fba.errors import FbaWarning, ModelError, OptionError
+from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.capture.markers.motion import MarkerMotion
+    from fba.capture.virtual_markers import MarkedHead, MarkerMapping
+    from fba_player.scene.marker_editing import MarkerEditing
+    from fba_player.scene.markers_scene import MarkersScene
+
+PICTURES, FILMS, OTHERS = (".png", ".jpg", ".jpeg"), (".mp4", ".gif"), (".glb", ".toml")
+Neutral = str | int | tuple[float, float]
+
+
+@click.command(
+    "markers",
+    cls=Command,
+    epilog=examples(
+        "fba markers face.c3d",
+        "fba markers face.c3d head.obj --points head.points.csv --map-out mapping.toml",
+        "fba markers face.csv head.glb --map mapping.toml -o face.mp4",
+        "fba markers face.csv -o reach.png --marker LPB",
+        "fba markers face.csv scan.obj --map mapping.toml -o moved.glb",
+    ),
+)
+@click.argument("capture", metavar="CAPTURE", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("head", metavar="[HEAD]", required=False, type=click.Path(exists=True, path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=OutputType(),
+    metavar="OUT.png|.jpg|.mp4|.gif|.glb|.toml",
+    help="A picture, a film, the head with its animation, or the mapping, instead of a window.",
+)
+@click.option(
+    "--map",
+    "maps",
+    type=MapType(),
+    multiple=True,
+    metavar="FILE.toml|MARKER=PLACE",
+    help="A saved mapping, in place of the proposed one. Or where a marker is: a feature point, Chin=2.1, or "
+    "a vertex, Chin=1234; nowhere: Chin=. Repeatable.",
+)
+@click.option(
+    "--map-out",
+    type=OutputType(),
+    metavar="FILE.toml",
+    help="Write the mapping beside OUT; in the window, Ctrl+S does. Default there: the file of --map, else "
+    "the capture's name with .virtual.toml.",
+)
+@options.no_clobber_option
+@click.option("--points", type=click.Path(exists=True, path_type=Path), metavar="FILE",
+              help="Feature points of HEAD (CSV, JSON, FDP). Default: a file beside HEAD with the same name, "
+              "else what is found.")  # fmt: skip
+@click.option(
+    "--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis of HEAD."
+)
+@click.option(
+    "--assignment",
+    type=click.Choice(["shared", "exclusive"]),
+    help="A vertex belongs to all markers in whose reach it is, or to the nearest alone. Default: as the "
+    "mapping says, shared in a new one.",
+)
+@click.option(
+    "--overlap",
+    type=click.Choice(["match", "add"]),
+    help="Shared vertices move so that centres meet their markers, or displacements are added. Default: as "
+    "the mapping says, match in a new one.",
+)
+@click.option(
+    "--neutral",
+    type=NeutralType(),
+    default="auto",
+    show_default=True,
+    metavar="auto|first|N|FROM-TO",
+    help="The neutral face is found, the first moment, frame N, or between two times.",
+)
+@click.option("--marker", metavar="NAME", help="Marker whose reach is shown in colours.")
+@click.option(
+    "--cloud",
+    type=click.Choice(["beside", "over", "none"]),
+    help="Where a picture or film shows the markers themselves. Default: beside.",
+)
+@click.option(
+    "--camera", type=click.Choice(["front", "three-quarter", "profile"]), default="front", show_default=True
+)
+@click.option("--time", type=options.MomentType(), metavar="SECONDS", help="For a picture: its time.")
+@click.option("--start", type=options.MomentType(), metavar="SECONDS", help="For a film: start time.")
+@click.option("--end", type=options.MomentType(), metavar="SECONDS", help="For a film: end time.")
+@options.fps_option("Frame rate of a film. Default: the capture's own, or a whole fraction of it.")
+@click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
+@options.from_option
+@options.limit_option
+def command(
+    capture: Path,
+    head: Path | None,
+    output: Path | None,
+    maps: tuple[Path | Pair, ...],
+    map_out: Path | None,
+    no_clobber: bool,
+    points: Path | None,
+    up: str,
+    assignment: str | None,
+    overlap: str | None,
+    neutral: Neutral,
+    marker: str | None,
+    cloud: str | None,
+    camera: str,
+    time: float | None,
+    start: float | None,
+    end: float | None,
+    fps: Fraction | None,
+    size: tuple[int, int] | None,
+    format: str | None,
+    limit: Limits,
+) -> None:
+    """Let captured markers move any head, in a window or into a file.
+
+    CAPTURE has markers on a face (C3D, TRC, CSV, ...). HEAD is a face model, or any mesh (OBJ, PLY, glTF);
+    without it, the built-in head. Each marker moves the vertices around the one that it is paired with,
+    less the farther away they are. Where the places of the markers and the feature points of the head are
+    known, a mapping is proposed.
+
+    In the window, click on a marker, then on the head where it belongs; the panel has its reach, and all
+    keys. With -o, no window opens.
+    """
+    films: dict[str, object] = {"--start": start, "--end": end, "--fps": fps}
+    _check_options(output, {"--cloud": cloud, "--time": time, **films, "--size": size}, films, time)
+    saved = [each for each in maps if isinstance(each, Path)]
+    if len(saved) > 1:
+        raise click.UsageError("--map: give one mapping at most; pairs change what it says")
+    outputs = _outputs(output, map_out, [capture, head, points, *saved], no_clobber=no_clobber)
+    if output is None:
+        from fba_player.window.map_markers import check_window
+
+        check_window()
+    motion = _read_capture(capture, format, limit)
+    with Progress("reading", None):
+        from fba.capture.virtual_markers import read_head
+
+        shown = read_head(head, points=points, up=up, limits=limit)
+        mapping = _find_mapping(motion, shown, saved, maps, limit, needed=output is not None)
+    mapping = replace(
+        mapping, assignment=assignment or mapping.assignment, overlap=overlap or mapping.overlap
+    )
+    if marker is not None and marker not in motion.names:
+        from fba.capture.markers.marker_maps import list_names
+
+        raise click.UsageError(
+            f"--marker {marker}: the capture has no such marker; it has {list_names(motion.names)}"
+        )
+    if output is None:
+        path = map_out or (saved[0] if saved else Path(f"{capture.stem}.virtual.toml"))
+        _show(motion, shown, mapping, path, neutral, marker, capture.name, size)
+    elif output.suffix.lower() == ".toml":
+        _write_mapping(mapping, shown, output, outputs)
+    else:
+        from fba.capture.virtual_markers import perform
+
+        with Progress("preparing", None):
+            performance = perform(motion, shown, mapping, neutral)  # says what is wrong or odd
+        if output.suffix.lower() == ".glb":
+            from fba.formats.gltf.moved_head import write_moved_head
+
+            with outputs.file(output) as file:
+                write_moved_head(file, performance, motion.name or capture.stem)
+            outputs.say(f"{display_name(output)}: {len(motion)} frames, {len(performance.names)} markers")
+        else:
+            from fba_player.scene.markers_scene import MarkersScene
+
+            scene = MarkersScene(_edit(motion, shown, mapping, None, neutral, marker), capture.name)
+            scene.place_cloud(cloud or "beside")
+            scene.shows_current = marker is not None
+            _draw(scene, output, outputs, camera=camera, time=time, start=start, end=end, fps=fps, size=size)
+        if map_out is not None:
+            _write_mapping(mapping, shown, map_out, outputs)
+
+
+def _check_options(
+    output: Path | None, drawn: dict[str, object], films: dict[str, object], time: float | None
+) -> None:
+    """Raise click.UsageError for options that the output does not take."""
+    suffix = "" if output is None else output.suffix.lower()
+    if output == STANDARD:
+        raise click.UsageError("--output -: give the name of a file")
+    if output is not None and suffix not in (*PICTURES, *FILMS, *OTHERS):
+        raise click.UsageError(
+            f"--output {output}: name a picture ({', '.join(PICTURES)}), a film ({', '.join(FILMS)}), a head "
+            "with its animation (.glb) or a mapping (.toml)"
+        )
+    for name, value in drawn.items():
+        if value is None:
+            continue
+        if output is None and name != "--size":
+            raise click.UsageError(f"{name} is for a picture or a film: give -o FILE.png or .mp4")
+        if suffix in OTHERS:
+            raise click.UsageError(f"{name} is for a picture or a film, not for {output}")
+        if name in films and suffix in PICTURES:
+            raise click.UsageError(f"{name} is for a film; a picture has a --time")
+    if time is not None and suffix in FILMS:
+        raise click.UsageError("--time is for a picture; a film has a --start and an --end")
+
+
+def _outputs(
+    output: Path | None, map_out: Path | None, inputs: list[Path | None], *, no_clobber: bool
+) -> Outputs:
+    if map_out == STANDARD:
+        raise click.UsageError("--map-out -: give the name of a file")
+    if map_out is not None and map_out.suffix.lower() != ".toml":
+        raise click.UsageError(
+            f"--map-out {map_out}: mappings are TOML; name it {map_out.with_suffix('.toml')}"
+        )
+    written = [Output("--output", output)] if output is not None else []
+    if output is not None and map_out is not None:
+        written.append(Output("--map-out", map_out, text=True))
+    return Outputs(written, inputs, no_clobber=no_clobber)
+
+
+def _read_capture(path: Path, format: str | None, limits: Limits) -> MarkerMotion:
+    """Return the markers of a capture; click.UsageError for a file of another kind."""
+    from fba.capture.markers.motion import MarkerMotion
+    from fba.formats import format_of, formats
+
+    reader = format_of(path, format)
+    motion = reader.read_face(path, limits=limits) if reader.has_markers and reader.read_face else None
+    if not isinstance(motion, MarkerMotion):
+        readers = ", ".join(one.name for one in formats() if one.has_markers)
+        raise click.UsageError(
+            f"{path} is {reader.name.upper()}, which has no markers; these have: {readers}"
+        )
+    if not len(motion):
+        raise ModelError(f"{path}: the capture has no frames")
+    return motion
+
+
+def _find_mapping(
+    motion: MarkerMotion,
+    head: MarkedHead,
+    saved: list[Path],
+    maps: tuple[Path | Pair, ...],
+    limits: Limits,
+    *,
+    needed: bool,
+) -> MarkerMapping:
+    """Return the mapping of `--map`, else the proposed one, changed by pairs.
+
+    needed: whether it is an error if none can be proposed; a window may begin without.
+    """
+    from fba.capture.markers.marker_maps import change_map
+    from fba.capture.virtual_markers import MarkerMapping, propose_mapping, read_mapping
+
+    pairs = dict(each for each in maps if not isinstance(each, Path))
+    places = {name: place for name, place in pairs.items() if place and not place.isdecimal()}
+    missing = [name for name in pairs if name not in motion.names]
+    if missing:
+        from fba.capture.markers.marker_maps import list_names
+
+        raise click.UsageError(
+            f"--map: the capture has no marker {list_names(missing)}; it has {list_names(motion.names)}"
+        )
+    if saved and places:
+        name, place = next(iter(places.items()))
+        raise click.UsageError(f"--map {name}={place}: with a saved mapping, give a vertex: {name}=1234")
+    mapping = MarkerMapping()
+    if saved:
+        mapping = read_mapping(saved[0], limits=limits)
+        mapping.check(head)
+        mapping.check_names(motion.names)
+    try:
+        if not saved:
+            found = change_map(motion, None, places) if places else None
+            mapping = propose_mapping(motion, head, found)
+    except OptionError as error:
+        raise click.UsageError(f"--map: {error}") from error
+    except ModelError as error:
+        if needed:
+            raise
+        warnings.warn(str(error), FbaWarning, stacklevel=2)
+    for name, vertex in pairs.items():
+        if name not in places:
+            mapping = _put(mapping, head, name, vertex)
+    return mapping
+
+
+def _put(mapping: MarkerMapping, head: MarkedHead, name: str, vertex: str) -> MarkerMapping:
+    """Return a mapping with a marker on a vertex, "" to take it away."""
+    from fba.capture.virtual_markers import VirtualMarker
+    from fba.capture.virtual_markers.proposal import usual_radius
+
+    if not vertex:
+        return mapping.changed(name, None)
+    old = mapping.markers.get(name)
+    number = int(vertex[:18])
+    if old is not None and old.vertex is not None:
+        return mapping.changed(name, replace(old, vertex=number))
+    radius = usual_radius(mapping, head)
+    return mapping.changed(name, VirtualMarker(number, radius, radius, old is not None and old.fixed))
+
+
+def _write_mapping(mapping: MarkerMapping, head: MarkedHead, path: Path, outputs: Outputs) -> None:
+    from fba.capture.virtual_markers import write_mapping
+
+    mapping.check(head)
+    with outputs.file(path) as file:
+        write_mapping(file, mapping.for_head(head))
+    outputs.say(f"{display_name(path)}: {len(mapping.markers)} markers, {len(mapping.fixed)} of them fixed")
+
+
+def _edit(
+    motion: MarkerMotion,
+    head: MarkedHead,
+    mapping: MarkerMapping,
+    path: Path | None,
+    neutral: Neutral,
+    marker: str | None,
+) -> MarkerEditing:
+    from fba_player.scene.marker_editing import MarkerEditing
+
+    editing = MarkerEditing(motion, head, mapping, path, neutral=neutral)
+    if marker is not None:
+        editing.choose(marker)
+    elif path is None:
+        editing.shows_weights = False
+    return editing
+
+
+def _show(
+    motion: MarkerMotion,
+    head: MarkedHead,
+    mapping: MarkerMapping,
+    path: Path,
+    neutral: Neutral,
+    marker: str | None,
+    title: str,
+    size: tuple[int, int] | None,
+) -> None:
+    from fba_player.window.map_markers import map_markers
+
+    editing = _edit(motion, head, mapping, path, neutral, marker)
+    map_markers(editing, title, size=size or (1280, 800))
+    if editing.written:
+        click.echo(
+            f"{path}: {len(editing.mapping.markers)} markers, {len(editing.mapping.fixed)} of them fixed"
+        )
+
+
+def _draw(
+    scene: MarkersScene,
+    output: Path,
+    outputs: Outputs,
+    *,
+    camera: str,
+    time: float | None,
+    start: float | None,
+    end: float | None,
+    fps: Fraction | None,
+    size: tuple[int, int] | None,
+) -> None:
+    from fba_player.export.render import picture_size, render
+
+    with outputs.file(output) as file, Progress("rendering", None) as step, usage_errors():
+        render(
+            scene,
+            file,
+            camera=camera,
+            time=time,
+            start=start,
+            end=end,
+            fps=fps,
+            size=size,
+            progress=step.show,
+        )
+    wide, high = picture_size(size, output)
+    outputs.say(f"{display_name(output)}: {wide}x{high}")

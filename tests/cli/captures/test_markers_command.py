@@ -1,0 +1,207 @@
+"""`fba markers`: pictures, films, animated heads and mappings without a window; what is refused."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers.targets import target_points
+from fba.capture.virtual_markers import perform, read_head, read_mapping
+from fba.face.feature_points import names, row_of
+from fba_conformance.captures.marker_files import wide
+from mesh_files import write_obj
+from small_head import small_head
+
+Run = Callable[..., Any]
+MARKED = ("2.1", "2.10", "4.1", "4.2", "5.1", "5.2", "8.1", "8.2", "8.3", "8.4", "9.3", "11.1", "11.2",
+          "11.3")  # fmt: skip
+
+
+def capture() -> MarkerMotion:
+    """Markers at points of the small head; that of the lower lip goes down by 8 mm, and the head turns."""
+    places = target_points(small_head().points)
+    positions = np.repeat(np.array([places[name] for name in MARKED])[None], 20, axis=0)
+    positions[10:, MARKED.index("8.2"), 1] -= 0.008
+    turn = np.array([[0.96, 0.0, 0.28], [0.0, 1.0, 0.0], [-0.28, 0.0, 0.96]])
+    positions[15:] = positions[15:] @ turn.T
+    return MarkerMotion(MARKED, positions, np.arange(20) / 50, Fraction(50), "m", "+y", "lip")
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[Path, Path]:
+    """A capture, and a head with its feature points beside it."""
+    (tmp_path / "lip.csv").write_bytes(wide(capture()))
+    write_obj(tmp_path / "head.obj", small_head().parts)
+    points = small_head().points
+    lines = [
+        f"{name},{','.join(map(str, points[row_of()[name]]))}"
+        for name in names()
+        if np.isfinite(points[row_of()[name]]).all()
+    ]
+    (tmp_path / "head.points.csv").write_text("\n".join(["name,x,y,z", *lines]) + "\n")
+    return tmp_path / "lip.csv", tmp_path / "head.obj"
+
+
+def test_a_proposed_mapping_is_written_changed_and_used(
+    run: Run, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    first, second = tmp_path / "first.toml", tmp_path / "second.toml"
+    code, out, err = run("markers", *files, "-o", first)
+    assert (code, err) == (0, "")
+    assert out == f"{first}: 14 markers, 3 of them fixed\n"
+    proposed = read_mapping(first)
+    assert proposed.made_for is not None
+    assert proposed.made_for.name == "head.obj"
+    assert proposed.markers["8.2"].vertex == small_head().bound[row_of()["8.2"]]
+    code, out, err = run(
+        "markers", *files, "--map", first, "--map", "8.2=7", "--map", "9.3=", "--overlap", "add", "-o", second
+    )
+    assert (code, err) == (0, "")
+    changed = read_mapping(second)
+    assert changed.overlap == "add"
+    assert changed.markers["8.2"] == replace(proposed.markers["8.2"], vertex=7)
+    assert set(proposed.markers) - set(changed.markers) == {"9.3"}
+    code, _, err = run("markers", *files, "--map", first, "-o", second, "--no-clobber")
+    assert code == 1
+    assert "exists" in err
+
+
+def test_a_head_with_its_animation(run: Run, files: tuple[Path, Path], tmp_path: Path) -> None:
+    moved = tmp_path / "moved.glb"
+    code, out, err = run("markers", *files, "-o", moved, "--map-out", tmp_path / "m.toml")
+    assert (code, err) == (0, "")
+    assert f"{moved}: 20 frames, 14 markers" in out
+    data = moved.read_bytes()
+    size = struct.unpack("<I", data[12:16])[0]
+    document, body = json.loads(data[20 : 20 + size]), data[28 + size :]
+
+    def numbers(index: int) -> np.ndarray:
+        entry = document["accessors"][index]
+        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[entry["type"]]
+        result = np.zeros((entry["count"], width), np.float32)
+        if "bufferView" in entry:
+            result = block(entry["bufferView"], entry.get("byteOffset", 0), "<f4", result.size).reshape(
+                -1, width
+            )
+        if "sparse" in entry:
+            sparse = entry["sparse"]
+            kind = {5123: "<u2", 5125: "<u4"}[sparse["indices"]["componentType"]]
+            rows = block(
+                sparse["indices"]["bufferView"], sparse["indices"].get("byteOffset", 0), kind, sparse["count"]
+            )
+            values = sparse["values"]
+            result = result.copy()
+            result[rows] = block(
+                values["bufferView"], values.get("byteOffset", 0), "<f4", sparse["count"] * width
+            ).reshape(-1, width)
+        return result
+
+    def block(view: int, offset: int, kind: str, count: int) -> np.ndarray:
+        start = document["bufferViews"][view].get("byteOffset", 0) + offset
+        return np.frombuffer(body, kind, count, start)
+
+    head = read_head(files[1])
+    shown = perform(capture(), head, read_mapping(tmp_path / "m.toml"))
+    node = next(number for number, one in enumerate(document["nodes"]) if one["name"] == "skin")
+    primitive = document["meshes"][document["nodes"][node]["mesh"]]["primitives"][0]
+    channels = {
+        (one["target"]["node"], one["target"]["path"]): document["animations"][0]["samplers"][one["sampler"]]
+        for one in document["animations"][0]["channels"]
+    }
+    weights = numbers(channels[node, "weights"]["output"]).reshape(20, -1)
+    targets = np.stack([numbers(one["POSITION"]) for one in primitive["targets"]])
+    positions = numbers(primitive["attributes"]["POSITION"]) + np.einsum("k,kvc->vc", weights[12], targets)
+    expected = shown.vertices(12)[head.rows[0]] * head.metres
+    np.testing.assert_allclose(positions, expected, atol=1e-6)
+    assert np.abs(positions - numbers(primitive["attributes"]["POSITION"])).max() > 0.007
+    top = next(number for number, one in enumerate(document["nodes"]) if one["name"] == "head")
+    assert document["nodes"][top]["children"]
+    x, y, z, w = numbers(channels[top, "rotation"]["output"])[17]
+    assert np.degrees(2 * np.arcsin(y)) == pytest.approx(np.degrees(np.arcsin(0.28)), abs=0.01)
+    assert max(abs(x), abs(z)) < 1e-3
+    assert w > 0.9
+    np.testing.assert_allclose(
+        numbers(channels[top, "rotation"]["input"])[:, 0], np.arange(20) / 50, atol=1e-6
+    )
+
+
+def test_a_picture_and_a_film(run: Run, files: tuple[Path, Path], tmp_path: Path, opengl: None) -> None:
+    pytest.importorskip("av")
+    from PIL import Image
+
+    code, out, err = run("markers", *files, "-o", tmp_path / "a.png", "--marker", "8.2", "--size", "320x200")
+    assert (code, err) == (0, "")
+    assert out == f"{tmp_path / 'a.png'}: 320x200\n"
+    pixels = np.asarray(Image.open(tmp_path / "a.png").convert("RGB")).astype(int)
+    assert ((pixels[..., 0] - pixels[..., 2]) > 60).sum() > 20  # the lip is red, and dots are orange
+    code, out, err = run("markers", *files, "-o", tmp_path / "a.mp4", "--cloud", "none", "--size", "160x120",
+                         "--fps", "25", "--end", "0.2")  # fmt: skip
+    assert (code, err) == (0, "")
+    assert (tmp_path / "a.mp4").stat().st_size > 500
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["-o", "a.fba"], "name a picture .*a film .*a head with its animation .*a mapping"),
+        (["-o", "a.toml", "--time", "1"], "--time is for a picture or a film, not for a.toml"),
+        (["-o", "a.png", "--fps", "25"], "--fps is for a film; a picture has a --time"),
+        (["-o", "a.mp4", "--time", "1"], "--time is for a picture; a film has a --start"),
+        (["--cloud", "over"], "--cloud is for a picture or a film: give -o"),
+        (["-o", "a.png", "--marker", "Lip"], "--marker Lip: the capture has no such marker; it has 2.1"),
+        (["-o", "a.png", "--map", "Lip=2.1"], "--map: the capture has no marker Lip; it has 2.1"),
+        (["-o", "a.png", "--map", "8.2=99.1"], "there is no place '99.1'"),
+        (["-o", "-"], "--output -: give the name of a file"),
+        (["-o", "a.png", "--map-out", "a.csv"], "mappings are TOML; name it a.toml"),
+    ],
+)  # fmt: skip
+def test_wrong_usage_is_said(
+    options: list[str], words: str, run: Run, files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(files[0].parent)
+    code, _, err = run("markers", *files, *options)
+    assert code == 2
+    assert re.search(words, " ".join(err.split())), err
+
+
+def test_what_fits_neither_head_nor_capture_is_refused(
+    run: Run, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    mapping = tmp_path / "m.toml"
+    run("markers", *files, "-o", mapping)
+    code, _, err = run("markers", *files, "--map", "8.2=99999", "-o", tmp_path / "a.glb")
+    assert code == 1
+    assert "virtual marker '8.2' is at vertex 99999, but head.obj has" in err
+    other = replace(capture(), names=("Chin", *MARKED[1:]))
+    (tmp_path / "other.csv").write_bytes(wide(other))
+    code, _, err = run(
+        "markers", tmp_path / "other.csv", files[1], "--map", mapping, "-o", tmp_path / "a.glb"
+    )
+    assert code == 1
+    assert "the capture has no marker 2.1, which the mapping names; it has Chin, 2.10" in err
+    few = replace(capture(), names=MARKED[:3], positions=capture().positions[:, :3])
+    (tmp_path / "few.csv").write_bytes(wide(few))
+    code, _, err = run("markers", tmp_path / "few.csv", files[1], "-o", tmp_path / "a.glb")
+    assert code == 1
+    assert "3 are too few to find a face by its shape" in err
+    code, _, err = run("markers", *files, "--map", mapping, "--map", "11.1=", "-o", tmp_path / "a.glb")
+    assert code == 1
+    assert "the head's motion needs 3 fixed markers" in err
+    text = files[1].read_text().rstrip()
+    files[1].write_text(text[: text.rindex("\n")] + "\n")  # a triangle less
+    code, _, err = run("markers", *files, "--map", mapping, "-o", tmp_path / "a.glb")
+    assert code == 1
+    assert "the mapping was made for another mesh (head.obj) than head.obj" in err
+    code, _, err = run("markers", files[1], files[1], "-o", tmp_path / "a.glb")
+    assert code != 0
+    assert not (tmp_path / "a.glb").exists()
