@@ -154,7 +154,7 @@ class MarkerEditing:
     def save(self) -> None:
         """Write the mapping, marked as made for this head. Raises OSError, FbaError where it cannot be."""
         if self.path is None:
-            raise OptionError("no file was named for the mapping; give --map-out FILE.toml")
+            raise OptionError("no file was named for the mapping")
         write_mapping(self.path, self.mapping.for_head(self.head))
         self._saved = self.mapping
         self.written = True

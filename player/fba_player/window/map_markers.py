@@ -12,8 +12,8 @@ from fba_player.window.display import check_display
 SECONDS = 8.0
 """For which the window says what was found."""
 WITHOUT = (
-    "Without a window, -o FILE.png or .mp4 draws what the proposed mapping does, --map-out FILE.toml writes "
-    "it, and --map FILE.toml reads it after you have changed it"
+    "Without a window, `fba markers CAPTURE -o FILE.toml` writes the proposed mapping, to be changed in an "
+    "editor; -o FILE.png draws what it does"
 )
 """What to do where no window can be opened."""
 
