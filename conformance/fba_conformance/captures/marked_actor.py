@@ -11,12 +11,16 @@ from fractions import Fraction
 
 import numpy as np
 
+from fba.animation import Animation
 from fba.arrays import Float64
+from fba.capture.markers.faces import PATH
 from fba.capture.markers.marker_maps import marker_sets
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.targets import TRAGIONS
 from fba.face import Deformer, FaceModel
 from fba.face.feature_points import row_of
+from fba.parameters import BAP_COUNT
+from fba.tracks import BodyTrack, FaceTrack
 from fba_conformance.captures.performances import HEAD, head_motion, speech
 
 BETWEEN = {
@@ -72,3 +76,14 @@ def record(model: FaceModel, faps: Float64, rate: int = 100, seed: int = 2) -> T
             positions[:, n] = sum(points[:, rows[point]] * share for point, share in BETWEEN[name])
     times = np.arange(len(faps)) / rate
     return Take(MarkerMotion(NAMES, positions, times, Fraction(rate), "m", "+y", "talk"), faps, path)
+
+
+def as_animation(take: Take) -> Animation:
+    """Return what is performed in a take: its FAPs, and the path of the head as BAPs 181 to 183."""
+    faps = np.rint(take.faps).astype(np.int32)
+    baps = np.zeros((len(faps), BAP_COUNT), dtype=np.int32)
+    sent = np.zeros(baps.shape, dtype=bool)
+    for bap, axis in zip(PATH, (1, 0, 2), strict=True):
+        baps[:, bap - 1], sent[:, bap - 1] = np.rint(1000 * take.path[:, axis]), True
+    face = FaceTrack(faps, np.broadcast_to((faps != 0).any(axis=0), faps.shape))
+    return Animation(take.motion.rate, np.arange(len(faps)), face, BodyTrack(baps, sent), take.motion.name)

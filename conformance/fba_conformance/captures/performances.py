@@ -6,9 +6,10 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
+from fba.capture.blendshapes.combination import part_lids
 from fba.errors import ModelError
 from fba.face import FaceModel, resolve
-from fba.parameters import FAP_COUNT
+from fba.parameters import FAP_COUNT, faps
 
 AMPLITUDES = {
     3: 500, 14: 120, 15: 60, 16: 150, 17: 150, 18: 120, 19: 900, 20: 900, 31: 200, 32: 200, 33: 200, 34: 200,
@@ -60,13 +61,18 @@ def head_motion(frames: int, rate: float, seed: int = 2) -> tuple[Float64, Float
 def perform_track(animation: Animation, rate: float) -> Float64:
     """Return what a face of an animation does, at another rate, after a rest: FAPs, float64 (T, 68).
 
-    Visemes and expressions become FAPs; the head stays as it is. Raises ModelError if there is no face.
+    Visemes and expressions become FAPs. What no face shows is left out: values below 0 of FAPs that go one
+    way only, and lids that are more than closed. Raises ModelError if there is no face.
     """
     if animation.face is None:
         raise ModelError("the animation has no face")
     shown = resolve(animation.face, FaceModel.default()).astype(np.float64)
     shown[:, :2] = 0
-    times = animation.times - animation.times[0] + 2 * REST
+    part_lids(shown)
+    one_way = [fap.direction == "U" for fap in faps()]
+    shown[:, one_way] = np.maximum(shown[:, one_way], 0)
+    times = animation.index / float(animation.rate)
+    times = times - times[0] + 2 * REST
     at = np.arange(round((times[-1]) * rate) + 1) / rate
     values = np.stack([np.interp(at, times, column) for column in shown.T], axis=1)
     return values * ease_in(at, REST, REST)[:, None]

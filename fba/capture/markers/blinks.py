@@ -10,12 +10,13 @@ LONGEST = 0.5
 """Seconds that a blink lasts at most, at half its depth."""
 DEEP = 0.5
 """Share of the usual opening that an upper lid sinks at least in a blink."""
-UPPER_SHARE = 0.9
-"""Share of the opening that the upper lid sinks in a blink; the lower one comes up to meet it. Of four heads
-with ARKit's shapes, the median is 0.90 (fba/capture/blendshapes/shape_faps.csv)."""
+UPPER_SHARE = 0.95
+"""Share of the opening that the upper lid sinks in a blink. The lower one comes up to meet it on four heads
+with ARKit's shapes (0.90 there, fba/capture/blendshapes/shape_faps.csv), and hardly in streams of old
+encoders; as it is not sent, a blink must nearly close the eye without it."""
 RANGE = (0.7, 1.3)
 """Openings that are believed, relative to the usual one."""
-SMOOTH = 0.03
+SMOOTH = 0.02
 """Seconds over which noise is averaged."""
 FULLEST = 75
 """Percentile of the blinks' depths: while people talk, many blinks stop half-way."""
