@@ -423,6 +423,12 @@ MUTANTS = (
     Mutant(COMBINATION, "amounts[:, but] = 0.0", "pass", FACES_TEST),
     Mutant(COMBINATION, "np.minimum(columns[closed], ", "np.maximum(columns[closed], ", SHAPES_TEST),
     Mutant(COMBINATION, "LID_GAP - values[:, upper]", "LID_GAP", SHAPES_TEST),
+    Mutant(
+        "fba/capture/blendshapes/inversion.py",
+        "rows[CLOSED] = rows[CLOSED] + rows[JAW]",
+        "rows[CLOSED] = rows[CLOSED] + 0 * rows[JAW]",
+        "tests/capture/faces/test_faps_to_shapes.py",
+    ),
     Mutant(f"{MARKERS}/gaps.py", "length <= SHORT", "length <= 5 * SHORT", MARKERS_TEST),
     Mutant(f"{MARKERS}/gaps.py", "off[0] * (1 - share) + off[1] * share", "off[0]", MARKERS_TEST),
     Mutant(

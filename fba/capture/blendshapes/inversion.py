@@ -10,6 +10,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture.blendshapes._weight_loops import find_weights
+from fba.capture.blendshapes.combination import CLOSED, JAW
 from fba.capture.blendshapes.conversion import EYES, HEAD, RADIAN
 from fba.capture.blendshapes.motion import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
@@ -43,6 +44,8 @@ def to_blendshapes(animation: Animation) -> ShapeMotion:
         raise ModelError("the animation has no face; there is nothing to make blendshapes of")
     shown = resolve(animation.face).astype(np.float64)
     weights = _solve(_shapes(), shown * _metres())
+    opened, closed = (ARKIT_ORDER.index(name) for name in (JAW, CLOSED))
+    weights[:, opened] = np.minimum(weights[:, opened] + weights[:, closed], 1.0)
     times = np.asarray(animation.index, dtype=np.float64) / float(animation.rate)
     return ShapeMotion(
         ARKIT_ORDER, weights, times - times[0], Fraction(animation.rate),
@@ -58,9 +61,13 @@ def _solve(shapes: Float64, wanted: Float64) -> Float64:
 
 @cache
 def _shapes() -> Float64:
-    """Return how far FAPs of each of ARKit's shapes move an adult's face, metres, (52, 68)."""
-    rows = [amounts_of(name) for name in ARKIT_ORDER]
-    return np.array([row for row in rows if row is not None]) * _metres()
+    """Return how far FAPs of each of ARKit's shapes move an adult's face, metres, (52, 68).
+
+    "mouthClose" is there an open jaw with lips together, since it does nothing beyond "jawOpen".
+    """
+    rows = {name: amounts for name in ARKIT_ORDER if (amounts := amounts_of(name)) is not None}
+    rows[CLOSED] = rows[CLOSED] + rows[JAW]
+    return np.array(list(rows.values())) * _metres()
 
 
 @cache

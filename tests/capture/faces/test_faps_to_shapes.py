@@ -68,6 +68,20 @@ def test_angles_come_back() -> None:
     assert into.max() == 0
 
 
+def test_lips_of_an_open_jaw_stay_where_they_are() -> None:
+    """mouthClose does nothing beyond jawOpen, so weights of it must not count on that."""
+    values = np.zeros((3, 68), dtype=np.int32)
+    values[:, fap_numbers()["open_jaw"] - 1] = [100, 300, 500]
+    back = to_blendshapes(Animation(25, np.arange(3), FaceTrack(values, np.ones(values.shape, bool))))
+    opened, closed = (back.weights[:, ARKIT_ORDER.index(name)] for name in ("jawOpen", "mouthClose"))
+    assert (closed <= opened + 1e-9).all()
+    assert (opened > [0.05, 0.2, 0.35]).all()
+    again = from_blendshapes(back).face
+    assert again is not None
+    lips = [fap_numbers()[name] - 1 for name in ("raise_b_midlip", "raise_b_lip_lm", "lower_t_midlip")]
+    assert np.abs(again.values[:, lips]).max() < 130
+
+
 def test_visemes_and_expressions_become_shapes() -> None:
     viseme = np.zeros((2, 4), dtype=np.int16)
     viseme[:, 0], viseme[:, 2] = 10, 63  # A:
