@@ -21,6 +21,7 @@ from fba.parameters import faps
 from fba.tracks import FaceTrack
 from fba_conformance.captures import damage, marker_files
 from fba_conformance.captures.marked_actor import Take, record
+from fba_conformance.captures.performances import HEAD, head_motion
 from fba_conformance.captures.shaped_face import action_units_at
 
 PER_CENT = 1024 / 100
@@ -96,16 +97,20 @@ def measure_marker_file(folder: Path, name: str, take: Take) -> tuple[Errors, fl
     return root_mean_squares(animation.face.values.astype(float), take.faps, told), off
 
 
-def measure_shapes(performed: Float64, rate: int) -> Errors:
-    """Return the errors of FAPs (T, 68) that become weights of ARKit's shapes and FAPs again."""
+def measure_shapes(performed: Float64, rate: int) -> dict[int, float | None]:
+    """Return the errors of FAPs (T, 68) that become weights of ARKit's shapes and FAPs again, with turns of
+    the head; None for those that come back, but are not performed."""
+    performed = performed.copy()
+    performed[:, HEAD] = head_motion(len(performed), rate)[0] / 1e-5
     track = FaceTrack(np.rint(performed).astype(np.int32), np.ones(performed.shape, dtype=bool))
     animation = Animation(Fraction(rate), np.arange(len(performed)), track)
-    return measure_animation(from_blendshapes(to_blendshapes(animation)), animation)
+    errors = measure_animation(from_blendshapes(to_blendshapes(animation)), animation)
+    return {fap: error if performed[:, fap - 1].any() else None for fap, error in errors.items()}
 
 
 def told_by_units() -> tuple[int, ...]:
     """Return the FAPs that OpenFace's action units, pose and gaze tell."""
-    found = from_action_units(action_units_at(np.zeros(1)))
+    found = from_action_units(action_units_at(np.ones(1)))
     assert found.face is not None
     return tuple((np.flatnonzero(found.face.mask[0]) + 1).tolist())
 
