@@ -91,7 +91,8 @@ HEADS_TEST = "tests/formats/gltf/test_own_heads.py"
 FACES_TEST = "tests/formats/gltf/test_face_motion.py"
 DECLARED_TEST = "tests/formats/gltf/test_declared_bones.py"
 FIGURE = "fba/capture/comparison/figure.py"
-MEASURES = "fba/capture/comparison/measures.py"
+POSE_MEASURES = "fba/capture/comparison/pose_measures.py"
+PATH_MEASURES = "fba/capture/comparison/path_measures.py"
 NAMED_BONES = "fba/capture/_named_bones.py"
 STANDING = "fba/capture/_standing.py"
 MEASUREMENT = "fba/capture/comparison/measurement.py"
@@ -283,14 +284,16 @@ MUTANTS = (
     ),
     Mutant(RANGES, "np.maximum(held, wanted)", "wanted", RANGES_TEST),
     Mutant(FIGURE, "unit(head - feet)[straight],", "unit(head - feet)[:0],", PREPARATION_TEST),
-    Mutant(MEASURES, "between @ mean_rotation(between).T", "between", COMPARISON_TEST),
-    Mutant(MEASURES, "np.maximum(ours - most, 0.0)", "np.maximum(ours - 9 * most, 0.0) * 0", COMPARISON_TEST),
-    Mutant(MEASURES, "np.median(own)) if level is None else level", "np.median(own))", COMPARISON_TEST),
-    Mutant(MEASURES, "lowest = above if level is None else highest", "lowest = above", COMPARISON_TEST),
-    Mutant(MEASURES, "(leaps > TEAR) & (leaps", "(leaps > 99 * TEAR) & (leaps", COMPARISON_TEST),
-    Mutant(MEASURES, "SLIGHT_BEND = 0.12", "SLIGHT_BEND = 0.012", COMPARISON_TEST),
-    Mutant(MEASURES, "- MOST_WRUNG, 0.0", "- 2 * MOST_WRUNG, 0.0", COMPARISON_TEST),
-    Mutant(MEASURES, "frames @ level, result", "frames @ -level, result", COMPARISON_TEST),
+    Mutant(POSE_MEASURES, "between @ mean_rotation(between).T", "between", COMPARISON_TEST),
+    Mutant(
+        PATH_MEASURES, "np.maximum(ours - most, 0.0)", "np.maximum(ours - 9 * most, 0.0) * 0", COMPARISON_TEST
+    ),
+    Mutant(PATH_MEASURES, "np.median(own)) if level is None else level", "np.median(own))", COMPARISON_TEST),
+    Mutant(PATH_MEASURES, "lowest = above if level is None else highest", "lowest = above", COMPARISON_TEST),
+    Mutant(PATH_MEASURES, "(leaps > TEAR) & (leaps", "(leaps > 99 * TEAR) & (leaps", COMPARISON_TEST),
+    Mutant(PATH_MEASURES, "SLIGHT_BEND = 0.12", "SLIGHT_BEND = 0.012", COMPARISON_TEST),
+    Mutant(POSE_MEASURES, "- MOST_WRUNG, 0.0", "- 2 * MOST_WRUNG, 0.0", COMPARISON_TEST),
+    Mutant(POSE_MEASURES, "frames @ level, result", "frames @ -level, result", COMPARISON_TEST),
     Mutant(MEASUREMENT, "turned[number] > MOVES", "turned[number] > 9 * MOVES", COMPARISON_TEST),
     Mutant(MEASUREMENT, "bounds()[row.name].hold * rate", "0 * rate", COMPARISON_TEST),
     Mutant(VERDICT, ">= limit.poor", "> 2 * limit.poor", COMPARISON_TEST),
@@ -384,7 +387,7 @@ MUTANTS = (
     ),
     Mutant(NAMED_BONES, 'f != "middle"', "True", PREPARATION_TEST),
     Mutant(NAMED_BONES, "len(others) < len(legs)", "True", PREPARATION_TEST),
-    Mutant(MEASURES, 'rest.tips.get(f"{side}_wrist", 2', 'rest.tips.get("", 2', COMPARISON_TEST),
+    Mutant(POSE_MEASURES, 'rest.tips.get(f"{side}_wrist", 2', 'rest.tips.get("", 2', COMPARISON_TEST),
     Mutant(FIGURE, "STRAIGHT = 0.9", "STRAIGHT = 0.5", PREPARATION_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 1.0", BVH_READING_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 500.0", BVH_READING_TEST),

@@ -11,9 +11,9 @@ from scipy.ndimage import minimum_filter1d
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.body import BapSolver
-from fba.capture.comparison import figure, measures
+from fba.capture.comparison import figure, path_measures, pose_measures
 from fba.capture.comparison.figure import Figure
-from fba.capture.comparison.measures import Row
+from fba.capture.comparison.pose_measures import Row
 from fba.capture.comparison.soles import sole_heights
 from fba.capture.comparison.standing import Floor, find_floor, find_standing
 from fba.capture.comparison.verdict import Comparison, Difference, bounds, in_order
@@ -70,7 +70,7 @@ def compare(
     metres = source_scale(motion, mapped, neutral, up) if scale is None else scale
     rest = rest_figure(motion, mapped, up, metres)
     rate = float(motion.rate)
-    lost, tears = measures.find_tears(motion.positions[:count] * metres, rate)
+    lost, tears = path_measures.find_tears(motion.positions[:count] * metres, rate)
     pieces = _pieces(count, most)
     floor = find_floor(
         (figure.source_figure(rows_of(motion, piece), mapped, up, metres) for piece in pieces), rate
@@ -123,16 +123,16 @@ def _measure(
     floor: Floor,
 ) -> Iterator[Row]:
     standing = find_standing(source, rate, floor.lows)
-    yield from measures.directions(source, result)
-    yield from measures.palms(source, result, rest)
-    yield from measures.turns(source, result)
-    yield from measures.feet(source, result, standing, rest)
-    yield from measures.heads(source, result, rest)
-    yield from measures.clavicles(source, result, neutral)
-    yield from measures.paths(source, result)
-    yield from measures.floors(source, soles, standing, level, floor.ground)
-    yield from measures.slips(source, result, standing, rate)
-    yield from measures.jumps(source, result)
+    yield from pose_measures.directions(source, result)
+    yield from pose_measures.palms(source, result, rest)
+    yield from pose_measures.turns(source, result)
+    yield from pose_measures.feet(source, result, standing, rest)
+    yield from pose_measures.heads(source, result, rest)
+    yield from pose_measures.clavicles(source, result, neutral)
+    yield from path_measures.paths(source, result)
+    yield from path_measures.floors(source, soles, standing, level, floor.ground)
+    yield from path_measures.slips(source, result, standing, rate)
+    yield from path_measures.jumps(source, result)
     yield from wringing(result)
 
 

@@ -12,7 +12,7 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.body import BapSolver
 from fba.body.model import BodyModel
-from fba.capture.comparison import figure, measurement, measures
+from fba.capture.comparison import figure, measurement, path_measures, pose_measures
 from fba.capture.comparison.standing import find_floor, find_standing
 from fba.capture.motion import SkeletonMotion
 from fba.parameters import BAP_COUNT
@@ -60,7 +60,7 @@ def find_sticks(
     usual = figure.source_figure(begin, mapped, up, metres)
     rate = float(motion.rate)
     standing = find_standing(usual, rate, find_floor([usual], rate).lows)
-    levels = measures.level_soles(usual, standing, measurement.rest_figure(motion, mapped, up, metres))
+    levels = pose_measures.level_soles(usual, standing, measurement.rest_figure(motion, mapped, up, metres))
     ground = min((float(np.percentile(p[:, 1], 5)) for p in _toes(usual)), default=0.0)
     numbers = list(frames)
     chosen = replace(motion, rotations=motion.rotations[numbers], positions=motion.positions[numbers])
@@ -73,7 +73,7 @@ def find_sticks(
     sticks = []
     for row in range(len(chosen)):
         shift = np.array([0.0, own - ground, 0.0])
-        hips = measures.pelvis(source), measures.pelvis(result)
+        hips = path_measures.pelvis(source), path_measures.pelvis(result)
         if hips[0] is not None and hips[1] is not None:
             shift[[0, 2]] = (hips[1] - hips[0])[row, [0, 2]]
         places = positions[row] + shift

@@ -12,7 +12,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture.comparison.figure import SIDES, Figure
-from fba.capture.comparison.measures import WORDS, Row
+from fba.capture.comparison.pose_measures import WORDS, Row
 
 LEGS = (("thigh", "sacroiliac", "{}_hip"), ("shank", "{}_hip", "{}_knee"))
 """Parts, the joint above, and the part's own."""
