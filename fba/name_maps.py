@@ -7,16 +7,19 @@ import os
 import re
 import textwrap
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 from fba.atomic import atomic
-from fba.errors import FormatError
+from fba.errors import FormatError, OptionError
 from fba.limits import Limits
 from fba.source import Path, read_whole
 
 MOST_BYTES = 1 << 20
 """Longest file of a map."""
+NAMED = 12
+"""Most names in a message."""
 
 
 def read_names(path: Path, table: str, example: str, limits: Limits) -> dict[str, Any]:
@@ -51,6 +54,67 @@ def read_toml(path: Path, expected: str, limits: Limits) -> dict[str, Any]:
             f"is not TOML: {str(error)[:200]}; expected lines such as {expected}",
             path=path, line=int(line[1]) if line else None,
         ) from None  # fmt: skip
+
+
+def change_names(
+    base: Mapping[str, str],
+    pairs: Mapping[str, str],
+    check_name: Callable[[str], None],
+    check_value: Callable[[str], None],
+    shared: str = "",
+) -> dict[str, str]:
+    """Return a map of names changed by hand.
+
+    pairs: name -> value, or "" to leave the name out. Another name that had the same value loses it, unless
+    that is the one that several may share. The checks raise OptionError for what does not exist.
+    """
+    result = dict(base)
+    for name, value in pairs.items():
+        check_name(name)
+        if value:
+            check_value(value)
+        result = {
+            each: taken
+            for each, taken in result.items()
+            if each != name and (taken != value or value == shared)
+        }
+        if value:
+            result[name] = value
+    return result
+
+
+def change_known_names(
+    base: Mapping[str, str],
+    pairs: Mapping[str, str],
+    known: Sequence[str],
+    what: str,
+    check_value: Callable[[str], None],
+    shared: str = "",
+) -> dict[str, str]:
+    """Return the same in the order of the names that are known: all names of the source.
+
+    what: begins the message of a name that it lacks, "the capture has no marker".
+    """
+
+    def check_name(name: str) -> None:
+        if name not in known:
+            raise OptionError(f"{what} {name!r}{_like(name, known)}; it has {list_names(known)}")
+
+    result = change_names(base, pairs, check_name, check_value, shared)
+    order = {name: number for number, name in reversed(list(enumerate(known)))}
+    return dict(sorted(result.items(), key=lambda pair: order.get(pair[0], len(order))))
+
+
+def list_names(names: Sequence[str]) -> str:
+    """Return names as text, the first of many."""
+    return ", ".join(names[:NAMED]) + (f", and {len(names) - NAMED} more" if len(names) > NAMED else "")
+
+
+def _like(name: str, known: Sequence[str]) -> str:
+    """Return " (did you mean 'LCL'?)", whatever is written in capitals, or ""."""
+    by_lower = {each.lower(): each for each in known}
+    near = get_close_matches(name.lower(), by_lower, n=1)
+    return f" (did you mean {by_lower[near[0]]!r}?)" if near else ""
 
 
 def write_names(

@@ -9,12 +9,10 @@ from fba.capture.bones import find_bones
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FormatError, ModelError, OptionError, did_you_mean
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.name_maps import read_names, write_names
+from fba.name_maps import change_known_names, read_names, write_names
 from fba.source import Path
 
 TABLE = "joints"
-NAMED = 12
-"""Most joints that a comment names in a line."""
 
 
 def find_map(motion: SkeletonMotion, joints: Mapping[str, str] | None = None) -> dict[str, str]:
@@ -43,23 +41,12 @@ def change_map(
             base = find_map(motion)
         except ModelError:
             base = {}
-    result = dict(base)
-    for source, joint in pairs.items():
-        if source not in motion.names:
-            raise OptionError(
-                f"the skeleton has no joint {source!r}{did_you_mean(source, motion.names)}; it has "
-                f"{_list(motion.names)}"
-            )
-        _check_joint(joint, allow_none=True)
-        result = {each: taken for each, taken in result.items() if each != source and taken != joint}
-        if joint:
-            result[source] = joint
+    result = change_known_names(base, pairs, motion.names, "the skeleton has no joint", _check_joint)
     if ROOT not in result.values():
         raise OptionError(
             f"no joint of the skeleton is mapped to {ROOT}, the hips: give one, such as Hips={ROOT}"
         )
-    order = {name: number for number, name in reversed(list(enumerate(motion.names)))}
-    return dict(sorted(result.items(), key=lambda pair: order.get(pair[0], len(order))))
+    return result
 
 
 def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
@@ -100,17 +87,13 @@ def write_map(path: Path, joints: Mapping[str, str], motion: SkeletonMotion | No
     write_names(path, TABLE, joints, heading, left)
 
 
-def _check_joint(joint: str, allow_none: bool = False) -> None:
+def _check_joint(joint: str) -> None:
     """Raise OptionError for a joint that the standard lacks."""
     names = Skeleton.default().names
-    if joint not in names and not (allow_none and not joint):
+    if joint not in names:
         near = did_you_mean(joint, names)
         raise OptionError(
             f"the standard has no joint {joint!r}{near}; it has {ROOT}, vl5 to vl1, vt12 to vt1, vc7 to vc1, "
             "skullbase, l_hip, l_knee, l_ankle, l_metatarsal, l_sternoclavicular, l_shoulder, l_elbow, "
             "l_wrist, l_thumb1 to l_pinky3, and the same with r_"
         )
-
-
-def _list(names: tuple[str, ...]) -> str:
-    return ", ".join(names[:NAMED]) + (f", and {len(names) - NAMED} more" if len(names) > NAMED else "")

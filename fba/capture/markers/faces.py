@@ -14,7 +14,7 @@ from fba.arrays import Float64
 from fba.capture.markers.blinks import opening_by_blinks
 from fba.capture.markers.exchanges import Exchange, undo_exchanges
 from fba.capture.markers.gaps import RARELY, Filled, fill_gaps, warn_of_gaps
-from fba.capture.markers.marker_maps import check_map, find_map, list_names
+from fba.capture.markers.marker_maps import check_map, find_map
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.neutral import neutral_frames
 from fba.capture.markers.pupils import find_gaze
@@ -28,6 +28,7 @@ from fba.face import FaceModel, Fapu
 from fba.face.feature_points import row_of
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, PITCH_EYE, YAW_EYE
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.name_maps import list_names
 from fba.parameters import BAP_COUNT, FAP_COUNT
 from fba.tracks import BodyTrack, FaceTrack
 

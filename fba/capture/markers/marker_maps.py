@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 
@@ -14,12 +13,10 @@ from fba.capture.markers.targets import HEAD, RIGID, TARGETS
 from fba.errors import FormatError, OptionError, did_you_mean
 from fba.face.feature_points import row_of
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.name_maps import read_names, write_names
+from fba.name_maps import change_known_names, read_names, write_names
 from fba.source import Path
 
 TABLE = "markers"
-NAMED = 12
-"""Most markers that a message names."""
 FEWEST = 8
 """Least number of names by which a set of markers fits."""
 SHARE = 0.6
@@ -90,23 +87,10 @@ def change_map(
     base: the map that is changed, None for what is found. pairs: marker -> target, or "" to leave it out.
     Another marker that had the same feature point loses it. OptionError for an unknown marker or target.
     """
-    result = dict(find_map(motion)[0] if base is None else base)
-    for marker, target in pairs.items():
-        if marker not in motion.names:
-            raise OptionError(
-                f"the capture has no marker {marker!r}{_like(marker, motion.names)}; it has "
-                f"{list_names(motion.names)}"
-            )
-        check_target(target, allow_none=True)
-        result = {
-            each: taken
-            for each, taken in result.items()
-            if each != marker and (taken != target or target == HEAD)
-        }
-        if target:
-            result[marker] = target
-    order = {name: number for number, name in enumerate(motion.names)}
-    return dict(sorted(result.items(), key=lambda pair: order.get(pair[0], len(order))))
+    return change_known_names(
+        find_map(motion)[0] if base is None else base,
+        pairs, motion.names, "the capture has no marker", check_target, shared=HEAD,
+    )  # fmt: skip
 
 
 def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
@@ -148,9 +132,9 @@ def check_map(markers: Mapping[str, str]) -> None:
         taken[target] = marker
 
 
-def check_target(target: str, allow_none: bool = False) -> None:
+def check_target(target: str) -> None:
     """Raise OptionError for a target that markers cannot have."""
-    if target in TARGETS or (allow_none and not target):
+    if target in TARGETS:
         return
     if target in row_of():
         raise OptionError(
@@ -161,15 +145,3 @@ def check_target(target: str, allow_none: bool = False) -> None:
         f"there is no place {target!r}{did_you_mean(target, TARGETS)}; a marker is at a feature point of the "
         f"face, such as 2.1 or 8.3, or at {', '.join(special)}"
     )
-
-
-def _like(marker: str, names: Sequence[str]) -> str:
-    """Return " (did you mean 'LCL'?)", whatever is written in capitals, or ""."""
-    by_lower = {name.lower(): name for name in names}
-    near = get_close_matches(marker.lower(), by_lower, n=1)
-    return f" (did you mean {by_lower[near[0]]!r}?)" if near else ""
-
-
-def list_names(names: Sequence[str]) -> str:
-    """Return names as text, the first of many."""
-    return ", ".join(names[:NAMED]) + (f", and {len(names) - NAMED} more" if len(names) > NAMED else "")

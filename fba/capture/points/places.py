@@ -17,7 +17,7 @@ from fba.arrays import Float64
 from fba.capture.markers.marker_maps import check_map, check_target
 from fba.capture.markers.targets import HEAD, RIGID
 from fba.errors import OptionError
-from fba.name_maps import write_names
+from fba.name_maps import change_names, write_names
 from fba.source import Path
 
 PARTS = {68: (68,), 70: (68, 70), 468: (468,), 478: (468, 478)}
@@ -56,7 +56,12 @@ def check_places(places: Mapping[str, str], count: int) -> None:
     """Raise OptionError for points that a tracker has not, and for places that markers cannot have."""
     check_map(dict(places))
     for points in places:
-        numbers_of(points, count)
+        check_points(points, count)
+
+
+def check_points(points: str, count: int) -> None:
+    """Raise OptionError for points that a tracker with so many has not."""
+    numbers_of(points, count)
 
 
 def numbers_of(points: str, count: int) -> tuple[int, ...]:
@@ -75,17 +80,10 @@ def change_places(count: int, base: Mapping[str, str] | None, pairs: Mapping[str
     base: the map that is changed, None for the table's. pairs: points -> place, or "" to leave them out.
     Other points that had the same place lose it. OptionError for unknown points or places.
     """
-    result = dict(point_places(count) if base is None else base)
-    for points, place in pairs.items():
-        numbers_of(points, count)
-        check_target(place, allow_none=True)
-        result = {
-            each: taken
-            for each, taken in result.items()
-            if each != points and (taken != place or place == HEAD)
-        }
-        if place:
-            result[points] = place
+    result = change_names(
+        point_places(count) if base is None else base,
+        pairs, lambda points: check_points(points, count), check_target, shared=HEAD,
+    )  # fmt: skip
     check_places(result, count)
     return result
 

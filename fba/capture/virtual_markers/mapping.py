@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from fba.capture.markers.marker_maps import list_names
 from fba.capture.virtual_markers.heads import MarkedHead
 from fba.errors import FbaWarning, ModelError, OptionError
+from fba.name_maps import list_names
 
 ASSIGNMENTS = ("shared", "exclusive")
 OVERLAPS = ("match", "add")

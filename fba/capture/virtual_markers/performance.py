@@ -11,7 +11,6 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 from fba.capture.markers.gaps import RARELY, fill_gaps, warn_of_gaps
-from fba.capture.markers.marker_maps import list_names
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.neutral import neutral_frames
 from fba.capture.markers.stabilisation import follow_head, relate_poses, remove_poses
@@ -20,6 +19,7 @@ from fba.capture.virtual_markers.heads import MarkedHead
 from fba.capture.virtual_markers.mapping import MarkerMapping
 from fba.capture.virtual_markers.weights import MarkerWeights, find_weights
 from fba.errors import FbaWarning, ModelError
+from fba.name_maps import list_names
 
 FEWEST_FIXED = 3
 """Fixed markers from which the head's motion is measured at least."""
