@@ -19,6 +19,8 @@ from fba_conformance.captures.tracked_actor import PointTake, film
 from small_head import small_head
 
 PER_MILLE = 1024 / 1000
+UNTOLD = (14, 18, 39, 40)
+"""FAPs that MediaPipe's points do not tell."""
 
 
 @cache
@@ -45,7 +47,7 @@ def errors(face: MarkerFace, take: PointTake) -> dict[int, float]:
 
 def check(take: PointTake, most: dict[int, float], usual: float, degrees: float) -> MarkerFace:
     """most: thousandths of FAPU that single FAPs may be off; usual: the others."""
-    face = find_point_face(take.motion, neutral="first", aspect=16 / 9)
+    face = find_point_face(replace(take.motion, aspect=16 / 9), neutral="first")
     angles = {fap.number for fap in faps() if fap.unit == "AU"}
     worse = {
         fap: round(error, 2)
@@ -57,9 +59,11 @@ def check(take: PointTake, most: dict[int, float], usual: float, degrees: float)
 
 
 def test_478_points_of_another_head() -> None:
-    face = check(deep_take(), {3: 35, 14: 25, 18: 70}, 12, 0.3)
-    assert {3, 4, 5, 14, 15, 16, 17, 19, 21, 23, 26, 31, 37, 41, 51, 59, 61, 63} <= set(face.sent)
-    assert not {27, 29, 39, 40, 43, 65} & set(face.sent)  # nothing is made up
+    take = film(actor(), 478, share=True, without=UNTOLD)
+    face = check(take, {3: 25}, 12, 0.3)
+    assert {3, 4, 5, 15, 16, 17, 19, 21, 23, 26, 31, 37, 41, 51, 59, 61, 63} <= set(face.sent)
+    assert not {*UNTOLD, 27, 29, 43, 65} & set(face.sent)  # nothing is made up
+    check(deep_take(), {3: 45, 16: 35}, 12, 0.3)  # what is not told disturbs little of what is
 
 
 def test_68_points_in_metres() -> None:
@@ -71,6 +75,7 @@ def test_points_without_depth_tell_nothing_of_depth() -> None:
     face = find_point_face(take.motion, neutral="first")
     assert not {14, 16, 17, 27, 28} & set(face.sent)
     assert {23, 24, 25, 26} <= set(face.sent)
+    check(take, {3: 65}, 40, 2.5)
 
 
 def test_a_head_that_turns_does_not_smile() -> None:

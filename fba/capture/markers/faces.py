@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float64
+from fba.arrays import Float64, Intp
 from fba.capture.markers.blinks import opening_by_blinks
 from fba.capture.markers.exchanges import Exchange, undo_exchanges
 from fba.capture.markers.gaps import RARELY, Filled, fill_gaps, warn_of_gaps
@@ -34,6 +34,7 @@ from fba.tracks import BodyTrack, FaceTrack
 
 PATH = (181, 182, 183)
 """BAPs that move the body up, to its left, and to its front, millimetres."""
+Neutral = str | int | tuple[float, float] | slice
 GAZES = ("none", "camera")
 MOST_FRAMES = 1_000_000
 """More than two hours at 120 frames/s."""
@@ -51,12 +52,18 @@ class Traits:
 
     still: names of those that the head alone moves; None: their places tell. depth: whether it was measured
     how far forward they are; otherwise no FAP in that direction is told. confused: whether points may take
-    each other's names, as optical markers do.
+    each other's names, as optical markers do. camera: whether a head that looks along z looks into the
+    camera, and turns are counted from there; otherwise from the neutral face. untold: FAPs that they do not
+    tell. rests: name -> frames in which a point is where it is in a neutral face, for those whose frames are
+    others than those of the whole face.
     """
 
     still: frozenset[str] | None = None
     depth: bool = True
     confused: bool = True
+    camera: bool = False
+    untold: frozenset[int] = frozenset()
+    rests: Mapping[str, Intp] = field(default_factory=dict)
 
     def find_still(self, places: Mapping[str, str]) -> list[int]:
         """Return numbers of the points in a map, name -> place, that the head alone moves."""
@@ -98,7 +105,7 @@ def from_markers(
     rate: Fraction | int | str | None = None,
     *,
     markers: Mapping[str, str] | None = None,
-    neutral: str | int | tuple[float, float] = "auto",
+    neutral: Neutral = "auto",
     gaze: str = "none",
     head_path: bool = True,
     model: FaceModel | None = None,
@@ -155,7 +162,7 @@ def find_face(
     motion: MarkerMotion,
     *,
     markers: Mapping[str, str] | None = None,
-    neutral: str | int | tuple[float, float] = "auto",
+    neutral: Neutral = "auto",
     gaze: str = "none",
     model: FaceModel | None = None,
     traits: Traits = MARKERS,
@@ -229,6 +236,9 @@ def find_face(
     local, filled = fill_gaps(names, local, motion.times)
     warn_of_gaps(filled)
     neutral_local = np.median(local[rest], axis=0)
+    for n, name in enumerate(names):
+        if name in traits.rests:
+            neutral_local[n] = np.median(local[traits.rests[name], n], axis=0)
     known = {places[name]: neutral_local[n] for n, name in enumerate(names) if places[name] != "head"}
     points = complete_points(known, model.points)
     _open_by_blinks(points, places, names, local - neutral_local, motion.times)
@@ -242,18 +252,20 @@ def find_face(
         if places[name] in rows:
             moved[:, rows[places[name]]] = local[:, n] - neutral_local[n]
     told = [place for place in places.values() if place in rows and place not in (*RIGID, *PUPILS)]
-    unknowns = choose_unknowns(told, traits.depth)
+    unknowns = choose_unknowns(told, traits.depth, traits.untold)
     values = np.zeros((len(motion), FAP_COUNT))
     sent: tuple[int, ...] = ()
     if unknowns.faps:
         values = solve(moved, points, fapu, unknowns, measure_responses(model))
         sent = (*unknowns.faps, *unknowns.mates)
-    values[:, [HEAD_PITCH - 1, HEAD_YAW - 1, HEAD_ROLL - 1]] = _head_angles(rotation) / fapu.AU
+    turns = where.axes.T @ rotation if traits.camera else rotation
+    values[:, [HEAD_PITCH - 1, HEAD_YAW - 1, HEAD_ROLL - 1]] = _head_angles(turns) / fapu.AU
     sent = (*sent, HEAD_PITCH, HEAD_YAW, HEAD_ROLL)
-    eyes = find_gaze(moved, set(places.values()), where.scale)
+    eyes = find_gaze(moved, points, set(places.values()), where.scale)
     if eyes is not None and gaze == "none":
         sent = (*sent, *YAW_EYE, *PITCH_EYE)
-        values[:, [fap - 1 for fap in (*YAW_EYE, *PITCH_EYE)]] = eyes / fapu.AU
+        values[:, [fap - 1 for fap in YAW_EYE]] = eyes[:, :1] / fapu.AU
+        values[:, [fap - 1 for fap in PITCH_EYE]] = eyes[:, 1:] / fapu.AU
     if gaze == "camera":
         sent = (*sent, *YAW_EYE, *PITCH_EYE)
         values[:, [fap - 1 for fap in YAW_EYE]] = -values[:, [HEAD_YAW - 1]]

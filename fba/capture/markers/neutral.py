@@ -13,13 +13,15 @@ SLOW = 0.6
 """Share of the usual motion within a window that a neutral start may have."""
 
 
-def neutral_frames(local: Float64, times: Float64, neutral: str | int | tuple[float, float]) -> slice:
+def neutral_frames(local: Float64, times: Float64, neutral: str | int | tuple[float, float] | slice) -> slice:
     """Return the frames of the neutral face.
 
-    local: float64 (T, M, 3), markers relative to the head, NaN for gaps. neutral: "auto", "first", the
-    number of a frame, or (from, to) in seconds from the start. Raises OptionError for frames that the take
-    has not.
+    local: float64 (T, M, 3), markers relative to the head, NaN for gaps. neutral: "auto", "first", the number
+    of a frame, (from, to) in seconds from the start, or the frames. Raises OptionError for frames that the
+    take has not.
     """
+    if isinstance(neutral, slice):
+        return neutral
     length = max(1, int(np.searchsorted(times - times[0], WINDOW)))
     if isinstance(neutral, tuple):
         first, last = (int(np.searchsorted(times - times[0], second)) for second in neutral)

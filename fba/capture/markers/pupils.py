@@ -12,25 +12,48 @@ from fba.face.feature_points import row_of
 
 RADIUS = 0.01205
 """Metres from the middle of an adult's eyeball to its front, hardly different between them."""
-MOST = 0.95
-"""Share of the radius that a pupil goes to a side at most."""
+LARGEST = 0.6
+"""Radians that an eye turns at most."""
+SHUT = 0.3
+"""Share of its neutral opening from which an eye is too shut to see the pupil."""
+LIDS = {"3.5": ("3.1", "3.3"), "3.6": ("3.2", "3.4")}
+"""Upper and lower lid of each pupil's eye."""
 
 
-def find_gaze(moved: Float64, places: Collection[str], size: float) -> Float64 | None:
-    """Return yaw of the left and the right eye (to the left), then their pitch (down): float64 (T, 4).
+def find_gaze(moved: Float64, points: Float64, places: Collection[str], size: float) -> Float64 | None:
+    """Return how far the eyes look to the left and down, float64 (T, 2), radians; None if no pupil is known.
 
-    Angles are in radians. moved: (T, 84, 3), displacements of feature points from the neutral face, in which
-    eyes look ahead, relative to the head, metres. places: those that are known; an eye whose pupil is not
-    does as the other. size: of the face, relative to an adult's. None if no pupil is known.
+    moved: (T, 84, 3), displacements of feature points from the neutral face, in which eyes look ahead,
+    relative to the head, metres. points: (84, 3), the neutral face. places: those that are known. size: of
+    the face, relative to an adult's. Both eyes look the same way, as eyes do, so that their noise is halved;
+    an eye that is shut does not count, and if both are, they look as before and after.
     """
     known = [name for name in PUPILS if name in places]
     if not known:
         return None
-    angles = []
-    for name in PUPILS:
-        shift = moved[:, row_of()[name if name in known else known[0]]] / (RADIUS * size)
-        pitch = -np.arcsin(np.clip(shift[:, 1], -MOST, MOST))
-        yaw = np.arcsin(np.clip(shift[:, 0] / np.cos(pitch), -MOST, MOST))
-        angles.append((yaw, pitch))
-    (left_yaw, left_pitch), (right_yaw, right_pitch) = angles
-    return np.stack([left_yaw, right_yaw, left_pitch, right_pitch], axis=1)
+    total, weight = np.zeros((len(moved), 2)), np.zeros(len(moved))
+    for name in known:
+        shift = moved[:, row_of()[name]] / (RADIUS * size)
+        most = np.sin(LARGEST)
+        pitch = -np.arcsin(np.clip(shift[:, 1], -most, most))
+        yaw = np.arcsin(np.clip(shift[:, 0] / np.cos(pitch), -most, most))
+        counts = _open(moved, points, name, places)
+        total += np.stack([yaw, pitch], axis=1) * counts[:, None]
+        weight += counts
+    rows = np.flatnonzero(weight > 0)
+    if not len(rows):
+        return np.zeros((len(moved), 2))
+    seen = total[rows] / weight[rows, None]
+    every = np.arange(len(moved))
+    return np.stack([np.interp(every, rows, seen[:, axis]) for axis in range(2)], axis=1)
+
+
+def _open(moved: Float64, points: Float64, pupil: str, places: Collection[str]) -> Float64:
+    """Return 1 where an eye is open, 0 where it is shut, float64 (T,); 1 if nothing tells."""
+    upper, lower = LIDS[pupil]
+    if not {upper, lower} <= set(places):
+        return np.ones(len(moved))
+    above, below = row_of()[upper], row_of()[lower]
+    neutral = points[above, 1] - points[below, 1]
+    opening = neutral + moved[:, above, 1] - moved[:, below, 1]
+    return np.asarray((opening > SHUT * neutral).astype(np.float64))

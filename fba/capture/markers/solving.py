@@ -6,7 +6,7 @@ it. The jaw moves on an arc whose shape depends on the skull, so its depth is fi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,11 +44,11 @@ class Unknowns:
     rows: tuple[tuple[int, int], ...]
 
 
-def choose_unknowns(points: Sequence[str], depth: bool = True) -> Unknowns:
+def choose_unknowns(points: Sequence[str], depth: bool = True, untold: Collection[int] = ()) -> Unknowns:
     """Return which FAPs markers on these feature points tell, and along which axes.
 
     depth: whether it is known how far forward the markers are; without it, FAPs in that direction are not
-    told.
+    told. untold: FAPs that are not told, either.
     """
     given = set(points)
     solved: list[int] = []
@@ -58,7 +58,7 @@ def choose_unknowns(points: Sequence[str], depth: bool = True) -> Unknowns:
         axis = _axis(fap.positive)
         owner = next((point for point in fap.feature_points if point in given), None)
         inner = next((outer for outer, point in INNER.items() if point in fap.feature_points), None)
-        if axis is None or fap.unit == "AU" or (axis == 2 and not depth):
+        if axis is None or fap.unit == "AU" or (axis == 2 and not depth) or fap.number in untold:
             continue
         if owner is not None:
             solved.append(fap.number)

@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float64
+from fba.arrays import Float64, Intp
 from fba.capture.markers.faces import MarkerFace, Traits, find_face, from_markers
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.targets import HEAD, target_points
 from fba.capture.points.lifting import lift
 from fba.capture.points.motion import PointMotion
+from fba.capture.points.neutral import find_rests
 from fba.capture.points.picture import upright_points
 from fba.capture.points.places import check_places, find_still, point_places, take_points
 from fba.capture.points.sizes import even_sizes
-from fba.capture.sampling import find_gaps
-from fba.errors import FbaWarning, ModelError
+from fba.capture.sampling import find_gaps, interpolate
+from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
+
+Neutral = str | int | tuple[float, float]
+GUESSED = frozenset({14})
+"""FAPs that a depth which a tracker guesses does not tell: the jaw's thrust is lost in the chin's arc."""
+FRAME_BYTES = 400
+"""Memory for each point in each frame."""
 
 
 def from_points(
@@ -29,7 +37,7 @@ def from_points(
     rate: Fraction | int | str | None = None,
     *,
     markers: Mapping[str, str] | None = None,
-    neutral: str | int | tuple[float, float] = "auto",
+    neutral: Neutral = "auto",
     gaze: str = "none",
     head_path: bool = True,
     aspect: float | None = None,
@@ -47,10 +55,10 @@ def from_points(
     Points without depth do not tell FAPs 14, 16 and 17, nor 27 and 28, and none is made up. Raises ModelError
     where there is no face; OptionError; LimitError. Warns (FbaWarning) of everything that was repaired.
     """
-    taken, places, traits = prepare(motion, markers=markers, aspect=aspect, model=model)
+    made = prepare(motion, markers=markers, neutral=neutral, aspect=aspect, model=model, limits=limits)
     return from_markers(
-        taken, motion.rate if rate is None else rate, markers=places, neutral=neutral, gaze=gaze,
-        head_path=head_path and motion.metric, model=model, traits=traits, limits=limits,
+        made.markers, motion.rate if rate is None else rate, markers=made.places, neutral=made.neutral,
+        gaze=gaze, head_path=head_path and motion.metric, model=model, traits=made.traits, limits=limits,
     )  # fmt: skip
 
 
@@ -58,30 +66,40 @@ def find_point_face(
     motion: PointMotion,
     *,
     markers: Mapping[str, str] | None = None,
-    neutral: str | int | tuple[float, float] = "auto",
+    neutral: Neutral = "auto",
     gaze: str = "none",
     aspect: float | None = None,
     model: FaceModel | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> MarkerFace:
     """Return the face that points show and its motion; options and errors as for `from_points`."""
-    taken, places, traits = prepare(motion, markers=markers, aspect=aspect, model=model)
+    made = prepare(motion, markers=markers, neutral=neutral, aspect=aspect, model=model, limits=limits)
     return find_face(
-        taken, markers=places, neutral=neutral, gaze=gaze, model=model, traits=traits, limits=limits
-    )
+        made.markers, markers=made.places, neutral=made.neutral, gaze=gaze, model=model, traits=made.traits,
+        limits=limits,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Points as if they were markers: in metres, of one size, in every frame; and what is known of them."""
+
+    markers: MarkerMotion
+    places: dict[str, str]
+    neutral: Neutral | slice
+    traits: Traits
 
 
 def prepare(
     motion: PointMotion,
     *,
     markers: Mapping[str, str] | None = None,
+    neutral: Neutral = "auto",
     aspect: float | None = None,
     model: FaceModel | None = None,
-) -> tuple[MarkerMotion, dict[str, str], Traits]:
-    """Return points as if they were markers, in metres and of one size; their places; what is known of them.
-
-    Options and errors as for `from_points`. Frames without a face are left out.
-    """
+    limits: Limits = DEFAULT_LIMITS,
+) -> Prepared:
+    """Return points as if they were markers; options and errors as for `from_points`."""
     model = FaceModel.default() if model is None else model
     places = dict(point_places(motion.count) if markers is None else markers)
     check_places(places, motion.count)
@@ -93,17 +111,44 @@ def prepare(
     if not seen.any():
         raise ModelError(f"no face is seen in any of the {len(motion)} frames; there is nothing to encode")
     _tell_unseen(motion)
-    times = motion.times[seen]
+    limits.check_bytes(FRAME_BYTES * len(motion) * len(names), "the capture", source=motion.positions.nbytes)
     points = take_points(motion.positions[seen], names)
     template = _template(places, model)
     points = upright_points(points, names, places, template, motion.share, aspect or motion.aspect)
     fixed = [n for n, name in enumerate(names) if name in still]
     if motion.flat:
-        points = lift(points, names, places, template, fixed)
+        points = lift(points, places, template, motion.times[seen], model)
     elif not motion.metric:
         points = even_sizes(points, template, fixed)
-    taken = MarkerMotion(names, points, times, motion.rate, "m", "+y", motion.name)
-    return taken, places, Traits(still=still, depth=not motion.flat, confused=False)
+    rests: dict[str, Intp] = {}
+    rest: Neutral | slice = neutral
+    if neutral == "auto":
+        found = find_rests(points, places, template, motion.times[seen])
+        if found is not None:
+            rows = np.flatnonzero(seen)
+            rest = slice(int(rows[found.whole.start]), int(rows[found.whole.stop - 1]) + 1)
+            rests = {name: rows[found.parts[place]] for name, place in places.items() if place in found.parts}
+    elif isinstance(neutral, int) and 0 <= neutral < len(seen) and not seen[neutral]:
+        raise OptionError(f"neutral: frame {neutral} has no face")
+    points = _bridge(points, motion, limits)
+    taken = MarkerMotion(names, points, motion.times, motion.rate, "m", "+y", motion.name)
+    untold = frozenset() if motion.metric or motion.flat else GUESSED
+    traits = Traits(
+        still=still, depth=not motion.flat, confused=False, camera=True, untold=untold, rests=rests
+    )
+    return Prepared(taken, places, rest, traits)
+
+
+def _bridge(points: Float64, motion: PointMotion, limits: Limits) -> Float64:
+    """Return points (T, M, 3) of all frames, of those (S, M, 3) in which a face is seen."""
+    seen = motion.seen
+    if seen.all():
+        return points
+    times = motion.times[seen]
+    at = np.clip(motion.times, times[0], times[-1])
+    flat = points.reshape(len(points), -1)
+    (bridged,) = interpolate(times, [flat], at, limits)
+    return bridged.reshape(len(motion), *points.shape[1:])
 
 
 def _template(places: Mapping[str, str], model: FaceModel) -> Float64:

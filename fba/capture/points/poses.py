@@ -35,27 +35,29 @@ class Poses:
         return np.asarray(self.scale[:, None, None] * turned + self.shift[:, None])
 
 
-def fit_poses(shape: Float64, picture: Float64) -> Poses:
+def fit_poses(shape: Float64, picture: Float64, trust: Float64 | None = None) -> Poses:
     """Return how a head is seen.
 
     shape: float64 (K, 3), metres, its points, around their middle. picture: float64 (T, K, 2), where these
-    are, x to the right, y up.
+    are, x to the right, y up. trust: (K,), how much each point counts; None if all count alike.
     """
-    middle = shape.mean(axis=0)
+    own = np.ones(len(shape)) if trust is None else trust
+    middle = own @ shape / own.sum()
     body = shape - middle
-    seen = picture - picture.mean(axis=1, keepdims=True)
-    first, second = np.swapaxes(np.linalg.pinv(body) @ seen, 1, 2).swapaxes(0, 1)
+    centre = np.einsum("k,tkc->tc", own, picture) / own.sum()
+    seen = (picture - centre[:, None]) * own[:, None]
+    first, second = np.swapaxes(np.linalg.pinv(own[:, None] * body) @ seen, 1, 2).swapaxes(0, 1)
     left, sizes, right = np.linalg.svd(np.stack([first, second], axis=1), full_matrices=False)
     rows = left @ right
     rotation = np.concatenate([rows, np.cross(rows[:, 0], rows[:, 1])[:, None]], axis=1)
     scale = sizes.mean(axis=1)
-    weights = np.ones(picture.shape[:2])
-    shift = picture.mean(axis=1)
+    weights = np.broadcast_to(own, picture.shape[:2])
+    shift = centre
     for _ in range(PASSES):
         poses, off = _step(body, picture, Poses(scale, rotation, shift), weights)
         scale, rotation, shift = poses.scale, poses.rotation, poses.shift
-        usual = np.maximum(np.median(off, axis=1), LEAST_SCALE)
-        weights = 1 / (1 + (off / (2 * usual[:, None])) ** 2) ** 2
+        usual = np.maximum(np.median(off[:, own > own.max() / 2], axis=1), LEAST_SCALE)
+        weights = own / (1 + (off * np.sqrt(own) / (2 * usual[:, None])) ** 2) ** 2
     return Poses(scale, rotation, shift - scale[:, None] * (rotation[:, :2] @ middle))
 
 
