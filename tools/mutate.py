@@ -477,7 +477,7 @@ MUTANTS = (
     Mutant(INVERSION, "+ SHARED**2 * np.eye(len(shapes))", "", SHAPES_BACK_TEST),
     Mutant(LIVELINK_CSV, "* rate > SPARSE", "* rate < 0", SHAPES_BACK_TEST),
     Mutant(FACES, "times = times - times[0]", "pass", ACTION_UNITS_TEST),
-    Mutant(OPENFACE, ">= CONFIDENT", ">= 0", ACTION_UNITS_TEST),
+    Mutant(FACES, ">= CONFIDENT", ">= 0", ACTION_UNITS_TEST),
     Mutant(OPENFACE, "set(columns) == set(VERSION_3)", "False", ACTION_UNITS_TEST),
     Mutant(UDP, "times = np.where(times < NOON, times + DAY, times)", "pass", RECORDS_TEST),
     Mutant(TIME_CODES, "if largest < rate", "if largest <= rate", LIVELINK_TEST),

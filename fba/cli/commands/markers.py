@@ -161,7 +161,7 @@ def command(
         mapping, assignment=assignment or mapping.assignment, overlap=overlap or mapping.overlap
     )
     if marker is not None and marker not in motion.names:
-        from fba.capture.markers.marker_maps import list_names
+        from fba.name_maps import list_names
 
         raise click.UsageError(
             f"--marker {marker}: the capture has no such marker; it has {list_names(motion.names)}"
@@ -270,7 +270,7 @@ def _find_mapping(
     places = {name: place for name, place in pairs.items() if place and not place.isdecimal()}
     missing = [name for name in pairs if name not in motion.names]
     if missing:
-        from fba.capture.markers.marker_maps import list_names
+        from fba.name_maps import list_names
 
         raise click.UsageError(
             f"--map: the capture has no marker {list_names(missing)}; it has {list_names(motion.names)}"

@@ -18,24 +18,15 @@ from fba.animation import Animation
 from fba.arrays import Float64, Int64
 from fba.capture.action_units import ActionUnitMotion
 from fba.errors import FormatError
-from fba.formats.face_tables._faces import (
-    choose_rows,
-    eye_angles,
-    find_missing,
-    head_angles,
-    row_times,
-    to_animation,
-    tracked_rows,
-)
+from fba.formats.face_tables._faces import eye_angles, find_missing, head_angles, to_animation
 from fba.formats.face_tables._tables import Table, header_names, read_table
+from fba.formats.face_tables._unit_rows import UnitLayout, number_columns, read_unit_rows
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
 INTENSITY = re.compile(r"AU(\d\d)_r")
 PRESENCE = re.compile(r"AU(\d\d)_c")
-STRONGEST = 5.0
-"""Intensity of an action unit that is as strong as can be."""
-LARGEST = 20.0
+LAYOUT = UnitLayout("face_id", "timestamp", strongest=5.0, largest=20.0)
 VERSION_3 = {1: 1, 2: 6, 3: 12, 4: 15, 5: 17, 6: 2, 7: 9, 8: 10}
 """Action units that the eight columns of version 3 mean."""
 POSE = ("pose_Rx", "pose_Ry", "pose_Rz")
@@ -78,7 +69,7 @@ def read_face(
     are several. Raises FormatError, LimitError.
     """
     table = read_table(path, limits)
-    column = {name: number for number, name in reversed(list(enumerate(table.names)))}
+    column = number_columns(table)
     columns = {int(found[1]): column[name] for name in column if (found := INTENSITY.fullmatch(name))}
     findings = []
     if not columns:
@@ -89,25 +80,14 @@ def read_face(
     if set(columns) == set(VERSION_3):
         columns = {VERSION_3[unit]: number for unit, number in columns.items()}
         findings.append("AU01_r to AU08_r are taken as OpenFace 3's: action units 1, 6, 12, 15, 17, 2, 9, 10")
-    ids = table.column(column["face_id"]) if "face_id" in column else [""] * len(table.rows)
-    rows = choose_rows(table, ids, face)
-    times, rate, odd = row_times(table, rows, column.get("timestamp"), column.get("frame"), fps)
-    units = sorted(columns)
-    strengths = table.numbers([columns[unit] for unit in units])[rows]
-    if np.nanmax(np.abs(strengths), initial=0.0) > LARGEST:
-        row = int(np.argwhere(np.abs(strengths) > LARGEST)[0][0])
-        raise FormatError(
-            "an action unit is stronger than 20; intensities go from 0 to 5",
-            path=path, line=table.lines[rows[row]],
-        )  # fmt: skip
-    seen = tracked_rows(table, column)[rows]
-    intensities = np.where(seen[:, None], np.clip(strengths / STRONGEST, 0.0, 1.0), np.nan)
+    rows = read_unit_rows(table, columns, LAYOUT, face, fps)
     turns = _turns(table, column)
-    turns = None if turns is None else turns[rows]
-    findings += odd + find_missing(intensities, times, rate)
+    turns = None if turns is None else turns[rows.numbers]
+    findings += rows.findings + find_missing(rows.intensities, rows.times, rows.rate)
     return ActionUnitMotion(
-        tuple(units), intensities, times, rate,
-        head=None if turns is None else head_angles(turns), eyes=_eyes(table, column, rows, turns),
+        rows.units, rows.intensities, rows.times, rows.rate,
+        head=None if turns is None else head_angles(turns),
+        eyes=_eyes(table, column, rows.numbers, turns),
         name=FilePath(path).stem, findings=tuple(findings),
     )  # fmt: skip
 

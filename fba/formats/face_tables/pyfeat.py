@@ -9,20 +9,18 @@ import re
 from fractions import Fraction
 from pathlib import Path as FilePath
 
-import numpy as np
-
 from fba.animation import Animation
 from fba.capture.action_units import ActionUnitMotion
-from fba.errors import FormatError
-from fba.formats.face_tables._faces import choose_rows, find_missing, row_times, to_animation
+from fba.formats.face_tables._faces import find_missing, to_animation
 from fba.formats.face_tables._tables import header_names, read_table
+from fba.formats.face_tables._unit_rows import UnitLayout, number_columns, read_unit_rows
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
 UNIT = re.compile(r"AU(\d\d)")
 BOX = ("FaceRectX", "FaceScore")
 FEWEST = 5
-LARGEST = 5.0
+LAYOUT = UnitLayout("Identity", "approx_time", strongest=1.0, largest=5.0)
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -60,23 +58,13 @@ def read_face(
     read, where there are several. Raises FormatError, LimitError.
     """
     table = read_table(path, limits)
-    column = {name: number for number, name in reversed(list(enumerate(table.names)))}
+    column = number_columns(table)
     columns = {int(found[1]): column[name] for name in column if (found := UNIT.fullmatch(name))}
-    ids = table.column(column["Identity"]) if "Identity" in column else [""] * len(table.rows)
-    rows = choose_rows(table, ids, face)
-    times, rate, odd = row_times(table, rows, column.get("approx_time"), column.get("frame"), fps)
-    units = sorted(columns)
-    strengths = table.numbers([columns[unit] for unit in units])[rows]
-    if np.nanmax(np.abs(strengths), initial=0.0) > LARGEST:
-        row = int(np.argwhere(np.abs(strengths) > LARGEST)[0][0])
-        raise FormatError(
-            "an action unit is stronger than 5; here they go from 0 to 1",
-            path=path, line=table.lines[rows[row]],
-        )  # fmt: skip
-    intensities = np.clip(strengths, 0.0, 1.0)
-    findings = odd + find_missing(intensities, times, rate)
+    rows = read_unit_rows(table, columns, LAYOUT, face, fps)
+    findings = rows.findings + find_missing(rows.intensities, rows.times, rows.rate)
     if "Pitch" in column:
         findings.append("the head's pose is left out: versions of py-feat differ in its unit and its signs")
     return ActionUnitMotion(
-        tuple(units), intensities, times, rate, name=FilePath(path).stem, findings=tuple(findings)
-    )
+        rows.units, rows.intensities, rows.times, rows.rate, name=FilePath(path).stem,
+        findings=tuple(findings),
+    )  # fmt: skip
