@@ -20,6 +20,7 @@ sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files",
 from fba.cache import load_or_make  # noqa: E402
 from fba.capture import MarkerMotion  # noqa: E402
 from fba.face import feature_point_names, neutral_points  # noqa: E402
+from fba.live import KINDS  # noqa: E402
 from fba_conformance.captures import marker_files  # noqa: E402
 from fba_conformance.captures.face_files import (  # noqa: E402
     beat,
@@ -34,6 +35,7 @@ from fba_conformance.captures.face_files import (  # noqa: E402
 )
 from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
+from live_senders import vmc_frames, vtube_objects  # noqa: E402
 from mesh_files import ply  # noqa: E402
 from small_bodies import rod  # noqa: E402
 from stored_models import face  # noqa: E402
@@ -295,6 +297,24 @@ def faces() -> dict[str, bytes]:
     }
 
 
+def live() -> dict[str, bytes]:
+    """Return live captures: a byte for the kind, then datagrams behind an address and a length."""
+    weights, rows = face_weights(4), np.zeros((4, 6))
+    still = np.tile([0.0, 0.0, 0.0, 1.0], (4, 1))
+    sent = {
+        "livelink": livelink_udp({**weights, **face_angles(4)}),
+        "ifacialmocap": [record.encode() for record in ifacialmocap_records(weights, rows, rows, version=2)],
+        "vtube": vtube_objects(weights, rows[:, :3]),
+        "vmc": [one for _, _, one in vmc_frames({"LeftUpperArm": still}, {"A": still[:, 3]}, 4, split=40)],
+    }
+    kinds = [kind.name for kind in KINDS]
+    return {
+        name: bytes([kinds.index(name)])
+        + b"".join(b"\0" + len(one).to_bytes(2, "big") + one for one in parts)
+        for name, parts in sent.items()
+    }
+
+
 def markers() -> dict[str, bytes]:
     """Return captures of markers in all formats: a few that fell, and a face in a table."""
     names = ("a", "b", "c", "d")
@@ -328,6 +348,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
             "mesh_binary": textured().glb(),
         },
         "capture": {**faces(), **markers()},
+        "live": live(),
         "obj": {"triangles": OBJ.encode()},
         "mtl": {"two": MTL.encode()},
         "mapping": {"all": MAPPING.encode()},

@@ -101,8 +101,7 @@ def prepare(
             level = with_rest(level, np.broadcast_to(back, (len(level.names), 3, 3)))
     else:
         frame = 0 if chosen == "first" else int(rest)
-        row = replace(level, rotations=level.rotations[[frame]], positions=level.positions[[frame]])
-        level = with_rest(level, rotations.matrices(row.world()[0][0]))
+        level = rest_on_frame(level, level, frame)
         if chosen != "first":
             chosen = f"frame {frame}"
     if chosen != "motion":
@@ -110,6 +109,12 @@ def prepare(
     result = Preparation(level, mapped, family, chosen, axis, confidence, reasons)
     _refuse_doubt(result, joints is not None, rest != "auto", up != "auto")
     return result
+
+
+def rest_on_frame(motion: SkeletonMotion, other: SkeletonMotion, frame: int) -> SkeletonMotion:
+    """Return a motion whose rest pose is a frame of another of the same skeleton, or of itself."""
+    row = replace(other, rotations=other.rotations[[frame]], positions=other.positions[[frame]])
+    return with_rest(motion, rotations.matrices(row.world()[0][0]))
 
 
 def _few(motion: SkeletonMotion) -> SkeletonMotion:

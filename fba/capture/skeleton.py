@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float64
+from fba.arrays import Float64, Int32
 from fba.body import BapSolver
 from fba.body.solve.solver import solve_track
 from fba.capture import _spine as spines
@@ -148,8 +148,13 @@ def from_skeleton(
     return Animation(motion.rate, np.arange(len(root)), None, track, motion.name)
 
 
-def solve_targets(turned: Mapping[str, Float64], root: Float64, solver: BapSolver) -> BodyTrack:
-    """Return the BAPs of targets: joint -> rotations (T, 3, 3) in the world, and the root's path (T, 3)."""
+def solve_targets(
+    turned: Mapping[str, Float64], root: Float64, solver: BapSolver, previous: Int32 | None = None
+) -> BodyTrack:
+    """Return the BAPs of targets: joint -> rotations (T, 3, 3) in the world, and the root's path (T, 3).
+
+    previous: BAPs (296,) of the frame before the first.
+    """
 
     def matrices(rows: slice) -> Float64:
         frames = np.zeros((rows.stop - rows.start, len(solver.skeleton), 4, 4))
@@ -159,7 +164,7 @@ def solve_targets(turned: Mapping[str, Float64], root: Float64, solver: BapSolve
         frames[:, 0, :3, 3] = root[rows]
         return frames
 
-    return solve_track(solver, turned, len(root), matrices)
+    return solve_track(solver, turned, len(root), matrices, previous)
 
 
 def check_memory(limits: Limits, frames: int, joints: int, what: str, source: int) -> None:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import NamedTuple
 
 from fba.animation import Animation
 from fba.live.faces import FaceConversion
 from fba.live.order import SampleOrder
+from fba.live.people import PersonConversion
 from fba.live.protocols.kinds import Kind
 from fba.live.protocols.sample import DatagramError, DatagramReader, Sample
+from fba.live.recording import stream_rate
 from fba.live.summary import Summary
 from fba.tracks import BodyTrack, FaceTrack
 
+LEAST_RATE = Fraction(10)
+"""Frames a second that a sender sends at least, of which nothing is known yet."""
 MOST_HOSTS = 32
 """Addresses whose datagrams are read."""
 
@@ -65,7 +69,7 @@ class Capture:
         self._readers: dict[str, DatagramReader] = {}
         self._sender: Sender | None = None
         self._order: SampleOrder | None = None
-        self._faces: FaceConversion | None = None
+        self._conversion: FaceConversion | PersonConversion | None = None
 
     def receive(self, data: bytes, host: str, now: float) -> None:
         """Take a datagram from an address. now: when it came, seconds of a clock that never goes back.
@@ -81,12 +85,21 @@ class Capture:
             except DatagramError as error:
                 self.summary.refuse(str(error))
 
+    def settle(self) -> None:
+        """Pass on the frames that are complete, after all datagrams that have come have been received.
+
+        Bodies need that: a few frames at once take hardly longer than one.
+        """
+        with self._lock:
+            if self._conversion is not None:
+                self._pass_on(self._conversion.settle())
+
     def finish(self) -> Summary:
         """Pass on the frames that are left; return what happened."""
         with self._lock:
-            if self._order is not None and self._faces is not None:
+            if self._order is not None and self._conversion is not None:
                 self._convert(self._order.finish())
-                self._pass_on(self._faces.finish())
+                self._pass_on(self._conversion.finish())
                 for name in ("doubled", "late", "reordered", "strayed", "jumps"):
                     setattr(self.summary, name, getattr(self._order, name))
             return self.summary
@@ -94,10 +107,10 @@ class Capture:
     def newest(self) -> tuple[FaceTrack | None, BodyTrack | None]:
         """Return what the newest datagram shows, tracks of one frame; None for what it does not show."""
         with self._lock:
-            if self._sender is None or self._faces is None:
+            if self._sender is None or self._conversion is None:
                 return None, None
             sample = self._readers[self._sender.host].newest()
-            return (None if sample is None else self._faces.show(sample)), None
+            return (None, None) if sample is None else self._conversion.show(sample)
 
     def _read(self, data: bytes, host: str, now: float) -> list[Sample]:
         if len(data) > self.kind.longest:
@@ -120,24 +133,29 @@ class Capture:
 
     def _begin(self, sender: Sender, sample: Sample) -> None:
         """Begin with the first sample of the sender that is used."""
-        sent_rate = sample.rate or self.kind.rate
-        assert sent_rate is not None
+        sent_rate = sample.rate or self.kind.rate or LEAST_RATE
         self._sender = sender
         self.summary.sender = sender.label
         self._order = SampleOrder(sent_rate)
-        self._faces = FaceConversion(
-            self._given_rate or sent_rate, sent_rate, swap=self._swap, neutral=self._neutral,
-            summary=self.summary,
-        )  # fmt: skip
+        self._conversion = self._make_conversion(sent_rate)
         self._say(f"receiving from {sender.label}")
 
+    def _make_conversion(self, sent_rate: Fraction) -> FaceConversion | PersonConversion:
+        if self.kind.bodies:
+            rate = self._given_rate or self.kind.rate
+            return PersonConversion(rate, t_pose=self._neutral is not None, summary=self.summary)
+        return FaceConversion(
+            self._given_rate or stream_rate(sent_rate), sent_rate, swap=self._swap, neutral=self._neutral,
+            summary=self.summary,
+        )  # fmt: skip
+
     def _convert(self, ready: list[tuple[float, Sample]]) -> None:
-        assert self._faces is not None
+        assert self._conversion is not None
         for timed in ready:
             self.summary.seconds = timed[0]
-            self._pass_on(self._faces.push(timed))
+            self._pass_on(self._conversion.push(timed))
 
-    def _pass_on(self, frames: object) -> None:
-        for animation in frames:  # type: ignore[attr-defined]
+    def _pass_on(self, frames: Iterator[Animation]) -> None:
+        for animation in frames:
             self.summary.frames += len(animation)
             self._push(animation)

@@ -65,6 +65,10 @@ class FaceConversion:
         if time - self._waiting[0][0] >= self._neutral_seconds:
             yield from self._find_neutral(frames)
 
+    def settle(self) -> Iterator[Animation]:
+        """Yield nothing: all frames that are complete have come out of `push`."""
+        yield from ()
+
     def finish(self) -> Iterator[Animation]:
         """Yield the frames that are left."""
         if self._frames is not None:
@@ -72,11 +76,11 @@ class FaceConversion:
                 yield from self._find_neutral(self._frames)
             yield from self._frames.finish()
 
-    def show(self, sample: Sample) -> FaceTrack | None:
+    def show(self, sample: Sample) -> tuple[FaceTrack | None, None]:
         """Return the FAPs of a sample as it is, a track of one frame; None without a face."""
         if sample.weights is None or self._frames is None or self._waiting:
-            return None
-        return self._frames.show(*self._without_neutral(self._row(sample)))
+            return None, None
+        return self._frames.show(*self._without_neutral(self._row(sample))), None
 
     def _begun(self, sample: Sample) -> LiveBlendshapes:
         """Return what makes frames, begun with the names of the first sample."""

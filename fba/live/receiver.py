@@ -94,6 +94,10 @@ class Receiver:
 
     def drain(self) -> None:
         """Take what has arrived, without waiting; the player does so before each picture."""
+        self._take_all()
+        self.capture.settle()
+
+    def _take_all(self) -> None:
         opened = self._socket
         for _ in range(AT_ONCE):
             try:

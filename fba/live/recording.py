@@ -9,6 +9,10 @@ from typing import BinaryIO, Protocol
 from fba.animation import Animation
 from fba.atomic import PathLike, check_target, write_error
 from fba.codec import Encoder, EncoderOptions
+from fba.codec.settings import FrameRate
+
+RATES = Fraction(1), Fraction(240)
+"""Smallest and largest frame rate of a live stream."""
 
 
 class Target(Protocol):
@@ -111,6 +115,12 @@ class StreamRecorder:
             target.write(data, ending)
 
 
+def stream_rate(rate: Fraction) -> Fraction:
+    """Return the frame rate that a stream can have and that is nearest to a sender's, 1 to 240."""
+    near = min(max(rate, RATES[0]), RATES[1])
+    return near if FrameRate.from_fraction(near) is not None else Fraction(round(16 * near), 16)
+
+
 def _write_all(file: BinaryIO, data: bytes) -> None:
     """Write bytes to an unbuffered file, which may take them in parts."""
     view = memoryview(data)
@@ -118,17 +128,25 @@ def _write_all(file: BinaryIO, data: bytes) -> None:
         view = view[file.write(view) :]
 
 
-def warm_up() -> None:
-    """Compile what encodes a face, before datagrams come: they would wait, and be lost, meanwhile."""
+def warm_up(*, bodies: bool = False) -> None:
+    """Compile what encodes faces, and bodies, before datagrams come, which would be lost meanwhile."""
     import numpy as np
 
-    from fba.tracks import FaceTrack
+    from fba.body import BapSolver
+    from fba.tracks import BodyTrack, FaceTrack
 
     values = np.zeros((3, 68), np.int32)
     values[1, 2:] = 100
     values[2, 2:] = 30_000
     face = FaceTrack(values, np.broadcast_to(np.arange(68) > 1, values.shape))
+    turns = np.zeros((3, 296), np.int32)
+    body = BodyTrack(turns, np.ones(turns.shape, bool)) if bodies else None
+    if bodies:
+        solver = BapSolver()
+        solver.solve(solver.pose(turns))
     recorder = StreamRecorder([])
     for frame in range(3):
-        recorder.push(Animation(Fraction(60), np.array([frame]), face[frame : frame + 1]))
+        part = slice(frame, frame + 1)
+        shown = None if body is None else body[part]
+        recorder.push(Animation(Fraction(60), np.array([frame]), face[part], shown))
     recorder.finish()

@@ -12,6 +12,7 @@ import fba
 from fba.capture import from_blendshapes
 from fba.formats.face_tables import ifacialmocap
 from fba.formats.face_tables import livelink_udp as recorded
+from fba.live.recording import stream_rate
 from fba_conformance.captures.face_files import (
     STEP,
     camel,
@@ -150,6 +151,16 @@ def test_clocks_that_jump() -> None:
     assert live is not None
     assert (summary.jumps, summary.gaps) == (0, 1)
     assert len(live) == pytest.approx(60 * 101, abs=3)  # the face holds still meanwhile
+
+
+def test_a_rate_that_no_stream_can_have() -> None:
+    whole = SENT[0].replace(b"\0\0\0\x3c\0\0\0\1", b"\0\0\0\x14\0\x2a\xaa\xab")
+    animation, _ = captured("livelink", at_rate([whole]))
+    assert animation is not None
+    assert animation.rate == 1
+    assert stream_rate(Fraction(60_000, 1001)) == Fraction(60_000, 1001)
+    assert stream_rate(Fraction(1000, 33)) == Fraction(485, 16)
+    assert stream_rate(Fraction(1000)) == 240
 
 
 def test_over_midnight() -> None:

@@ -30,6 +30,7 @@ from fba.formats.gltf import reader as gltf
 from fba.formats.text.bap import read_bap, write_bap
 from fba.formats.text.fap import read_fap, write_fap
 from fba.gltf.reader import read_gltf
+from fba.live import KINDS, Capture, StreamFile, StreamRecorder
 from fba.mesh.mtl import read_mtl
 from fba.mesh.obj import read_obj
 from fba.mesh.ply import read_ply
@@ -43,6 +44,8 @@ Shape { geometry IndexedFaceSet {
 Shape { geometry IndexedFaceSet { coord Coordinate { point [ 3 1 2, 4 1 2, 3 2 2 ] } coordIndex [ 0 1 2 ] } }
 """
 """The mesh that an Xface file of the corpus names."""
+LONGEST_CAPTURE = 2.0
+"""Seconds of a live capture that are received: a body takes long for each moment."""
 _CACHED = np.arange(24, dtype=np.float32).reshape(4, 6), np.arange(5, dtype=np.float32)
 
 
@@ -99,6 +102,31 @@ def check_gltf(data: bytes, folder: Path) -> Outcome:
 def check_capture(data: bytes, folder: Path) -> Outcome:
     """Read the capture of a face as FAPs."""
     return _check_file(data, folder / "input.csv", fba.read)
+
+
+def check_live(data: bytes, folder: Path) -> Outcome:
+    """Receive datagrams, and record what they show: a complete stream, whatever comes.
+
+    The first byte chooses the kind; each datagram follows its address and its length, a byte and two.
+    """
+    kind = KINDS[data[0] % len(KINDS)] if data else KINDS[0]
+    file = folder / "live.fba"
+    file.unlink(missing_ok=True)
+    recorder = StreamRecorder([StreamFile(file)])
+    capture = Capture(kind, recorder.push)
+    position, now = 1, 0.0
+    while position < len(data) and now < LONGEST_CAPTURE:
+        size = int.from_bytes(data[position + 1 : position + 3], "big")
+        now += 1 / 60
+        capture.receive(data[position + 3 : position + 3 + size], f"10.0.0.{data[position] % 4}", now)
+        capture.settle()
+        capture.newest()
+        position += 3 + size
+    summary = capture.finish()
+    recorder.finish()
+    if summary.frames and len(fba.read(file)) != summary.frames:
+        raise ContractError(f"{summary.frames} frames were recorded, and the file has others")
+    return Outcome(not summary.refused)
 
 
 def check_face(data: bytes, folder: Path) -> Outcome:

@@ -69,6 +69,11 @@ def targets() -> tuple[Target, ...]:
             b"JawOpen", b"timestamp", b"PathFileType", b"Frame#\t", b"Format Version,", b"Trajectories\n",
             b"NO_OF_FRAMES\t", b"MARKER_NAMES\t", b"marker,x,y,z", b"\x02\x50", *_TEXT,
         ),
+        _reader(
+            "live", "live captures, a datagram in each part", b"\0\0\0\0", b"\xff\xff", b"\x06", b"#bundle\0",
+            b"/VMC/Ext/T\0\0,f\0\0", b",sfffffff\0\0\0", b"NaN", b"1e999", b'"FaceFound":true', b"jawOpen&1|",
+            b"=head#0,0,0,0,0,0|", b"___iFacialMocap", b"[" * 300, *_TEXT,
+        ),
         _reader("face", "face models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),
         _reader("body", "body models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),
         _reader("obj", "OBJ meshes", b"v 1 2 3\n", b"f 1 2 3\n", b"f -1/1/1 -2// 3\n", b"g a\n", b"\\\n",

@@ -192,16 +192,20 @@ class BapSolver:
 
 
 def solve_track(
-    solver: BapSolver, joints: Collection[str], count: int, matrices: Callable[[slice], Float64]
+    solver: BapSolver,
+    joints: Collection[str],
+    count: int,
+    matrices: Callable[[slice], Float64],
+    previous: Int32 | None = None,
 ) -> BodyTrack:
     """Return a track of count frames that sends the BAPs of these joints, with angles within +-pi.
 
     matrices: returns the joint matrices (F, J, 4, 4) of a slice of frames, as `BapSolver.solve` takes them.
+    previous: BAPs (296,) of the frame before the first.
     """
     sent = np.zeros(BAP_COUNT, dtype=bool)
     sent[[bap.number - 1 for bap in baps() if bap.joint in joints]] = True
     rows = np.empty((count, int(sent.sum())), dtype=np.int32)  # every block is written below
-    previous = None
     for begin in range(0, count, BLOCK):
         block = slice(begin, min(begin + BLOCK, count))
         values = solver.solve(matrices(block), joints, previous)

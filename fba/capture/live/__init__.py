@@ -4,5 +4,6 @@ May use: all of `fba.capture`.
 """
 
 from fba.capture.live.blendshapes import LiveBlendshapes
+from fba.capture.live.skeleton import LiveSkeleton
 
-__all__ = ["LiveBlendshapes"]
+__all__ = ["LiveBlendshapes", "LiveSkeleton"]

@@ -28,16 +28,16 @@ class LiveBlendshapes:
     names: of the N shapes, as in `ShapeMotion`. rate: frames per second. Frames are those that
     `from_blendshapes` makes of all rows in which a face is seen: each is complete once a row at its time, or
     a later one, has come. Angles of the head and of the eyes turn them from the first row on in which they
-    are not all 0.
+    are not all 0; with_head: the head from the beginning.
     """
 
-    def __init__(self, names: Sequence[str], rate: Fraction) -> None:
+    def __init__(self, names: Sequence[str], rate: Fraction, *, with_head: bool = False) -> None:
         self.names = tuple(names)
         self.rate = Fraction(rate)
         self._before: Row | None = None
         self._next = 0  # number of the next frame
         self._frames_made = False
-        self._recorded = [False, False]  # head, eyes
+        self._recorded = [with_head, False]  # head, eyes
 
     def push(self, time: float, weights: Float64, head: Float64, eyes: Float64) -> Iterator[Animation]:
         """Add a row, later than the one before; yield the frames that are now complete.
@@ -65,8 +65,12 @@ class LiveBlendshapes:
 
     def show(self, weights: Float64, head: Float64, eyes: Float64) -> FaceTrack:
         """Return the FAPs of a row as it is, between frames: a track of one frame."""
+        return self.convert(weights[None], head[None], eyes[None])
+
+    def convert(self, weights: Float64, head: Float64, eyes: Float64) -> FaceTrack:
+        """Return the FAPs of rows (T, N), (T, 3) and (T, 4) as they are, for who makes frames himself."""
         self._note_angles(head, eyes)
-        return self._convert([weights[None], head[None], eyes[None]])
+        return self._convert([weights, head, eyes])
 
     def _note_angles(self, head: Float64, eyes: Float64) -> None:
         for number, angles in enumerate((head, eyes)):

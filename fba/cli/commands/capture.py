@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from fba.live import Capture, Receiver, StreamRecorder, Summary
     from fba.live.recording import Target
 
-KINDS = ("livelink", "ifacialmocap", "vtube")
+KINDS = ("livelink", "ifacialmocap", "vtube", "vmc")
 LONGEST_NEUTRAL = 60.0
 
 
@@ -35,6 +35,7 @@ LONGEST_NEUTRAL = 60.0
         "fba capture livelink --play --subject Anna",
         "fba capture ifacialmocap --ask 192.168.0.20 -o face.fba --seconds 60",
         "fba capture vtube --ask 192.168.0.20 --play",
+        "fba capture vmc -o person.fba",
     ),
 )
 @click.argument("kind", type=click.Choice(KINDS), metavar=f"[{'|'.join(KINDS)}]")
@@ -51,7 +52,7 @@ LONGEST_NEUTRAL = 60.0
     "--port",
     type=click.IntRange(0, 65_535),
     help="UDP port to listen on; 0: any that is free. Default: 11111 for livelink, 49983 for ifacialmocap, "
-    "11125 for vtube.",
+    "11125 for vtube, 39539 for vmc.",
 )
 @click.option(
     "--host", default="", metavar="ADDRESS", help="Own address to listen on. Default: all of this computer's."
@@ -71,12 +72,15 @@ LONGEST_NEUTRAL = 60.0
 @click.option(
     "--seconds", type=options.PeriodType(), metavar="SECONDS", help="Stop after that; default: on Ctrl-C."
 )
-@options.fps_option("Frame rate of the stream. Default: the sender's own, or 60.")
+@options.fps_option(
+    "Frame rate of the stream. Default: the sender's own, else 60; vmc: that of its first second."
+)
 @click.option(
     "--neutral",
     type=click.FloatRange(0, LONGEST_NEUTRAL, min_open=True),
     metavar="SECONDS",
-    help="The first seconds show the neutral face: their median is subtracted. Default: weights as sent.",
+    help="The first seconds show the neutral face: their median is subtracted. vmc: the first moment is a "
+    "T-pose. Default: all counts as it is sent.",
 )
 @click.option("--swap", is_flag=True, help="MouthLeft and MouthRight, JawLeft and JawRight change places.")
 @click.option(
@@ -110,11 +114,11 @@ def command(
     model: Path | None,
     as_json: bool,
 ) -> None:
-    """Receive a captured face over the network, show it, and record it as an FBA stream.
+    """Receive a captured face or person over the network, show it, and record it as an FBA stream.
 
-    livelink is Live Link Face, ifacialmocap also Facemotion3d, vtube VTube Studio on a telephone. The file is
-    complete at any moment, whatever happens to this program. Ctrl-C ends it and prints what was received,
-    and what was left out.
+    livelink is Live Link Face, ifacialmocap also Facemotion3d, vtube VTube Studio on a telephone, vmc any
+    program that performs by the VMC protocol, bodies too. The file is complete at any moment, whatever
+    happens to this program. Ctrl-C ends it and prints what was received, and what was left out.
     """
     if output is None and not play:
         raise click.UsageError("give -o OUT.fba to record, --play to see it, or both")
@@ -132,7 +136,7 @@ def command(
     found = find_kind(kind)
     if ask is not None and not found.asked_port:
         raise click.UsageError(f"--ask: {found.description} sends by itself; enter our address in the app")
-    warm_up()
+    warm_up(bodies=found.bodies)
     targets, stream = _targets(output, play=play)
     recorder = StreamRecorder(
         targets, EncoderOptions(fap_quant=quant, clamp=True, bap_steps="visage", mark=True)

@@ -11,6 +11,7 @@ from fba.errors import OptionError, did_you_mean
 from fba.live.protocols.ifacialmocap import FacialMocapReader
 from fba.live.protocols.livelink import LiveLinkReader
 from fba.live.protocols.sample import DatagramReader
+from fba.live.protocols.vmc import VmcReader
 from fba.live.protocols.vtube import VTubeReader
 
 
@@ -22,7 +23,7 @@ class Kind:
     reader: makes a reader for one address. longest: bytes of the longest datagram that is looked at.
     asked_port: of the sender, on which it waits to be asked; 0 where it sends without. ask: returns what asks
     it to send to a port. ask_every: seconds. rate: frames in a second of the stream, where neither sender nor
-    user says it; None: they are found in the first second.
+    user says it; None: they are found in the first second. bodies: whether bones come, too.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Kind:
     ask: Callable[[int], bytes] = lambda _port: b""
     ask_every: float = 0.0
     rate: Fraction | None = Fraction(60)
+    bodies: bool = False
 
 
 def _ask_vtube(port: int) -> bytes:
@@ -56,6 +58,7 @@ KINDS = (
         "vtube", "VTube Studio", 11125, VTubeReader, 32_768,
         asked_port=21412, ask=_ask_vtube, ask_every=1.0,
     ),
+    Kind("vmc", "a VMC performer", 39539, VmcReader, 65_535, rate=None, bodies=True),
 )  # fmt: skip
 """All kinds."""
 

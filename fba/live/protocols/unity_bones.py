@@ -1,0 +1,51 @@
+"""Unity's humanoid bones: what hangs on what, which joints of the standard they are, and Unity's axes."""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from fba.arrays import Float64
+from fba.formats.gltf.humanoid import OLD_THUMB, joints_of_bones
+
+TO_OURS = np.array([-1.0, 1.0, 1.0])
+"""Factors of a position: Unity's x points to the right of who looks ahead, ours to the left."""
+
+
+@cache
+def parents() -> dict[str, str]:
+    """Return the bone above each bone, "" above the hips; a bone comes after the one above it."""
+    result: dict[str, str] = {}
+    text = (files(__package__) / "unity_bones.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        for side in ("Left", "Right") if "?" in row["bone"] else ("",):
+            result[row["bone"].replace("?", side)] = row["parent"].replace("?", side)
+    return result
+
+
+@cache
+def joint_of(bone: str) -> str | None:
+    """Return the joint of the standard that begins where a bone does; None for eyes and the jaw."""
+    side = next((word for word in ("Left", "Right") if bone.startswith(word)), "")
+    plain = bone.removeprefix(side)
+    plain = OLD_THUMB.get(plain, plain)
+    name = side.lower() + plain if side else plain[0].lower() + plain[1:]
+    return joints_of_bones().get(name)
+
+
+def position(numbers: Float64) -> Float64:
+    """Return a position (3,) in our axes, y up and right-handed, of one in Unity's."""
+    result: Float64 = numbers * TO_OURS
+    return result
+
+
+def rotation(numbers: Float64) -> Float64 | None:
+    """Return a unit quaternion (w, x, y, z) in our axes of Unity's (x, y, z, w); None where it is none."""
+    length = float(np.linalg.norm(numbers))
+    if not 0.5 < length < 2:
+        return None
+    x, y, z, w = (numbers / length).tolist()
+    return np.array([w, x, -y, -z])
