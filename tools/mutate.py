@@ -176,6 +176,7 @@ LONG_TEST = "tests/body/test_plausibility.py -k long_motion"
 GAIT_TEST = "tests/body/gait/test_gait_rules.py"
 FOREIGN_HEADS_TEST = "tests/face/importers/test_foreign_heads.py"
 DRAWN_TEST = "tests/face/importers/test_drawn_heads.py"
+CLEARANCE_TEST = "tests/face/importers/test_teeth_clearance.py"
 JOINING_TEST = "tests/face/importers/test_joining.py"
 HEAD_ZOO_TEST = "tests/face/importers/test_head_zoo.py -k 'same or surfaces'"
 PACKED_TEST = "tests/gltf/test_gltf_packed.py"
@@ -218,6 +219,10 @@ MUTANTS = (
         HEAD_ZOO_TEST,
     ),
     Mutant("fba/face/eyeball.py", "FLAT = 0.3", "FLAT = 0.7", DRAWN_TEST),
+    Mutant("fba/face/importers/assembly/_teeth_clearance.py", "GAP = 0.0008", "GAP = -0.003", CLEARANCE_TEST),
+    Mutant(
+        "fba/face/importers/assembly/_teeth_clearance.py", "BRIDGINGS = 3", "BRIDGINGS = 0", CLEARANCE_TEST
+    ),
     Mutant("fba/face/importers/assembly/_atlas.py", "REPEATS = 4.0", "REPEATS = 400.0", JOINING_TEST),
     Mutant("fba/face/importers/assembly/_mouth_loop.py", "NEAR = 0.08", "NEAR = 0.8", DRAWN_TEST),
     Mutant("fba/face/importers/assembly/definitions.py", "LEAST = 0.004", "LEAST = -1.0", DRAWN_TEST),

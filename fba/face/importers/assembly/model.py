@@ -12,6 +12,7 @@ import numpy as np
 from fba.arrays import Float64, Int32
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
+from fba.face.importers.assembly._teeth_clearance import clear_teeth
 from fba.face.importers.assembly._winding import turn_outward
 from fba.face.importers.assembly.default_materials import apply_default_materials
 from fba.face.importers.assembly.definitions import define_by_shapes
@@ -111,7 +112,7 @@ def author_pieces(
     face = author(parts, points, bound=known, name=name, notes=notes)
     shapes = sorted({shape for piece in pieces for shape in piece.morphs})
     if not shapes:
-        return drop_false_pupils(face)
+        return clear_teeth(drop_false_pupils(face))
     from fba.face.authoring.shapes.morphs import add_shapes
 
     morphs = {
@@ -120,7 +121,7 @@ def author_pieces(
     }
     made = add_shapes(face, morphs)
     repaired = drop_false_pupils(made if made is face else repair_tables(made, face))
-    return define_by_shapes(repaired, morphs)
+    return define_by_shapes(clear_teeth(repaired), morphs)
 
 
 def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:
