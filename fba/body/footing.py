@@ -14,16 +14,24 @@ from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
 
 OUTLINE = (
-    ("ankle", 0.011, 0.0, -0.0685), ("ankle", -0.028, 0.0, -0.040), ("ankle", 0.043, 0.0, -0.040),
-    ("ankle", -0.038, 0.0, 0.055), ("ankle", 0.055, 0.0, 0.055),
-    ("metatarsal", -0.046, 0.0, 0.0), ("metatarsal", 0.065, 0.0, 0.0),
+    ("ankle", 0.011, 0.0, -0.0645), ("ankle", -0.024, 0.0, -0.030), ("ankle", 0.040, 0.0, -0.039),
+    ("ankle", -0.033, 0.0, 0.057), ("ankle", 0.054, 0.0, 0.063),
+    ("ankle", 0.011, 0.004, -0.0685), ("ankle", -0.028, 0.004, -0.032), ("ankle", 0.043, 0.004, -0.041),
+    ("ankle", -0.037, 0.004, 0.057), ("ankle", 0.0575, 0.004, 0.062),
+    ("metatarsal", -0.0415, 0.0, -0.002), ("metatarsal", 0.061, 0.0, -0.012),
+    ("metatarsal", 0.059, 0.0, 0.0025), ("metatarsal", -0.0455, 0.004, -0.002),
+    ("metatarsal", 0.065, 0.004, -0.0115), ("metatarsal", 0.063, 0.004, 0.003),
 )  # fmt: skip
-"""Edge of the shown person's soles: the joint that it moves with, and metres from that joint, outwards and
-ahead, at a height above the ground in the default posture. Measured on `fba/body/builtin/body.glb`."""
+"""Edge of the shown person's soles, which is bevelled: the joint that it moves with, and metres from that
+joint, outwards and ahead, at a height above the ground in the default posture. Vertices of
+`fba/body/builtin/body.glb`."""
 TIP = (
-    ("metatarsal", -0.045, 0.002, 0.031), ("metatarsal", 0.053, 0.002, 0.031),
-    ("metatarsal", -0.033, 0.0067, 0.070), ("metatarsal", 0.023, 0.0067, 0.070),
-    ("metatarsal", -0.005, 0.008, 0.0745),
+    ("metatarsal", -0.041, 0.002, 0.028), ("metatarsal", 0.050, 0.002, 0.029),
+    ("metatarsal", -0.031, 0.0067, 0.066), ("metatarsal", 0.021, 0.0062, 0.059),
+    ("metatarsal", -0.005, 0.0068, 0.0695), ("metatarsal", -0.019, 0.0069, 0.0705),
+    ("metatarsal", -0.045, 0.006, 0.028), ("metatarsal", 0.053, 0.006, 0.031),
+    ("metatarsal", -0.033, 0.0105, 0.069), ("metatarsal", 0.023, 0.010, 0.063),
+    ("metatarsal", -0.005, 0.0105, 0.0735), ("metatarsal", -0.019, 0.0105, 0.0745),
 )  # fmt: skip
 """The same for what is ahead of the ball."""
 

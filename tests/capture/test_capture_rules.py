@@ -156,9 +156,10 @@ def test_on_tiptoe_the_tip_of_the_toes_is_lowest() -> None:
 @pytest.mark.parametrize(
     ("height", "lacking", "move"),
     [
-        (0.012, 0.02, 0.015),  # on the ground: but for 5 mm, which nobody sees
-        (0.012, -0.02, -0.015),
-        (0.012, 0.004, 0.0),
+        (0.012, 0.02, 0.017),  # on the ground: but for 3 mm
+        (0.012, -0.02, -0.016),  # or 4 mm, which nobody sees
+        (0.012, 0.0025, 0.0),
+        (0.012, -0.0035, 0.0),
         (0.012, 0.2, 0.025),  # at most 2.5 cm up
         (0.012, -0.2, -0.03),  # and 3 cm down
         (0.06, 0.02, 0.0),  # in the air

@@ -12,9 +12,10 @@ from test_from_skeleton import NAMES
 from capture_bodies import bone_errors, limb_bones, motion
 from fba.body import BapSolver, Skeleton
 from fba.body.footing import lowest_sole
+from fba.body.model import BodyModel
 from fba.capture import SkeletonMotion, from_skeleton, retarget_report
 from fba.capture.limbs import _leg_ik as leg_ik
-from fba.capture.limbs import ground
+from fba.capture.limbs import ground, soles
 from fba.parameters import bap_numbers
 
 THIGH, SHANK = 0.36, 0.54
@@ -229,3 +230,64 @@ def test_heights_of_no_person_have_a_level_ground() -> None:
     across = np.array([[1.2e27, 0.09, 0.09], [1.2e27, -0.15, -0.09]])
     points = np.stack([across, lowest, np.full((2, 3), 0.0225)], axis=-1)
     assert ground.find(lowest, points).slope == (0.0, 0.0)
+
+
+def settled(left: object, right: object, *, slide: float = 0.0, ends: float = 1.0) -> np.ndarray:
+    """(2, T): heights of soles that were captured at these heights (T,), after the ground was found.
+
+    slide: metres a second by which both feet are carried backwards. ends: seconds after which the right
+    foot moves off, sideways, at a metre a second.
+    """
+    heights = np.array(np.broadcast_arrays(left, right), dtype=float)
+    seconds = np.arange(heights.shape[1]) / 60
+    points = np.zeros((2, 2, len(seconds), 3))
+    points[..., 1] = heights[:, None]
+    points[..., 2] = -slide * seconds
+    points[1, :, :, 0] = np.maximum(0.0, seconds - ends)
+    return soles.settle(heights, points, 60.0)
+
+
+def test_both_feet_that_are_still_stand_on_the_ground() -> None:
+    """Captures of feet are off by 2 cm; somebody on one leg holds the other foot higher."""
+    level = np.full(60, 0.01)
+    np.testing.assert_allclose(settled(level, 0.03), 0.0, atol=1e-12)
+    np.testing.assert_allclose(settled(level, 0.0345), 0.0, atol=1e-12)
+    np.testing.assert_allclose(settled(level, 0.036)[1], 0.026, atol=1e-12)
+
+
+def test_a_foot_that_comes_and_goes_is_not_pulled_down() -> None:
+    """It is still for 0.6 s, or for 0.4 s only."""
+    level = np.zeros(60)
+    np.testing.assert_allclose(settled(level, 0.02, ends=0.6)[1, :12], 0.0, atol=1e-12)
+    np.testing.assert_allclose(settled(np.zeros(40), 0.02, ends=0.2)[1], 0.02, atol=1e-12)
+
+
+def test_a_foot_that_slides_stands_where_the_other_one_is_lifted() -> None:
+    """As on a treadmill: at 1.2 m/s, 1 cm above the ground, while the other foot swings."""
+    np.testing.assert_allclose(settled(np.full(60, 0.01), 0.1, slide=1.2)[0], 0.0, atol=1e-12)
+    rising = np.linspace(0.0, 0.07, 60)
+    np.testing.assert_allclose(settled(rising, 0.1, slide=1.2)[0, 25:35], 0.0, atol=1e-12)  # 7 cm/s
+    np.testing.assert_allclose(settled(2.3 * rising, 0.4, slide=1.2)[0], 2.3 * rising, atol=1e-12)  # 16 cm/s
+    np.testing.assert_allclose(settled(np.full(60, 0.01), 0.02, slide=1.2)[0], 0.01, atol=1e-12)  # a leap
+
+
+def test_nobody_stands_on_a_step_that_is_no_ground() -> None:
+    np.testing.assert_allclose(settled(np.full(60, 0.079), 0.3), [[0.0] * 60, [0.3 - 0.079] * 60], atol=1e-12)
+    np.testing.assert_allclose(settled(np.full(60, 0.081), 0.3)[0], 0.081, atol=1e-12)
+
+
+def test_soles_are_those_of_the_person_that_is_shown() -> None:
+    """Who has shorter shanks: on a bent leg, the foot of the shown person is lower against the other one."""
+    skeleton, shown = Skeleton.default(), BodyModel.default().skeleton
+    bent = Rotation.from_rotvec([[np.radians(50), 0.0, 0.0]]).as_matrix()
+    turned = {"l_hip": bent.swapaxes(1, 2), "l_knee": np.eye(3)[None], "l_ankle": np.eye(3)[None]}
+    root = skeleton.centres[:1]
+    found = soles.body_soles(skeleton, turned, root)
+    assert found is not None
+    apart = []
+    for body in (skeleton, shown):
+        thigh = body.centres[body.number("l_knee")] - body.centres[body.number("l_hip")]
+        apart.append(float((bent[0].T @ thigh - thigh)[1]))
+    assert found.lowest[1, 0] == pytest.approx(0.0, abs=1e-6)
+    assert found.lowest[0, 0] == pytest.approx(apart[1], abs=0.001)
+    assert abs(apart[1] - apart[0]) > 0.002

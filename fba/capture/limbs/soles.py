@@ -15,18 +15,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba import rotations
-from fba.arrays import Float64
+from fba.arrays import Bool, Float64
 from fba.body.footing import OUTLINE, TIP
+from fba.body.model import BodyModel
 from fba.body.skeleton import Skeleton
 from fba.capture.limbs._coupled_paths import chain
 from fba.capture.motion import SkeletonMotion
 
 STILL = 0.15
 """Speed in metres per second below which a heel or a ball stands."""
+LEVEL = 0.15
+"""Speed in metres per second, up or down, below which the lower foot stands, wherever it slides."""
 STILL_SECONDS = 0.1
 """For so long at least: at the top of a leap, feet are still for less."""
 SUPPORT = 0.08
 """Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
+PLACED, PLACED_SECONDS = 0.025, 0.5
+"""Metres above the lower foot up to which a foot that is still for so many seconds stands on its ground."""
 LEVEL_SECONDS = 0.2
 """Seconds over which the height of the ground under feet that stand is averaged."""
 FRONT = 0.05
@@ -39,15 +44,15 @@ ON_GROUND = 0.015
 """Height in metres at which the influence of a foot on the height of the body falls to 1/e."""
 SETTLED = 0.02
 """Weight of the usual height, which counts while no foot is on the ground."""
-SMOOTH = 0.03
+SMOOTH = 0.02
 """Seconds over which corrections are averaged."""
 WITHIN = 0.012
 """Height in metres up to which a leg moves its foot all the way."""
-TOLERATED = 0.005
-"""Error in metres of a sole's height below which its leg does not move."""
+TOLERATED, SUNK = 0.004, 0.003
+"""Metres by which a sole may be too high, and too low, before its leg moves: the body rises by the latter."""
 PITCH_SHARE = 0.9
 """Share of the height correction of a foot on its ball that its own pitch makes."""
-MOST_PITCH = np.radians(3.0)
+MOST_PITCH = np.radians(6.0)
 """Largest change of a foot's pitch, in radians."""
 MOST_AIR_PITCH = np.radians(6.0)
 """The same of a foot in the air, whose toes would be under the ground."""
@@ -147,9 +152,12 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
     """Return the body's soles, or None if it lacks a joint of the feet.
 
     wanted: joint -> world rotations (T, 3, 3); other joints turn with their parents. root: (T, 3), metres.
-    The lowest points are of the soles' edge, see `fba.body.footing`.
+    The lowest points are of the soles' edge, see `fba.body.footing`: for the default skeleton those of the
+    person that is shown, who has other proportions and stands with the lower foot where the skeleton does.
     """
     lows, points, balls = [], [], []
+    shown = BodyModel.default().skeleton if skeleton is Skeleton.default() else skeleton
+    seen = []
     for side in "lr":
         parts = [f"{side}_ankle", f"{side}_subtalar", f"{side}_midtarsal", f"{side}_metatarsal"]
         if not all(joint in skeleton for joint in parts):
@@ -170,7 +178,16 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
         ])  # fmt: skip
         lows.append(lowest_edge(skeleton, frames, side, (*OUTLINE, *TIP)))
         balls.append(points[-1][1][:, 1] - lows[-1])
-    return Soles(np.array(lows), np.array(points), np.array(balls))
+        if shown is not skeleton:
+            frames = {
+                name: (position, frame)
+                for name, position, frame in joint_frames(shown, wanted, root, parts[3])
+            }
+            seen.append(lowest_edge(shown, frames, side, (*OUTLINE, *TIP)))
+    lowest = np.array(lows)
+    if seen:
+        lowest = np.array(seen) + lowest.min(axis=0) - np.min(seen, axis=0)
+    return Soles(lowest, np.array(points), np.array(balls))
 
 
 def lowest_edge(
@@ -236,24 +253,44 @@ def lift(above: Float64, body: Float64, stiff: Float64, rate: float) -> Float64:
 def settle(above: Float64, points: Float64, rate: float) -> Float64:
     """Return heights (2, T) of soles above the ground without what captures leave of it in feet that stand.
 
-    above: (2, T), metres. points: (2, 2, T, 3), of the soles. The lower foot, while it is still and not far
-    from the ground, stands on it; in between, the ground goes from one such height to the next. Nobody is
-    under the ground.
+    above: (2, T), metres. points: (2, 2, T, 3), of the soles. The lower foot, while it is level and not far
+    from the ground, stands on it, even if it slides or a treadmill carries it; so does the other one while an
+    end of it is still, up to `PLACED` higher, by which captures of feet are often off. In between, the ground
+    of a foot goes from one such height to the next. Nobody is under the ground.
     """
-    frames = np.arange(above.shape[1])
-    if len(frames) > 1:
+    count = above.shape[1]
+    if count > 1:
         speed = np.linalg.norm(np.gradient(points, axis=2), axis=3).min(axis=1) * rate
-        half = round(STILL_SECONDS * rate / 2)
-        around = np.pad(speed, ((0, 0), (half, half)), mode="edge")
-        fastest = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2)
-        lower = above.argmin(axis=0)
-        height = above[lower, frames]
-        still = (fastest[lower, frames] < STILL) & (height < SUPPORT)
-        if still.any():
-            level = np.interp(frames, frames[still], height[still])
-            above = above - smooth(level, rate * LEVEL_SECONDS / SMOOTH)
+        rising = np.abs(np.gradient(above, axis=1)) * rate
+        lowest = above.min(axis=0)
+        lower, near = above <= lowest, above <= lowest + PLACED
+        still = _fastest(speed, rate, STILL_SECONDS) < STILL
+        alone = (_fastest(rising, rate, STILL_SECONDS) < LEVEL) & ~near[::-1]
+        placed = (_fastest(speed, rate, PLACED_SECONDS) < STILL) & near
+        stands = (above < SUPPORT) & np.where(lower, still | alone, placed)
+        support = _levels(lowest, (stands & lower).any(axis=0), rate)
+        own = [
+            _levels(foot, on, rate) if on.any() else support for foot, on in zip(above, stands, strict=True)
+        ]
+        above = above - np.array(own)
     result: Float64 = np.maximum(above, 0.0)
     return result
+
+
+def _fastest(speed: Float64, rate: float, seconds: float) -> Float64:
+    """Return the highest of speeds (2, T) within so many seconds around each frame."""
+    half = round(seconds * rate / 2)
+    around = np.pad(speed, ((0, 0), (half, half)), mode="edge")
+    result: Float64 = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2)
+    return result
+
+
+def _levels(height: Float64, stands: Bool, rate: float) -> Float64:
+    """Return the height (T,) of the ground under a foot at heights (T,): its own where it stands."""
+    if not stands.any():
+        return np.zeros_like(height)
+    frames = np.arange(len(height))
+    return smooth(np.interp(frames, frames[stands], height[stands]), rate * LEVEL_SECONDS / SMOOTH)
 
 
 def grounded(above: Float64) -> Float64:
@@ -269,7 +306,7 @@ def heights(above: Float64, body: Float64, rate: float, done: Float64 | float = 
     been raised before.
     """
     lacking = above - body
-    needed = np.sign(lacking) * np.maximum(np.abs(lacking) - TOLERATED, 0.0)
+    needed = np.maximum(lacking - SUNK, 0.0) - np.maximum(-lacking - TOLERATED, 0.0)
     moves = np.array([smooth(foot, rate) for foot in needed * grounded(above - WITHIN)])
     dips = np.array([rise_above(foot, rate) for foot in -body])
     moves = np.clip(done + moves, -FARTHEST, FARTHEST_UP) - done
