@@ -154,6 +154,8 @@ TRANSPORT_TEST = "tests/player/playback/test_transport.py"
 NOTICES_TEST = "tests/player/session/test_notices.py"
 TAKES_TEST = "tests/player/session/test_puppet.py"
 RENDER_TEST = "tests/player/export/test_render_files.py -k rounded"
+FRAMING_TEST = "tests/player/scene/test_framing.py"
+JOINT_MAPS_TEST = "tests/cli/captures/test_joint_maps.py"
 GLTF_TEST = "tests/formats/gltf/test_gltf_skeletons.py"
 OTHER_BODIES_TEST = "tests/capture/test_other_bodies.py"
 LIVE_TEST = "tests/player/playback/test_live.py"
@@ -393,6 +395,8 @@ MUTANTS = (
     Mutant(NAMED_BONES, 'f != "middle"', "True", PREPARATION_TEST),
     Mutant(NAMED_BONES, "len(others) < len(legs)", "True", PREPARATION_TEST),
     Mutant(POSE_MEASURES, 'rest.tips.get(f"{side}_wrist", 2', 'rest.tips.get("", 2', COMPARISON_TEST),
+    Mutant("player/fba_player/scene/_framing.py", "height + headroom - (", "height - (", FRAMING_TEST),
+    Mutant(MEASUREMENT, "UNKNOWN_UNIT = 0.01", "UNKNOWN_UNIT = 1.0", JOINT_MAPS_TEST),
     Mutant(FIGURE, "STRAIGHT = 0.9", "STRAIGHT = 0.5", PREPARATION_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 1.0", BVH_READING_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 500.0", BVH_READING_TEST),

@@ -73,7 +73,9 @@ def prepare(
     if not len(motion):
         raise ModelError("the motion has no frames")
     if not isinstance(rest, str) and not 0 <= rest < len(motion):
-        raise ModelError(f"rest: the motion has {len(motion)} frames, from 0; there is no frame {rest}")
+        raise ModelError(
+            f"the motion has {len(motion)} frames, from 0; there is no frame {rest} to rest in"
+        ).with_remedies(Remedy("rest", "choose one of these with {}", "0"))
     matching.check_root(skeleton)
     if not np.ptp(motion.rest(), axis=0).any():
         raise ModelError("the source's joints all coincide in its rest pose; it has no bones")

@@ -39,7 +39,7 @@ class CaptureReport:
     path: of the capture. motion: what was read of it. mapped: joint of the standard -> number of the
     source's. animation: what a decoder returns. comparison: how they differ. bones: what `retarget_report`
     says of the motion before coding; None where no report was asked for. up: what brings the source's axis up
-    that the user named; None if that was found.
+    that the user named; None if that was found. scale: metres in one unit of the source, as given; else None.
     """
 
     path: Path
@@ -49,6 +49,7 @@ class CaptureReport:
     comparison: Comparison
     bones: dict[str, Any] | None = None
     up: Float64 | None = None
+    scale: float | None = None
 
 
 def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str, Any]]:
@@ -89,8 +90,8 @@ def compare_captures(
 
     animation, decoded: before coding and after. clamped: what the encoder clamped. ground: the value of
     `--ground`. detailed: compare all frames, and bones before coding. clip: the animation that was read of a
-    file with several, by name or number. options: those with which captures were read, of which joints, rest
-    and up count. lead: frames of a capture that are before the animation's first one.
+    file with several, by name or number. options: those with which captures were read, of which joints, rest,
+    up and scale count. lead: frames of a capture that are before the animation's first one.
     """
     from fba.body import Skeleton
     from fba.capture import retarget_report
@@ -99,7 +100,9 @@ def compare_captures(
     from fba.capture.comparison.measurement import rows_of
     from fba.formats import format_of
 
-    given = {name: value for name, value in (options or {}).items() if name in ("joints", "rest", "up")}
+    given = {
+        name: value for name, value in (options or {}).items() if name in ("joints", "rest", "scale", "up")
+    }
     reports = []
     for path in captures:
         reader = format_of(path, format)
@@ -116,10 +119,11 @@ def compare_captures(
         level = 0.0 if ground == "floor" else None
         up = _rotation_up(str(given.get("up", "auto")))
         most = None if detailed else SAMPLE
-        comparison = compare(motion, decoded, mapped, up=up, level=level, most=most)
+        scale = (options or {}).get("scale")
+        comparison = compare(motion, decoded, mapped, scale=scale, up=up, level=level, most=most)
         comparison = comparison.with_more(_clamped_differences(clamped))
         bones = asdict(retarget_report(motion, animation, **given)) if detailed else None
-        reports.append(CaptureReport(path, motion, mapped, decoded, comparison, bones, up))
+        reports.append(CaptureReport(path, motion, mapped, decoded, comparison, bones, up, scale))
     return reports
 
 
@@ -201,7 +205,9 @@ def draw_sights(report: CaptureReport, count: int) -> UInt8:
     rate = float(report.animation.rate)
     worst = report.comparison.worst_frames(count, max(1, round(APART * rate)))
     frames = [one.frame for one in worst]
-    sticks = find_sticks(report.motion, report.animation, report.mapped, frames, up=report.up)
+    sticks = find_sticks(
+        report.motion, report.animation, report.mapped, frames, scale=report.scale, up=report.up
+    )
     sights = [
         Sight(
             one.frame,

@@ -32,6 +32,7 @@ OPTIONS = {
     "markers": "maps",
     "rest": "rest",
     "up": "up",
+    "scale": "scale",
 }
 """Arguments of the library, and the parameters of commands that do the same."""
 OTHER_COMMANDS = (("encode",), ("convert",), ("model", "import"))

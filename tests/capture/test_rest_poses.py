@@ -188,6 +188,9 @@ def test_an_animal_has_no_counterpart() -> None:
 
 
 def test_a_frame_that_is_not_there() -> None:
-    with pytest.raises(ModelError, match="has 4 frames, from 0; there is no frame 9"):
+    with pytest.raises(
+        ModelError,
+        match=r"has 4 frames, from 0; there is no frame 9 to rest in; choose one of these with rest=0",
+    ):
         prepare(motion("T", 4), SKELETON, rest=9)
     assert prepare(motion("T", 4), SKELETON, rest=2).rest == "frame 2"

@@ -26,6 +26,8 @@ PIECE = 8192
 """Frames that are compared at once, which bounds the memory; each piece is measured by itself."""
 RUNS = 4
 """Runs of frames that stand for a long motion."""
+UNKNOWN_UNIT = 0.01
+"""Metres in one unit of a source whose size no limb tells, as for `from_skeleton`."""
 MOVES = 10.0
 """Degrees that a joint turns to count as moving."""
 LIMBS = {
@@ -107,9 +109,9 @@ def _pieces(count: int, most: int | None) -> list[slice]:
 
 
 def source_scale(motion: SkeletonMotion, mapped: Mapping[str, int], neutral: Figure, up: Float64) -> float:
-    """Return metres of the body in one unit of the source, by the lengths of limbs; 1 without limbs."""
+    """Return metres of the body in one unit of the source, by the lengths of limbs; 0.01 without limbs."""
     theirs = figure.leg_lengths(figure.source_figure(rows_of(motion, slice(0, 1)), mapped, up, 1.0))
-    return figure.leg_lengths(neutral) / theirs if theirs > 0 else 1.0
+    return figure.leg_lengths(neutral) / theirs if theirs > 0 else UNKNOWN_UNIT
 
 
 def _measure(

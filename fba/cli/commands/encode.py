@@ -37,8 +37,8 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.codec import ClampedParameter
 
-CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "swap", "face", "neutral", "gaze", "head_path",
-           "aspect")  # fmt: skip
+CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "scale", "swap", "face", "neutral", "gaze",
+           "head_path", "aspect")  # fmt: skip
 """Options that say how a capture becomes BAPs and FAPs: those that its reader takes count."""
 
 
@@ -166,6 +166,12 @@ class _EncodeCommand(Command):
 )
 @options.choice_option(
     "--up", "Motion capture: the axis that points up.", "auto", "+x", "-x", "+y", "-y", "+z", "-z"
+)
+@click.option(
+    "--scale",
+    type=click.FloatRange(1e-6, 1e6),
+    metavar="METRES",
+    help="Motion capture: metres of the person shown in one unit of the file, in place of what its legs say.",
 )
 @options.choice_option(
     "--swap",

@@ -24,7 +24,7 @@ from fba.cli.inputs import (
 )
 from fba.cli.printing import clock_text, print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
-from fba.errors import FbaWarning
+from fba.errors import FbaWarning, ModelError
 from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO
 
@@ -88,6 +88,8 @@ def command(
         with each.file(path), input_file(path) as file:
             steps = ""
             if (person := describe_person(file, format, limit)) is not None:
+                if clip is not None:
+                    raise ModelError(f"there is no animation {clip!r}; the file has none")
                 size = file.stat().st_size
                 reports.append({"file": str(path), "format": "gltf", "size": size, "person": asdict(person)})
                 if not as_json:

@@ -18,6 +18,9 @@ MOST_TRAVEL = 4.0
 """The camera follows a performance that moves further than this (m)."""
 NEAR = 0.12
 """Movement (m) below which the camera's distance is not enlarged."""
+LOWER = 0.09
+"""Metres below the root of a person who walks away at which the middle of the picture is."""
+HEAD = "skullbase"
 LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 
 
@@ -57,7 +60,10 @@ def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HE
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
     if not np.isfinite(high - low).all() or (high - low).max() > MOST_TRAVEL:
         x, y, z = (float(v) for v in positions[0, 0])
-        subject = Subject((x, y - 0.09, z), BODY_SUBJECT.half_height, BODY_SUBJECT.half_width)
+        more = _head_above(positions, names, headroom)
+        subject = Subject(
+            (x, y - LOWER + more / 2, z), BODY_SUBJECT.half_height + more / 2, BODY_SUBJECT.half_width
+        )
         return Extent(subject, follows=True, legs_move=legs_move)
     low, high = low - np.array([0.10, 0.06, 0.10]), high + np.array([0.10, max(headroom, HEADROOM), 0.10])
     low = np.minimum(low, np.array(BODY_SUBJECT.centre) - (0.35, 0.95, 0.3) + _aside(low, high))
@@ -68,6 +74,14 @@ def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HE
     towards = float(np.linalg.norm(path - (x, z), axis=1).max())  # from any side
     subject = Subject((x, y, z), tall, max(wide, BODY_SUBJECT.half_width), max(towards - NEAR, 0.0))
     return Extent(subject, follows=False, legs_move=legs_move)
+
+
+def _head_above(positions: Float64, names: tuple[str, ...], headroom: float) -> float:
+    """Return metres by which a head rises above `BODY_SUBJECT` at the root at most; 0 for usual ones."""
+    if HEAD not in names or not np.isfinite(positions).all():
+        return 0.0
+    height = float((positions[:, names.index(HEAD), 1] - positions[:, 0, 1]).max())
+    return max(height + headroom - (BODY_SUBJECT.half_height - LOWER), 0.0)
 
 
 def _aside(low: Float64, high: Float64) -> Float64:

@@ -87,4 +87,7 @@ def test_info_of_a_person_without_motion(run: Run, tmp_path: Path) -> None:
     assert "1; 1 shapes of a face" in out
     assert f"fba play MOTION --body {path}" in out
     listed = json.loads(run("info", path, "--json").out)["person"]  # type: ignore[attr-defined]
+    code, out, err = run("info", path, "--clip", "3")
+    assert (code, out) == (1, "")
+    assert "there is no animation '3'; the file has none" in err
     assert listed == {"declared": "VRM 0", "joints": 23, "matched": 23, "meshes": 1, "shapes": 1}

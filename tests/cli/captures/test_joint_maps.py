@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import fba
+from fba.parameters import bap_numbers
 from small_people import BONES, write_person
 
 Run = Callable[..., tuple[int, str, str]]
@@ -34,6 +36,31 @@ def person(path: Path, names: dict[str, str] | None = None) -> Path:
     arm = [Rotation.from_euler("z", -20 * step, degrees=True) for step in range(4)]
     knee = [Rotation.from_euler("x", 10 * step, degrees=True) for step in range(4)]
     return write_person(path, clips={"move": {"leftUpperArm": arm, "rightLowerLeg": knee}}, names=names)
+
+
+def test_a_unit_that_limbs_do_not_tell(run: Run, tmp_path: Path) -> None:
+    """Somebody without knees and elbows, in centimetres, who moves half a metre aside."""
+    joints = (("Hips", "0 90 0"), ("LeftUpLeg", "10 0 0"), ("RightUpLeg", "-10 0 0"))
+    lines = []
+    for name, offset in joints:
+        kind = "JOINT" if lines else "ROOT"
+        channels = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+        lines += [f"{kind} {name} {{ OFFSET {offset} {channels}"] + (["}"] if lines else [])
+    rows = [f"{x} 90 0 0 0 0 10 0 0 0 0 0 -10 0 0 0 0 0" for x in (0, 50)]
+    path = tmp_path / "half.bvh"
+    path.write_text("\n".join(["HIERARCHY", *lines, "}", "MOTION", "Frames: 2", "Frame Time: 0.04", *rows]))
+    given = ["--map", "Hips=HumanoidRoot", "--map", "LeftUpLeg=l_hip", "--map", "RightUpLeg=r_hip"]
+    code, _, err = run("encode", path, "-o", tmp_path / "half.fba", *given)
+    assert code == 0
+    assert "its unit is unknown; taken as centimetres; give another, in metres, with --scale 0.001" in err
+    assert "off their path" not in err
+    code, _, err = run("encode", path, "-o", tmp_path / "half.fba", *given, "--scale", "0.02")
+    assert code == 0
+    assert "unit" not in err
+    assert "off their path" not in err
+    body = fba.read(tmp_path / "half.fba").body
+    assert body is not None
+    assert np.ptp(body.values[:, bap_numbers()["HumanoidRoot_tr_lateral"] - 1]) == pytest.approx(1000, abs=3)
 
 
 def test_what_was_found_is_saved_and_read_again(run: Run, tmp_path: Path) -> None:

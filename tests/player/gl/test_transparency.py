@@ -108,3 +108,11 @@ def test_what_hides_most_hides_other_blended_parts_in_any_order(context: Any) ->
         left, right = draw(context, order)
         assert left[2] > 100 > left[0]
         assert right[0] > 100 > right[2]
+
+
+def test_from_nine_tenths_on_a_blended_part_hides_others(context: Any) -> None:
+    """The nearest has alphas of 0.92 and 0.86; what is behind it, drawn later, shows through the second."""
+    far = wall(0.2, BLUE, [200, 200], alpha="blend")
+    hidden, shown = draw(context, [wall(0.5, RED, [235, 220], alpha="blend"), far])
+    assert hidden[0] > 100 > hidden[2]
+    assert shown[2] > 100 > shown[0]

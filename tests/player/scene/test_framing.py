@@ -65,6 +65,14 @@ def test_who_goes_far_is_followed_from_where_he_begins(away: tuple[float, float,
     assert extent.subject.half_height == pytest.approx(0.98)
 
 
+def test_who_walks_away_with_a_large_head_is_seen_whole() -> None:
+    """A head that reaches 0.9 m over its joint, which rises by 0.1 m: 2.6 m, and the floor as ever."""
+    places = moved({}, {"all": (5.0, 0.0, 0.0)}, {"skullbase": (0.0, 0.1, 0.0)})
+    subject = body_extent(places, NAMES, headroom=0.9).subject
+    assert subject.centre[1] + subject.half_height == pytest.approx(2.6)
+    assert subject.centre[1] - subject.half_height == pytest.approx(-0.1)
+
+
 def test_the_upper_half_ends_at_the_hips() -> None:
     extent = body_extent(moved({}), NAMES)
     upper = extent.upper_half
