@@ -49,13 +49,17 @@ class _Bone:
     kind: str
 
 
-def read_face_motion(gltf: Gltf, clip: Clip, times: Float64) -> FaceTrack | None:
+def read_face_motion(gltf: Gltf, clip: Clip, times: Float64, *, head: bool = False) -> FaceTrack | None:
     """Return the FAPs of a clip at times (T,), seconds; None if it does not move a face.
+
+    head: how a mesh with morph targets and no skin turns is how the head turns (FAPs 48 to 50).
 
     Warns (FbaWarning) of morph targets whose names mean nothing here.
     """
     values = np.zeros((len(times), FAP_COUNT))
     sent = np.zeros(FAP_COUNT, dtype=bool)
+    if head and (turns := _mesh_turns(gltf, clip, times)) is not None:
+        _turn_head(turns, values, sent)
 
     turned = np.zeros(FAP_COUNT, dtype=bool)  # where eyes turn, shapes that look aside move their lids
     _turn_eyes(_gaze(gltf, clip, times), "lr", values, turned)
@@ -177,6 +181,41 @@ def _turn_eyes(forward: Float64 | None, sides: str, values: Float64, sent: Bool)
             column = fap_numbers()[name] - 1
             values[:, column] += angles
             sent[column] = True
+
+
+def _mesh_turns(gltf: Gltf, clip: Clip, times: Float64) -> Float64 | None:
+    """Return turns (T, 3, 3) of a face from its place at rest, in the axes of the scene.
+
+    It is the first mesh without a skin whose morph targets move. None if neither it nor a node above turns.
+    """
+    nodes = [channel.node for channel in clip.channels if channel.path == "weights"]
+    faces = [node for node in nodes if gltf.nodes[node].mesh is not None and gltf.nodes[node].skin is None]
+    if not faces:
+        return None
+    above: list[int] = []
+    node: int | None = faces[0]
+    while node is not None:
+        above.append(node)
+        node = gltf.nodes[node].parent
+    if not any(channel.path == "rotation" and channel.node in above for channel in clip.channels):
+        return None
+    sampler = Sampler(gltf, clip.channels, times)
+    linear = np.broadcast_to(np.eye(3), (len(times), 3, 3))
+    for number in reversed(above):
+        linear = linear @ sampler.linear(number)
+    return nearest_rotation(linear) @ nearest_rotation(gltf.nodes[faces[0]].world[:3, :3]).T
+
+
+def _turn_head(turns: Float64, values: Float64, sent: Bool) -> None:
+    """Add turns (T, 3, 3) of a head, which looks along +z at rest: yaw, then roll, then pitch."""
+    angles = {
+        "head_pitch": np.unwrap(np.arctan2(-turns[:, 1, 2], turns[:, 1, 1])),
+        "head_yaw": np.unwrap(np.arctan2(-turns[:, 2, 0], turns[:, 0, 0])),
+        "head_roll": np.arcsin(np.clip(turns[:, 1, 0], -1.0, 1.0)),
+    }
+    for name, turned in angles.items():
+        values[:, fap_numbers()[name] - 1] += turned * RADIAN
+        sent[fap_numbers()[name] - 1] = True
 
 
 def _face_bones(gltf: Gltf, clip: Clip) -> list[_Bone]:

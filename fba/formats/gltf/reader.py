@@ -178,7 +178,8 @@ def _read_face_alone(gltf: Gltf, clip: Clip, rate: Fraction | int | str | None, 
     limits.check_frames(count, f"{gltf.file}: animation {clip.name!r}")
     keys = sum(channel.times.nbytes + channel.values.nbytes for channel in clip.channels)
     limits.check_bytes(count * FACE_BYTES, f"{gltf.file}: animation {clip.name!r}", source=keys)
-    face = read_face_motion(gltf, clip, float(times[0]) + np.arange(count) / float(frames))
+    moments = float(times[0]) + np.arange(count) / float(frames)
+    face = read_face_motion(gltf, clip, moments, head=True)
     return Animation(frames, np.arange(count), face, None, clip.name)
 
 

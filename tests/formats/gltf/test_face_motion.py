@@ -13,6 +13,7 @@ from fba.capture.blendshapes.shape_table import amounts_of
 from fba.errors import FbaWarning
 from fba.face.expressions import Definitions
 from fba.gltf import read_gltf
+from fba.gltf.writer import Builder
 from fba.parameters import fap_numbers
 from gltf_edits import edit
 from small_people import write_person
@@ -148,3 +149,35 @@ def test_both_ends_of_a_take_of_blender(tmp_path: Path) -> None:
     animation = fba.read(path)
     assert column(animation, "open_jaw").any()
     np.testing.assert_allclose(column(animation, "yaw_r_eyeball") / 1e5, np.radians(20) * RAMP, atol=1e-3)
+
+
+def test_a_mesh_that_turns_turns_the_head(tmp_path: Path) -> None:
+    """A face without a skeleton hangs on a group that turns by 20 degrees to the left, or down, or right."""
+    for axis, degrees, name in (("y", 20, "head_yaw"), ("x", 20, "head_pitch"), ("z", 20, "head_roll")):
+        turns = [Rotation.from_euler("Y", 90, degrees=True)] * FRAMES  # of a node above, undone below
+        turns = [Rotation.from_euler(axis, degrees * s, degrees=True) * turns[0] for s in RAMP]
+        builder = Builder()
+        back = Rotation.from_euler("Y", -90, degrees=True).as_quat().tolist()
+        rest = turns[0].as_quat().tolist()
+        builder.add("nodes", {"name": "group", "children": [1], "rotation": rest})
+        builder.add("nodes", {"name": "face", "mesh": 0, "rotation": back})
+        corners = np.eye(3, dtype=np.float32)
+        positions = builder.data(corners, bounds=True)
+        primitive = {"attributes": {"POSITION": positions}, "targets": [{"POSITION": builder.data(corners)}]}
+        builder.add("meshes", {"primitives": [primitive], "extras": {"targetNames": ["jawOpen"]}})
+        builder.add("scenes", {"nodes": [0]})
+        times = builder.data((np.arange(FRAMES) / 30).astype(np.float32), bounds=True)
+        outputs = [RAMP.astype(np.float32), np.array([turn.as_quat() for turn in turns], np.float32)]
+        builder.add("animations", {
+            "samplers": [{"input": times, "output": builder.data(one)} for one in outputs],
+            "channels": [
+                {"sampler": 0, "target": {"node": 1, "path": "weights"}},
+                {"sampler": 1, "target": {"node": 0, "path": "rotation"}},
+            ],
+        })  # fmt: skip
+        path = tmp_path / "face.glb"
+        path.write_bytes(builder.glb())
+        animation = fba.read(path)
+        assert animation.body is None
+        np.testing.assert_allclose(column(animation, name) / 1e5, np.radians(degrees * RAMP), atol=1e-3)
+        assert column(animation, "open_jaw")[-1] > 800
