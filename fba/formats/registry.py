@@ -185,11 +185,6 @@ def formats() -> tuple[Format, ...]:
             read_face=lazy("face_tables.pyfeat", "read_face"),
         ),
         Format(
-            "points", (".csv",), "points of a tracked face: MediaPipe's 478, iBUG's 68",
-            lazy("face_tables.points_csv", "sniff"), lazy("face_tables.points_csv", "read"), None,
-            read_face=lazy("face_tables.points_csv", "read_points"),
-        ),
-        Format(
             "livelink-udp", (".udp",), "recorded datagrams of Live Link Face",
             lazy("face_tables.livelink_udp", "sniff"), lazy("face_tables.livelink_udp", "read"), None,
             ("face",), read_face=lazy("face_tables.livelink_udp", "read_face"),
@@ -203,6 +198,12 @@ def formats() -> tuple[Format, ...]:
             "shapes-json", (".json",), "blendshapes in JSON: MediaPipe's scores, BEAT",
             lazy("face_tables.shapes_json", "sniff"), lazy("face_tables.shapes_json", "read"), None,
             ("face",), read_face=lazy("face_tables.shapes_json", "read_face"),
+        ),
+        Format(
+            "points", (".csv", ".json", ".npz", ".npy", ".jsonl"),
+            "points of a tracked face: MediaPipe's 478, iBUG's 68; tables, JSON, NumPy's arrays",
+            lazy("face_tables.points", "sniff"), lazy("face_tables.points", "read"), None,
+            read_face=lazy("face_tables.points", "read_points"),
         ),
         Format(
             "c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face",

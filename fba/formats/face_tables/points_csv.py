@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path as FilePath
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Float64, Int64
-from fba.capture.points.motion import OTHERS, PointMotion, check_count
+from fba.capture.points.motion import COUNTS, OTHERS, PointMotion, check_count
 from fba.errors import FormatError, ModelError
 from fba.formats.face_tables._faces import choose_rows, row_times, tracked_rows
-from fba.formats.face_tables._points import Neutral, build_points, points_to_animation
+from fba.formats.face_tables._points import build_points
 from fba.formats.face_tables._tables import Table, header_names, named, read_table
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
@@ -47,48 +47,19 @@ SIZES = (("width", "height"), ("image_width", "image_height"), ("frame_width", "
 WORDS = ("", "landmark", "landmarks", "lm", "lmk", "face", "facelandmark", "point", "points", "p", "pt", "kp",
          "keypoint", "facepoint", "mesh", "facemesh")  # fmt: skip
 """What may stand before the numbers of columns, in small letters."""
+PLAIN = re.compile(r"-?\d{1,9}(?:\.\d{0,20})?(?:[eE][+-]?\d{1,3})?")
+PLAIN_COUNTS = {width * count for count in COUNTS for width in (2, 3)}
+"""Columns of tables that number them, or that have no header."""
 MILLIMETRE = 0.001
 
 
 def sniff(head: bytes, suffix: str) -> bool:
     """Whether the first line of a file names coordinates of numbered points."""
     names = header_names(head)
-    if _long_columns(names) is not None:
+    if _long_columns(names) is not None or _plain_columns(names) is not None:
         return True
     sets = _find_sets(names)
     return any(len(columns.get("x", columns.get("X", {}))) >= FEWEST for columns in sets.values())
-
-
-def read(
-    path: Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
-    face: str | None = None,
-    markers: dict[str, str] | None = None,
-    neutral: Neutral = "auto",
-    gaze: str = "none",
-    head_path: bool = True,
-    aspect: float | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return a tracked face as FAPs, at `rate` or at the rate of its own times.
-
-    fps, face: as for `read_points`; the others: as for `fba.capture.points.from_points`. Warns (FbaWarning)
-    of what is odd. Raises FormatError, LimitError.
-    """
-    motion = read_points(path, fps=fps, face=face, limits=limits)
-    return points_to_animation(
-        motion,
-        rate,
-        path,
-        limits,
-        markers=markers,
-        neutral=neutral,
-        gaze=gaze,
-        head_path=head_path,
-        aspect=aspect,
-    )
 
 
 def read_points(
@@ -103,7 +74,7 @@ def read_points(
     fps: frames in a second, for tables without times. face: the name or number of the face to read, where
     there are several. Raises FormatError, LimitError.
     """
-    table = read_table(path, limits)
+    table = _with_header(read_table(path, limits))
     column = {name: number for number, name in reversed(list(enumerate(table.names)))}
     by_word = {name.lower(): number for name, number in column.items()}
     long = _long_columns(table.names)
@@ -140,6 +111,27 @@ def _find_sets(names: Sequence[str]) -> dict[str, dict[str, dict[int, int]]]:
     return result
 
 
+def _plain_columns(names: Sequence[str]) -> list[int] | None:
+    """Return columns of coordinates, one after another, of a table that numbers its columns or has no names."""
+    numbers = [column for column, name in enumerate(names) if PLAIN.fullmatch(name)]
+    for columns in (numbers, numbers[1:]):
+        if len(names) - len(columns) <= 3 and len(columns) in PLAIN_COUNTS:
+            return columns
+    return None
+
+
+def _with_header(table: Table) -> Table:
+    """Return a table whose first line may be no header, but numbers, as one with a header."""
+    plain = _plain_columns(table.names)
+    if plain is None or all(name.isdigit() for name in (table.names[column] for column in plain)):
+        return table
+    names = [str(column) for column in range(len(table.names))]
+    if len(plain) < len(names):
+        names[0] = "frame"
+    rows = [list(table.names), *table.rows]
+    return replace(table, names=tuple(names), rows=rows, lines=[table.lines[0] - 1, *table.lines])
+
+
 def _is_metric(names: Sequence[str]) -> bool:
     """Whether columns are OpenFace's points in millimetres, X_0, Y_0, Z_0."""
     sets = _find_sets(names)
@@ -148,6 +140,10 @@ def _is_metric(names: Sequence[str]) -> bool:
 
 def _read_wide(table: Table, rows: Int64) -> Float64:
     """Return points (T, N, 2 or 3) of a table with a column for each coordinate."""
+    if (plain := _plain_columns(table.names)) is not None:
+        count = len(plain)
+        width = 3 if count % 3 == 0 and count // 3 in COUNTS else 2
+        return table.numbers(plain)[rows].reshape(len(rows), -1, width)
     sets = _find_sets(table.names)
     if not sets:
         raise FormatError(

@@ -73,18 +73,19 @@ def read_face(
     fps: frames in a second, for files without times. A frame without scores is one without a face. Raises
     FormatError, LimitError.
     """
-    document = _read_json(path, limits)
+    document = read_json(path, limits)
     names, weights, stamps = _beat(document, path) or _frames(document, path)
     limits.check_frames(len(weights), f"{path}: the recording")
     check_weights(weights, names, path)
-    times, rate = _times(stamps, len(weights), fps, path)
+    times, rate = frame_times(stamps, len(weights), fps, path)
     return ShapeMotion(
         tuple(names), weights, times, rate, name=FilePath(path).stem,
         findings=tuple(find_lacks(names, weights, times, rate)),
     )  # fmt: skip
 
 
-def _read_json(path: Path, limits: Limits) -> Any:
+def read_json(path: Path, limits: Limits) -> Any:
+    """Return the document in a file of JSON. Raises FormatError, LimitError."""
     data = read_whole(path)
     values = data.count(b",") + data.count(b"[") + data.count(b"{")
     limits.check_bytes(VALUE_BYTES * values, f"{path}: the recording", source=len(data))
@@ -134,7 +135,7 @@ def _frames(document: Any, path: Path) -> tuple[list[str], Float64, list[Any]]:
         [_number(scores.get(name, np.nan), number, path) for name in names]
         for number, scores in enumerate(found)
     ]
-    return names, np.array(rows), [_stamp(frame) for frame in frames]
+    return names, np.array(rows), [frame_time(frame) for frame in frames]
 
 
 def _list_of_frames(document: Any) -> list[Any] | None:
@@ -200,7 +201,7 @@ def _number(value: Any, frame: int, path: Path) -> float:
     return number if np.isfinite(number) else float("nan")
 
 
-def _stamp(frame: Any) -> Any:
+def frame_time(frame: Any) -> Any:
     """Return the time of a frame, None if it has none."""
     if not isinstance(frame, dict):
         return None
@@ -208,7 +209,7 @@ def _stamp(frame: Any) -> Any:
     return next((by_key[key] for key in TIMES if key in by_key), None)
 
 
-def _times(
+def frame_times(
     stamps: list[Any], count: int, fps: Fraction | int | str | None, path: Path
 ) -> tuple[Float64, Fraction]:
     """Return times (T,) in seconds from the first frame, and the nominal rate."""
