@@ -17,7 +17,7 @@ from fba.capture.markers.targets import HEAD, target_points
 from fba.capture.points.lifting import lift
 from fba.capture.points.motion import PointMotion
 from fba.capture.points.neutral import find_rests
-from fba.capture.points.picture import upright_points
+from fba.capture.points.picture import face_misfit, upright_points
 from fba.capture.points.places import check_places, find_still, point_places, take_points
 from fba.capture.points.sizes import even_sizes
 from fba.capture.sampling import find_gaps, interpolate
@@ -28,6 +28,10 @@ from fba.limits import DEFAULT_LIMITS, Limits
 Neutral = str | int | tuple[float, float]
 GUESSED = frozenset({14})
 """FAPs that a depth which a tracker guesses does not tell: the jaw's thrust is lost in the chin's arc."""
+MISFIT = 0.02
+"""Metres by which half of the points are off a known face at most; those of real faces are 5 mm off."""
+SAMPLES = 60
+"""Frames, about, that tell whether points are those of a face."""
 FRAME_BYTES = 400
 """Memory for each point in each frame."""
 
@@ -120,6 +124,7 @@ def prepare(
         points = lift(points, places, template, motion.times[seen], model)
     elif not motion.metric:
         points = even_sizes(points, template, fixed)
+    _check_face(points, template)
     rests: dict[str, Intp] = {}
     rest: Neutral | slice = neutral
     if neutral == "auto":
@@ -137,6 +142,19 @@ def prepare(
         still=still, depth=not motion.flat, confused=False, camera=True, untold=untold, rests=rests
     )
     return Prepared(taken, places, rest, traits)
+
+
+def _check_face(points: Float64, template: Float64) -> None:
+    """Raise ModelError for points (T, M, 3) that do not lie as on a face, template (M, 3)."""
+    known = ~np.isnan(template[:, 0])
+    whole = ~np.isnan(points[:, known]).any(axis=(1, 2))
+    some = points[whole][:: max(1, int(whole.sum()) // SAMPLES)][:, known]
+    off = face_misfit(some, template[known]) if len(some) else 0.0
+    if off > MISFIT:
+        raise ModelError(
+            f"the points do not lie as those of a face: they are {1000 * off:.0f} mm off; are they "
+            "another tracker's, or in another order?"
+        )
 
 
 def _bridge(points: Float64, motion: PointMotion, limits: Limits) -> Float64:

@@ -74,7 +74,7 @@ def _turn_round(points: Float64, where: Mapping[str, int]) -> Float64:
     return points
 
 
-def _misfit(points: Float64, shape: Float64) -> float:
+def face_misfit(points: Float64, shape: Float64) -> float:
     """Return how far points (T, K, D) are from a shape (K, 3), metres, in the middle."""
     if points.shape[2] == 2:
         poses = fit_poses(shape, points)
@@ -98,7 +98,7 @@ def _find_aspect(points: Float64, template: Float64) -> float:
         raise ModelError("no frame has all points of the face; give the aspect of the picture")
     left = {}
     for name, ratio in ASPECTS.items():
-        left[name] = _misfit(some * np.array([ratio, 1.0, ratio])[: some.shape[2]], template[known])
+        left[name] = face_misfit(some * np.array([ratio, 1.0, ratio])[: some.shape[2]], template[known])
     best, next_best = sorted(left, key=lambda name: left[name])[:2]
     sure = "" if left[best] < SURE * left[next_best] else f", or {next_best}"
     warnings.warn(

@@ -112,7 +112,7 @@ def _find_sets(names: Sequence[str]) -> dict[str, dict[str, dict[int, int]]]:
 
 
 def _plain_columns(names: Sequence[str]) -> list[int] | None:
-    """Return columns of coordinates, one after another, of a table that numbers its columns or has no names."""
+    """Return columns of coordinates, one after another, of a table that numbers columns or has no names."""
     numbers = [column for column, name in enumerate(names) if PLAIN.fullmatch(name)]
     for columns in (numbers, numbers[1:]):
         if len(names) - len(columns) <= 3 and len(columns) in PLAIN_COUNTS:
