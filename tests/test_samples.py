@@ -18,6 +18,8 @@ from fba.face import resolve
 from fba.formats import merge
 from fba.formats.bvh.reader import read_motion
 from fba.parameters import bap_numbers, baps, fap_numbers, faps
+from fba_conformance.captures.measurement import root_mean_squares
+from fba_conformance.captures.performances import perform_track
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = Path(fba.__file__).parent / "samples"
@@ -76,6 +78,20 @@ def test_script_makes_the_same_bytes(tmp_path: Path) -> None:
 def test_files_are_small() -> None:
     assert (SAMPLES / "hello.bvh").stat().st_size <= 600_000
     assert (SAMPLES / "hello.fap").stat().st_size <= 150_000
+
+
+def test_markers_say_what_the_face_says() -> None:
+    """From a rest on, but for what they cannot tell: the inner lips, whose corners the outer ones follow."""
+    talk = fba.read(SAMPLES / "talk.c3d", neutral="first")
+    performed = perform_track(fba.read(SAMPLES / "hello.fap"), 50)[: len(talk)]
+    assert len(talk) == 300
+    assert talk.face is not None
+    told = tuple(fap for fap in (3, 14, *range(16, 21), *range(31, 43), *range(51, 65)))
+    assert talk.face.mask[0, np.array(told) - 1].all()
+    errors = root_mean_squares(talk.face.values.astype(float), performed, told)
+    assert {fap: error for fap, error in errors.items() if error > (4 if fap in (59, 60) else 2.5)} == {}
+    assert np.ptp(talk.face.values[:, 47:50], axis=0).min() > 10_000  # the head moves
+    assert (SAMPLES / "talk.c3d").stat().st_size <= 150_000
 
 
 def test_face_and_body_last_equally_long() -> None:

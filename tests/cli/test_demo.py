@@ -22,7 +22,7 @@ def test_the_folder_has_the_samples_and_the_stream_made_of_them(
     result = CliRunner().invoke(group, ["demo", "--no-play", "--out", str(folder)])
     assert result.exit_code == 0, result.output
     names = sorted(path.name for path in SAMPLES.iterdir())
-    assert names == ["hello.bvh", "hello.fap"]
+    assert names == ["hello.bvh", "hello.fap", "talk.c3d"]
     for name in names:
         assert (folder / name).read_bytes() == (SAMPLES / name).read_bytes()
         assert str(folder / name) in result.output
@@ -30,3 +30,8 @@ def test_the_folder_has_the_samples_and_the_stream_made_of_them(
     assert len(stream) == len(fba.read(folder / "hello.fap"))
     assert stream.face is not None
     assert stream.body is not None
+    talk = fba.read(folder / "talk.fba")
+    assert float(talk.duration) == pytest.approx(6.0)
+    assert talk.face is not None
+    assert talk.body is not None
+    assert "talk.c3d, 6.00 s" in result.output

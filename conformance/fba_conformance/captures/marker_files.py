@@ -78,7 +78,7 @@ def c3d(
     parameters += entry(1, "DATA_START", struct.pack("bB", 2, 0) + word(2 + section_blocks))
     stored = struct.pack("bB", 4, 0) + real(frames) if long_frames else struct.pack("bB", 2, 0) + word(frames)
     parameters += entry(1, "FRAMES", stored)
-    parameters += text(1, "Y_SCREEN", ["+Z"])
+    parameters += text(1, "Y_SCREEN", [motion.up.upper() or "+Z"])
     blocks = section_blocks
     section = bytes([1, 0x50, blocks, PROCESSORS[processor]]) + parameters
     header = bytes([2, 0x50]) + word(count, analogue, 1, 0xFFFF if long_frames else frames, 0)

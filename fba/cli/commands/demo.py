@@ -1,6 +1,6 @@
-"""`fba demo`: goes from BVH and FAP files to a stream and a picture, with the samples that come with fba.
+"""`fba demo`: goes from BVH, FAP and C3D files to streams and a picture, with the samples that come with fba.
 
-A script made the samples (tools/make_samples.py); nobody was captured for them.
+Scripts made the samples (tools/make_samples.py, make_face_capture.py); nobody was captured for them.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ BAP_STEPS = "visage"
 """The standard's own table moves the root in steps of 64 mm, which is visible."""
 SAMPLES = ("hello.bvh", "hello.fap")
 """A body and a face, which come with fba."""
+CAPTURE = "talk.c3d"
+"""Markers on somebody's face."""
 SECONDS_BEFORE_NOTICE = 4.0
 """Seconds after which a line explains the wait."""
 COMPILING = "compiling for this machine, on the first run only: about a minute in all"
@@ -39,10 +41,11 @@ COMPILING = "compiling for this machine, on the first run only: about a minute i
 @options.no_clobber_option
 @click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
 def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
-    """Encode the sample animation, print its size, and play it.
+    """Encode the samples, print their sizes, and play the first.
 
-    A script made the sample; it is not motion capture. Without a display, a film and a picture are made
-    instead. The sample files hello.bvh and hello.fap are copied into the folder.
+    hello.bvh (a body) and hello.fap (a face) become one stream; talk.c3d (markers on a face) becomes
+    another. Scripts made them; they are not motion capture. Without a display, a film and a picture are
+    made instead. The sample files are copied into the folder.
     """
     from fba import player
     from fba.codec import EncoderOptions, encode, probe_stream
@@ -52,13 +55,13 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     stream, video, picture = (folder / f"hello{suffix}" for suffix in (".fba", ".mp4", ".png"))
     sources = [folder / name for name in SAMPLES]
-    outputs = Outputs(
-        [Output("--out", path) for path in (*sources, stream, video, picture)], no_clobber=no_clobber
-    )
+    capture, talk = folder / CAPTURE, folder / "talk.fba"
+    made = (*sources, capture, stream, talk, video, picture)
+    outputs = Outputs([Output("--out", path) for path in made], no_clobber=no_clobber)
     compiling = Timer(SECONDS_BEFORE_NOTICE, click.echo, [COMPILING], {"err": True})
     compiling.daemon = True
     compiling.start()
-    for source in sources:
+    for source in (*sources, capture):
         outputs.write(source, (files("fba") / "samples" / source.name).read_bytes())
     body, face = (read(source) for source in sources)
     source_bytes = sum(source.stat().st_size for source in sources)
@@ -78,11 +81,27 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     )
     decoded = read(stream)
     click.echo(f"decoded: {len(decoded)} frames at {rate_text(decoded.rate)} frames/s")
+    _encode_capture(capture, talk, outputs)
     again = as_typed(f"fba play {shlex.quote(str(stream))}")
     click.echo(f"to see it again: {again}")
     if play is not False and _play(player, decoded, asked=play is True):
         return
     _render(player, decoded, video, picture)
+
+
+def _encode_capture(capture: Path, stream: Path, outputs: Outputs) -> None:
+    """Encode markers on a face, with the path of the head, and print what became of them."""
+    from fba.codec import EncoderOptions, encode
+    from fba.formats import read
+
+    face = read(capture, rate=25)
+    data = encode(face, EncoderOptions(bap_steps=BAP_STEPS, mark=True))
+    outputs.write(stream, data)
+    size = capture.stat().st_size
+    click.echo(
+        f"markers on a face: {capture}, {seconds_text(face.duration)}, {size} bytes; encoded: {stream}: "
+        f"{len(data)} bytes, {size / len(data):.0f} times smaller"
+    )
 
 
 def _play(player: object, animation: Animation, *, asked: bool) -> bool:
