@@ -1,4 +1,4 @@
-"""Markers on a face (C3D) to FAPs: who was captured, what the markers tell, and the stream that it becomes."""
+"""Markers on a face (C3D) to FAPs: who was captured, what markers tell, and the stream that it becomes."""
 
 from pathlib import Path
 
