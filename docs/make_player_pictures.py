@@ -7,13 +7,18 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from make_marker_picture import capture
+
 import fba
 from fba.animation import Animation
+from fba.capture.virtual_markers import head_of_model, propose_mapping
 from fba.face import FaceModel, feature_point_names
 from fba.face.importers.head_surface import read_head_surface
 from fba.formats import merge
 from fba_player.export.image_files import write_picture
 from fba_player.scene.compare import CompareScene
+from fba_player.scene.marker_editing import MarkerEditing
+from fba_player.scene.markers_scene import MarkersScene
 from fba_player.scene.placement_scene import PlacementScene
 from fba_player.scene.point_placement import PointPlacement
 from fba_player.scene.scene import Scene
@@ -90,6 +95,15 @@ def points() -> None:
     write_picture(IMAGES / "points.jpg", picture(session, ("points",)))
 
 
+def markers() -> None:
+    """Markers beside the built-in head, and the reach of one of them."""
+    motion, head = capture(fba.read(SAMPLES / "hello.fap")), head_of_model(FaceModel.default())
+    editing = MarkerEditing(motion, head, propose_mapping(motion, head), Path("mapping.toml"))
+    editing.choose("8.2")
+    session = Session(MarkersScene(editing, "face.csv"), size=SIZE)
+    write_picture(IMAGES / "markers-page.jpg", picture(session, ("markers",)))
+
+
 @contextlib.contextmanager
 def _played(animation: Animation) -> Iterator[Session]:
     """A session that plays the animation from a stream with an I plane every two seconds."""
@@ -107,3 +121,4 @@ if __name__ == "__main__":
     panels()
     compare()
     points()
+    markers()

@@ -83,6 +83,10 @@ SHAPES_BACK_TEST = "tests/capture/faces/test_faps_to_shapes.py"
 SAMPLING = "fba/capture/sampling.py"
 MARKERS = "fba/capture/markers"
 MARKERS_TEST = "tests/capture/test_from_markers.py"
+VIRTUAL = "fba/capture/virtual_markers"
+VIRTUAL_TEST = "tests/capture/test_virtual_markers.py"
+VIRTUAL_FILES_TEST = "tests/capture/test_virtual_marker_files.py"
+MAP_PAGE_TEST = "tests/player/window/test_map_markers.py"
 MARKER_FILES_TEST = "tests/formats/test_marker_files.py"
 LIVELINK_TEST = "tests/formats/face_tables/test_livelink_csv.py"
 SHAPES_TEST = "tests/capture/faces/test_shapes_to_faps.py"
@@ -456,6 +460,52 @@ MUTANTS = (
         "tests/capture/faces/test_faps_to_shapes.py",
     ),
     Mutant(f"{MARKERS}/gaps.py", "length <= SHORT", "length <= 5 * SHORT", MARKERS_TEST),
+    Mutant(f"{VIRTUAL}/_walk_loops.py", "abs(front) <= depth", "abs(front) <= radius", VIRTUAL_TEST),
+    Mutant(f"{VIRTUAL}/_walk_loops.py", "beside < radius * radius", "beside < radius", VIRTUAL_TEST),
+    Mutant(
+        f"{VIRTUAL}/influence.py",
+        "1.0 - self.distances / self.radius, 0.0",
+        "1.0 - self.distances / self.radius, -1.0",
+        VIRTUAL_TEST,
+    ),
+    Mutant(
+        f"{VIRTUAL}/influence.py",
+        "np.lexsort((owner, distances, vertices))",
+        "np.lexsort((distances, owner, vertices))",
+        VIRTUAL_TEST,
+    ),
+    Mutant(f"{VIRTUAL}/influence.py", "total > MOST_SHARES", "size > MOST_SHARES", VIRTUAL_TEST),
+    Mutant(f"{VIRTUAL}/weights.py", 'mapping.overlap == "match"', 'mapping.overlap == "add"', VIRTUAL_TEST),
+    Mutant(f"{VIRTUAL}/weights.py", 'mapping.assignment == "exclusive"', "False", VIRTUAL_TEST),
+    Mutant(f"{VIRTUAL}/performance.py", "FEWEST_FIXED = 3", "FEWEST_FIXED = 2", VIRTUAL_TEST),
+    Mutant(f"{VIRTUAL}/performance.py", "TOGETHER = 1e-3", "TOGETHER = 0.0", VIRTUAL_TEST),
+    Mutant(f"{VIRTUAL}/performance.py", "ODD_SCALE = 1.5", "ODD_SCALE = 15.0", VIRTUAL_TEST),
+    Mutant(
+        f"{VIRTUAL}/performance.py",
+        "if not marker.fixed and name in columns",
+        "if name in columns",
+        VIRTUAL_TEST,
+    ),
+    Mutant(f"{VIRTUAL}/alignment.py", "MIRRORED = 0.5", "MIRRORED = 0.0", VIRTUAL_TEST),
+    Mutant(f"{VIRTUAL}/mapping.py", "own.connectivity != head.connectivity", "False", VIRTUAL_TEST),
+    Mutant(f"{VIRTUAL}/mapping.py", "own.shape != head.shape", "False", VIRTUAL_TEST),
+    Mutant(
+        f"{VIRTUAL}/mapping.py",
+        "marker.vertex >= len(head.vertices)",
+        "marker.vertex > len(head.vertices)",
+        VIRTUAL_TEST,
+    ),
+    Mutant(
+        f"{VIRTUAL}/mapping_files.py",
+        'entry.get("depth", radius)',
+        'entry.get("depth", 1.0)',
+        VIRTUAL_FILES_TEST,
+    ),
+    Mutant(f"{VIRTUAL}/proposal.py", "NEAR = 0.015", "NEAR = 0.15", MAP_PAGE_TEST),
+    Mutant(f"{VIRTUAL}/proposal.py", "REACH = 3, 1.2", "REACH = 3, 3.0", VIRTUAL_TEST),
+    Mutant(f"{VIRTUAL}/followers.py", '"teeth", "tongue"', '"tongue",', VIRTUAL_TEST),
+    Mutant("player/fba_player/scene/markers_scene.py", "GRAB = 10.0", "GRAB = 100.0", MAP_PAGE_TEST),
+    Mutant("player/fba_player/scene/marker_editing.py", 'if what != "size" or', "if True or", MAP_PAGE_TEST),
     Mutant(f"{MARKERS}/gaps.py", "off[0] * (1 - share) + off[1] * share", "off[0]", MARKERS_TEST),
     Mutant(
         f"{MARKERS}/stabilisation.py",

@@ -216,6 +216,15 @@ def test_gaps_are_filled() -> None:
     assert np.isnan(shown.cloud[20, 4]).all()
 
 
+def test_what_a_fixed_marker_does_by_itself_is_noise() -> None:
+    positions = capture().positions.copy()
+    positions[20:, 1, 2] += 0.002
+    shown = perform(replace(capture(), positions=positions), sheet(), mapping())
+    for name in CORNERS:
+        assert not shown.displacements[:, shown.names.index(name)].any()
+    assert shown.displacements[39, shown.names.index("M"), 2] == pytest.approx(1.0, abs=0.1)
+
+
 def test_a_marker_that_is_never_seen_stays_where_it_is() -> None:
     positions = capture().positions.copy()
     positions[:, 5] = np.nan
@@ -252,7 +261,7 @@ def test_mappings_that_fit_neither_capture_nor_head() -> None:
 
 def test_fixed_markers_at_one_place_give_no_scale() -> None:
     positions = capture().positions.copy()
-    positions[:, 3] = positions[:, 0]
+    positions[:, 3] = positions[:, 0] + (1e-6, 0, 0)
     with pytest.raises(
         ModelError, match="the markers of 'A' and 'D', which tell the scale, are at one place"
     ):
