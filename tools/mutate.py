@@ -551,6 +551,12 @@ MUTANTS = (
     Mutant(LIVELINK_CSV, "* rate > SPARSE", "* rate < 0", SHAPES_BACK_TEST),
     Mutant(FACES, "times = times - times[0]", "pass", ACTION_UNITS_TEST),
     Mutant(FACES, ">= CONFIDENT", ">= 0", ACTION_UNITS_TEST),
+    Mutant(
+        "fba/formats/gltf/face_motion.py",
+        "if humanoid is not None and not LIMBS",
+        "if False and not LIMBS",
+        "tests/formats/gltf/test_vrma_writing.py",
+    ),
     Mutant("fba/formats/gltf/reader.py", "moments, head=True", "moments", FACES_TEST),
     Mutant(OPENFACE, "set(columns) == set(VERSION_3)", "False", ACTION_UNITS_TEST),
     Mutant(UDP, "times = np.where(times < NOON, times + DAY, times)", "pass", RECORDS_TEST),

@@ -162,7 +162,13 @@ def formats() -> tuple[Format, ...]:
             read_motion=lazy("bvh.reader", "read_motion"),
         ),
         Format(
-            "gltf", (".glb", ".gltf"), "glTF 2.0: read, an animated skeleton; written, a skinned person",
+            "vrma", (".vrma",), "VRM animation: read as glTF; written, the expressions of a face",
+            lazy("gltf.vrma", "sniff"), lazy("gltf.reader", "read"), lazy("gltf.vrma", "write"), ("face",),
+            written="VRM animation, the expressions of a face",
+        ),
+        Format(
+            "gltf", (".glb", ".gltf", ".vrma"),
+            "glTF 2.0: read, an animated skeleton; written, a skinned person",
             lazy("gltf.reader", "sniff"), lazy("gltf.reader", "read"), lazy("gltf.writer", "write"),
             read_motion=lazy("gltf.reader", "read_motion"), list_clips=lazy("gltf.clips", "list_clips"),
             describe_person=lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",

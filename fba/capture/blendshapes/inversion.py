@@ -31,24 +31,27 @@ SHARED = 5e-4
 real faces do, and none is used for what is next to nothing."""
 
 
-def to_blendshapes(animation: Animation) -> ShapeMotion:
+def to_blendshapes(animation: Animation, names: tuple[str, ...] = ARKIT_ORDER) -> ShapeMotion:
     """Return weights of ARKit's 52 shapes, 0 to 1, that show a face like its FAPs, and head and eyes.
+
+    names: of other shapes with known FAPs instead, such as "aa" and "happy" of VRM.
 
     Visemes and expressions become FAPs first (`fba.face.resolve`). The weights of each frame are those whose
     FAPs come closest, by least squares of how far an adult's face moves. What no shape moves (ears, pupils,
     the tongue but for its tip) is lost. Times and rate are the animation's own.
 
-    Raises ModelError without a face.
+    Raises ModelError without a face, or for a shape whose FAPs are not known.
     """
     if animation.face is None or not len(animation):
         raise ModelError("the animation has no face; there is nothing to make blendshapes of")
     shown = resolve(animation.face).astype(np.float64)
-    weights = _solve(_shapes(), shown * _metres())
-    opened, closed = (ARKIT_ORDER.index(name) for name in (JAW, CLOSED))
-    weights[:, opened] = np.minimum(weights[:, opened] + weights[:, closed], 1.0)
+    weights = _solve(_shapes(names), shown * _metres(names))
+    if {JAW, CLOSED} <= set(names):
+        opened, closed = names.index(JAW), names.index(CLOSED)
+        weights[:, opened] = np.minimum(weights[:, opened] + weights[:, closed], 1.0)
     times = np.asarray(animation.index, dtype=np.float64) / float(animation.rate)
     return ShapeMotion(
-        ARKIT_ORDER, weights, times - times[0], Fraction(animation.rate),
+        names, weights, times - times[0], Fraction(animation.rate),
         head=_angles(shown, HEAD), eyes=_angles(shown, EYES), start=float(times[0]), name=animation.name,
     )  # fmt: skip
 
@@ -60,25 +63,29 @@ def _solve(shapes: Float64, wanted: Float64) -> Float64:
 
 
 @cache
-def _shapes() -> Float64:
-    """Return how far FAPs of each of ARKit's shapes move an adult's face, metres, (52, 68).
+def _shapes(names: tuple[str, ...]) -> Float64:
+    """Return how far FAPs of each of these shapes move an adult's face, metres, (N, 68).
 
     "mouthClose" is there an open jaw with lips together, since it does nothing beyond "jawOpen".
     """
-    rows = {name: amounts for name in ARKIT_ORDER if (amounts := amounts_of(name)) is not None}
-    rows[CLOSED] = rows[CLOSED] + rows[JAW]
-    return np.array(list(rows.values())) * _metres()
+    rows = {name: amounts for name in names if (amounts := amounts_of(name)) is not None}
+    unknown = [name for name in names if name not in rows]
+    if unknown:
+        raise ModelError(f"no FAPs are known for the shape {unknown[0]!r}")
+    if CLOSED in rows and JAW in rows:
+        rows[CLOSED] = rows[CLOSED] + rows[JAW]
+    return np.array(list(rows.values())) * _metres(names)
 
 
 @cache
-def _metres() -> Float64:
+def _metres(names: tuple[str, ...]) -> Float64:
     """Return how far one step of each FAP moves an adult's face, metres (68,); 0 for what no shape moves."""
     fapu = Fapu.measure(neutral_points())
     metres = np.array([fapu[fap.unit] if fap.unit and fap.unit != "AU" else 0.0 for fap in faps()])
     for name in EYES:
         metres[fap_numbers()[name] - 1] = EYEBALL / RADIAN
     moved = np.zeros(FAP_COUNT, dtype=bool)
-    for name in ARKIT_ORDER:
+    for name in names:
         amounts = amounts_of(name)
         moved |= amounts != 0 if amounts is not None else False
     return np.where(moved, metres, 0.0)

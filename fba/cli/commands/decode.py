@@ -46,6 +46,7 @@ _FOLDER_OR_FILE = OutputType(folders=True)
         "fba decode both.fba -o person.glb",
         "fba decode walk.fba -o walk.bvh --joints moving",
         "fba decode talk.fba -o talk.csv",
+        "fba decode talk.fba -o talk.vrma",
         "fba decode talk.fba --fap - | less",
         "fba decode archive/*.fba --fap decoded/",
         "fba decode archive/*.fba -o decoded/ --to glb",

@@ -37,6 +37,7 @@ EYES = {
 }
 """What the names of bones of eyes contain, in small letters."""
 JAW = re.compile("(^|_)(lower)?jaw(bone|root|_?master)?$")
+LIMBS = {"leftUpperArm", "rightUpperArm", "leftUpperLeg", "rightUpperLeg"}
 NAMED = 6
 """Most names in a message."""
 
@@ -52,7 +53,7 @@ class _Bone:
 def read_face_motion(gltf: Gltf, clip: Clip, times: Float64, *, head: bool = False) -> FaceTrack | None:
     """Return the FAPs of a clip at times (T,), seconds; None if it does not move a face.
 
-    head: how a mesh with morph targets and no skin turns is how the head turns (FAPs 48 to 50).
+    head: FAPs 48 to 50 turn as a declared bone of a head, or a mesh with morph targets and no skin.
 
     Warns (FbaWarning) of morph targets whose names mean nothing here.
     """
@@ -107,9 +108,12 @@ def find_face_clip(gltf: Gltf, clip: str | int | None) -> Clip | None:
 
 
 def nodes_of_faces(gltf: Gltf) -> frozenset[int]:
-    """Return the nodes that only a face uses: expressions and the gaze of VRMA."""
+    """Return the nodes that only a face uses: expressions and gaze of VRMA, and a head without limbs."""
     look = optional_member(optional_member(_animation_extension(gltf), "lookAt"), "node")
     nodes = [node for _, node in _expressions(gltf)]
+    humanoid = find_humanoid(gltf)
+    if humanoid is not None and not LIMBS & set(humanoid.bones):
+        nodes += humanoid.bones.values()
     return frozenset([*nodes, *([] if look is None else [look.index(len(gltf.nodes), "node")])])
 
 
@@ -186,14 +190,18 @@ def _turn_eyes(forward: Float64 | None, sides: str, values: Float64, sent: Bool)
 def _mesh_turns(gltf: Gltf, clip: Clip, times: Float64) -> Float64 | None:
     """Return turns (T, 3, 3) of a face from its place at rest, in the axes of the scene.
 
-    It is the first mesh without a skin whose morph targets move. None if neither it nor a node above turns.
+    It is the declared bone of a head, else the first mesh without a skin whose morph targets move. None if
+    neither it nor a node above turns.
     """
+    humanoid = find_humanoid(gltf)
+    declared = humanoid.bones.get("head") if humanoid is not None else None
     nodes = [channel.node for channel in clip.channels if channel.path == "weights"]
     faces = [node for node in nodes if gltf.nodes[node].mesh is not None and gltf.nodes[node].skin is None]
-    if not faces:
+    face = declared if declared is not None else next(iter(faces), None)
+    if face is None:
         return None
     above: list[int] = []
-    node: int | None = faces[0]
+    node: int | None = face
     while node is not None:
         above.append(node)
         node = gltf.nodes[node].parent
@@ -203,7 +211,7 @@ def _mesh_turns(gltf: Gltf, clip: Clip, times: Float64) -> Float64 | None:
     linear = np.broadcast_to(np.eye(3), (len(times), 3, 3))
     for number in reversed(above):
         linear = linear @ sampler.linear(number)
-    return nearest_rotation(linear) @ nearest_rotation(gltf.nodes[faces[0]].world[:3, :3]).T
+    return nearest_rotation(linear) @ nearest_rotation(gltf.nodes[face].world[:3, :3]).T
 
 
 def _turn_head(turns: Float64, values: Float64, sent: Bool) -> None:
