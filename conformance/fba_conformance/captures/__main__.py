@@ -19,15 +19,18 @@ import fba
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.errors import FbaError, FbaWarning
+from fba.face import FaceModel
 from fba_conformance.captures import measurement, report
 from fba_conformance.captures.heads import load_head, other_head
-from fba_conformance.captures.marked_actor import as_animation, record
+from fba_conformance.captures.marked_actor import as_animation, as_face, record
 from fba_conformance.captures.marker_files import MAKERS, write
 from fba_conformance.captures.performances import perform_track, speech
+from fba_conformance.captures.point_files import LAYOUTS
 from fba_conformance.captures.shaped_face import FACE_FILES, encode_file
+from fba_conformance.captures.tracked_actor import film
 
-RATE = 100
-"""Frames a second of the markers."""
+RATE, FILM_RATE = 100, 30
+"""Frames a second of the markers, and of films."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -64,14 +67,25 @@ def write_captures(folder: Path, seconds: float, head: Path | None) -> None:
     for name in MAKERS:
         write(folder, name, take.motion)
         save_truth(folder, name, truth)
+    for name in LAYOUTS:
+        save_points(folder, name, model, seconds)
     for name in FACE_FILES:
         save_truth(folder, name, encode_file(folder, name, seconds)[1])
-    click.echo(f"{folder}: {len(MAKERS) + len(FACE_FILES)} captures of {seconds:g} s, and their FAPs")
+    click.echo(
+        f"{folder}: {len(MAKERS) + len(LAYOUTS) + len(FACE_FILES)} captures of {seconds:g} s, and their FAPs"
+    )
 
 
 def save_truth(folder: Path, name: str, truth: Animation) -> None:
     """Write the FAPs of a capture beside it."""
     fba.write(folder / f"{name}.truth.fba", truth, clamp=True)
+
+
+def save_points(folder: Path, name: str, head: FaceModel, seconds: float) -> None:
+    """Write tracked points in one layout, and the FAPs of it beside it."""
+    seen = film(head, 478, frames=round(seconds * FILM_RATE), rate=FILM_RATE, share=True)
+    (folder / f"points_{name}").write_bytes(LAYOUTS[name](seen.motion))
+    save_truth(folder, f"points_{name}", as_face(seen.faps, FILM_RATE))
 
 
 def measure_all(seconds: float, heads: list[Path], performances: list[Path]) -> str:
@@ -87,6 +101,7 @@ def measure_all(seconds: float, heads: list[Path], performances: list[Path]) -> 
             for head, model in models.items()
             for way, each in measurement.measure_markers(model, values, rate=RATE).items()
         }
+        errors |= measurement.measure_points(other_head(), values, RATE)
         errors["ARKit"] = measurement.measure_shapes(values, RATE)
         errors["AU"] = dict.fromkeys(measurement.told_by_units())
         parts += [f"### FAPs: {what}", report.faps_table(errors)]

@@ -6,7 +6,7 @@ ears 2, mouth 9, cheeks 5 and 5, chin 9), in names of our own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -80,10 +80,16 @@ def record(model: FaceModel, faps: Float64, rate: int = 100, seed: int = 2) -> T
 
 def as_animation(take: Take) -> Animation:
     """Return what is performed in a take: its FAPs, and the path of the head as BAPs 181 to 183."""
-    faps = np.rint(take.faps).astype(np.int32)
-    baps = np.zeros((len(faps), BAP_COUNT), dtype=np.int32)
+    face = as_face(take.faps, take.motion.rate)
+    baps = np.zeros((len(face), BAP_COUNT), dtype=np.int32)
     sent = np.zeros(baps.shape, dtype=bool)
     for bap, axis in zip(PATH, (1, 0, 2), strict=True):
         baps[:, bap - 1], sent[:, bap - 1] = np.rint(1000 * take.path[:, axis]), True
-    face = FaceTrack(faps, np.broadcast_to((faps != 0).any(axis=0), faps.shape))
-    return Animation(take.motion.rate, np.arange(len(faps)), face, BodyTrack(baps, sent), take.motion.name)
+    return replace(face, body=BodyTrack(baps, sent), name=take.motion.name)
+
+
+def as_face(faps: Float64, rate: Fraction | int) -> Animation:
+    """Return FAPs (T, 68) as an animation that sends those that are not always 0."""
+    values = np.rint(faps).astype(np.int32)
+    face = FaceTrack(values, np.broadcast_to((values != 0).any(axis=0), values.shape))
+    return Animation(Fraction(rate), np.arange(len(values)), face)

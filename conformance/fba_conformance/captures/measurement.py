@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from fba.arrays import Float64
 from fba.capture import from_action_units, from_blendshapes, to_blendshapes
 from fba.capture.markers.faces import find_face
 from fba.capture.markers.motion import MarkerMotion
+from fba.capture.points.conversion import find_point_face
 from fba.errors import FbaWarning
 from fba.face import FaceModel
 from fba.parameters import faps
@@ -23,6 +26,7 @@ from fba_conformance.captures import damage, marker_files
 from fba_conformance.captures.marked_actor import Take, record
 from fba_conformance.captures.performances import HEAD, head_motion
 from fba_conformance.captures.shaped_face import action_units_at
+from fba_conformance.captures.tracked_actor import FAR, FOCAL, film
 
 PER_CENT = 1024 / 100
 """Units of a FAP in a hundredth of its FAPU."""
@@ -30,6 +34,8 @@ DEGREE = np.radians(1.0) / 1e-5
 """Units of a FAP in a degree."""
 NOISE = 0.3e-3
 """Metres by which good cameras are off."""
+PICTURE = FOCAL / FAR
+"""Widths of a picture in which a face is a metre wide."""
 Errors = Mapping[int, float]
 """Root mean square error of each FAP that a capture tells: percent of its FAPU, or degrees."""
 
@@ -66,6 +72,34 @@ def measure_take(take: Take, motion: MarkerMotion, model: FaceModel | None = Non
         face = find_face(motion, neutral="first", model=model)
     told = [fap for fap in face.sent if fap not in _lip_mates(face.sent)]
     return root_mean_squares(face.faps, take.faps, tuple(told))
+
+
+WATCHED: Mapping[str, Mapping[str, Any]] = {
+    "478 points": {"count": 478, "share": True},
+    "68 points, flat": {"count": 68, "flat": True},
+}
+"""Trackers: MediaPipe's points with depth, in shares of a picture; iBUG's in pixels. Options of `film`."""
+FILM = 4
+"""Frames of the markers' cameras for one of a film."""
+
+
+def measure_points(head: FaceModel, performed: Float64, rate: int) -> dict[str, Errors]:
+    """Return the errors of points that trackers see on a head, by tracker: as they are, and 0.3 mm off."""
+    result = {}
+    for name, options in WATCHED.items():
+        take = film(head, performed=performed[::FILM], rate=rate // FILM, **options)
+        size = PICTURE if take.motion.share else PICTURE * 1280
+        noise = np.random.default_rng(1).normal(0, NOISE * size, take.motion.positions.shape)
+        for way, positions in (
+            ("exact", take.motion.positions),
+            ("0.3 mm", take.motion.positions + noise),
+        ):
+            motion = replace(take.motion, positions=positions, aspect=16 / 9)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", FbaWarning)
+                face = find_point_face(motion, neutral="first")
+            result[f"{name}, {way}"] = root_mean_squares(face.faps, take.faps, face.sent)
+    return result
 
 
 def measure_animation(found: Animation, truth: Animation) -> Errors:

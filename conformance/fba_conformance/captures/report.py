@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import fba
 from fba.face import FaceModel
 from fba.parameters import faps
-from fba_conformance.captures.marked_actor import record
+from fba_conformance.captures.marked_actor import as_face, record
 from fba_conformance.captures.marker_files import MAKERS
 from fba_conformance.captures.measurement import (
+    Errors,
     measure_animation,
     measure_marker_file,
     worst,
 )
 from fba_conformance.captures.performances import speech
+from fba_conformance.captures.point_files import LAYOUTS
 from fba_conformance.captures.shaped_face import FACE_FILES, encode_file
+from fba_conformance.captures.tracked_actor import film
 
 RATE = 100
 
@@ -52,11 +56,21 @@ def files_table(folder: Path, head: FaceModel, seconds: float) -> str:
     take = record(head, speech(round(seconds * RATE), RATE), RATE)
     for name in MAKERS:
         errors, _ = measure_marker_file(folder, name, take)
-        rows.append([f"`{name}`", f"{worst(errors, turns=False):.2f}", f"{worst(errors, turns=True):.2f}"])
+        rows.append([f"`{name}`", *_worst_cells(errors)])
+    seen = film(head, 478, frames=round(seconds * 30), share=True)
+    for name in LAYOUTS:
+        (folder / name).write_bytes(LAYOUTS[name](seen.motion))
+        found = fba.read(folder / name, fps=30, aspect=16 / 9, neutral="first")
+        errors = measure_animation(found, as_face(seen.faps, 30))
+        rows.append([f"points: `{name}`", *_worst_cells(errors)])
     for name in FACE_FILES:
         errors = measure_animation(*encode_file(folder, name, seconds))
-        rows.append([f"`{name}`", f"{worst(errors, turns=False):.2f}", f"{worst(errors, turns=True):.2f}"])
+        rows.append([f"`{name}`", *_worst_cells(errors)])
     return as_markdown(rows)
+
+
+def _worst_cells(errors: Errors) -> list[str]:
+    return [f"{worst(errors, turns=turns):.2f}" for turns in (False, True)]
 
 
 def as_markdown(rows: Iterable[list[str]]) -> str:

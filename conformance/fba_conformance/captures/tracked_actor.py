@@ -110,14 +110,17 @@ def film(
     distance: float | None = None,
     without: tuple[int, ...] = (),
     turn: float = 1.0,
+    performed: Float64 | None = None,
 ) -> PointTake:
     """Return a take of an actor with this face.
 
+    performed: FAPs (T, 68) at `rate`; None for `frames` of a face that talks. Head and eyes turn in any case.
     flat: without depth. share: in shares of a picture of this aspect, otherwise in its pixels (1280 to its
     width); metric: in metres before the camera. distance: of the camera with perspective, metres; None for
     one far away. without: FAPs that stay 0. turn: how far the head turns, 1 for 26 degrees to a side.
     """
-    faps = speech(frames, rate, seed)
+    faps = speech(frames, rate, seed) if performed is None else performed.copy()
+    frames = len(faps)
     angles, path = head_motion(frames, rate, seed + 1)
     faps[:, 47:50] = turn * angles / 1e-5
     times = np.arange(frames) / rate
