@@ -160,6 +160,7 @@ TAKES_TEST = "tests/player/session/test_puppet.py"
 RENDER_TEST = "tests/player/export/test_render_files.py -k rounded"
 FRAMING_TEST = "tests/player/scene/test_framing.py"
 JOINT_MAPS_TEST = "tests/cli/captures/test_joint_maps.py"
+FACE_MOTION_TEST = "tests/formats/gltf/test_face_motion.py"
 GLTF_TEST = "tests/formats/gltf/test_gltf_skeletons.py"
 OTHER_BODIES_TEST = "tests/capture/test_other_bodies.py"
 LIVE_TEST = "tests/player/playback/test_live.py"
@@ -401,6 +402,16 @@ MUTANTS = (
     Mutant(POSE_MEASURES, 'rest.tips.get(f"{side}_wrist", 2', 'rest.tips.get("", 2', COMPARISON_TEST),
     Mutant("player/fba_player/scene/_framing.py", "height + headroom - (", "height - (", FRAMING_TEST),
     Mutant(MEASUREMENT, "UNKNOWN_UNIT = 0.01", "UNKNOWN_UNIT = 1.0", JOINT_MAPS_TEST),
+    Mutant(
+        NAMED_BONES,
+        "return {} if last else _numbered_limb",
+        "return {} if True else _numbered_limb",
+        ZOO_TEST,
+    ),
+    Mutant(NAMED_BONES, "if len(chains) != 1", "if not chains", PREPARATION_TEST),
+    Mutant(GLTF_READER, "MANY = 10", "MANY = 11", FACE_MOTION_TEST),
+    Mutant(GLTF_READER, "MANY = 10", "MANY = 9", FACE_MOTION_TEST),
+    Mutant(GLTF_READER, "if person or joints is not None", "if joints is not None", FACE_MOTION_TEST),
     Mutant(FIGURE, "STRAIGHT = 0.9", "STRAIGHT = 0.5", PREPARATION_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 1.0", BVH_READING_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 500.0", BVH_READING_TEST),

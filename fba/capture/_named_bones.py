@@ -117,8 +117,31 @@ def _limb(
             if score > best[0]:
                 best = (score, three)
     if best[0] < 3:
-        return {}
+        return {} if last else _numbered_limb(side, limb, meanings, parents)
     return {f"{side}_{joint}": number for number, (_, joint) in zip(best[1], parts, strict=True)}
+
+
+def _numbered_limb(side: str, limb: str, meanings: Sequence[Meaning], parents: Int64) -> dict[str, int]:
+    """Return the joints of a limb that are all called the same, "leg_joint_L_1" to 3, from the trunk on.
+
+    A fourth of a leg is the toes'. Nothing if there are several such limbs, as of animals.
+    """
+    words = {part for part, _ in LIMBS[limb]}
+    named = {
+        number
+        for number, meaning in enumerate(meanings)
+        if meaning.side == side and meaning.parts.keys() & words and not meaning.helper
+    }
+    chains = [[number] for number in sorted(named) if int(parents[number]) not in named]
+    if len(chains) != 1:
+        return {}
+    chain = chains[0]
+    while len(below := [n for n in np.flatnonzero(parents == chain[-1]).tolist() if n in named]) == 1:
+        chain.append(below[0])
+    joints = [f"{side}_{joint}" for _, joint in LIMBS[limb]]
+    if limb == "leg":
+        joints.append(f"{side}_metatarsal")
+    return dict(zip(joints, chain, strict=False)) if len(chain) >= len(LIMBS[limb]) else {}
 
 
 def _has_four_legs(mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64) -> bool:

@@ -185,6 +185,13 @@ def test_an_animal_has_no_counterpart() -> None:
     )  # fmt: skip
     with pytest.raises(ModelError, match=r"no known skeleton family|no arms or legs"):
         prepare(replace(captured, names=renamed), SKELETON)
+    words = {"UpLeg": "leg_back_1", "Leg": "leg_back_2", "Foot": "leg_back_3", "ToeBase": "leg_back_4",
+             "Arm": "leg_front_1", "ForeArm": "leg_front_2", "Hand": "leg_front_3"}  # fmt: skip
+    sides = ("Left", "Right")
+    numbered = {f"{side}{word}": f"{side}_{name}" for side in sides for word, name in words.items()}
+    renamed = tuple(numbered.get(name, name) for name in captured.names)
+    with pytest.raises(ModelError, match=r"no known skeleton family|no arms or legs"):
+        prepare(replace(captured, names=renamed), SKELETON)
 
 
 def test_a_frame_that_is_not_there() -> None:

@@ -35,6 +35,8 @@ CHUNK = 200_000
 """Joints times frames that are sampled at once."""
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 DEFAULT_RATE = Fraction(30)
+MANY = 10
+"""Joints of skins that turn from which on they are more than those of a head."""
 FACE_BYTES = 2500
 """Memory that a frame of a face takes."""
 HALF_TURN = (-1, 1, -1)
@@ -97,10 +99,13 @@ def read(
                     sampled.motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant,
                     spine=spine, rest=rest, up=up, limits=limits,
                 )  # fmt: skip
-        except ModelError:
+        except ModelError as error:
             person = _moves_person(gltf, clip, rate, limits)  # whose pose is not clear
             if person or joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
                 raise
+            if _count_turning(face_clip, gltf) >= MANY:
+                text = f"{gltf.file}: no body is read, the face alone: {error.finding}"
+                warnings.warn(FbaWarning(text).with_remedies(*error.remedies), stacklevel=2)
             return _read_face_alone(gltf, face_clip, rate, limits)
         for each in said:  # not what concerns a skeleton that turned out to be none
             warnings.warn(each.message, each.category, stacklevel=2)
@@ -160,6 +165,15 @@ def _moves_person(
     except ModelError:
         return False
     return True
+
+
+def _count_turning(clip: Clip, gltf: Gltf) -> int:
+    """Return how many joints of skins a clip turns."""
+    joints = {joint for skin in gltf.skins for joint in skin.joints}
+    return sum(
+        channel.path == "rotation" and channel.node in joints and np.ptp(channel.values, axis=0).max() > 0
+        for channel in clip.channels
+    )
 
 
 def _clip_of_face_alone(gltf: Gltf, clip: str | int | None) -> Clip | None:

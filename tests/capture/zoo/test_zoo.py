@@ -127,6 +127,9 @@ MAKERS = (
           finger="finger{finger}-{number}.{side}", fingers=("1", "2", "3", "4", "5")),
     Maker("extra joints everywhere", MIXAMO, rest="T", extra=("Tail", "Sword", "Backpack"),
           twist="{}Twist"),
+    Maker("numbered limbs", ("torso_joint_1", "torso_joint_2 torso_joint_3", "neck_joint_1", "head_joint",
+          "clavicle_{}", "arm_joint_{}_1", "arm_joint_{}_2", "arm_joint_{}_3", "leg_joint_{}_1",
+          "leg_joint_{}_2", "leg_joint_{}_3", "leg_joint_{}_5"), DOT, rest="T"),
     Maker("mirrored, fingers, y up", MIXAMO, rest="M", finger=FINGERS),
     Maker("fitted to positions: hips turned aside, thighs turned back", MIXAMO, aside=-70.0),
 )  # fmt: skip

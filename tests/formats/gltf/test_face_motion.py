@@ -10,13 +10,13 @@ from scipy.spatial.transform import Rotation
 
 import fba
 from fba.capture.blendshapes.shape_table import amounts_of
-from fba.errors import FbaWarning
+from fba.errors import FbaWarning, FormatError
 from fba.face.expressions import Definitions
 from fba.gltf import read_gltf
 from fba.gltf.writer import Builder
 from fba.parameters import fap_numbers
 from gltf_edits import edit
-from small_people import write_person
+from small_people import BONES, write_person
 
 FRAMES = 5
 RAMP = np.linspace(0, 1, FRAMES)
@@ -50,6 +50,28 @@ def test_a_face_alone(tmp_path: Path) -> None:
     assert animation.body is None
     assert (column(animation, "raise_l_cornerlip") > 0).sum() == FRAMES - 1
     assert len(fba.read(path, rate=60)) == 2 * FRAMES - 1
+
+
+def test_a_body_that_is_left_out_is_said(tmp_path: Path) -> None:
+    """A riddle of ten joints that turn beside a face; nine may be those of a head."""
+    turns = ARM["leftUpperArm"]
+    riddle = {bone: f"n{number}" for number, bone in enumerate(BONES)}
+    ten = dict.fromkeys(list(BONES)[:10], turns)
+    path = write_person(tmp_path / "p.glb", clips={"talk": ten}, names=riddle, morphs={"jawOpen": RAMP})
+    with pytest.warns(FbaWarning, match="no body is read, the face alone: no known skeleton family"):
+        assert fba.read(path).body is None
+    nine = dict.fromkeys(list(BONES)[:9], turns)
+    head = write_person(tmp_path / "h.glb", clips={"talk": nine}, names=riddle, morphs={"jawOpen": RAMP})
+    assert fba.read(head).body is None
+
+
+def test_a_body_in_doubt_is_no_face_alone(tmp_path: Path) -> None:
+    """A person whose left is called right, beside a face: refused as without the face."""
+    other = {"left": "right", "righ": "left"}
+    names = {bone: other.get(bone[:4], bone[:4]) + bone[4 + (bone[:5] == "right") :] for bone in BONES}
+    path = write_person(tmp_path / "p.glb", clips={"talk": ARM}, names=names, morphs={"jawOpen": RAMP})
+    with pytest.raises(FormatError, match="left and right are swapped"):
+        fba.read(path)
 
 
 def test_expressions_and_gaze_of_vrma(tmp_path: Path) -> None:
