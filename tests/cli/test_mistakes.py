@@ -121,7 +121,7 @@ def test_joints_of_a_body_are_given_as_options(run: Run, tmp_path: Path, face: A
     assert err.endswith("name each joint's counterpart in the standard with --map Pelvis=HumanoidRoot\n")
 
 
-def test_what_only_python_can_do_is_shown_as_python(run: Run, tmp_path: Path) -> None:
+def test_what_another_command_can_do_is_shown_as_its_option(run: Run, tmp_path: Path) -> None:
     """A trunk with shoulders alone does not tell how long its unit is."""
     path = tmp_path / "trunk.bvh"
     joints = {
@@ -143,7 +143,7 @@ def test_what_only_python_can_do_is_shown_as_python(run: Run, tmp_path: Path) ->
     )
     maps = [word for pair in joints.items() for word in ("--map", "=".join(pair))]
     code, _, err = run("convert", path, tmp_path / "a.bap", *maps)
-    assert "with fba.read(FILE, scale=0.001) in Python; the command line has no option for it\n" in err
+    assert "give another, in metres, with --scale 0.001 of `fba encode`\n" in err
     assert code == 0
 
 
