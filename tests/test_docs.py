@@ -56,6 +56,7 @@ ILLUSTRATIONS = {
     ("docs/capture-live.md", "fba capture livelink --play -o face.fba"): WINDOW,
     ("docs/capture-live.md", "fba capture livelink -o face.fba"): SENT,
     ("docs/capture-live.md", "fba capture livelink -o - | fba play -"): WINDOW,
+    ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",
     (

@@ -118,6 +118,7 @@ def film(
     flat: without depth. share: in shares of a picture of this aspect, otherwise in its pixels (1280 to its
     width); metric: in metres before the camera. distance: of the camera with perspective, metres; None for
     one far away. without: FAPs that stay 0. turn: how far the head turns, 1 for 26 degrees to a side.
+    performed: (T, 68), FAPs that the actor performs; None for what `speech` makes up.
     """
     faps = speech(frames, rate, seed) if performed is None else performed.copy()
     frames = len(faps)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from dataclasses import replace
 from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -155,3 +158,27 @@ def test_openface_without_points(tmp_path: Path) -> None:
     table = openface_csv({1: np.ones(3)}, np.zeros((3, 3)), np.ones((3, 6)))
     with pytest.raises(FormatError, match=r"no columns of points"):
         read_points(saved(tmp_path, "a.csv", table))
+
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "track_a_film" / "track_a_film.py"
+
+
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason="the examples come with a checkout")
+def test_the_table_of_the_example_that_tracks_films(tmp_path: Path) -> None:
+    spec = spec_from_file_location("track_a_film", EXAMPLE)
+    assert spec is not None
+    assert spec.loader is not None
+    tracking = module_from_spec(spec)
+    spec.loader.exec_module(tracking)
+    motion = deep()
+    frames = []
+    for number, points in enumerate(motion.positions.tolist()):
+        faces = [] if number == 4 else [[SimpleNamespace(x=x, y=y, z=z) for x, y, z in points]]
+        frames.append(tracking.Frame(number, number / 30, faces))
+    path = tmp_path / "points.csv"
+    with path.open("w", newline="") as file:
+        assert tracking.write_points(csv.writer(file), 1920, 1080, frames) == (FRAMES - 1, FRAMES)
+    found = read_points(path)
+    assert found.aspect == pytest.approx(16 / 9)
+    assert np.flatnonzero(~found.seen).tolist() == [4]
+    np.testing.assert_allclose(found.positions[5:], motion.positions[5:], atol=1e-6)
