@@ -7,17 +7,16 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from make_marker_picture import capture
+from make_marker_picture import edit
 
 import fba
 from fba.animation import Animation
-from fba.capture.virtual_markers import head_of_model, propose_mapping
 from fba.face import FaceModel, feature_point_names
 from fba.face.importers.head_surface import read_head_surface
 from fba.formats import merge
+from fba.formats.c3d.reader import read_markers
 from fba_player.export.image_files import write_picture
 from fba_player.scene.compare import CompareScene
-from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.scene.markers_scene import MarkersScene
 from fba_player.scene.placement_scene import PlacementScene
 from fba_player.scene.point_placement import PointPlacement
@@ -97,10 +96,9 @@ def points() -> None:
 
 def markers() -> None:
     """Markers beside the built-in head, and the reach of one of them."""
-    motion, head = capture(fba.read(SAMPLES / "hello.fap")), head_of_model(FaceModel.default())
-    editing = MarkerEditing(motion, head, propose_mapping(motion, head), Path("mapping.toml"))
-    editing.choose("8.2")
-    session = Session(MarkersScene(editing, "face.csv"), size=SIZE)
+    editing = edit(read_markers(SAMPLES / "talk.c3d"))
+    editing.choose("LPB")
+    session = Session(MarkersScene(editing, "talk.c3d"), size=SIZE)
     write_picture(IMAGES / "markers-page.jpg", picture(session, ("markers",)))
 
 

@@ -75,7 +75,7 @@ ILLUSTRATIONS = {
     ("docs/play.md", "fba play hello.fap small.fba"): WINDOW,
     ("docs/play.md", "nc host 7000 | fba play -"): ARRIVING,
     ("docs/play.md", "apt-get install libegl1 libgl1"): SYSTEM,
-    ("docs/virtual-markers.md", "$ fba markers face.csv head.obj --points head.points.csv"): WINDOW,
+    ("docs/virtual-markers.md", "$ fba markers talk.c3d head.obj --points head.points.csv"): WINDOW,
     (
         "docs/play.md",
         "import fba, pyrender",

@@ -23,15 +23,19 @@ class VirtualMarker:
     vertex: its centre, a vertex of the head; None for a fixed marker beside the face, such as one on a cap,
     which only tells how the head moves. radius: of the cylinder around the centre, in x and y. depth: half
     the cylinder's length, along z. Both in the unit of the head. fixed: the face does not move it; what the
-    capture says of it is how the head moves.
+    capture says of it is how the head moves. follows: the captured marker that it goes with, "" for that of
+    its own name: so a marker on the outer lip takes the inner one along, where nothing can be glued.
     """
 
     vertex: int | None
     radius: float = 0.0
     depth: float = 0.0
     fixed: bool = False
+    follows: str = ""
 
     def __post_init__(self) -> None:
+        if self.follows and (self.fixed or self.vertex is None):
+            raise OptionError(f"what follows {self.follows!r} needs a vertex, and cannot be fixed")
         if self.vertex is None:
             if not self.fixed:
                 raise OptionError(
@@ -61,12 +65,12 @@ class MadeFor:
 class MarkerMapping:
     """The virtual markers of a head.
 
-    markers: by the name of the captured marker. assignment: "shared", a vertex belongs to all virtual markers
-    in whose reach it is, or "exclusive", to the nearest alone. overlap: how displacements of shared vertices
-    go together. "match": so that each centre goes where its marker goes. "add": they are added, as in the
-    source of this method, and centres go too far where markers are close to each other. scale: two fixed
-    markers; the distance of their vertices over their own is the scale of all displacements; () for the
-    farthest apart. made_for: the mesh, None if unknown.
+    markers: by the name of the captured marker, or any other name of one that follows another. assignment:
+    "shared", a vertex belongs to all virtual markers in whose reach it is, or "exclusive", to the nearest
+    alone. overlap: how displacements of shared vertices go together. "match": so that each centre goes where
+    its marker goes. "add": they are added, as in the source of this method, and centres go too far where
+    markers are close to each other. scale: two fixed markers; the distance of their vertices over their own
+    is the scale of all displacements; () for the farthest apart. made_for: the mesh, None if unknown.
 
     Raises OptionError for parts that contradict each other.
     """
@@ -104,6 +108,11 @@ class MarkerMapping:
     def centres(self) -> dict[str, VirtualMarker]:
         """Those with a vertex."""
         return {name: marker for name, marker in self.markers.items() if marker.vertex is not None}
+
+    @property
+    def captured(self) -> tuple[str, ...]:
+        """Names of the captured markers that are needed."""
+        return tuple(dict.fromkeys(marker.follows or name for name, marker in self.markers.items()))
 
     @property
     def fixed(self) -> tuple[str, ...]:
@@ -177,8 +186,8 @@ class MarkerMapping:
 
     def check_names(self, names: tuple[str, ...]) -> None:
         """Raise ModelError for markers that a capture with these names does not have."""
-        missing = [name for name in self.markers if name not in names]
-        if missing and len(missing) == len(self.markers):
+        missing = [name for name in self.captured if name not in names]
+        if missing and len(missing) == len(self.captured):
             raise ModelError(
                 f"the capture has none of the mapping's markers ({list_names(missing)}); it has "
                 f"{list_names(names)}"

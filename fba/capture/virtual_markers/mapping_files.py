@@ -21,8 +21,8 @@ HEADING = """\
 # the head. Fixed markers are not moved by the face; they tell how the head moves. Change what you like and
 # give it to `fba markers --map`.
 """
-KEYS = {"vertex": int, "radius": (int, float), "depth": (int, float), "fixed": bool}
-MARKER_WORDS = {int: "a whole number", (int, float): "a number", bool: "true or false"}
+KEYS = {"vertex": int, "radius": (int, float), "depth": (int, float), "fixed": bool, "follows": str}
+MARKER_WORDS = {int: "a whole number", (int, float): "a number", bool: "true or false", str: "a text"}
 COUNTS, TEXTS = ("vertices", "triangles"), ("name", "connectivity", "shape")
 
 
@@ -85,7 +85,8 @@ def _read_marker(name: str, entry: Any) -> VirtualMarker:
         raise OptionError(f"{name!r} has no radius")
     try:
         radius = float(entry.get("radius", 0.0))
-        return VirtualMarker(entry.get("vertex"), radius, float(entry.get("depth", radius)), fixed)
+        depth = float(entry.get("depth", radius))
+        return VirtualMarker(entry.get("vertex"), radius, depth, fixed, entry.get("follows", ""))
     except (OptionError, OverflowError) as error:
         raise OptionError(f"{name!r}: {error}") from None
 
@@ -129,6 +130,8 @@ def _entry(marker: VirtualMarker) -> str:
         parts += [f"vertex = {marker.vertex}", f"radius = {marker.radius!r}", f"depth = {marker.depth!r}"]
     if marker.fixed:
         parts.append("fixed = true")
+    if marker.follows:
+        parts.append(f"follows = {_text(marker.follows)}")
     return f"{{ {', '.join(parts)} }}"
 
 

@@ -115,18 +115,18 @@ def steady(motion: MarkerMotion, mapping: MarkerMapping, neutral: Neutral = "aut
     if not len(motion):
         raise ModelError("the capture has no frames")
     mapping.check_names(motion.names)
-    columns = [motion.names.index(name) for name in mapping.markers]
+    columns = [motion.names.index(name) for name in mapping.captured]
     positions = motion.positions[:, columns]
     often = (~np.isnan(positions[..., 0])).mean(axis=0) >= RARELY
-    names = tuple(name for name, kept in zip(mapping.markers, often, strict=True) if kept)
+    names = tuple(name for name, kept in zip(mapping.captured, often, strict=True) if kept)
     if len(names) < len(columns):
-        rare = [name for name in mapping.markers if name not in names]
+        rare = [name for name in mapping.captured if name not in names]
         warnings.warn(
             f"seen in less than {RARELY:.0%} of the frames, and left out: {list_names(rare)}",
             FbaWarning, stacklevel=4,
         )  # fmt: skip
     positions = positions[:, often]
-    fixed = [n for n, name in enumerate(names) if mapping.markers[name].fixed]
+    fixed = [n for n, name in enumerate(names) if name in mapping.fixed]
     if len(fixed) < FEWEST_FIXED:
         raise ModelError(
             f"the head's motion needs {FEWEST_FIXED} fixed markers (hairline, ears, bridge of the nose, a "
@@ -162,22 +162,22 @@ def perform_steady(
     motion: MarkerMotion, head: MarkedHead, mapping: MarkerMapping, markers: SteadyMarkers
 ) -> MarkerPerformance:
     """Return a head moved by a capture whose markers are steady already: `perform` for a checked mapping."""
-    placed = [n for n, name in enumerate(markers.names) if mapping.markers[name].vertex is not None]
-    names = [markers.names[n] for n in placed]
-    vertices = [mapping.markers[name].vertex for name in names]
+    kept = mapping.centres
+    placed = [n for n, name in enumerate(markers.names) if name in kept]
+    vertices = [kept[markers.names[n]].vertex for n in placed]
     centres = head.vertices[np.array(vertices, dtype=np.intp)]
     fit = align(markers.neutral[placed], centres)
     if fit.mirrored:
         warnings.warn("the capture is mirrored: x is turned round", FbaWarning, stacklevel=3)
     scale = _measure_scale(head, mapping, markers, fit.scale)
     turn = fit.rotation * fit.mirror  # from the capture's axes to the head's
-    local = np.einsum("ij,tkj->tki", scale * turn, markers.local[:, placed] - markers.neutral[placed])
-    columns = {name: n for n, name in enumerate(names)}
-    kept = mapping.centres
+    local = np.einsum("ij,tkj->tki", scale * turn, markers.local - markers.neutral)
+    columns = {name: n for n, name in enumerate(markers.names)}
     displacements = np.zeros((len(motion), len(kept), 3))
     for n, (name, marker) in enumerate(kept.items()):
-        if not marker.fixed and name in columns:  # one that was left out stays where it is
-            displacements[:, n] = local[:, columns[name]]
+        source = marker.follows or name
+        if not marker.fixed and source in columns:  # one that was left out stays where it is
+            displacements[:, n] = local[:, columns[source]]
     # the head's motion about the point that the neutral markers' middle is laid onto
     middle, there = markers.neutral[placed].mean(axis=0), centres.mean(axis=0)
     rotation = turn @ markers.rotation @ turn.T

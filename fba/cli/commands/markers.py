@@ -160,7 +160,7 @@ def command(
     mapping = replace(
         mapping, assignment=assignment or mapping.assignment, overlap=overlap or mapping.overlap
     )
-    if marker is not None and marker not in motion.names:
+    if marker is not None and marker not in (*motion.names, *mapping.markers):
         from fba.name_maps import list_names
 
         raise click.UsageError(
@@ -181,7 +181,9 @@ def command(
 
             with outputs.file(output) as file:
                 write_moved_head(file, performance, motion.name or capture.stem)
-            outputs.say(f"{display_name(output)}: {len(motion)} frames, {len(performance.names)} markers")
+            outputs.say(
+                f"{display_name(output)}: {len(motion)} frames, {len(performance.names)} virtual markers"
+            )
         else:
             from fba_player.scene.markers_scene import MarkersScene
 
@@ -320,7 +322,11 @@ def _write_mapping(mapping: MarkerMapping, head: MarkedHead, path: Path, outputs
     mapping.check(head)
     with outputs.file(path) as file:
         write_mapping(file, mapping.for_head(head))
-    outputs.say(f"{display_name(path)}: {len(mapping.markers)} markers, {len(mapping.fixed)} of them fixed")
+    outputs.say(f"{display_name(path)}: {_count(mapping)}")
+
+
+def _count(mapping: MarkerMapping) -> str:
+    return f"{len(mapping.markers)} virtual markers, {len(mapping.fixed)} of them fixed"
 
 
 def _edit(
@@ -356,9 +362,7 @@ def _show(
     editing = _edit(motion, head, mapping, path, neutral, marker)
     map_markers(editing, title, size=size or (1280, 800))
     if editing.written:
-        click.echo(
-            f"{path}: {len(editing.mapping.markers)} markers, {len(editing.mapping.fixed)} of them fixed"
-        )
+        click.echo(f"{path}: {_count(editing.mapping)}")
 
 
 def _draw(

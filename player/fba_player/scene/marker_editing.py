@@ -84,20 +84,32 @@ class MarkerEditing:
             self._reach = (key, self._find_influence())
         return self._reach[1]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The markers of the capture, and the virtual ones that follow some of them."""
+        names = self.motion.names
+        return (*names, *(name for name in self.mapping.markers if name not in names))
+
+    @property
+    def source(self) -> str:
+        """The captured marker that the current one is, or follows."""
+        follows = "" if self.marker is None else self.marker.follows
+        return follows or self.current
+
     def choose(self, name: str) -> None:
-        """Make a marker the current one. Raises ValueError for one that the capture has not."""
-        if name not in self.motion.names:
+        """Make a marker the current one. Raises ValueError for one that is not there."""
+        if name not in self.names:
             raise ValueError(f"the capture has no marker {name!r}")
         self.current = name
 
     def step(self, by: int) -> None:
         """Make the marker `by` places further in the capture the current one; it goes round."""
-        names = self.motion.names
+        names = self.names
         self.current = names[(names.index(self.current) + by) % len(names)]
 
     def next_missing(self) -> bool:
         """Go to the next marker without a virtual one; returns False if there is none."""
-        names, at = self.motion.names, self.motion.names.index(self.current)
+        names, at = self.names, self.names.index(self.current)
         for name in (*names[at + 1 :], *names[: at + 1]):
             if name not in self.mapping.markers:
                 self.current = name
@@ -109,10 +121,10 @@ class MarkerEditing:
         old = self.marker
         radius = old.radius if old is not None and old.radius > 0 else self.first_radius
         depth = old.depth if old is not None and old.depth > 0 else radius
-        fixed = old is not None and old.fixed
-        self._change(
-            "vertex", self.mapping.changed(self.current, VirtualMarker(vertex, radius, depth, fixed))
-        )
+        placed = VirtualMarker(vertex, radius, depth)
+        if old is not None:
+            placed = replace(placed, fixed=old.fixed, follows=old.follows)
+        self._change("vertex", self.mapping.changed(self.current, placed))
 
     def resize(self, radius: float, depth: float) -> None:
         """Give the current marker another reach, in the head's unit. Raises OptionError for none."""
@@ -121,8 +133,10 @@ class MarkerEditing:
             self._change("size", self.mapping.changed(self.current, marker))
 
     def fix(self, fixed: bool) -> None:
-        """Make the current marker fixed, or not; one without a vertex can only be fixed."""
+        """Make the current marker fixed, or not; one without a vertex can only be fixed, a follower not."""
         old = self.marker
+        if old is not None and old.follows:
+            return
         if old is None:
             marker = VirtualMarker(None, fixed=True) if fixed else None
         elif old.vertex is None and not fixed:
@@ -141,7 +155,9 @@ class MarkerEditing:
 
     def remove(self) -> None:
         """Take away the current marker's virtual one."""
+        source = self.source
         self._change("remove", self.mapping.changed(self.current, None))
+        self.current = source  # a follower is gone
 
     def undo(self) -> bool:
         """Take back the last change, and go to the marker that was current; False if there is none."""

@@ -284,7 +284,7 @@ class MarkersScene(Timed[CaptureTimes]):
     ) -> tuple[tuple[Dots, ...], tuple[Lines, ...]]:
         editing = self.editing
         names, markers = editing.motion.names, editing.mapping.markers
-        current = editing.current if self.shows_current else ""
+        current, source = (editing.current, editing.source) if self.shows_current else ("", "")
         groups: list[tuple[Float64, Colour, float, str]] = []
         at = {name: place for name, place in zip(names, cloud, strict=True) if np.isfinite(place).all()}
         if self.shows_cloud:
@@ -293,7 +293,7 @@ class MarkersScene(Timed[CaptureTimes]):
                 (FIXED, [name for name in at if name in markers and markers[name].fixed]),
                 (MOVING, [name for name in at if name in markers and not markers[name].fixed]),
             ):
-                places = np.array([at[name] for name in chosen if name != current]).reshape(-1, 3)
+                places = np.array([at[name] for name in chosen if name != source]).reshape(-1, 3)
                 groups.append((places, colour, RADIUS, ""))
         world = self.to_world(_posed(vertices, pose))
         lines: tuple[Lines, ...] = ()
@@ -305,12 +305,12 @@ class MarkersScene(Timed[CaptureTimes]):
                 ]  # fmt: skip
                 groups.append((world[np.array(own, dtype=np.intp)], colour, CENTRE_RADIUS, ""))
         centre = editing.mapping.centres.get(current)
-        if self.shows_cloud and current in at:
-            groups.append((at[current][None], CURRENT, CURRENT_RADIUS, current))
+        if self.shows_cloud and source in at:
+            groups.append((at[source][None], CURRENT, CURRENT_RADIUS, source))
         if centre is not None and centre.vertex is not None and (editing.beside or editing.shows_weights):
             groups.append((world[centre.vertex][None], CURRENT, CURRENT_RADIUS - 1, ""))
-            if self.shows_cloud and current in at:
-                ends = np.stack([at[current], world[centre.vertex]])[None]
+            if self.shows_cloud and source in at:
+                ends = np.stack([at[source], world[centre.vertex]])[None]
                 lines = (Lines(ends.astype(np.float32), LINE, 1.2, LIFT),)
         return tuple(_make_dots(*group) for group in groups if len(group[0])), lines
 

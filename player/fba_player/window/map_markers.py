@@ -44,6 +44,8 @@ def open_markers(editing: MarkerEditing, title: str, *, size: tuple[int, int] = 
     window.session.open.add("markers")
     names = editing.motion.names
     window.session.say(
-        f"{len(editing.mapping.markers)} of {len(names)} markers are on the head: check them", seconds=SECONDS
+        f"{sum(name in editing.mapping.markers for name in names)} of {len(names)} markers are on the head: "
+        "check them",
+        seconds=SECONDS,
     )
     return window

@@ -58,7 +58,7 @@ def test_a_proposed_mapping_is_written_changed_and_used(
     first, second = tmp_path / "first.toml", tmp_path / "second.toml"
     code, out, err = run("markers", *files, "-o", first)
     assert (code, err) == (0, "")
-    assert out == f"{first}: 14 markers, 3 of them fixed\n"
+    assert out == f"{first}: 16 virtual markers, 3 of them fixed\n"
     proposed = read_mapping(first)
     assert proposed.made_for is not None
     assert proposed.made_for.name == "head.obj"
@@ -80,7 +80,7 @@ def test_a_head_with_its_animation(run: Run, files: tuple[Path, Path], tmp_path:
     moved = tmp_path / "moved.glb"
     code, out, err = run("markers", *files, "-o", moved, "--map-out", tmp_path / "m.toml")
     assert (code, err) == (0, "")
-    assert f"{moved}: 20 frames, 14 markers" in out
+    assert f"{moved}: 20 frames, 16 virtual markers" in out
     data = moved.read_bytes()
     size = struct.unpack("<I", data[12:16])[0]
     document, body = json.loads(data[20 : 20 + size]), data[28 + size :]

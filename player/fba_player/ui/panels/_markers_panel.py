@@ -48,8 +48,12 @@ class MarkersPanel(Panel):
         session.open.add(self.name)  # without it the page would be of no use
 
     def _list(self, editing: MarkerEditing) -> None:
-        markers, names = editing.mapping.markers, editing.motion.names
-        heading(f"{len(markers)} of {len(names)} on the head, {len(editing.mapping.fixed)} fixed", exact=True)
+        markers, names = editing.mapping.markers, editing.names
+        placed = sum(name in markers for name in editing.motion.names)
+        heading(
+            f"{placed} of {len(editing.motion.names)} on the head, {len(editing.mapping.fixed)} fixed",
+            exact=True,
+        )
         tall = max(imgui.get_window_height() * LIST_HEIGHT, 80.0)
         if imgui.begin_child("list", (0, tall)):
             for name in names:
@@ -84,7 +88,7 @@ def _current(session: Session, editing: MarkerEditing) -> None:
     else:
         count = 0 if editing.influence is None else int((editing.influence.shares > 0).sum())
         imgui.text_unformatted(f"vertex {marker.vertex}, moves {count} vertices")
-    if not editing.seen[session.transport.frame, editing.motion.names.index(editing.current)]:
+    if not editing.seen[session.transport.frame, editing.motion.names.index(editing.source)]:
         imgui.text_colored(theme.FAINT, "not seen in this frame")
     imgui.pop_text_wrap_pos()
 
@@ -108,6 +112,9 @@ def _reach(editing: MarkerEditing) -> None:
         editing.resize(radius, float(value))
     tooltip("How far before and behind its vertex")
     imgui.end_disabled()
+    if marker is not None and marker.follows:
+        imgui.text_colored(theme.FAINT, f"goes with {marker.follows}")
+        return
     changed, fixed = imgui.checkbox("fixed", marker is not None and marker.fixed)
     if changed:
         editing.fix(fixed)
@@ -118,7 +125,7 @@ def _buttons(session: Session, editing: MarkerEditing) -> None:
     buttons = (
         ("Previous", "previous", True),
         ("Next", "next", True),
-        ("Next free", "missing", len(editing.mapping.markers) < len(editing.motion.names)),
+        ("Next free", "missing", any(name not in editing.mapping.markers for name in editing.motion.names)),
         ("Remove", "remove", editing.marker is not None),
         ("Undo", "undo", True),
         ("Save", "save", editing.path is not None),
