@@ -74,6 +74,10 @@ SYNCHRONISATION = "fba/formats/synchronisation.py"
 SYNCHRONISATION_TEST = "tests/formats/test_synchronisation.py"
 VOICE_TEST = "tests/cli/captures/test_face_body_voice.py"
 FACES, OPENFACE = "fba/formats/face_tables/_faces.py", "fba/formats/face_tables/openface.py"
+LIVE_ORDER, PEOPLE = "fba/live/order.py", "fba/live/people.py"
+RECORDING, LIVE_BONES = "fba/live/recording.py", "fba/live/protocols/unity_bones.py"
+LIVE_FACES_TEST, VMC_TEST = "tests/live/test_live_faces.py", "tests/live/test_vmc.py"
+STREAM_FILES_TEST = "tests/live/test_stream_files.py -k 'not killed'"
 UDP = "fba/formats/face_tables/livelink_udp.py"
 ACTION_UNITS_TEST = "tests/formats/face_tables/test_action_units.py"
 RECORDS_TEST = "tests/formats/face_tables/test_face_records.py"
@@ -572,6 +576,28 @@ MUTANTS = (
     ),
     Mutant("fba/formats/gltf/reader.py", "moments, head=True", "moments", FACES_TEST),
     Mutant(OPENFACE, "set(columns) == set(VERSION_3)", "False", ACTION_UNITS_TEST),
+    Mutant(LIVE_ORDER, "JUMP = 1.0", "JUMP = 1e9", LIVE_FACES_TEST),
+    Mutant(LIVE_ORDER, "MOST_HELD = 2", "MOST_HELD = 1", LIVE_FACES_TEST),
+    Mutant(LIVE_ORDER, "MOST_HELD = 2", "MOST_HELD = 3", LIVE_FACES_TEST),
+    Mutant(LIVE_ORDER, "TOLERANCE = 5.0", "TOLERANCE = 500.0", LIVE_FACES_TEST),
+    Mutant(LIVE_ORDER, "LONGEST_GAP = 600.0", "LONGEST_GAP = 60.0", LIVE_FACES_TEST),
+    Mutant(LIVE_ORDER, "WHOLE_STEP = 1.5", "WHOLE_STEP = 15", LIVE_FACES_TEST),
+    Mutant("fba/live/protocols/ifacialmocap.py", "LOST_TOUCH = 0.25", "LOST_TOUCH = 1e9", LIVE_FACES_TEST),
+    Mutant("fba/live/faces.py", "np.maximum(weights, 0.0)", "weights", LIVE_FACES_TEST),
+    Mutant("fba/capture/live/blendshapes.py", "while last / frames > time", "while False", LIVE_FACES_TEST),
+    Mutant(RECORDING, "self._file.seek(self._size)", "self._file.seek(0, 2)", STREAM_FILES_TEST),
+    Mutant(RECORDING, "data + ending)", "data)", STREAM_FILES_TEST),
+    Mutant(
+        ENCODER,
+        "return self._writer.ending() + self._mark()",
+        "return self._writer.ending()",
+        STREAM_FILES_TEST,
+    ),
+    Mutant(LIVE_BONES, "[w, x, -y, -z]", "[w, x, y, z]", VMC_TEST),
+    Mutant(LIVE_BONES, "[-1.0, 1.0, 1.0]", "[1.0, 1.0, 1.0]", VMC_TEST),
+    Mutant(PEOPLE, "FEWEST_SHAPES = 5", "FEWEST_SHAPES = 50", VMC_TEST),
+    Mutant(PEOPLE, '"a": "aa"', '"a": "oh"', VMC_TEST),
+    Mutant("fba/live/protocols/_osc.py", "DEEPEST = 8", "DEEPEST = 80", VMC_TEST),
     Mutant(UDP, "times = np.where(times < NOON, times + DAY, times)", "pass", RECORDS_TEST),
     Mutant(TIME_CODES, "if largest < rate", "if largest <= rate", LIVELINK_TEST),
     Mutant(SAMPLING, "np.where(length > BRIDGED, RETURN, length)", "length", LIVELINK_TEST),

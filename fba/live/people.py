@@ -34,6 +34,7 @@ FEWEST_SHAPES = 5
 """Shapes with ARKit's names from which on others are left out, which show the same once more."""
 OLD_NAMES = {
     "a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed",
+    "blink_l": "blinkLeft", "blink_r": "blinkRight",
 }  # fmt: skip
 """VRM 1's names of VRM 0's expressions, in small letters."""
 LEAST_OFFSET = 1e-3
@@ -152,11 +153,17 @@ class _Face:
         cls, sent: list[str], bones: dict[str, BoneTurn], rate: Fraction, *, with_head: bool, summary: Summary
     ) -> _Face | None:
         """Return what converts expressions with these names, or a turned head; None without either."""
-        shapes = {shape: name for name in sent if (shape := arkit_of(name)) is not None}
+        expressions = {*OLD_NAMES, *(name.lower() for name in OLD_NAMES.values())}  # "aa" opens a jaw, too
+        shapes = {
+            shape: name
+            for name in sent
+            if name.lower() not in expressions and (shape := arkit_of(name)) is not None
+        }
         others = {
             plain: name
             for name in sent
-            if arkit_of(name) is None and amounts_of(plain := OLD_NAMES.get(name.lower(), name)) is not None
+            if name not in shapes.values()
+            and amounts_of(plain := OLD_NAMES.get(name.lower(), name)) is not None
         }
         if len(shapes) >= FEWEST_SHAPES and others:
             summary.notes.append(

@@ -80,8 +80,11 @@ def test_out_of_order_doubled_lost_and_without_a_face(tmp_path: Path) -> None:
     live, summary = captured("livelink", at_rate(late))
     check_same(live, from_file(tmp_path, b"".join(sent)))
     assert (summary.reordered, summary.doubled, summary.unseen) == (2, 2, 1)
-    live, summary = captured("livelink", at_rate([*SENT[:4], *SENT[5:9], SENT[4], *SENT[9:]]))
-    assert summary.late == 1  # three were before it
+    passed = [*SENT[:4], *SENT[5:7], SENT[4], *SENT[7:]]  # by two, and below by three
+    live, summary = captured("livelink", at_rate(passed))
+    check_same(live, from_file(tmp_path, b"".join(SENT)))
+    live, summary = captured("livelink", at_rate([*SENT[:4], *SENT[5:8], SENT[4], *SENT[8:]]))
+    assert summary.late == 1
     assert live is not None
     assert len(live) == ROWS
 
@@ -145,6 +148,11 @@ def test_clocks_that_jump() -> None:
     assert live is not None
     assert summary.jumps == 1
     assert len(live) == pytest.approx(2 * ROWS, abs=2)
+    ahead = livelink_udp({**WEIGHTS, **ANGLES}, start=18_060.0)  # without a pause
+    live, summary = captured("livelink", at_rate([*SENT, *ahead]))
+    assert live is not None
+    assert (summary.jumps, summary.gaps) == (1, 0)
+    assert len(live) == pytest.approx(2 * ROWS, abs=2)
     paused = [*at_rate(SENT), *((now + 100, host, one) for now, host, one in at_rate(
         livelink_udp({**WEIGHTS, **ANGLES}, start=18_100.0)))]  # fmt: skip
     live, summary = captured("livelink", paused)
@@ -171,7 +179,7 @@ def test_over_midnight() -> None:
 
 
 def test_the_neutral_face_of_the_first_seconds_is_subtracted() -> None:
-    rows = [[0.2] * 61] * 30 + [[0.5] * 61] * 30
+    rows = [[0.2] * 61] * 30 + [[0.5] * 61] * 20 + [[0.1] * 52 + [0.2] * 9] * 10
     sent = [datagram(row, 18_000 + number / 60) for number, row in enumerate(rows)]
     live, summary = captured("livelink", at_rate(sent), neutral=0.4)
     plain, _ = captured("livelink", at_rate([datagram([0.3] * 61, 18_000 + n / 60) for n in range(60)]))
@@ -181,6 +189,7 @@ def test_the_neutral_face_of_the_first_seconds_is_subtracted() -> None:
     assert plain.face is not None
     assert not live.face.values[:29].any()
     np.testing.assert_allclose(live.face.values[40], plain.face.values[40], atol=1)
+    assert not live.face.values[52:].any()  # no weight is less than none
     assert summary.notes == ["the median of the first 0.40 s is the neutral face, subtracted"]
 
 

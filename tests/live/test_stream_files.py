@@ -77,20 +77,23 @@ SENDS = 200
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
 def test_a_killed_program_leaves_a_stream_of_all_frames_but_the_last(tmp_path: Path) -> None:
-    sent = [datagram([0.01 * (row % 90)] * 61, 18_000 + row / 60) for row in range(SENDS)]
+    sent = [datagram([0.01 * (row % 90)] * 61, 100 + row / 64, rate=64) for row in range(SENDS)]
     path, count = tmp_path / "a.fba", random.randint(30, SENDS)
     command = [sys.executable, "-m", "fba", "capture", "livelink", "--port", "0", "--host", "127.0.0.1"]
-    with subprocess.Popen([*command, "-o", str(path)], stderr=subprocess.PIPE, text=True) as program:
-        assert program.stderr is not None
-        port = int(program.stderr.readline().split()[-1])
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-            for one in sent[:count]:
-                sender.sendto(one, ("127.0.0.1", port))
-                time.sleep(0.001)
-        until = time.monotonic() + 20
-        while time.monotonic() < until and not (path.exists() and len(fba.read(path)) == count - 1):
-            time.sleep(0.02)
-        program.send_signal(signal.SIGKILL)
+    command += ["-o", str(path), "--seconds", "60"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as program:
+        try:
+            assert program.stderr is not None
+            port = next(int(line.split()[-1]) for line in program.stderr if "listening" in line)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+                for one in sent[:count]:
+                    sender.sendto(one, ("127.0.0.1", port))
+                    time.sleep(0.001)
+            until = time.monotonic() + 20
+            while time.monotonic() < until and not (path.exists() and len(fba.read(path)) == count - 1):
+                time.sleep(0.02)
+        finally:
+            program.send_signal(signal.SIGKILL)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # as for a file that was cut off
         assert len(fba.read(path)) == count - 1

@@ -115,8 +115,27 @@ def test_expressions_are_faps(person: fba.Animation) -> None:
     assert not values["close_t_r_eyelid"].any()
 
 
+NEW_NAMES = {
+    "A": "aa", "I": "ih", "U": "ou", "E": "ee", "O": "oh", "Joy": "happy", "Sorrow": "sad", "Fun": "relaxed",
+    "Angry": "angry", "Blink_L": "blinkLeft", "Blink_R": "blinkRight", "LookUp": "lookUp",
+}  # fmt: skip
+
+
+def test_old_names_of_expressions_are_the_new_ones() -> None:
+    faces = []
+    for names in (list(NEW_NAMES), list(NEW_NAMES.values())):
+        rows = {name: np.array([0.0, 0.1, 0.0]) + 0.05 * number for number, name in enumerate(names)}
+        animation, summary = captured("vmc", vmc_frames({}, rows, 3), settle=False)
+        assert animation is not None
+        assert not any("left out" in note for note in summary.notes)
+        faces.append(animation.face)
+    assert faces[0] == faces[1]
+    assert faces[0] is not None
+    assert faces[0].values.any()
+
+
 def test_shapes_with_arkits_names_come_before_expressions() -> None:
-    names = ("JawOpen", "eyeBlinkLeft", "EyeBlinkRight", "mouthSmileLeft", "MouthSmileRight")
+    names = ("JawOpen", "eyeBlinkLeft", "EyeBlinkRight", "mouthSmile_L", "MouthSmileRight")
     rows = {name: np.full(COUNT, 0.5) for name in names}
     both, summary = captured("vmc", vmc_frames({}, rows | {"A": np.ones(COUNT)}, COUNT), settle=False)
     alone, _ = captured("vmc", vmc_frames({}, rows, COUNT), settle=False)
