@@ -18,7 +18,15 @@ from fba.face.importers.assembly.model import ImportOptions, finish_import, turn
 from fba.face.importers.assembly.pieces import assemble, guess_kind, part_names
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.repair import repair_tables
-from fba.face.importers.assembly.symmetry import ALIKE, EXACT, asymmetry, mirror_tables, stand_upright
+from fba.face.importers.assembly.symmetry import (
+    ALIKE,
+    EXACT,
+    NEARLY,
+    asymmetry,
+    mirror_faulty_lids,
+    mirror_tables,
+    stand_upright,
+)
 from fba.face.importers.points.points_file import given_points, points_beside
 from fba.face.model import FaceModel, Material, Part
 from fba.gltf.part_materials import convert_material
@@ -58,13 +66,13 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
 def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceModel:
     """A face from pieces whose feature points are to be found."""
     upright, points, uneven, notes = locate(pieces, options)
-    model = finish_import(upright, points, {}, replace(options, up="y"), notes)
-    # the mirror image of a sound motion may fold a triangle that has none on the other side
-    if uneven >= EXACT:
+    model = finish_import(upright, points, {}, replace(options, up="y"), notes, given=False)
+    if uneven >= NEARLY:
         return model
-    return repair_tables(
-        mirror_tables(model), model, note=("symmetry", "both sides differ a little for {}: left as they are")
-    )
+    # the mirror image of a sound motion may fold a triangle that has none on the other side
+    note = ("symmetry", "both sides differ a little for {}: left as they are")
+    mirrored = repair_tables(mirror_tables(model, lids=uneven < EXACT), model, note=note)
+    return mirrored if uneven < EXACT else mirror_faulty_lids(mirrored)
 
 
 def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Float64, float, dict[str, str]]:

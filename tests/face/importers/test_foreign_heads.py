@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from fba.errors import ModelError
 from fba.face.authoring import author
@@ -16,7 +17,7 @@ from fba.face.authoring.surface.surface import weld_parts
 from fba.face.checks import check_faps
 from fba.face.deform.deformer import Deformer
 from fba.face.eyeball import eyeballs
-from fba.face.feature_points import row_of
+from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
@@ -24,8 +25,15 @@ from fba.face.importers.assembly._joining import join_pieces
 from fba.face.importers.assembly._winding import turn_outward
 from fba.face.importers.assembly.pieces import assemble
 from fba.face.importers.assembly.polygon_parts import Piece
-from fba.face.importers.assembly.repair import repair_tables
-from fba.face.importers.assembly.symmetry import asymmetry, mirror_points, mirror_tables, stand_upright
+from fba.face.importers.assembly.repair import _stopped, repair_tables
+from fba.face.importers.assembly.symmetry import (
+    asymmetry,
+    mirror_faulty_lids,
+    mirror_points,
+    mirror_tables,
+    stand_upright,
+    stand_upright_by_points,
+)
 from fba.face.model import FaceModel, Part
 from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.gltf import read_gltf, surfaces
@@ -307,3 +315,61 @@ def test_an_expression_of_several_targets_is_their_sum(tmp_path: Path) -> None:
     (piece,), _ = gltf_pieces(sheet.save(tmp_path / "a.vrm"))
     assert list(piece.morphs) == ["target 0", "target 1", "target 2", "jawOpen", "viseme aa"]
     assert piece.morphs["jawOpen"][0].tolist() == [0, 0, -(2 + 3 / 2)]
+
+
+def turned_points(base: FaceModel, axis: int, degrees: float, noise: float = 0.0) -> np.ndarray:
+    """The feature points of a head that is turned about an axis, given by a hand that trembles."""
+    turn = Rotation.from_euler("xyz"[axis], degrees, degrees=True).as_matrix()
+    trembling = np.random.default_rng(7).normal(0, noise, base.points.shape)
+    return np.asarray(base.points @ turn.T + trembling)
+
+
+@pytest.mark.parametrize(("axis", "degrees"), [(1, 12.0), (2, -9.0), (2, 25.0)])
+def test_heads_with_given_points_are_stood_upright(base: FaceModel, axis: int, degrees: float) -> None:
+    _, points, angle = stand_upright_by_points([], turned_points(base, axis, degrees, 0.0005))
+    assert np.degrees(angle) == pytest.approx(abs(degrees), abs=0.4)
+    for left in ("3.7", "2.4", "4.5"):
+        way = points[row_of()[left]] - points[row_of()[MIRRORED[left]]]
+        assert np.degrees(np.arccos(way[0] / np.linalg.norm(way))) < 2.0
+
+
+def test_points_that_tremble_turn_nothing(base: FaceModel) -> None:
+    given = turned_points(base, 2, 0.5, 0.002)
+    assert stand_upright_by_points([], given)[2] == 0.0
+    # the points of one side, or of a face seen from behind, do not say how it is turned
+    one_side = given.copy()
+    one_side[[row_of()[name] for name in MIRRORED]] = np.nan
+    assert stand_upright_by_points([], one_side)[2] == 0.0
+    assert stand_upright_by_points([], given * (-1, 1, -1))[2] == 0.0
+
+
+def test_pieces_are_turned_with_their_points(base: FaceModel) -> None:
+    turn = Rotation.from_euler("z", 10, degrees=True).as_matrix()
+    skin = base.part("skin")
+    shape = np.zeros_like(skin.vertices)
+    shape[:, 1] = 0.01
+    tilted = replace(skin, vertices=(skin.vertices @ turn.T).astype(np.float32), normals=None)
+    pieces, points, _ = stand_upright_by_points(
+        [Piece(tilted, morphs={"jawOpen": (shape @ turn.T).astype(np.float32)})], base.points @ turn.T
+    )
+    bound = base.bound[row_of()["9.3"]]
+    np.testing.assert_allclose(pieces[0].part.vertices[bound], points[row_of()["9.3"]], atol=1e-6)
+    np.testing.assert_allclose(pieces[0].morphs["jawOpen"], shape, atol=1e-5)
+
+
+def test_lids_that_break_rules_are_those_of_the_other_eye() -> None:
+    """The lower lid of one eye stopped half-way, where it has a few vertices more in its corner."""
+    base = FaceModel.default()
+    stopped = tuple(
+        FaceDefTables(22, tuple(_stopped(mesh, 0.3, (1,)) for mesh in table.meshes))
+        if table.fap == 22
+        else table
+        for table in base.tables
+    )
+    broken = base.with_tables(stopped, base.lost)
+    before = check_faps(broken, [20, 22])
+    assert any("lids meet" in finding.rule for finding in before)
+    mended = mirror_faulty_lids(broken)
+    assert not any("lids meet" in finding.rule for finding in check_faps(mended, [20, 22]))
+    assert mended.table_of[19] is broken.table_of[19]
+    assert mirror_faulty_lids(base) is base

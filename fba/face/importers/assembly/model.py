@@ -19,6 +19,7 @@ from fba.face.importers.assembly.definitions import define_by_shapes
 from fba.face.importers.assembly.pieces import FREE, assemble, shift_piece
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.repair import drop_false_pupils, repair_tables
+from fba.face.importers.assembly.symmetry import stand_upright_by_points
 from fba.face.model import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
 
@@ -69,15 +70,23 @@ def finish_import(
     vertices: Mapping[str, int],
     options: ImportOptions,
     notes: Mapping[str, str] | None = None,
+    *,
+    given: bool = True,
 ) -> FaceModel:
     """A face from the pieces of a file and its feature points (84, 3), both in the file's unit.
 
-    vertices: numbers of the vertices in the file that points stand on. The face is converted to
+    vertices: numbers of the vertices in the file that points stand on. given: the points were given, not
+    found, and tell whether the head is turned aside or tilted. The face is converted to
     metres, with its origin between the pupils. Pieces with shapes get tables measured from them.
     """
     if not pieces:
         raise ModelError(f"{os.fspath(options.path)}: contains no triangles; export the head as a mesh")
     pieces, points = turn_upright(pieces, points, options.up)
+    all_notes = {"source": Path(options.path).name, **(notes or {})}
+    if given:
+        pieces, points, angle = stand_upright_by_points(pieces, points)
+        if angle:
+            all_notes["position"] = f"turned by {np.degrees(angle):.1f} degrees, so that both sides are level"
     size, how = metres_per_unit(points, options.unit)
     pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
     middle = float(np.nanmean(pupils[:, 0])) if np.isfinite(pupils[:, 0]).any() else None
@@ -94,7 +103,7 @@ def finish_import(
     bound = bind_by_number(parts, vertices)
     everything = np.concatenate([piece.part.vertices for piece in parts]).astype(np.float64)
     points[bound >= 0] = everything[bound[bound >= 0]]
-    all_notes = {"source": Path(options.path).name, "unit": how, **(notes or {})}
+    all_notes["unit"] = how
     if turned:
         all_notes["triangles"] = f"{turned} turned to face outwards"
     return author_pieces(parts, points, bound, name=options.name, notes=all_notes)

@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.face.checks.fap_checks import check_posed
+from fba.face.checks.posing import Poser
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.model import FaceModel
@@ -15,13 +17,19 @@ from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.parameters import faps
 from fba.rotations import between
 
-ALIKE, EXACT = 0.02, 0.003
+ALIKE, NEARLY, EXACT = 0.02, 0.006, 0.003
 """Distances of 98 % of a face's vertices from the mirror image, in distances of the eyes, below which points
-are mirrored, and below which also tables are."""
+are mirrored, below which also tables are but those of the lids, and below which all are."""
+LIDS = ((19, 20), (21, 22))
+"""FAPs of the lids, left and right: their rows of vertices are the first that differ."""
 BETTER = 0.5
 """A head is turned if this share of the distances from the mirror image remains at most."""
 ANGLES = np.radians((0.2, 15.0))
 """Angles between the plane of symmetry and the upright one within which a head is turned."""
+POINT_ANGLES = np.radians((2.0, 40.0))
+"""The same for points that are given, which are no more exact than a hand."""
+FEWEST_PAIRS = 4
+"""Fewest pairs of points, left and right, that tell how a head is turned."""
 AROUND = 1.6
 """Distance from the middle of the eyes, in those of the eyes, within which vertices belong to the face."""
 TOUCHING = 0.1
@@ -49,7 +57,34 @@ def stand_upright(
     )
     if after > BETTER * before or after > ALIKE * float(np.linalg.norm(left - right)):
         return list(pieces), 0.0
-    turn = between(normal, np.eye(3)[0])
+    return _turned(pieces, between(normal, np.eye(3)[0]), middle), angle
+
+
+def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[list[Piece], Float64, float]:
+    """(pieces and their feature points (84, 3) turned so that both sides are level, the angle in radians).
+
+    The angle is 0 where nothing was turned: where points of both sides say nothing, or not the same.
+    """
+    row = row_of()
+    pairs = np.array([(points[row[left]], points[row[right]]) for left, right in MIRRORED.items()])
+    pairs = pairs[np.isfinite(pairs).all(axis=(1, 2))]
+    ways = pairs[:, 0] - pairs[:, 1] if len(pairs) else np.zeros((0, 3))
+    wide = np.linalg.norm(ways, axis=1)
+    if len(pairs) < FEWEST_PAIRS or not wide.max() > 0:
+        return list(pieces), points, 0.0
+    normal = ways.sum(axis=0) / np.linalg.norm(ways.sum(axis=0))
+    angle = float(np.arccos(np.clip(normal[0], -1.0, 1.0)))
+    before, after = (
+        float(np.linalg.norm(ways - wide[:, None] * axis, axis=1).sum()) for axis in (np.eye(3)[0], normal)
+    )
+    if not POINT_ANGLES[0] < angle < POINT_ANGLES[1] or after > BETTER * before:
+        return list(pieces), points, 0.0
+    turn, middle = between(normal, np.eye(3)[0]), pairs.mean(axis=(0, 1))
+    return _turned(pieces, turn, middle), (points - middle) @ turn.T + middle, angle
+
+
+def _turned(pieces: Sequence[Piece], turn: Float64, middle: Float64) -> list[Piece]:
+    """The pieces turned by a matrix (3, 3) about a point."""
     result = []
     for piece in pieces:
         part = piece.part
@@ -58,7 +93,7 @@ def stand_upright(
         part = replace(part, vertices=placed.astype(np.float32), normals=normals)
         morphs = {name: (morph @ turn.T).astype(np.float32) for name, morph in piece.morphs.items()}
         result.append(replace(piece, part=part, morphs=morphs))
-    return result, angle
+    return result
 
 
 def asymmetry(pieces: Sequence[Piece], left: Float64, right: Float64) -> float:
@@ -90,13 +125,15 @@ def mirror_points(points: dict[str, Float64], middle: float, own: Collection[str
     return result
 
 
-def mirror_tables(model: FaceModel) -> FaceModel:
+def mirror_tables(model: FaceModel, *, lids: bool = True) -> FaceModel:
     """The model with the tables of each pair of FAPs mirror images, and those of the middle symmetric.
 
-    The side is kept on which FAPs reach further. The face must be symmetric.
+    The side is kept on which FAPs reach further. The face must be symmetric. lids: those of the lids, too.
     """
     other = _counterparts(model)
     pairs = [(fap.number, fap.left_right_mate) for fap in faps() if fap.left_right_mate is not None]
+    if not lids:
+        pairs = [pair for pair in pairs if pair not in LIDS and pair[::-1] not in LIDS]
     reach = [
         sum(
             _reach(model.table_of[pair[side]])
@@ -117,6 +154,30 @@ def mirror_tables(model: FaceModel) -> FaceModel:
             made[there] = _mirrored(model, made[here], there, other)
             lost.pop(there, None)
     return model.with_tables(tuple(made[fap] for fap in sorted(made)), lost)
+
+
+def mirror_faulty_lids(model: FaceModel) -> FaceModel:
+    """The model; where the lids of one eye break more rules than those of the other, these are mirrored.
+
+    That is undone where the mirror images break as many.
+    """
+    poser = Poser(model)
+    errors = [_count_errors(poser, [pair[side] for pair in LIDS]) for side in (0, 1)]
+    if errors[0] == errors[1]:
+        return model
+    bad = int(errors[1] > errors[0])
+    other = _counterparts(model)
+    tables = dict(model.table_of)
+    for pair in LIDS:
+        if pair[1 - bad] in tables and pair[bad] in tables:
+            tables[pair[bad]] = _mirrored(model, tables[pair[1 - bad]], pair[bad], other)
+    mirrored = model.with_tables(tuple(tables.values()), model.lost)
+    found = _count_errors(Poser(mirrored, like=poser), [pair[bad] for pair in LIDS])
+    return mirrored if found < errors[bad] else model
+
+
+def _count_errors(poser: Poser, lids: list[int]) -> int:
+    return sum(finding.severity == "error" for finding in check_posed(poser, lids))
 
 
 def _face(pieces: Sequence[Piece], left: Float64, right: Float64) -> Float64:
