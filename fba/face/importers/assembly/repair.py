@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from fba.easing import smoothstep
+from fba.face.authoring.regions.eye_opening import LIDS
 from fba.face.authoring.regions.eyes import PUPIL_OF_IRIS
-from fba.face.checks._lid_rules import SIDES
 from fba.face.checks.fap_checks import check_posed, region_table
 from fba.face.checks.posing import Poser
 from fba.face.eyeball import PUPIL_FAP, eyeballs, pupil_diameter
@@ -78,7 +78,7 @@ def drop_false_pupils(model: FaceModel) -> FaceModel:
 
 def _count_errors(poser: Poser, fap: int) -> int:
     """Errors of one FAP; of a lid, with the other of its eye: one that stops early does not close it."""
-    pair = next((pair for pair in SIDES.values() if fap in pair), (fap,))
+    pair = [each for each, (side, _) in LIDS.items() if fap in LIDS and side == LIDS[fap][0]] or [fap]
     found = check_posed(poser, pair, combined=len(pair) > 1)
     return sum(finding.severity == "error" for finding in found)
 
