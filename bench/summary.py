@@ -115,6 +115,18 @@ ROWS = (
         "fba encode --report --json",
     ),
     Row(
+        "50 markers on a face (C3D) to a stream",
+        "one minute at 100 Hz; warm, one core",
+        "{seconds:.2f} s of processor",
+        "test_markers.py::test_a_minute_of_markers",
+    ),
+    Row(
+        "ARKit's 52 shapes (CSV of Live Link Face) to a stream",
+        "ten minutes at 60 Hz; warm, one core",
+        "{seconds:.2f} s of processor",
+        "test_face_capture.py::test_ten_minutes_of_blendshapes",
+    ),
+    Row(
         "BAPs to 87 joint matrices",
         "186 BAPs, 2000 poses a call; warm, one core, `out=`",
         "{rate:,.0f} poses/s, {ratio:.1f} times NumPy",
