@@ -1,7 +1,7 @@
 """Makes the picture of docs/capture-markers.md: `python docs/make_marker_capture_picture.py`.
 
-Above, the head that performs talk.c3d; below it, the built-in head as the stream of its markers moves it; then
-curves of some FAPs, as performed (grey) and as they come from the markers.
+Above, the head that performs talk.c3d; below it, the built-in head as the stream of its markers moves it;
+then curves of some FAPs, as performed (grey) and as they come from the markers.
 """
 
 from __future__ import annotations
