@@ -320,6 +320,17 @@ def test_an_upper_arm_follows_the_plane_in_which_an_elbow_bends(bend: float, jum
     assert row.values.max() == pytest.approx(jumps, abs=0.5)
 
 
+def test_a_foot_that_is_held_up_does_not_stand(mapped: dict[str, int]) -> None:
+    """On one leg, with the other thigh level, still."""
+    turns = {"LeftUpLeg": Rotation.from_euler("x", -90, degrees=True),
+             "LeftLeg": Rotation.from_euler("x", 90, degrees=True)}  # fmt: skip
+    stork = motion("standing", FRAMES, turns=turns, rate=15)
+    comparison = compare(stork, from_skeleton(stork), mapped)
+    floor = [one for one in comparison.differences if one.measure == "floor" and one.typical > 0]
+    assert {one.part for one in floor} <= {"right sole"}
+    assert all(one.worst < 10 for one in floor)
+
+
 def test_runs_of_a_long_motion_have_one_floor(mapped: dict[str, int]) -> None:
     """Somebody steps on a box of 1 m: those who see that part only would take the box for the floor."""
     captured = motion("standing", 64, rate=15)

@@ -15,6 +15,9 @@ STILL = 0.25
 LOW = 0.05
 """Metres above the lowest heights up to which a foot stands."""
 
+RAISED = 0.3
+"""Metres by which one foot may stand above the other; one that is always higher is in the air."""
+
 
 class Floor(NamedTuple):
     """Where the feet of a source stand, in metres.
@@ -41,6 +44,8 @@ def find_floor(sources: Iterable[Figure], rate: float) -> Floor:
     known = [side for side in SIDES if ends[side]]
     heights = {side: np.concatenate(ends[side]) for side in known}
     lows = {side: float(np.percentile(heights[side], 5)) + LOW for side in known}
+    lowest_of_both = min(lows.values(), default=0.0)
+    lows = {side: min(low, lowest_of_both + RAISED) for side, low in lows.items()}
     stands = {side: np.concatenate(still[side]) & (heights[side] < lows[side]) for side in known}
     standing = [np.concatenate(lowest[side])[stands[side]] for side in known]
     together = np.concatenate(standing) if standing else np.zeros(0)
