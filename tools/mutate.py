@@ -417,6 +417,12 @@ MUTANTS = (
     Mutant(GLTF_READER, "MANY = 10", "MANY = 9", FACE_MOTION_TEST),
     Mutant(GLTF_READER, "if person or joints is not None", "if joints is not None", FACE_MOTION_TEST),
     Mutant("fba/capture/comparison/standing.py", "RAISED = 0.3", "RAISED = 0.6", COMPARISON_TEST),
+    Mutant(
+        "player/fba_player/gl/_textures.py",
+        "if not (self._solid or",
+        "if False and not (self._solid or",
+        TRANSPARENCY_TEST,
+    ),
     Mutant(FIGURE, "STRAIGHT = 0.9", "STRAIGHT = 0.5", PREPARATION_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 1.0", BVH_READING_TEST),
     Mutant(BVH, "CARRIED = 5.0", "CARRIED = 500.0", BVH_READING_TEST),

@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fba.arrays import Float32
+import numpy as np
+
+from fba.arrays import Float32, UInt8
 from fba_player.gl.resources import make_texture
 from fba_player.mesh.textures import texture_breadth
 from fba_player.view.view import FaceShape
@@ -28,6 +30,7 @@ class Pictures:
     def __init__(self, context: Any, shape: FaceShape, positions: Float32) -> None:
         self._gl = context
         self._picture = shape.picture
+        self._solid = shape.alpha == "opaque"
         self._sizes: dict[int, Any] = {}
         self._breadth = 0.0
         if shape.picture is not None and shape.texcoords is not None:
@@ -39,7 +42,10 @@ class Pictures:
             return None
         halvings = count_halvings(self._breadth / max(self._picture.size), pixel, max(self._picture.size))
         if halvings not in self._sizes:
-            self._sizes[halvings] = make_texture(self._gl, self._picture.reduced(2**halvings))
+            pixels = self._picture.reduced(2**halvings)
+            if not (self._solid or self._picture.opaque):
+                pixels = _weigh_by_alpha(pixels)
+            self._sizes[halvings] = make_texture(self._gl, pixels)
         return self._sizes[halvings]
 
     def close(self) -> None:
@@ -47,6 +53,14 @@ class Pictures:
         for texture in self._sizes.values():
             texture.release()
         self._sizes.clear()
+
+
+def _weigh_by_alpha(pixels: UInt8) -> UInt8:
+    """Return pixels (H, W, 4) with colours times alpha, so that those of holes do not colour their edges."""
+    result = pixels.copy()
+    for rows in result:  # one at a time, which needs little memory
+        rows[:, :3] = (rows[:, :3].astype(np.uint16) * rows[:, 3:] + 127) // 255
+    return result
 
 
 def count_halvings(texel: float, pixel: float, size: int) -> int:

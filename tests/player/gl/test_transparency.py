@@ -36,6 +36,7 @@ def wall(depth: float, colour: tuple[float, ...], alphas: list[int], **look: Any
     corners = np.array([[-1, -1, depth], [1, -1, depth], [1, 1, depth], [-1, 1, depth]], dtype=np.float32)
     pixels = np.full((1, len(alphas), 4), 255, dtype=np.uint8)
     pixels[0, :, 3] = alphas
+    pixels[0, pixels[0, :, 3] == 0, :3] = 0  # as most programs save what is not seen
     file = io.BytesIO()
     Image.fromarray(np.repeat(np.repeat(pixels, 8, axis=0), 8, axis=1)).save(file, "WEBP", lossless=True)
     shape = FaceShape(
@@ -53,6 +54,11 @@ def wall(depth: float, colour: tuple[float, ...], alphas: list[int], **look: Any
 
 def draw(context: Any, meshes: list[FaceMesh]) -> np.ndarray:
     """Red, green and blue at the middles of the left and the right half, (2, 3)."""
+    return draw_row(context, meshes)[[SIZE // 4, 3 * SIZE // 4]]
+
+
+def draw_row(context: Any, meshes: list[FaceMesh]) -> np.ndarray:
+    """Red, green and blue along the middle of the picture, (SIZE, 3)."""
     renderer = FaceRenderer(context)
     target = context.simple_framebuffer((SIZE, SIZE))
     target.use()
@@ -63,7 +69,7 @@ def draw(context: Any, meshes: list[FaceMesh]) -> np.ndarray:
     pixels = np.frombuffer(target.read(components=3), dtype=np.uint8).reshape(SIZE, SIZE, 3)
     renderer.close()
     target.release()
-    return pixels[SIZE // 2, [SIZE // 4, 3 * SIZE // 4]].astype(int)
+    return pixels[SIZE // 2].astype(int)
 
 
 def shows_wall(colour: np.ndarray) -> bool:
@@ -116,3 +122,12 @@ def test_from_nine_tenths_on_a_blended_part_hides_others(context: Any) -> None:
     hidden, shown = draw(context, [wall(0.5, RED, [235, 220], alpha="blend"), far])
     assert hidden[0] > 100 > hidden[2]
     assert shown[2] > 100 > shown[0]
+
+
+@pytest.mark.parametrize("alpha", ["mask", "blend"])
+def test_edges_of_holes_are_not_dark(context: Any, alpha: Alpha) -> None:
+    """A white wall with black holes before a white one is as bright at their edges as elsewhere."""
+    behind = wall(0.0, WHITE, [255, 255])
+    front = wall(0.5, WHITE, [255, 0, 255, 0, 255], alpha=alpha)  # no edge is at one of a pixel
+    plain = draw_row(context, [behind])
+    np.testing.assert_allclose(draw_row(context, [behind, front]), plain, atol=4)

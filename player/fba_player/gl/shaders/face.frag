@@ -32,10 +32,11 @@ void main() {
     vec3 albedo = vec3(1.0);
 #ifdef TEXTURED
     vec4 texel = texture(picture, coordinates.xy);
-    albedo = texel.rgb * texel.rgb;
 #ifndef SOLID
     opaque *= texel.a;
+    texel.rgb /= max(texel.a, 0.004); // colours of pictures with holes are multiplied by their alpha
 #endif
+    albedo = texel.rgb * texel.rgb;
 #endif
 #if defined(CUT) || defined(VEIL)
     opaque *= opacity;
