@@ -74,6 +74,7 @@ fba.formats
 fba.formats.text
 fba.formats.epf
 fba.formats.bvh
+fba.formats.smpl
 fba.formats.markers
 fba.formats.c3d
 fba.formats.gltf

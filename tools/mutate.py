@@ -69,6 +69,7 @@ FACE_MOTION, HUMANOID = "fba/formats/gltf/face_motion.py", "fba/formats/gltf/hum
 SHAPE_TABLE = "fba/capture/blendshapes/shape_table.py"
 COMBINATION = "fba/capture/blendshapes/combination.py"
 LIVELINK = "fba/formats/face_tables/_shape_rows.py"
+SMPL, SMPL_TEST = "fba/formats/smpl/reader.py", "tests/formats/smpl/test_smpl_motion.py"
 TIME_CODES, TIME_CODES_TEST = "fba/formats/time_codes.py", "tests/formats/test_time_codes.py"
 SYNCHRONISATION = "fba/formats/synchronisation.py"
 SYNCHRONISATION_TEST = "tests/formats/test_synchronisation.py"
@@ -581,6 +582,9 @@ MUTANTS = (
         "if False and not LIMBS",
         "tests/formats/gltf/test_vrma_writing.py",
     ),
+    Mutant(SMPL, "[-np.pi / 2, 0.0, 0.0]", "[np.pi / 2, 0.0, 0.0]", SMPL_TEST),
+    Mutant(SMPL, "heads[1] < -UPRIGHT", "heads[1] < -9", SMPL_TEST),
+    Mutant(SMPL, "[66, 69, 75]", "[66, 72, 75]", SMPL_TEST),
     Mutant("fba/formats/gltf/reader.py", "moments, head=True", "moments", FACES_TEST),
     Mutant(OPENFACE, "set(columns) == set(VERSION_3)", "False", ACTION_UNITS_TEST),
     Mutant(LIVE_ORDER, "JUMP = 1.0", "JUMP = 1e9", LIVE_FACES_TEST),

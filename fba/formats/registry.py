@@ -174,6 +174,11 @@ def formats() -> tuple[Format, ...]:
             describe_person=lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
         ),
         Format(
+            "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
+            lazy("smpl.reader", "sniff"), lazy("smpl.reader", "read"), None,
+            read_motion=lazy("smpl.reader", "read_motion"),
+        ),
+        Format(
             "livelink", (".csv",), "table of blendshapes: Live Link Face's, or with ARKit's names",
             lazy("face_tables.livelink_csv", "sniff"), lazy("face_tables.livelink_csv", "read"),
             lazy("face_tables.livelink_writer", "write"), ("face",),

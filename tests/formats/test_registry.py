@@ -36,8 +36,9 @@ def performance(face: bool = True, body: bool = True, rate: int = 25, first: int
 
 def test_the_table() -> None:
     assert [entry.name for entry in formats()] == [
-        "fba", "fap", "bap", "epf", "bvh", "vrma", "gltf", "livelink", "openface", "pyfeat", "livelink-udp",
-        "ifacialmocap", "shapes-json", "points", "c3d", "trc", "motive", "nexus", "qualisys", "markers",
+        "fba", "fap", "bap", "epf", "bvh", "vrma", "gltf", "smpl", "livelink", "openface", "pyfeat",
+        "livelink-udp", "ifacialmocap", "shapes-json", "points", "c3d", "trc", "motive", "nexus", "qualisys",
+        "markers",
     ]  # fmt: skip
     by_name = {entry.name: entry for entry in formats()}
     assert by_name["fap"].read_options == ("fps", "name", "salvage", "angle_scale", "limits")

@@ -7,9 +7,6 @@ picture are arrays of their own: `times` or `timestamps`, `fps`, `width` and `he
 
 from __future__ import annotations
 
-import io
-import math
-import zipfile
 from fractions import Fraction
 from pathlib import Path as FilePath
 from typing import Any
@@ -22,10 +19,10 @@ from fba.capture.sampling import find_rate
 from fba.errors import FormatError, ModelError, Remedy
 from fba.formats.face_tables._points import build_points
 from fba.formats.face_tables._times import check_order, seconds_of
+from fba.formats.numpy_archives import NPY, ZIP, read_arrays
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path, read_whole
+from fba.source import Path
 
-NPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"
 NAMES = (
     "landmarks", "landmark", "face_landmarks", "landmarks68", "landmarks_68", "landmarks478", "points", "pts",
     "keypoints", "face", "faces", "lms", "lmks", "lm", "coords", "preds", "positions", "data", "arr_0",
@@ -34,7 +31,6 @@ NAMES = (
 TIMES = ("times", "timestamps", "timestamp", "time", "t")
 RATES = ("fps", "rate", "frame_rate", "video_fps")
 SINGLE = "points"
-MOST_ARRAYS = 1000
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -54,7 +50,7 @@ def read_points(
     limits: Limits = DEFAULT_LIMITS,
 ) -> PointMotion:
     """Return the points in an array; options and errors as for `points.read_points`."""
-    arrays = _read_arrays(path, limits)
+    arrays = read_arrays(path, limits, single=SINGLE)
     positions, odd = _choose(arrays, path, face)
     limits.check_frames(len(positions), f"{path}: the recording")
     times, rate = _times(arrays, len(positions), fps, path)
@@ -63,57 +59,6 @@ def read_points(
         positions, times, rate, path=path, name=FilePath(path).stem,
         aspect=width / height if width and height else None, findings=odd,
     )  # fmt: skip
-
-
-def _read_arrays(path: Path, limits: Limits) -> dict[str, Any]:
-    """Return the arrays of numbers in a file, by name."""
-    data = read_whole(path)
-    if data.startswith(NPY):
-        return {SINGLE: _read_array(data, path, limits)}
-    arrays = {}
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            members = archive.infolist()
-            if len(members) > MOST_ARRAYS:
-                raise FormatError(f"holds {len(members)} files; expected a few arrays", path=path)
-            for member in members:
-                if member.filename.endswith(".npy"):
-                    limits.check_bytes(member.file_size, f"{path}: {member.filename}", source=len(data))
-                    arrays[member.filename[:-4]] = _read_array(archive.read(member), path, limits)
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, OSError, ValueError) as error:
-        raise FormatError(f"is no archive of arrays that can be read: {error}", path=path) from error
-    except Exception as error:  # zlib.error and the like have no common class
-        if type(error).__module__ in ("zlib", "lzma", "_lzma"):
-            raise FormatError(f"is damaged: {error}", path=path) from error
-        raise
-    return {name: array for name, array in arrays.items() if array is not None}
-
-
-def _read_array(data: bytes, path: Path, limits: Limits) -> Any:
-    """Return an array of numbers as float64; None for one of something else."""
-    file = io.BytesIO(data)
-    try:
-        version = np.lib.format.read_magic(file)
-        read = (
-            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        )
-        shape, _, dtype = read(file)
-    except (ValueError, TypeError, SyntaxError, EOFError) as error:
-        raise FormatError(f"is no array that can be read: {error}", path=path) from error
-    if dtype.kind not in "fiu":
-        if dtype.hasobject:
-            raise FormatError(
-                "holds Python objects, which are not read, as they may run programs; save the points as an "
-                "array of numbers",
-                path=path,
-            )
-        return None
-    count = math.prod(shape)
-    if count * dtype.itemsize > len(data) - file.tell():
-        raise FormatError("is cut off: the array says that it has more numbers than there are", path=path)
-    limits.check_bytes(8 * count, f"{path}: the points", source=len(data))
-    file.seek(0)
-    return np.asarray(np.load(file, allow_pickle=False), dtype=np.float64)
 
 
 def _choose(arrays: dict[str, Any], path: Path, face: str | None) -> tuple[Float64, list[str]]:

@@ -1,0 +1,73 @@
+"""Read the arrays of numbers in files of NumPy (.npy, .npz), without ever loading Python objects."""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+from typing import Any
+
+import numpy as np
+
+from fba.errors import FormatError
+from fba.limits import Limits
+from fba.source import Path, read_whole
+
+NPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"
+MOST_ARRAYS = 1000
+
+
+def read_arrays(path: Path, limits: Limits, *, single: str, objects: bool = False) -> dict[str, Any]:
+    """Return the arrays of numbers in a file as float64, by name; others are left out.
+
+    single: the name for the array of an .npy file. objects: leave out arrays of Python objects, too, instead
+    of refusing the file. Raises FormatError for damage, LimitError.
+    """
+    data = read_whole(path)
+    if data.startswith(NPY):
+        return {single: _read_array(data, path, limits, objects)}
+    arrays = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = archive.infolist()
+            if len(members) > MOST_ARRAYS:
+                raise FormatError(f"holds {len(members)} files; expected a few arrays", path=path)
+            for member in members:
+                if member.filename.endswith(".npy"):
+                    limits.check_bytes(member.file_size, f"{path}: {member.filename}", source=len(data))
+                    arrays[member.filename[:-4]] = _read_array(archive.read(member), path, limits, objects)
+    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, OSError, ValueError) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError(f"is no archive of arrays that can be read: {error}", path=path) from error
+    except Exception as error:  # zlib.error and the like have no common class
+        if type(error).__module__ in ("zlib", "lzma", "_lzma"):
+            raise FormatError(f"is damaged: {error}", path=path) from error
+        raise
+    return {name: array for name, array in arrays.items() if array is not None}
+
+
+def _read_array(data: bytes, path: Path, limits: Limits, objects: bool) -> Any:
+    """Return an array of numbers as float64; None for one of something else."""
+    file = io.BytesIO(data)
+    try:
+        version = np.lib.format.read_magic(file)
+        read = (
+            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        )
+        shape, _, dtype = read(file)
+    except (ValueError, TypeError, SyntaxError, EOFError) as error:
+        raise FormatError(f"is no array that can be read: {error}", path=path) from error
+    if dtype.kind not in "fiu":
+        if dtype.hasobject and not objects:
+            raise FormatError(
+                "holds Python objects, which are not read, as they may run programs; save numbers",
+                path=path,
+            )
+        return None
+    count = math.prod(shape)
+    if count * dtype.itemsize > len(data) - file.tell():
+        raise FormatError("is cut off: the array says that it has more numbers than there are", path=path)
+    limits.check_bytes(8 * count, f"{path}: an array", source=len(data))
+    file.seek(0)
+    return np.asarray(np.load(file, allow_pickle=False), dtype=np.float64)

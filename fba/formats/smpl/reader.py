@@ -1,0 +1,216 @@
+"""Read motion of SMPL's family of body models as AMASS saves it (.npz): SMPL, SMPL-H, SMPL-X.
+
+Poses are turns of joints as rotation vectors. The places of the joints depend on a body model that may not
+be passed on, so the skeleton is one of average proportions (`joints.csv`); turns are what counts. AMASS has
+z up, other makers y: the way in which people stand tells.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from importlib.resources import files
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fba.animation import Animation, FaceTrack
+from fba.arrays import Float64
+from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture.blendshapes.conversion import convert_rows
+from fba.capture.sampling import find_rate, interpolate
+from fba.capture.skeleton import check_memory
+from fba.errors import FormatError, Remedy
+from fba.formats.numpy_archives import ZIP, read_arrays
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import Path, naming_file
+
+RATES = ("mocap_frame_rate", "mocap_framerate", "fps")
+PARTS = ("poses", "root_orient", "pose_body")
+NAMES = (*PARTS, "mocap_framerate", "mocap_frame_rate", "surface_model_type")
+BODY = 22
+"""Joints of the body itself, which come first."""
+FINGERS = 30
+SMPL, SMPL_H, SMPL_X = 72, 156, 165
+"""Numbers of a pose: 24 joints, 52 with fingers, 55 with jaw and eyes as well."""
+JAW_OPEN = np.radians(20.0)
+"""Angle of the jaw at which the mouth is as open as by a shape "jawOpen" of weight 1."""
+SLOWEST, FASTEST = 0.1, 10_000
+"""Frames per second below and beyond which a rate is damage."""
+UPRIGHT = 0.6
+"""Least share of the mean direction of heads along an axis for that axis to be up."""
+
+
+class _Motion(NamedTuple):
+    """Turns of joints (T, J, 3), path (T, 3), turns of the jaw (T, 3) and the eyes (T, 2, 3); the rate."""
+
+    turns: Float64
+    path: Float64
+    jaw: Float64 | None
+    eyes: Float64 | None
+    rate: Fraction
+
+
+def sniff(head: bytes, suffix: str) -> bool:
+    """Whether a file that begins like this is an archive with arrays as AMASS names them."""
+    return head.startswith(ZIP) and any(f"{name}.npy".encode() in head for name in NAMES)
+
+
+def read(
+    path: Path,
+    *,
+    rate: Fraction | int | str | None = None,
+    fps: Fraction | int | str | None = None,
+    origin: str = "source",
+    ground: str = "floor",
+    plant: bool = True,
+    spine: str | int = "spread",
+    joints: Mapping[str, str] | None = None,
+    rest: str | int = "auto",
+    up: str = "auto",
+    limits: Limits = DEFAULT_LIMITS,
+) -> Animation:
+    """Return the motion of a body as BAPs, and of its jaw and eyes, where they move, as FAPs.
+
+    The options are those of `fba.capture.from_skeleton`; fps: of a file that has no rate. Raises FormatError,
+    LimitError; warns (FbaWarning).
+    """
+    with naming_file(path):
+        read_in = _read(path, fps, limits)
+        motion = _skeleton(read_in, path)
+        animation = from_skeleton(
+            motion, rate, joints=joints, origin=origin, ground=ground, plant=plant, spine=spine, rest=rest,
+            up=up, limits=limits,
+        )  # fmt: skip
+        at = np.asarray(animation.index, dtype=np.float64) / float(animation.rate)
+        return replace(animation, face=_face(read_in, at, limits))
+
+
+def read_motion(
+    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> SkeletonMotion:
+    """Return the joints as they turn in the file, y up. Raises FormatError, LimitError."""
+    with naming_file(path):
+        return _skeleton(_read(path, fps, limits), path)
+
+
+def _read(path: Path, fps: Fraction | int | str | None, limits: Limits) -> _Motion:
+    arrays = read_arrays(path, limits, single="poses", objects=True)
+    poses, jaw, eyes = _poses(arrays, path)
+    count = len(poses)
+    limits.check_frames(count, f"{path}: the motion")
+    path_of_root = arrays.get("trans", np.zeros((count, 3)))
+    if path_of_root.shape != (count, 3):
+        raise FormatError(f"trans has the shape {path_of_root.shape}, not ({count}, 3)", path=path)
+    parts = {"poses": poses, "trans": path_of_root, "jaw": jaw, "eyes": eyes}
+    for name, values in parts.items():
+        if values is not None and not np.isfinite(values).all():
+            row = int(np.argwhere(~np.isfinite(values))[0][0])
+            raise FormatError(f"frame {row}: {name} has a number that is not finite", path=path)
+    rate = _rate(arrays, fps, path)
+    turns = poses.reshape(count, -1, 3)
+    return _Motion(turns, path_of_root, jaw, None if eyes is None else eyes.reshape(count, 2, 3), rate)
+
+
+def _rate(arrays: dict[str, Any], fps: Fraction | int | str | None, path: Path) -> Fraction:
+    """Return the frame rate of a file, or `fps` if it has none."""
+    stored = next((arrays[name] for name in RATES if name in arrays and arrays[name].size == 1), None)
+    if stored is None:
+        if fps is None:
+            raise FormatError("has no frame rate", path=path).with_remedies(
+                Remedy("fps", "give one with {}", "120")
+            )
+        return Fraction(fps)
+    if not SLOWEST <= (rate := float(stored.ravel()[0])) <= FASTEST:
+        raise FormatError(f"its frame rate must be {SLOWEST} to {FASTEST:g}", path=path, token=f"{rate:g}")
+    return find_rate(np.array([0.0, 1.0 / rate]))
+
+
+def _poses(arrays: dict[str, Any], path: Path) -> tuple[Float64, Float64 | None, Float64 | None]:
+    """Return turns of the body and its fingers (T, 3 J), of the jaw (T, 3), and of the eyes (T, 6)."""
+    if "root_orient" in arrays and "pose_body" in arrays:
+        parts = [arrays[name] for name in ("root_orient", "pose_body", "pose_hand") if name in arrays]
+        if any(part.ndim != 2 or len(part) != len(parts[0]) for part in parts):
+            raise FormatError("root_orient, pose_body and pose_hand differ in their frames", path=path)
+        poses = np.concatenate(parts, axis=1)
+        jaw, eyes = (arrays.get(name) for name in ("pose_jaw", "pose_eye"))
+        widths = [one.shape for one in (jaw, eyes) if one is not None]
+        if widths not in ([], [(len(poses), 3)], [(len(poses), 3), (len(poses), 6)], [(len(poses), 6)]):
+            raise FormatError(f"pose_jaw, pose_eye: shapes {widths}, not (T, 3) and (T, 6)", path=path)
+        if poses.shape[1] in (3 * BODY, 3 * (BODY + FINGERS)) and len(poses):
+            return poses, jaw, eyes
+        raise FormatError(f"its body has {poses.shape[1] / 3:g} joints; expected {BODY} or 52", path=path)
+    poses = arrays.get("poses", np.zeros((0, 0)))
+    if poses.ndim != 2 or not len(poses) or poses.shape[1] not in (3 * BODY, SMPL, SMPL_H, SMPL_X):
+        raise FormatError(
+            f"poses has the shape {poses.shape}; expected frames of {3 * BODY}, {SMPL}, {SMPL_H} or {SMPL_X} "
+            "numbers, as in AMASS",
+            path=path,
+        )
+    if poses.shape[1] == SMPL_X:
+        body, jaw, eyes, hands = np.split(poses, [66, 69, 75], axis=1)
+        return np.concatenate([body, hands], axis=1), jaw, eyes
+    return (poses[:, : 3 * BODY] if poses.shape[1] == SMPL else poses), None, None
+
+
+def _skeleton(read_in: _Motion, path: Path) -> SkeletonMotion:
+    """Return the motion of a skeleton of average proportions, y up."""
+    count, joints = read_in.turns.shape[:2]
+    table = _joints()[:joints]
+    names = tuple(row[0] for row in table)
+    check_memory(DEFAULT_LIMITS, count, joints, f"{path}: a motion", read_in.turns.nbytes)
+    turns = Rotation.from_rotvec(read_in.turns.reshape(-1, 3)).as_quat().reshape(count, joints, 4)
+    turns = np.roll(turns, 1, axis=2)
+    upright = _to_y_up(turns[:, 0])
+    root = upright * Rotation.from_quat(np.roll(turns[:, 0], -1, axis=1))
+    turns[:, 0] = np.roll(root.as_quat(), 1, axis=1)
+    return SkeletonMotion(
+        names, np.array([names.index(row[1]) if row[1] else -1 for row in table]),
+        np.array([row[2] for row in table]), turns, upright.apply(read_in.path), read_in.rate,
+        name=FilePath(path).stem, up="+y",
+    )  # fmt: skip
+
+
+def _to_y_up(root: Float64) -> Rotation:
+    """Return what brings up to +y. root: quaternions (T, 4) of the pelvis, whose own y points to the head."""
+    heads = Rotation.from_quat(np.roll(root, -1, axis=1)).apply([0.0, 1.0, 0.0]).mean(axis=0)
+    axis = int(np.abs(heads).argmax())
+    if axis == 1 and heads[1] > UPRIGHT:
+        return Rotation.identity()
+    if axis == 1 and heads[1] < -UPRIGHT:  # the axes of a camera: y down, z away
+        return Rotation.from_rotvec([np.pi, 0.0, 0.0])
+    return Rotation.from_rotvec([-np.pi / 2, 0.0, 0.0])  # AMASS
+
+
+def _face(read_in: _Motion, at: Float64, limits: Limits) -> FaceTrack | None:
+    """Return FAPs of jaw and eyes at times (F,), seconds; None where they do not move."""
+    jaw = read_in.jaw if read_in.jaw is not None and read_in.jaw.any() else None
+    eyes = read_in.eyes if read_in.eyes is not None and read_in.eyes.any() else None
+    if jaw is None and eyes is None:
+        return None
+    times = np.arange(len(read_in.turns)) / float(read_in.rate)
+    opened = np.zeros((len(times), 1)) if jaw is None else jaw[:, :1] / JAW_OPEN
+    looks = None
+    if eyes is not None:
+        ahead = Rotation.from_rotvec(eyes.reshape(-1, 3)).apply([0.0, 0.0, 1.0]).reshape(-1, 2, 3)
+        yaw = np.arctan2(ahead[..., 0], ahead[..., 2])
+        pitch = np.arctan2(-ahead[..., 1], np.hypot(ahead[..., 0], ahead[..., 2]))
+        looks = np.concatenate([yaw, pitch], axis=1)
+    sampled = interpolate(times, [opened, *([] if looks is None else [looks])], at, limits)
+    names = () if jaw is None else ("jawOpen",)
+    return convert_rows(names, sampled[0][:, : len(names)], None, sampled[1] if looks is not None else None)
+
+
+@cache
+def _joints() -> tuple[tuple[str, str, tuple[float, float, float]], ...]:
+    """Return name, parent ("" for none) and place in metres of each joint, in the order of a pose."""
+    text = (files(__package__) / "joints.csv").read_text(encoding="utf-8")
+    return tuple(
+        (row["joint"], row["parent"], (float(row["x"]), float(row["y"]), float(row["z"])))
+        for row in csv.DictReader(text.splitlines())
+    )
