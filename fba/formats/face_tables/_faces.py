@@ -79,6 +79,8 @@ def row_times(
     """
     if len(rows) == 1:
         return np.zeros(1), Fraction(fps or USUAL), []
+    if seconds is not None and ":" in table.rows[rows[0]][seconds]:
+        seconds = None  # py-feat's "00:03" is too coarse to be the time of a frame
     findings = []
     counted = seconds is not None or frame is not None
     if seconds is not None and _are_pictures(table, seconds):

@@ -16,6 +16,8 @@ from fba.limits import Limits
 from fba.source import Path, naming_file
 
 Neutral = str | int | tuple[float, float]
+FLATTEST = 0.08
+"""Least ratio of a face's depth to its width, or the other way round, whatever the shape of the picture."""
 SHARES = 2.0
 """Coordinates up to this are shares of a picture: pixels of a face are more."""
 
@@ -40,6 +42,10 @@ def build_points(
     positions[~(np.abs(np.nan_to_num(positions)) > 0).any(axis=(1, 2))] = np.nan
     if positions.shape[2] == 3 and not (np.abs(np.nan_to_num(positions[..., 2])) > 0).any():
         positions = positions[..., :2]  # a depth that is 0 everywhere is none
+    findings = list(findings)
+    if not metric and positions.shape[2] == 3 and not _is_deep(positions):
+        positions = positions[..., :2]
+        findings.append("depth is in another unit than x and y, and left out")
     plane = np.abs(positions[..., :2])
     share = not metric and bool(np.isfinite(plane).any()) and float(np.nanmedian(plane)) <= SHARES
     if share and float(np.nanmin(positions[..., :2])) < 0 and float(np.nanmedian(plane)) < 0.1:
@@ -51,6 +57,15 @@ def build_points(
         )  # fmt: skip
     except ModelError as error:
         raise FormatError(error.finding, path=path) from error
+
+
+def _is_deep(positions: Float64) -> bool:
+    """Whether z of points (T, N, 3) goes about as far as x and y do, as a face's depth in one unit does."""
+    seen = positions[~np.isnan(positions).any(axis=(1, 2))]
+    if not len(seen):
+        return True
+    across, up, deep = np.median(seen.std(axis=1), axis=0).tolist()
+    return bool(FLATTEST < deep / max(across, up, 1e-300) < 1 / FLATTEST)
 
 
 def points_to_animation(

@@ -43,7 +43,12 @@ POINTS = (
     "idx",
     "id",
 )
-SIZES = (("width", "height"), ("image_width", "image_height"), ("frame_width", "frame_height"))
+SIZES = (
+    ("width", "height"),
+    ("framewidth", "frameheight"),
+    ("image_width", "image_height"),
+    ("frame_width", "frame_height"),
+)
 WORDS = ("", "landmark", "landmarks", "lm", "lmk", "face", "facelandmark", "point", "points", "p", "pt", "kp",
          "keypoint", "facepoint", "mesh", "facemesh")  # fmt: skip
 """What may stand before the numbers of columns, in small letters."""

@@ -18,8 +18,9 @@ from fba.capture.points import PointMotion
 from fba.errors import FbaWarning, FormatError
 from fba.face import FaceModel
 from fba.formats import format_of
+from fba.formats.face_tables import pyfeat
 from fba.formats.face_tables.points import read_points
-from fba_conformance.captures.face_files import openface_csv
+from fba_conformance.captures.face_files import openface_csv, pyfeat_csv
 from fba_conformance.captures.point_files import (
     LAYOUTS,
     array,
@@ -182,3 +183,26 @@ def test_the_table_of_the_example_that_tracks_films(tmp_path: Path) -> None:
     assert found.aspect == pytest.approx(16 / 9)
     assert np.flatnonzero(~found.seen).tolist() == [4]
     np.testing.assert_allclose(found.positions[5:], motion.positions[5:], atol=1e-6)
+
+
+def test_depth_in_another_unit_is_left_out(tmp_path: Path) -> None:
+    mixed = replace(deep(), positions=deep().positions * (1280, 720, 1))
+    found = read_points(saved(tmp_path, "a.csv", wide(mixed)))
+    assert found.flat
+    assert found.findings == ("depth is in another unit than x and y, and left out",)
+
+
+def test_heads_of_py_feat_are_found_from_points(tmp_path: Path) -> None:
+    take = film(FaceModel.default(), 68, frames=90, flat=True)
+    units = {unit: np.zeros(90) for unit in (1, 2, 4, 6, 12)}
+    table = pyfeat_csv(units, frames=np.arange(90.0)).splitlines()
+    names = ",".join(f"{axis}_{point}" for axis in "xy" for point in range(68))
+    rows = [",".join(map(str, points.T.ravel().tolist())) for points in take.motion.positions]
+    lines = [f"{line},{more},approx_time" for line, more in zip(table[:1], [names], strict=True)]
+    lines += [f"{line},{more},00:01" for line, more in zip(table[1:], rows, strict=True)]
+    found = pyfeat.read_face(saved(tmp_path, "face.csv", "\n".join(lines)), fps=30)
+    assert found.head is not None
+    np.testing.assert_allclose(found.head[:, 0], take.faps[:, 47] * 1e-5, atol=0.06)
+    np.testing.assert_allclose(found.head[:, 1], take.faps[:, 48] * 1e-5, atol=0.06)
+    np.testing.assert_allclose(found.head[:, 2], take.faps[:, 49] * 1e-5, atol=0.02)
+    assert "found from the face's points instead" in found.findings[-1]
