@@ -131,3 +131,12 @@ def test_edges_of_holes_are_not_dark(context: Any, alpha: Alpha) -> None:
     front = wall(0.5, WHITE, [255, 0, 255, 0, 255], alpha=alpha)  # no edge is at one of a pixel
     plain = draw_row(context, [behind])
     np.testing.assert_allclose(draw_row(context, [behind, front]), plain, atol=4)
+
+
+def test_a_colour_is_the_same_at_any_alpha(context: Any) -> None:
+    """A grey wall is as grey half transparent by its picture as by its material."""
+    behind, grey = wall(0.0, RED, [255, 255]), (0.05, 0.05, 0.05, 0.0)
+    by_picture = wall(0.5, grey, [128, 128], alpha="blend")
+    by_material = wall(0.5, grey, [255, 255], alpha="blend", opacity=128 / 255)
+    seen = [draw(context, [behind, front])[0] for front in (by_picture, by_material)]
+    np.testing.assert_allclose(*seen, atol=3)
