@@ -84,9 +84,9 @@ class StreamPipe:
 class StreamRecorder:
     """Encodes frames as they come and writes them to targets at once.
 
-    frames, size: written so far. rate: frames per second; 0 before the first. options: by default those of
-    captures: values that no plane carries are brought as near as can be, and a body's steps are the finer
-    ones, named behind the end.
+    targets: where it goes. frames, size: written so far. rate: frames per second; 0 before the first.
+    options: by default those of captures: values that no plane carries are brought as near as can be, and a
+    body's steps are the finer ones, named behind the end.
     """
 
     def __init__(self, targets: Sequence[Target], options: EncoderOptions | None = None) -> None:
@@ -94,7 +94,7 @@ class StreamRecorder:
         self.frames = self.size = 0
         self.rate = Fraction(0)
         self.encoder = Encoder(self.options)
-        self._targets = tuple(targets)
+        self.targets = tuple(targets)
 
     def push(self, animation: Animation) -> None:
         """Add frames. Raises FormatError where a target cannot be written."""
@@ -106,12 +106,12 @@ class StreamRecorder:
         """End the stream, if it has any frame, and close the targets."""
         if self.frames:
             self._write(self.encoder.finish(), b"")
-        for target in self._targets:
+        for target in self.targets:
             target.close()
 
     def _write(self, data: bytes, ending: bytes) -> None:
         self.size += len(data)
-        for target in self._targets:
+        for target in self.targets:
             target.write(data, ending)
 
 

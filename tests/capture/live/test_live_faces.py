@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from fractions import Fraction
 from pathlib import Path
 
@@ -10,11 +11,15 @@ import pytest
 
 import fba
 from fba.capture import from_blendshapes
+from fba.errors import FbaError
 from fba.formats.face_tables import ifacialmocap
 from fba.formats.face_tables import livelink_udp as recorded
+from fba.live import Capture, Summary, find_kind
 from fba.live.recording import stream_rate
+from fba.live.sending import send
 from fba_conformance.captures.face_files import (
     STEP,
+    UDP_ORDER,
     camel,
     datagram,
     face_angles,
@@ -248,3 +253,78 @@ def test_objects_of_vtube_studio() -> None:
     np.testing.assert_allclose(live.face.values, expected.values[: len(live)], atol=1)
     assert (summary.used, summary.unseen) == (ROWS - 1, 1)
     assert dict(summary.refused) == {"no objects of VTube Studio": 6, "without a time": 1}
+
+
+def test_what_is_shown_is_the_newest_datagram() -> None:
+    capture = Capture(find_kind("livelink"), lambda _frames: None)
+    assert capture.newest() == (None, None)
+    for row, data in enumerate([*SENT[:9], datagram(None, 18_000 + 9 * STEP)]):
+        capture.receive(data, "10.0.0.2", row / 60)
+        face, body = capture.newest()
+        assert body is None
+        if row == 9:
+            assert face is None
+            continue
+        alone, _ = captured("livelink", [(0.0, "10.0.0.2", data)])
+        assert alone is not None
+        assert face == alone.face
+    nobody = Capture(find_kind("vtube"), lambda _frames: None, neutral=1.0)
+    nobody.receive(vtube_objects(WEIGHTS, np.zeros((1, 3)))[0], "10.0.0.2", 0.0)
+    assert nobody.newest() == (None, None)  # the neutral face is not known yet
+
+
+def test_swapped_sides() -> None:
+    def face(left: float, right: float) -> list[bytes]:
+        values = [0.0] * 61
+        values[UDP_ORDER.index("MouthLeft")], values[UDP_ORDER.index("MouthRight")] = left, right
+        values[UDP_ORDER.index("JawLeft")], values[UDP_ORDER.index("JawRight")] = left, right
+        return [datagram(values, 1.0)]
+
+    one, summary = captured("livelink", at_rate(face(0.6, 0.1)), swap=True)
+    other, _ = captured("livelink", at_rate(face(0.1, 0.6)))
+    assert one is not None
+    assert other is not None
+    assert one.face == other.face
+    assert summary.notes == ["mouthLeft/mouthRight and jawLeft/jawRight changed places"]
+    assert one != captured("livelink", at_rate(face(0.6, 0.1)))[0]
+
+
+def test_the_summary_says_everything_once() -> None:
+    summary = Summary(
+        sender="'Anna' (10.0.0.2)", received=90, used=70, unseen=5, doubled=1, late=2, reordered=3, strayed=4,
+        jumps=2, gaps=2, longest_gap=0.5, notes=["a note"],
+    )  # fmt: skip
+    summary.leave_out("'Bo' (10.0.0.3)")
+    summary.refuse("cut short")
+    assert summary.lines() == [
+        "90 datagrams from 'Anna' (10.0.0.2): 70 used, 5 without a face",
+        "3 out of order, put in order, 1 doubled, 2 too late, 4 with a time of their own",
+        "2 gaps, 0.50 s at most, are bridged",
+        "the sender's clock was set 2 times; the stream goes on by ours",
+        "left out: 1 cut short",
+        "of other senders, left out: 'Bo' (10.0.0.3) (1); --sender NAME chooses one",
+        "a note",
+    ]
+    assert summary.values()["refused"] == {"cut short": 1}
+
+
+def test_what_is_sent_again_and_again() -> None:
+    now, sent = [0.0], []
+
+    def sleep(seconds: float) -> None:
+        now[0] += seconds
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(5)
+        animation, _ = captured("livelink", at_rate(SENT[:6]))
+        assert animation is not None
+        address = ("127.0.0.1", int(receiver.getsockname()[1]))
+        count = send(animation, address, loop=True, seconds=0.2, clock=lambda: now[0], sleep=sleep)
+        assert count == 12
+        sent = [receiver.recv(1000) for _ in range(count)]
+    assert now[0] == pytest.approx(11 / 60)
+    times = [recorded.read_packet(one, 0, "a.udp")[0] for one in sent]
+    assert [round(60 * one.seconds, 3) for one in times if one is not None] == list(range(12))
+    with pytest.raises(FbaError, match="nothing can be sent there"):
+        send(animation, ("127.0.0.1", 0))

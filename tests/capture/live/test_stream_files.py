@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import random
 import signal
@@ -19,6 +20,7 @@ import fba
 from fba.animation import Animation
 from fba.errors import FormatError
 from fba.live import StreamFile, StreamRecorder
+from fba.live.recording import StreamPipe
 from fba.tracks import BodyTrack, FaceTrack
 from fba_conformance.captures.face_files import datagram
 
@@ -97,3 +99,23 @@ def test_a_killed_program_leaves_a_stream_of_all_frames_but_the_last(tmp_path: P
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # as for a file that was cut off
         assert len(fba.read(path)) == count - 1
+
+
+def test_a_pipe_gets_what_is_complete() -> None:
+    whole, target = performance(), io.BytesIO()
+    recorder = StreamRecorder([StreamPipe(target)])
+    for frame in range(FRAMES):
+        recorder.push(whole[frame : frame + 1])
+    recorder.finish()
+    at_once = fba.Encoder(recorder.options)
+    assert target.getvalue() == at_once.push_animation(whole) + at_once.finish()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device")
+def test_a_full_disk() -> None:
+    recorder = StreamRecorder([StreamFile("/dev/full")])
+    recorder.push(performance()[:1])
+    with pytest.raises(FormatError, match="could not be written"):
+        recorder.push(performance()[1:9])
+    for target in recorder.targets:
+        target.close()
