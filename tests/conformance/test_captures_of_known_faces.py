@@ -14,6 +14,7 @@ import fba
 from fba.face import FaceModel
 from fba_conformance.captures import __main__ as command
 from fba_conformance.captures import damage
+from fba_conformance.captures.face_files import ANGLES, UDP_ORDER, livelink_csv, livelink_udp
 from fba_conformance.captures.heads import other_head
 from fba_conformance.captures.marked_actor import Take, as_animation, perform
 from fba_conformance.captures.marker_files import MAKERS
@@ -92,6 +93,20 @@ def test_our_own_sample_performed() -> None:
     corners = {59: errors[59], 60: errors[60]}  # they differ from the inner lips, where no marker is
     check({fap: error for fap, error in errors.items() if fap not in corners}, EXACT)
     check(errors, NOISY)
+
+
+def test_shapes_of_recordings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A smile comes back, and what is never moved has no correlation."""
+    count = 90
+    columns = {name: np.zeros(count) for name in (*UDP_ORDER, *ANGLES)}
+    columns["MouthSmileLeft"] = 0.5 + 0.5 * np.sin(np.arange(count) / 9)
+    (tmp_path / "face.csv").write_text(livelink_csv(columns))
+    (tmp_path / "face.udp").write_bytes(b"".join(livelink_udp(columns)))
+    command.main(["correlate", str(tmp_path / "face.csv"), str(tmp_path / "face.udp")])
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 2 + 52
+    assert "| mouthSmileLeft | 1.000 | 1.00 |" in lines
+    assert "| tongueOut | – | 0.00 |" in lines
 
 
 def test_truth_of_a_take(take: Take) -> None:

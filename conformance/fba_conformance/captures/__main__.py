@@ -2,6 +2,7 @@
 
 python -m fba_conformance.captures write FOLDER [--seconds 10] [--head HEAD]
 python -m fba_conformance.captures measure [--seconds 10] [--head HEAD]... [--faps FILE]...
+python -m fba_conformance.captures correlate RECORDING...
 """
 
 from __future__ import annotations
@@ -45,6 +46,10 @@ def main(arguments: list[str] | None = None) -> None:
     measuring = commands.add_parser("measure", help="encode captures; print how far their FAPs are off")
     measuring.add_argument("--head", type=Path, action="append", default=[], help="another head, too")
     measuring.add_argument("--faps", type=Path, action="append", default=[], help="what else is performed")
+    correlating = commands.add_parser(
+        "correlate", help="shapes of recordings to FAPs and back; print their correlations"
+    )
+    correlating.add_argument("recordings", type=Path, nargs="+", help="tables or datagrams of Live Link Face")
     for each in (writing, measuring):
         each.add_argument("--seconds", type=float, default=10.0)
     options = parser.parse_args(arguments)
@@ -52,6 +57,8 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         if options.command == "write":
             write_captures(options.folder, options.seconds, options.head)
+        elif options.command == "correlate":
+            click.echo(report.shapes_table(options.recordings))
         else:
             click.echo(measure_all(options.seconds, options.head, options.faps))
     except FbaError as error:

@@ -5,8 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import numpy as np
+
 import fba
+from fba.arrays import Float64
+from fba.capture import ShapeMotion, from_blendshapes, to_blendshapes
+from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.face import FaceModel
+from fba.formats import format_of
+from fba.formats.face_tables import livelink_csv, livelink_udp
 from fba.parameters import faps
 from fba_conformance.captures.marked_actor import as_face, record
 from fba_conformance.captures.marker_files import MAKERS
@@ -25,6 +32,8 @@ RATE = 100
 
 
 NOT_TOLD = "–"
+STILL = 1e-6
+"""Sum of the squares of weights that do not move."""
 
 
 def faps_table(errors: Mapping[str, Mapping[int, float | None]]) -> str:
@@ -67,6 +76,43 @@ def files_table(folder: Path, head: FaceModel, seconds: float) -> str:
         errors = measure_animation(*encode_file(folder, name, seconds))
         rows.append([f"`{name}`", *_worst_cells(errors)])
     return as_markdown(rows)
+
+
+def shapes_table(recordings: Iterable[Path]) -> str:
+    """Return a row for each of ARKit's shapes: its correlation with itself after FAPs, its largest weight.
+
+    Means of each recording do not count. Shapes that a recording does not move have no correlation.
+    """
+    before: list[Float64] = []
+    after: list[Float64] = []
+    largest = np.zeros(len(ARKIT_ORDER))
+    for path in recordings:
+        motion = read_shapes(path)
+        animation = from_blendshapes(motion)
+        seen, at = motion.seen, animation.index / float(animation.rate)
+        weights = np.zeros((len(at), len(ARKIT_ORDER)))
+        for name, values in zip(motion.names, motion.weights[seen].T, strict=True):
+            if name in ARKIT_ORDER:
+                weights[:, ARKIT_ORDER.index(name)] = np.interp(at, motion.times[seen], values)
+        largest = np.maximum(largest, weights.max(axis=0))
+        before.append(weights - weights.mean(axis=0))
+        back = to_blendshapes(animation).weights
+        after.append(back - back.mean(axis=0))
+    one, other = np.concatenate(before), np.concatenate(after)
+    powers = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
+    rows = [["shape", "correlation", "largest weight"]]
+    for number, name in enumerate(ARKIT_ORDER):
+        power = float(powers[number])
+        told = f"{float(one[:, number] @ other[:, number]) / power:.3f}" if power > STILL else NOT_TOLD
+        rows.append([name, told, f"{largest[number]:.2f}"])
+    return as_markdown(rows)
+
+
+def read_shapes(path: Path) -> ShapeMotion:
+    """Return what a table of Live Link Face or its datagrams hold. Raises FbaError."""
+    if format_of(path).name == "livelink-udp":
+        return livelink_udp.read_face(path)
+    return livelink_csv.read_face(path)
 
 
 def _worst_cells(errors: Errors) -> list[str]:
