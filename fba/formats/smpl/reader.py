@@ -82,7 +82,7 @@ def read(
     """
     with naming_file(path):
         read_in = _read(path, fps, limits)
-        motion = _skeleton(read_in, path)
+        motion = _skeleton(read_in, path, limits)
         animation = from_skeleton(
             motion, rate, joints=joints, origin=origin, ground=ground, plant=plant, spine=spine, rest=rest,
             up=up, limits=limits,
@@ -96,7 +96,7 @@ def read_motion(
 ) -> SkeletonMotion:
     """Return the joints as they turn in the file, y up. Raises FormatError, LimitError."""
     with naming_file(path):
-        return _skeleton(_read(path, fps, limits), path)
+        return _skeleton(_read(path, fps, limits), path, limits)
 
 
 def _read(path: Path, fps: Fraction | int | str | None, limits: Limits) -> _Motion:
@@ -158,12 +158,12 @@ def _poses(arrays: dict[str, Any], path: Path) -> tuple[Float64, Float64 | None,
     return (poses[:, : 3 * BODY] if poses.shape[1] == SMPL else poses), None, None
 
 
-def _skeleton(read_in: _Motion, path: Path) -> SkeletonMotion:
+def _skeleton(read_in: _Motion, path: Path, limits: Limits) -> SkeletonMotion:
     """Return the motion of a skeleton of average proportions, y up."""
     count, joints = read_in.turns.shape[:2]
     table = _joints()[:joints]
     names = tuple(row[0] for row in table)
-    check_memory(DEFAULT_LIMITS, count, joints, f"{path}: a motion", read_in.turns.nbytes)
+    check_memory(limits, count, joints, f"{path}: a motion", read_in.turns.nbytes)
     turns = Rotation.from_rotvec(read_in.turns.reshape(-1, 3)).as_quat().reshape(count, joints, 4)
     turns = np.roll(turns, 1, axis=2)
     upright = _to_y_up(turns[:, 0])

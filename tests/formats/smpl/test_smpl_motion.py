@@ -136,3 +136,10 @@ def test_python_objects_are_not_loaded(tmp_path: Path) -> None:
     path.write_bytes(data[: len(data) // 2])
     with pytest.raises(FormatError, match="no archive of arrays that can be read"):
         read_motion(path)
+
+
+@pytest.mark.parametrize("root", [STANDS, np.zeros(3), np.array([np.pi, 0.0, 0.0])])
+def test_heads_are_up_along_y(tmp_path: Path, root: np.ndarray) -> None:
+    """Whether the file has z up, y up, or y down as cameras have it."""
+    _, places = read_motion(saved(tmp_path, poses=body(root).reshape(FRAMES, -1))).world()
+    assert (places[:, 15, 1] - places[:, 0, 1] > 0.5).all()
