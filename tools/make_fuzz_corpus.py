@@ -208,7 +208,7 @@ scale = ["A", "B"]
 "B" = { vertex = 2, radius = 2, fixed = true }
 "Cap" = { fixed = true }
 "Chin: low" = { vertex = 3, radius = 0.25 }
-"Lip" = { vertex = 4, radius = 0.25, follows = "Chin: low" }
+"Lip" = { vertex = 4, radius = 0.25, follows = "Chin: low", share = 0.5 }
 """
 MTL = "newmtl flesh\nKd 0.7 0.4 0.3\nNs 20\nd 0.9\nmap_Kd -s 1 1 1 skin.png\nnewmtl eye\nKd 1 1 1\nTr 0.5\n"
 VRML = """#VRML V2.0 utf8

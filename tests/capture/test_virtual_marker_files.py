@@ -18,7 +18,7 @@ MAPPING = MarkerMapping(
         "FHL": VirtualMarker(1, 0.1, 0.1, fixed=True),
         "FHR": VirtualMarker(0, 0.1, 0.1, fixed=True),
         "Cap": VirtualMarker(None, fixed=True),
-        "Lip": VirtualMarker(9, 0.5, 0.25, follows="Chin"),
+        "Lip": VirtualMarker(9, 0.5, 0.25, follows="Chin", share=0.75),
     },
     assignment="exclusive", overlap="add", scale=("FHL", "FHR"),
     made_for=MadeFor("head.obj", 20, 30, "00ff", "ff00"),

@@ -24,6 +24,7 @@ from fba.capture.virtual_markers.influence import WalkedMesh, give_to_nearest
 from fba.capture.virtual_markers.weights import find_weights
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import Deformer, FaceModel
+from fba.face.authoring.surface.landmarks import find_landmarks
 from fba.face.feature_points import row_of
 from fba.face.model import Part
 from fba_conformance.captures.marked_actor import Take
@@ -368,7 +369,8 @@ def test_inner_lips_follow_the_outer_ones() -> None:
     model, shown = FaceModel.default(), perform(take().motion, head(), proposed())
     inner = {"LPT inner": "2.2", "LPB inner": "2.3", "LPL1 inner": "2.6", "LPR1 inner": "2.7",
              "LPL2 inner": "2.8", "LPR2 inner": "2.9"}  # fmt: skip
-    assert {name for name, one in proposed().markers.items() if one.follows} == set(inner)
+    following = {name for name, one in proposed().markers.items() if one.follows}
+    assert {name for name in following if name.endswith(" inner")} == set(inner)
     moved = shown.vertices(90) - head().vertices
     for name, point in inner.items():
         vertex = model.bound[row_of()[point]]
@@ -377,6 +379,29 @@ def test_inner_lips_follow_the_outer_ones() -> None:
         assert proposed().markers[name].follows == outer
         way = shown.displacements[90, shown.names.index(outer)]
         np.testing.assert_allclose(moved[vertex], way, atol=1e-9)  # both lips, though they touch
+
+
+def test_lids_shut_along_their_whole_length() -> None:
+    model, weights = FaceModel.default(), find_weights(head(), proposed())
+    shut = np.zeros((len(weights.names), 3))
+    for name, marker in proposed().markers.items():
+        if name == "LIDL" or marker.follows == "LIDL":
+            shut[weights.names.index(name), 1] = -0.009 * marker.share
+    moved = weights.moved(shut)[:, 1] / -0.009
+    faps = np.zeros(68, np.float32)
+    faps[18] = 900  # close_t_l_eyelid
+    deformer = Deformer(model)
+    truth = np.linalg.norm(deformer.local(faps) - deformer.local(np.zeros(68, np.float32)), axis=1)
+    margin = find_landmarks(head().skin, model.points, model.bound).contour("left upper lid")
+    at = [int(np.flatnonzero(head().skin.number == vertex)[0]) for vertex in margin]
+    middle = model.bound[row_of()["3.1"]]
+    assert len(at) > 20
+    np.testing.assert_allclose(moved[at], truth[at] / truth[middle], atol=0.15)
+    below = model.bound[row_of()["3.3"]]
+    assert abs(moved[below]) < 0.02  # the walk does not go round the corners of the eye
+    assert {name for name, one in proposed().markers.items() if one.follows == "LIDL"} == {
+        "LIDL 1", "LIDL 2", "LIDL 3", "LIDL 4"
+    }  # fmt: skip
 
 
 def test_a_marker_may_move_several_places() -> None:
@@ -390,6 +415,12 @@ def test_a_marker_may_move_several_places() -> None:
     lost = mapping().changed("Hat", VirtualMarker(100, 3.0, 3.0, follows="Cap"))
     with pytest.raises(ModelError, match="the capture has no marker Cap, which the mapping names"):
         perform(capture(), sheet(), lost)
+    half = mapping().changed("M too", VirtualMarker(100, 3.0, 3.0, follows="M", share=0.5))
+    moved = perform(capture(), sheet(), half).vertices(39) - sheet().vertices
+    np.testing.assert_allclose(moved[100], (0, 0, 0.5), atol=1e-9)
+    for share, follows in ((0.5, ""), (0.0, "M"), (-1.0, "M"), (float("nan"), "M"), (11.0, "M")):
+        with pytest.raises(OptionError, match="a share, from above 0 to 10, is of what another"):
+            VirtualMarker(3, 1.0, 1.0, follows=follows, share=share)
     with pytest.raises(OptionError, match="what follows 'M' needs a vertex, and cannot be fixed"):
         VirtualMarker(3, 1.0, 1.0, fixed=True, follows="M")
 

@@ -12,6 +12,8 @@ from fba.name_maps import list_names
 
 ASSIGNMENTS = ("shared", "exclusive")
 OVERLAPS = ("match", "add")
+MOST_SHARE = 10.0
+"""Largest share by which one marker goes with another."""
 LARGEST = 1e9
 """Largest radius or depth, in the unit of the head."""
 
@@ -24,7 +26,8 @@ class VirtualMarker:
     which only tells how the head moves. radius: of the cylinder around the centre, in x and y. depth: half
     the cylinder's length, along z. Both in the unit of the head. fixed: the face does not move it; what the
     capture says of it is how the head moves. follows: the captured marker that it goes with, "" for that of
-    its own name: so a marker on the outer lip takes the inner one along, where nothing can be glued.
+    its own name: so a marker on the outer lip takes the inner one along, where nothing can be glued. share:
+    how far it goes with that one, above 0: the ends of a lid go less far than its middle.
     """
 
     vertex: int | None
@@ -32,10 +35,15 @@ class VirtualMarker:
     depth: float = 0.0
     fixed: bool = False
     follows: str = ""
+    share: float = 1.0
 
     def __post_init__(self) -> None:
         if self.follows and (self.fixed or self.vertex is None):
             raise OptionError(f"what follows {self.follows!r} needs a vertex, and cannot be fixed")
+        if self.share != 1.0 and not (self.follows and 0 < self.share <= MOST_SHARE):
+            raise OptionError(
+                f"a share, from above 0 to {MOST_SHARE:g}, is of what another marker does, not {self.share:g}"
+            )
         if self.vertex is None:
             if not self.fixed:
                 raise OptionError(

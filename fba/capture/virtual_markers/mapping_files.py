@@ -21,7 +21,14 @@ HEADING = """\
 # the head. Fixed markers are not moved by the face; they tell how the head moves. Change what you like and
 # give it to `fba markers --map`.
 """
-KEYS = {"vertex": int, "radius": (int, float), "depth": (int, float), "fixed": bool, "follows": str}
+KEYS = {
+    "vertex": int,
+    "radius": (int, float),
+    "depth": (int, float),
+    "fixed": bool,
+    "follows": str,
+    "share": (int, float),
+}
 MARKER_WORDS = {int: "a whole number", (int, float): "a number", bool: "true or false", str: "a text"}
 COUNTS, TEXTS = ("vertices", "triangles"), ("name", "connectivity", "shape")
 
@@ -86,7 +93,8 @@ def _read_marker(name: str, entry: Any) -> VirtualMarker:
     try:
         radius = float(entry.get("radius", 0.0))
         depth = float(entry.get("depth", radius))
-        return VirtualMarker(entry.get("vertex"), radius, depth, fixed, entry.get("follows", ""))
+        follows, share = entry.get("follows", ""), float(entry.get("share", 1.0))
+        return VirtualMarker(entry.get("vertex"), radius, depth, fixed, follows, share)
     except (OptionError, OverflowError) as error:
         raise OptionError(f"{name!r}: {error}") from None
 
@@ -132,6 +140,8 @@ def _entry(marker: VirtualMarker) -> str:
         parts.append("fixed = true")
     if marker.follows:
         parts.append(f"follows = {_text(marker.follows)}")
+    if marker.share != 1.0:
+        parts.append(f"share = {marker.share!r}")
     return f"{{ {', '.join(parts)} }}"
 
 

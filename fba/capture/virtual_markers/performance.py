@@ -177,7 +177,7 @@ def perform_steady(
     for n, (name, marker) in enumerate(kept.items()):
         source = marker.follows or name
         if not marker.fixed and source in columns:  # one that was left out stays where it is
-            displacements[:, n] = local[:, columns[source]]
+            displacements[:, n] = marker.share * local[:, columns[source]]
     # the head's motion about the point that the neutral markers' middle is laid onto
     middle, there = markers.neutral[placed].mean(axis=0), centres.mean(axis=0)
     rotation = turn @ markers.rotation @ turn.T

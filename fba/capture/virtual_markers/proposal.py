@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from fba.capture.markers.marker_maps import find_map
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.targets import HEAD, RIGID, target_points
 from fba.capture.virtual_markers.alignment import align
+from fba.capture.virtual_markers.companions import LIDS, find_companions
 from fba.capture.virtual_markers.heads import MarkedHead
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
 from fba.errors import ModelError
@@ -28,13 +29,10 @@ RADII = (0.010, 0.045)
 """Smallest and largest radius that is proposed, metres on a head of natural size."""
 FIRST_RADIUS = 0.03
 """Metres, on a head of natural size, that the first virtual marker reaches."""
-INNER_LIPS = {"2.2": "8.1", "2.3": "8.2", "2.6": "8.5", "2.7": "8.6", "2.8": "8.7", "2.9": "8.8"}
-"""Points of the inner lips, and of the outer ones that they go with: nothing can be glued to them."""
-INNER_RADIUS, INNER_DEPTH = 0.012, 0.004
-"""Metres that these reach: any deeper, a walk goes through the mouth to the other lip."""
-LIDS = ("3.1", "3.2", "3.3", "3.4")
-LID_RADIUS = 0.016
-"""Half the width of an eye."""
+EYE_CORNERS = ("3.7", "3.11", "3.12", "3.8")
+LID_REACH = 0.8
+"""Share of the way to the nearer corner of the eye that a lid's radius is: a walk that reaches the corner
+goes on to the other lid."""
 
 
 def propose_mapping(
@@ -44,8 +42,8 @@ def propose_mapping(
 
     places: marker -> place on the face, as of `fba.capture.from_markers`; None to find them by names, or by
     the cloud's shape. A marker at a feature point that the head has gets its vertex; one that the face does
-    not move is fixed. Others are laid onto the nearest skin between them, and inner lips without markers
-    follow the outer ones. The radius reaches just beyond the
+    not move is fixed. Others are laid onto the nearest skin between them, and some
+    virtual markers follow captured ones, see `find_companions`. The radius reaches just beyond the
     third nearest of the other markers.
 
     Raises ModelError where too few places are known.
@@ -74,17 +72,13 @@ def propose_mapping(
         if name not in vertices and places[name] not in targets and places[name] != HEAD
     ]
     vertices |= _lay_others(motion, head, vertices, others)
-    inner = _inner_lips(head, vertices, places, motion.names)
-    vertices |= {name: vertex for name, (vertex, _) in inner.items()}
-    reaches = _reaches(head, vertices, places, inner)
+    radii = _radii(head, vertices, places)
     markers = {
-        name: VirtualMarker(vertices[name], *reaches[name], name in fixed)
+        name: VirtualMarker(vertices[name], radii[name], radii[name], name in fixed)
         for name in motion.names
         if name in vertices
     }
-    markers |= {
-        name: VirtualMarker(vertex, *reaches[name], follows=outer) for name, (vertex, outer) in inner.items()
-    }
+    markers |= find_companions(head, vertices, places, motion.names)
     # what is on a cap, or where this head has no skin, still tells how the head moves
     markers |= {
         name: VirtualMarker(None, fixed=True) for name in motion.names if name in fixed - set(vertices)
@@ -99,24 +93,6 @@ def _known_targets(head: MarkedHead) -> dict[str, Float64]:
 
 def _on_skin(head: MarkedHead, vertex: int) -> bool:
     return bool(np.isin(vertex, head.face))
-
-
-def _inner_lips(
-    head: MarkedHead, vertices: Mapping[str, int], places: Mapping[str, str], names: tuple[str, ...]
-) -> dict[str, tuple[int, str]]:
-    """Return (vertex, captured marker) of virtual markers on inner lips; none if captured ones are there."""
-    if any(place in INNER_LIPS for place in places.values()):
-        return {}
-    rows, at = row_of(), {place: name for name, place in places.items() if name in vertices}
-    found = {}
-    for inner, outer in INNER_LIPS.items():
-        vertex = int(head.bound[rows[inner]])
-        if outer not in at or vertex < 0 or not _on_skin(head, vertex) or vertex in vertices.values():
-            continue
-        name = f"{at[outer]} inner"
-        if name not in names:
-            found[name] = (vertex, at[outer])
-    return found
 
 
 def _lay_others(
@@ -152,21 +128,22 @@ def _fullest_frame(motion: MarkerMotion, names: list[str]) -> int:
     return int(motion.seen[:, columns].sum(axis=1).argmax())
 
 
-def _reaches(
-    head: MarkedHead, vertices: Mapping[str, int], places: Mapping[str, str], inner: Collection[str]
-) -> dict[str, tuple[float, float]]:
-    """Return radius and depth for each marker, in the head's unit. inner: names of those on inner lips."""
+def _radii(head: MarkedHead, vertices: Mapping[str, int], places: Mapping[str, str]) -> dict[str, float]:
+    """Return a radius for each marker, in the head's unit."""
     from scipy.spatial import cKDTree
 
     names = list(vertices)
     at = head.vertices[list(vertices.values())]
     away = cKDTree(at).query(at, k=min(NEIGHBOURS + 1, len(names)))[0]
     low, high = (size / head.metres for size in RADII)
+    corners = head.points[[row_of()[name] for name in EYE_CORNERS]]
+    corners = corners[np.isfinite(corners).all(axis=1)]
     result = {}
-    for name, usual in zip(names, np.clip(REACH * away[:, -1], low, high).tolist(), strict=True):
-        most = LID_RADIUS if places.get(name) in LIDS else INNER_RADIUS if name in inner else RADII[1]
-        radius = round(min(usual, most / head.metres), 6)
-        result[name] = radius, round(INNER_DEPTH / head.metres, 6) if name in inner else radius
+    for name, place, usual in zip(names, at, np.clip(REACH * away[:, -1], low, high).tolist(), strict=True):
+        most = high
+        if places.get(name) in LIDS and len(corners):
+            most = LID_REACH * float(np.linalg.norm(corners - place, axis=1).min())
+        result[name] = round(min(usual, most), 6)
     return result
 
 
