@@ -541,6 +541,7 @@ MUTANTS = (
         MARKERS_TEST,
     ),
     Mutant(f"{MARKERS}/solving.py", "curve[:, chin] = shifts", "curve[:, chin] += 0 * shifts", MARKERS_TEST),
+    Mutant(f"{MARKERS}/solving.py", "if JAW in solved:", "if not solved:", MARKERS_TEST),
     Mutant(f"{MARKERS}/blinks.py", "UPPER_SHARE = 0.95", "UPPER_SHARE = 0.7", MARKERS_TEST),
     Mutant(f"{MARKERS}/blinks.py", "DEEP = 0.5", "DEEP = 0.1", MARKERS_TEST),
     Mutant(f"{MARKERS}/blinks.py", "LONGEST = 0.5", "LONGEST = 5.0", MARKERS_TEST),
