@@ -26,6 +26,7 @@ OPTIONS = {
     "replace": "replace",
     "limits": "limit",
     "clip": "clip",
+    "face": "face",
     "sync": "sync",
     "offset": "offset",
     "joints": "maps",

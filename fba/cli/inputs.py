@@ -150,18 +150,18 @@ def probe_input(
     format: str | None,
     salvage: bool,
     clip: str | None = None,
+    face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> StreamInfo:
     """Return what a file of any format holds.
 
-    fps: the rate of a file that has none. clip: see `read_input`.
+    fps: the rate of a file that has none. clip: see `read_input`. face: the one to read of several.
     """
     from fba.formats import probe
 
     reader = _find_format(path, format)
-    options = (
-        {} if reader.name == "fba" else _taken(reader, {"fps": fps, "salvage": salvage or None, "clip": clip})
-    )
+    given = {"fps": fps, "salvage": salvage or None, "clip": clip, "face": face}
+    options = {} if reader.name == "fba" else _taken(reader, given)
     return probe(path, format=reader.name, limits=limits, **options)
 
 
@@ -259,7 +259,8 @@ def check_capture_options(given: Mapping[str, str], files: Iterable[Path], forma
     readers = {_find_format(file, format) for file in files if str(file) != "-"}
     for option, flag in given.items():
         if readers and not any(option in reader.read_options for reader in readers):
-            takers = " and ".join(one.name.upper() for one in formats() if option in one.read_options)
+            able = [one.name.upper() for one in formats() if one.is_capture and option in one.read_options]
+            takers = " and ".join([*([", ".join(able[:-1])] if able[:-1] else []), *able[-1:]])
             names = " and ".join(sorted(one.name.upper() for one in readers))
             raise click.UsageError(f"{flag} is for {takers}, not for {names}")
 

@@ -128,6 +128,10 @@ clip_option = click.option(
     help="Which animation of a glTF file with several, by name or number; `fba info` lists them.",
 )
 
+face_option = click.option(
+    "--face", metavar="NAME", help="Captures of several faces: the one to read, by its name."
+)
+
 limit_option = click.option(
     "--limit",
     "limit",

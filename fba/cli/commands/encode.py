@@ -178,7 +178,7 @@ class _EncodeCommand(Command):
     "Live Link Face's tables: MouthLeft and MouthRight, JawLeft and JawRight change places.",
     "auto", "yes", "no",
 )  # fmt: skip
-@click.option("--face", metavar="NAME", help="Captures of several faces: the one to read, by its name.")
+@options.face_option
 @marker_options.marker_options
 @sync_options
 @voice.audio_options

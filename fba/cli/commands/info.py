@@ -54,6 +54,7 @@ SHOWN = 8
 @options.fps_option("Frame rate of a file without a header.")
 @options.from_option
 @options.clip_option
+@options.face_option
 @options.salvage_option
 @options.limit_option
 @click.option("--values", is_flag=True, help="With --trace: the decoded symbols of every segment as well.")
@@ -66,6 +67,7 @@ def command(
     fps: Fraction | None,
     format: str | None,
     clip: str | None,
+    face: str | None,
     salvage: bool,
     limit: Limits,
 ) -> None:
@@ -95,19 +97,21 @@ def command(
                 if not as_json:
                     _print_person(path, size, person)
                 continue
-            kind, face = read_face(file, fps, format, limit) or ("", None)
-            if face is not None and (markers := _summarise_markers(face)) is not None:
+            kind, captured = read_face(file, fps, format, limit, {"face": face}) or ("", None)
+            if captured is not None and (markers := _summarise_markers(captured)) is not None:
                 size = file.stat().st_size
                 reports.append({"file": str(path), "format": kind, "size": size, "markers": markers})
                 if not as_json:
                     click.echo(f"{path}: {kind.upper()}, {size} bytes")
                     _print_markers(markers)
                 continue
-            capture = None if face is None else face.describe()
+            capture = None if captured is None else captured.describe()
             with warnings.catch_warnings():
                 if capture is not None:  # which lists what would be warned of
                     warnings.simplefilter("ignore", FbaWarning)
-                info = probe_input(file, fps=fps, format=format, salvage=salvage, clip=clip, limits=limit)
+                info = probe_input(
+                    file, fps=fps, format=format, salvage=salvage, clip=clip, face=face, limits=limit
+                )
             clips = list_clips(file, info.format, limit)
             if info.format == "fba" and info.body is not None:
                 data = file.read_bytes()

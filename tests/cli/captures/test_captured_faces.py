@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import fba
-from fba_conformance.captures.face_files import ANGLES, UDP_ORDER, livelink_csv
+from fba_conformance.captures.face_files import ANGLES, UDP_ORDER, livelink_csv, openface_csv
 
 ROWS = 90
 
@@ -51,7 +51,23 @@ def test_encode(run: Callable[..., Any], tmp_path: Path) -> None:
     assert (fba.read(target).rate, len(fba.read(target))) == (25, 38)
 
 
+def test_one_of_several_faces(run: Callable[..., Any], tmp_path: Path) -> None:
+    units = {unit: np.full(4, 2.0) for unit in (1, 6, 12, 15, 26)}
+    still, ahead = np.zeros((4, 3)), np.tile([0.0, 0.0, -1.0], (4, 2))
+    header, *rows = openface_csv(units, still, ahead).splitlines()
+    others = [row.replace(", 0,", ", 1,", 1) for row in rows]
+    path = tmp_path / "two.csv"
+    path.write_text("\n".join([header, *(row for pair in zip(rows, others, strict=True) for row in pair)]))
+    said = run("info", path)
+    assert said.code == 1
+    assert "has several faces: 0 (4 rows), 1 (4 rows); choose one with --face 0" in said.err
+    said = run("info", path, "--face", "1")
+    assert said.code == 0, said.err
+    assert "capture  4 rows" in said.out
+    assert run("encode", path, "-o", tmp_path / "a.fba", "--face", "1").code == 0
+
+
 def test_an_option_that_no_input_takes(run: Callable[..., Any], tmp_path: Path) -> None:
     said = run("encode", table(tmp_path), "-o", tmp_path / "a.fba", "--spine", "full")
     assert said.code == 2
-    assert "--spine is for BVH and GLTF, not for LIVELINK" in said.err
+    assert "--spine is for BVH, GLTF and SMPL, not for LIVELINK" in said.err

@@ -84,7 +84,7 @@ def test_info(run: Run, capture: Path) -> None:
     assert done.out.splitlines() == [
         f"{capture}: C3D, {capture.stat().st_size} bytes",
         "  time     200 frames, 2.00 s at 100 frames/s",
-        "  markers  50, in mm, +z up: FHC, FHL, FHR, FHM, FHM2, FHL2, FHR2, BRL1, ...",
+        "  markers  50, in mm, +y up: FHC, FHL, FHR, FHM, FHM2, FHL2, FHR2, BRL1, ...",
         "  gaps     none",
         "  face     34 markers have a place by the names (regions50)",
     ]
