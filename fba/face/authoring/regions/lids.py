@@ -124,15 +124,15 @@ def lid_motion(
         )
         shifts = push_edges_outside(profile, marks.surface, motion.vertices, shifts, pinned, values)
         motion = Motion(values, motion.vertices, shifts)
-    # in the corners of the eye, skin closes on itself
+    # in the corners of the eye, skin closes on itself, behind its margins too
     ends = marks.surface.vertices[own[[0, -1]]]
-    near = np.linalg.norm(marks.surface.vertices[margins][:, None] - ends, axis=2).min(axis=1)
-    corners = margins[near < CORNER * np.linalg.norm(ends[1] - ends[0])]
+    near = np.linalg.norm(marks.surface.vertices[:, None] - ends, axis=2).min(axis=1)
+    corners = np.flatnonzero(near < CORNER * np.linalg.norm(ends[1] - ends[0]))
     limited = stop_at_folds(limiter.without(corners), motion, turning=True)
     if not follows and _moving_range(limited)[1] >= CLOSED:
         return limited
     # an eye closes although its lids' edges roll in; the way up is no sculptor's
-    closing = stop_at_folds(sculptors.without(margins), motion, turning=True)
+    closing = stop_at_folds(sculptors.without(np.union1d(margins, corners)), motion, turning=True)
     up, down = limited.values < 0, closing.values >= 0
     return Motion(
         np.concatenate([limited.values[up], closing.values[down]]),
