@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -19,9 +20,9 @@ sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files",
 
 from fba.cache import load_or_make  # noqa: E402
 from fba.capture import MarkerMotion  # noqa: E402
-from fba.face import feature_point_names, neutral_points  # noqa: E402
+from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.live import KINDS  # noqa: E402
-from fba_conformance.captures import marker_files  # noqa: E402
+from fba_conformance.captures import marker_files, point_files  # noqa: E402
 from fba_conformance.captures.face_files import (  # noqa: E402
     beat,
     face_angles,
@@ -33,6 +34,7 @@ from fba_conformance.captures.face_files import (  # noqa: E402
     openface_csv,
     pyfeat_csv,
 )
+from fba_conformance.captures.tracked_actor import film  # noqa: E402
 from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
@@ -295,7 +297,17 @@ def faces() -> dict[str, bytes]:
         ).encode(),
         "pyfeat": pyfeat_csv({one: np.ones(3) / 2 for one in range(1, 7)}, frames=np.arange(3.0)).encode(),
         "beat": json.dumps(beat(few)).encode(),
+        **tracked(),
     }
+
+
+def tracked() -> dict[str, bytes]:
+    """Return points of tracked faces: iBUG's 68, in a table, in JSON and in arrays."""
+    motion = film(FaceModel.default(), 68, frames=3, flat=True).motion
+    small = replace(motion, positions=motion.positions.round())
+    kinds = ("wide.csv", "long.csv", "headless.csv", "lists.json", "points.npz", "points.npy")
+    found = {f"points-{kind}": point_files.LAYOUTS[kind](small) for kind in kinds}
+    return {**found, "points-openpose": point_files.lines(point_files.openpose_frames(small))}
 
 
 def live() -> dict[str, bytes]:

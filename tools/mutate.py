@@ -88,6 +88,9 @@ SHAPES_BACK_TEST = "tests/capture/faces/test_faps_to_shapes.py"
 SAMPLING = "fba/capture/sampling.py"
 MARKERS = "fba/capture/markers"
 MARKERS_TEST = "tests/capture/test_from_markers.py"
+POINTS, POINTS_TEST = "fba/capture/points", "tests/capture/test_from_points.py"
+POINT_FILES = "fba/formats/face_tables"
+POINT_TABLES_TEST = "tests/formats/face_tables/test_point_tables.py"
 VIRTUAL = "fba/capture/virtual_markers"
 VIRTUAL_TEST = "tests/capture/test_virtual_markers.py"
 VIRTUAL_FILES_TEST = "tests/capture/test_virtual_marker_files.py"
@@ -750,6 +753,31 @@ MUTANTS = (
     Mutant(PLANE_TIMES, "elif jump < 0 or (agreed and jump):", "elif False:", LOSS_TEST),
     Mutant(RESTARTS, "_CYCLE = 2", "_CYCLE = 1", LOSS_TEST),
     Mutant(DAMAGE, "self._frames / self._bits", "0 / self._bits", LOSS_TEST),
+    Mutant(f"{POINTS}/picture.py", "axis = 0 if down[1] < 0 else 1", "axis = 0", POINTS_TEST),
+    Mutant(f"{POINTS}/picture.py", "if tip < 0:", "if False:", POINTS_TEST),
+    Mutant(
+        f"{POINTS}/picture.py",
+        "points * np.array([ratio, 1.0, ratio])",
+        "points * np.array([ratio, 1.0, 1.0])",
+        POINTS_TEST,
+    ),
+    Mutant(
+        f"{POINTS}/lifting.py",
+        "deep[part] = shape[:, 2] + moved",
+        "deep[part] = known.template[:, 2] + 0 * moved",
+        POINTS_TEST,
+    ),
+    Mutant(
+        f"{POINTS}/neutral.py", "frames = _best(sum(told, turned), length)", "frames = whole", POINTS_TEST
+    ),
+    Mutant(f"{MARKERS}/pupils.py", "opening > SHUT * neutral", "opening > 0 * neutral", POINTS_TEST),
+    Mutant(f"{POINT_FILES}/_points.py", "and not _is_deep(positions)", "and False", POINT_TABLES_TEST),
+    Mutant(
+        f"{POINT_FILES}/points_csv.py",
+        ".reshape(len(rows), -1, width)",
+        ".reshape(len(rows), width, -1).swapaxes(1, 2)",
+        POINT_TABLES_TEST,
+    ),
     Mutant(ENCODER, "- self._origin, rate)\n        plane", ", rate)\n        plane", LOSS_TEST),
 )
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fba.capture.markers.faces import MarkerFace
+from fba.capture.markers.marker_maps import read_map
 from fba.capture.points import from_points
 from fba.capture.points.conversion import find_point_face
-from fba.errors import FbaWarning
+from fba.capture.points.places import change_places, write_places
+from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.parameters import faps
@@ -71,7 +74,7 @@ def test_68_points_in_metres() -> None:
 
 
 def test_points_without_depth_tell_nothing_of_depth() -> None:
-    take = film(actor(), 70, flat=True)
+    take = film(actor(), 70, flat=True, frames=180)
     face = find_point_face(take.motion, neutral="first")
     assert not {14, 16, 17, 27, 28} & set(face.sent)
     assert {23, 24, 25, 26} <= set(face.sent)
@@ -121,3 +124,49 @@ def test_frames_without_a_face_are_bridged() -> None:
         animation = from_points(motion)
     assert len(animation) == 240
     assert animation.body is None
+
+
+def test_the_neutral_face_of_a_film_is_found() -> None:
+    performed = np.zeros((90, 68))
+    smile = [fap - 1 for fap in (6, 7, 12, 13, 53, 54, 59, 60)]
+    performed[:50, smile] = 200.0  # most of the film, and its start
+    performed[40:, [18, 19]] = 900.0  # eyes are shut where the mouth rests
+    take = film(actor(), 478, share=True, performed=performed, turn=0.2)
+    face = find_point_face(replace(take.motion, aspect=16 / 9))
+    np.testing.assert_allclose(face.faps[:50, smile], 200, atol=25)
+    np.testing.assert_allclose(face.faps[60:, smile], 0, atol=15)
+    np.testing.assert_allclose(face.faps[:35, 18], 0, atol=30)
+    assert face.faps[60:, 18].min() > 750
+
+
+def test_eyes_that_are_shut_do_not_look_elsewhere() -> None:
+    performed = np.zeros((60, 68))
+    performed[20:30, [18, 19]] = 1000.0
+    take = film(actor(), 478, share=True, performed=performed, turn=0.0)
+    positions = take.motion.positions.copy()
+    positions[20:30, [468, 473], 0] += 0.01
+    face = find_point_face(replace(take.motion, positions=positions, aspect=16 / 9), neutral="first")
+    np.testing.assert_allclose(face.faps[:, 22:26], take.faps[:, 22:26], atol=6000)
+
+
+def test_a_neutral_frame_must_have_a_face() -> None:
+    positions = deep_take().motion.positions.copy()
+    positions[7] = np.nan
+    motion = replace(deep_take().motion, positions=positions, aspect=16 / 9)
+    with pytest.raises(OptionError, match="frame 7 has no face"), pytest.warns(FbaWarning, match="no face"):
+        find_point_face(motion, neutral=7)
+    with pytest.raises(ModelError, match="no face is seen in any of the 240 frames"):
+        find_point_face(replace(motion, positions=positions * np.nan))
+
+
+def test_places_of_points_are_changed_by_hand(tmp_path: Path) -> None:
+    changed = change_places(478, None, {"199": "2.10", "280": ""})
+    assert (changed["199"], "280" in changed) == ("2.10", False)
+    write_places(tmp_path / "map.toml", changed, 478)
+    assert read_map(tmp_path / "map.toml") == changed
+    face = find_point_face(replace(deep_take().motion, aspect=16 / 9), markers=changed, neutral="first")
+    assert 18 in face.sent
+    assert 41 not in face.sent
+    for pair, said in (({"900": "2.1"}, "there is no point 900"), ({"a+1": "2.1"}, "is no point")):
+        with pytest.raises(OptionError, match=said):
+            change_places(478, None, pair)
