@@ -94,6 +94,16 @@ class Encoder:
         self._last_intra = 0  # index of the last I plane
         self._finished = False
 
+    def expect(self, animation: Animation) -> None:
+        """Begin with ranges that hold the values and changes of an animation, in place of the standard's.
+
+        For what is coded while it comes, of which it is known how far values go: ranges that hold them from
+        the beginning need no other I planes. Ranges grow as before. ValueError after the first frame.
+        """
+        if self._pending is not None:
+            raise ValueError("this encoder has begun; say what to expect before the first frame")
+        self._ranges |= fitting_ranges(animation, self.options)
+
     def push(self, frame: Frame) -> bytes:
         """Add a frame; return the bytes that are complete."""
         return self.push_animation(Animation.from_frames([frame]))

@@ -8,6 +8,7 @@ from typing import BinaryIO, Protocol
 
 from fba.animation import Animation
 from fba.atomic import PathLike, check_target, write_error
+from fba.capture.live import widest_faces
 from fba.codec import Encoder, EncoderOptions
 from fba.codec.settings import FrameRate
 
@@ -94,6 +95,7 @@ class StreamRecorder:
         self.frames = self.size = 0
         self.rate = Fraction(0)
         self.encoder = Encoder(self.options)
+        self.encoder.expect(widest_faces())
         self.targets = tuple(targets)
 
     def push(self, animation: Animation) -> None:

@@ -10,9 +10,11 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture.blendshapes.conversion import convert_rows
+from fba.capture.blendshapes.conversion import EYES, HEAD, RADIAN, convert_rows
+from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of, largest_amounts
 from fba.capture.sampling import SLACK, interpolate
 from fba.limits import DEFAULT_LIMITS
+from fba.parameters import FAP_COUNT, fap_numbers
 from fba.tracks import FaceTrack
 
 CHUNK = 4096
@@ -20,6 +22,22 @@ CHUNK = 4096
 
 Row = tuple[float, list[Float64]]
 """A time, and what is there then: weights (N,), angles of the head (3,) and of the eyes (4,)."""
+
+
+def widest_faces() -> Animation:
+    """Return frames in which each FAP goes to the most and to the least that shapes make of it, and back.
+
+    Heads and eyes turn by a radian each way. For `fba.codec.Encoder.expect`.
+    """
+    shapes = np.array([amounts for name in ARKIT_ORDER if (amounts := amounts_of(name)) is not None])
+    most = np.maximum(np.maximum(shapes, 0.0).sum(axis=0), largest_amounts())
+    least = np.minimum(np.minimum(shapes, 0.0).sum(axis=0), -largest_amounts())
+    turns = [fap_numbers()[name] - 1 for name in (*HEAD, *EYES)]
+    most[turns], least[turns] = RADIAN, -RADIAN
+    still = np.zeros(FAP_COUNT)
+    values = np.rint([still, most, still, least, still]).astype(np.int32)
+    sent = np.broadcast_to((values != 0).any(axis=0), values.shape)
+    return Animation(Fraction(1), np.arange(len(values)), FaceTrack(values, sent))
 
 
 class LiveBlendshapes:

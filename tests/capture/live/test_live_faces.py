@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import socket
 from fractions import Fraction
 from pathlib import Path
@@ -15,7 +16,7 @@ from fba.errors import FbaError
 from fba.formats.face_tables import ifacialmocap
 from fba.formats.face_tables import livelink_udp as recorded
 from fba.live import Capture, Summary, find_kind
-from fba.live.recording import stream_rate
+from fba.live.recording import StreamPipe, StreamRecorder, stream_rate
 from fba.live.sending import send
 from fba_conformance.captures.face_files import (
     STEP,
@@ -74,6 +75,21 @@ def test_the_recorded_capture_gives_the_stream_that_its_file_gives(
         "567 datagrams from 'Test_iPhone_X' (10.0.0.2): 560 used, 7 without a face",
         "a gap of 0.13 s is bridged",
     ]
+
+
+def test_the_recorded_capture_is_read_back_as_from_its_file(shared: Path, tmp_path: Path) -> None:
+    data = (shared / "data/capture/livelink_capture.udp").read_bytes()
+    target = io.BytesIO()
+    recorder = StreamRecorder([StreamPipe(target)])
+    capture = Capture(find_kind("livelink"), recorder.push)
+    for now, host, one in at_rate(divided(data)):
+        capture.receive(one, host, now)
+    capture.finish()
+    recorder.finish()
+    assert recorder.encoder.statistics.intra_planes == 1
+    check_same(fba.decode(target.getvalue()), fba.decode(fba.encode(from_file(tmp_path, data))))
+    with pytest.raises(ValueError, match="has begun"):
+        recorder.encoder.expect(from_file(tmp_path, data))
 
 
 def test_out_of_order_doubled_lost_and_without_a_face(tmp_path: Path) -> None:

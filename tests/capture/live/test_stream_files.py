@@ -18,6 +18,7 @@ import pytest
 
 import fba
 from fba.animation import Animation
+from fba.capture.live import widest_faces
 from fba.errors import FormatError
 from fba.live import StreamFile, StreamRecorder
 from fba.live.recording import StreamPipe
@@ -56,6 +57,7 @@ def test_a_file_holds_all_frames_but_the_last_at_any_moment(parts: tuple[str, ..
                 assert len(fba.read(path)) == frame
     recorder.finish()
     at_once = fba.Encoder(recorder.options)
+    at_once.expect(widest_faces())
     assert path.read_bytes() == at_once.push_animation(whole) + at_once.finish()
     assert recorder.size == path.stat().st_size
 
@@ -108,6 +110,7 @@ def test_a_pipe_gets_what_is_complete() -> None:
         recorder.push(whole[frame : frame + 1])
     recorder.finish()
     at_once = fba.Encoder(recorder.options)
+    at_once.expect(widest_faces())
     assert target.getvalue() == at_once.push_animation(whole) + at_once.finish()
 
 
