@@ -238,6 +238,9 @@ MUTANTS = (
     Mutant(
         "fba/face/importers/assembly/_teeth_clearance.py", "BRIDGINGS = 3", "BRIDGINGS = 0", CLEARANCE_TEST
     ),
+    Mutant(
+        "fba/face/importers/assembly/pieces.py", "SIDES_OF_EYE = 3", "SIDES_OF_EYE = 0", FOREIGN_HEADS_TEST
+    ),
     Mutant("fba/face/importers/assembly/_atlas.py", "REPEATS = 4.0", "REPEATS = 400.0", JOINING_TEST),
     Mutant("fba/face/importers/assembly/_mouth_loop.py", "NEAR = 0.08", "NEAR = 0.8", DRAWN_TEST),
     Mutant("fba/face/importers/assembly/definitions.py", "LEAST = 0.004", "LEAST = -1.0", DRAWN_TEST),

@@ -39,7 +39,7 @@ from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.gltf import read_gltf, surfaces
 from gltf_documents import Sheet
 from mesh_files import write_glb
-from small_head import small_head
+from small_head import ball, small_head
 
 
 @pytest.fixture(scope="module")
@@ -373,3 +373,21 @@ def test_lids_that_break_rules_are_those_of_the_other_eye() -> None:
     assert not any("lids meet" in finding.rule for finding in check_faps(mended, [20, 22]))
     assert mended.table_of[19] is broken.table_of[19]
     assert mirror_faulty_lids(base) is base
+
+
+def test_buns_of_hair_are_no_eyes() -> None:
+    """Two round shells on top of a head without names are as much a pair as its eyes."""
+    head = small_head(cell=0.006)
+    eyes = [part for part in head.parts if part.kind == "eye"]
+    buns = []
+    for side in (-1, 1):
+        vertices, triangles = ball(np.array([0.05 * side, 0.085, -0.03]), 0.014)
+        buns.append(Part(f"shell {side}", "other", vertices, triangles))
+    unnamed = [
+        Piece(replace(part, name=f"mesh {number}", kind="other"))
+        for number, part in enumerate([head.part("skin"), *eyes, *buns])
+    ]
+    found = {piece.part.name: piece.part.vertices for piece in assemble(unnamed) if piece.part.kind == "eye"}
+    assert set(found) == {"left eye", "right eye"}
+    for name, vertices in found.items():
+        np.testing.assert_allclose(vertices.mean(axis=0), head.part(name).vertices.mean(axis=0), atol=1e-6)

@@ -35,6 +35,10 @@ PAIR = 1.7
 """Two eyes are together at least this many times as wide as tall; one eye is round."""
 WHITE = re.compile("white|sclera", re.IGNORECASE)
 """In the names of the whites of eyes."""
+AROUND = (0.7, 2.0)
+"""Least and greatest distance, in radii, at which the lids around an eyeball have vertices..."""
+SIDES_OF_EYE = 3
+"""... on at least this many of its four sides."""
 EYE_SIZES = (0.02, 0.12)
 """Radius of an eyeball by the height of the mesh, head alone to head and shoulders."""
 
@@ -135,6 +139,9 @@ def _with_eyes(
             centre, radius, error, share = fit
             if error < EYE_ROUND * radius and share > 0.5 and EYE_SIZES[0] < radius / tall < EYE_SIZES[1]:
                 spheres.append((number, int(shell), centre, radius))
+    others = [~np.isin(label, [s[1] for s in spheres if s[0] == k]) for k, label in enumerate(labels)]
+    around = np.concatenate([piece.part.vertices[own] for piece, own in zip(pieces, others, strict=True)])
+    spheres = [s for s in spheres if _is_set_in(around, s[2], s[3])] or spheres
     eyes: set[tuple[int, int]] = set()
     for plane in (0.0, _centre([piece.part.vertices for piece in pieces])) if middle is None else (middle,):
         for a in spheres if not eyes else ():
@@ -150,6 +157,15 @@ def _with_eyes(
             rest = _cut(piece, ~mask, piece.part.name) if mask.any() else piece
             result.append((rest, kinds[id(piece)]))
     return result
+
+
+def _is_set_in(vertices: Float32, centre: Float64, radius: float) -> bool:
+    """Whether vertices (N, 3) lie around a ball on most sides, as lids do, but none around a bun of hair."""
+    x, y, z = ((vertices - centre) / radius).T
+    far = np.hypot(x, y)
+    near = (far > AROUND[0]) & (far < AROUND[1]) & (np.abs(z) < AROUND[1])
+    sides = (y > np.abs(x), -y > np.abs(x), x >= np.abs(y), -x >= np.abs(y))
+    return sum(bool((near & side).any()) for side in sides) >= SIDES_OF_EYE
 
 
 def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[Piece, ...]:
