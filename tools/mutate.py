@@ -606,7 +606,7 @@ MUTANTS = (
     Mutant("fba/live/faces.py", "np.maximum(weights, 0.0)", "weights", LIVE_FACES_TEST),
     Mutant("fba/capture/live/blendshapes.py", "while last / frames > time", "while False", LIVE_FACES_TEST),
     Mutant(RECORDING, "self._file.seek(self._size)", "self._file.seek(0, 2)", STREAM_FILES_TEST),
-    Mutant(RECORDING, "self.encoder.expect(widest_faces())", "pass", LIVE_FACES_TEST),
+    Mutant(RECORDING, "self.encoder.expect(widest_faces())", "pass", STREAM_FILES_TEST),
     Mutant(RECORDING, "data + ending)", "data)", STREAM_FILES_TEST),
     Mutant(
         ENCODER,
