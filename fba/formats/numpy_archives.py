@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import zipfile
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,7 @@ def _read_array(data: bytes, path: Path, limits: Limits, objects: bool) -> Any:
             np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         )
         shape, _, dtype = read(file)
-    except (ValueError, TypeError, SyntaxError, EOFError) as error:
+    except (ValueError, TypeError, SyntaxError, EOFError, TokenError) as error:
         raise FormatError(f"is no array that can be read: {error}", path=path) from error
     if dtype.kind not in "fiu":
         if dtype.hasobject and not objects:

@@ -170,3 +170,16 @@ def test_places_of_points_are_changed_by_hand(tmp_path: Path) -> None:
     for pair, said in (({"900": "2.1"}, "there is no point 900"), ({"a+1": "2.1"}, "is no point")):
         with pytest.raises(OptionError, match=said):
             change_places(478, None, pair)
+
+
+def test_points_that_are_missing_now_and_then() -> None:
+    take = film(actor(), 68, frames=90, flat=True)
+    positions = take.motion.positions.copy()
+    positions[20:24, 48:55] = np.nan
+    positions[50:, 30] = np.nan
+    positions[:, 17] = np.nan
+    face = find_point_face(replace(take.motion, positions=positions), neutral="first")
+    assert 36 not in face.sent  # nobody saw the outer end of the right brow
+    assert np.isfinite(face.faps).all()
+    whole = find_point_face(take.motion, neutral="first")
+    assert np.abs(face.faps[:15, [52, 58]] - whole.faps[:15, [52, 58]]).max() < 40

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float64, Intp
+from fba.arrays import Bool, Float64, Intp
 from fba.capture.markers.faces import MarkerFace, Traits, find_face, from_markers
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.targets import HEAD, target_points
@@ -18,7 +18,13 @@ from fba.capture.points.lifting import lift
 from fba.capture.points.motion import PointMotion
 from fba.capture.points.neutral import find_rests
 from fba.capture.points.picture import face_misfit, upright_points
-from fba.capture.points.places import check_places, find_still, point_places, take_points
+from fba.capture.points.places import (
+    check_places,
+    fill_points,
+    find_still,
+    point_places,
+    take_points,
+)
 from fba.capture.points.sizes import even_sizes
 from fba.capture.sampling import find_gaps, interpolate
 from fba.errors import FbaWarning, ModelError, OptionError
@@ -109,14 +115,19 @@ def prepare(
     check_places(places, motion.count)
     if motion.flat:  # a point somewhere on the head has a depth that nobody knows
         places = {name: place for name, place in places.items() if place != HEAD}
-    names = tuple(places)
     still = find_still(places, motion.count)
     seen = motion.seen
     if not seen.any():
         raise ModelError(f"no face is seen in any of the {len(motion)} frames; there is nothing to encode")
     _tell_unseen(motion)
-    limits.check_bytes(FRAME_BYTES * len(motion) * len(names), "the capture", source=motion.positions.nbytes)
-    points = take_points(motion.positions[seen], names)
+    limits.check_bytes(FRAME_BYTES * len(motion) * len(places), "the capture", source=motion.positions.nbytes)
+    points = take_points(motion.positions[seen], tuple(places))
+    common: Bool = np.isfinite(points[..., 0]).any(axis=0)
+    points = points[:, common]
+    places = {name: place for (name, place), there in zip(places.items(), common, strict=True) if there}
+    names = tuple(places)
+    if motion.flat:
+        points = fill_points(points)
     template = _template(places, model)
     points = upright_points(points, names, places, template, motion.share, aspect or motion.aspect)
     fixed = [n for n, name in enumerate(names) if name in still]

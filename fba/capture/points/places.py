@@ -102,3 +102,21 @@ def take_points(positions: Float64, names: tuple[str, ...]) -> Float64:
     """Return what is at each of these points, or in their middle: positions (T, N, D) to (T, M, D)."""
     count = positions.shape[1]
     return np.stack([positions[:, list(numbers_of(name, count))].mean(axis=1) for name in names], axis=1)
+
+
+def fill_points(positions: Float64) -> Float64:
+    """Return points (T, M, D) without gaps: a missing one goes straight on, and moves as the face's middle does.
+
+    positions: NaN where a point is missing; each is there in one frame at least, as is a point in each frame.
+    """
+    missing = np.isnan(positions[..., 0])
+    if not missing.any():
+        return positions
+    middle = np.nanmedian(positions, axis=1, keepdims=True)
+    away = positions - middle
+    frames = np.arange(len(positions))
+    for point in np.flatnonzero(missing.any(axis=0)).tolist():
+        there = np.flatnonzero(~missing[:, point])
+        for axis in range(away.shape[2]):
+            away[:, point, axis] = np.interp(frames, there, away[there, point, axis])
+    return np.asarray(away + middle)

@@ -36,10 +36,12 @@ def build_points(
 ) -> PointMotion:
     """Return points (T, N, 2 or 3) as a motion; whether they are shares of the picture is seen by their size.
 
-    Points that are all 0, as trackers write where they see no face, are missing. Raises FormatError.
+    Points that are all in one place, as the zeros that trackers write where they see no face, are missing.
+    Raises FormatError.
     """
     positions = positions.copy()
-    positions[~(np.abs(np.nan_to_num(positions)) > 0).any(axis=(1, 2))] = np.nan
+    spread = np.ptp(np.nan_to_num(positions[..., :2]), axis=1)
+    positions[(spread == 0).any(axis=1)] = np.nan
     if positions.shape[2] == 3 and not (np.abs(np.nan_to_num(positions[..., 2])) > 0).any():
         positions = positions[..., :2]  # a depth that is 0 everywhere is none
     findings = list(findings)

@@ -139,6 +139,8 @@ def test_arrays_of_objects_are_not_run(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"is cut off"):
         read_points(saved(tmp_path, "a.npy", data[:-100]))
     with pytest.raises(FormatError):
+        read_points(saved(tmp_path, "a.npy", data.replace(b"}", b"{", 1)))
+    with pytest.raises(FormatError):
         read_points(saved(tmp_path, "a.npz", arrays(flat())[:-300]))
 
 
