@@ -122,7 +122,7 @@ def prepare(
     _tell_unseen(motion)
     limits.check_bytes(FRAME_BYTES * len(motion) * len(places), "the capture", source=motion.positions.nbytes)
     points = take_points(motion.positions[seen], tuple(places))
-    common: Bool = np.isfinite(points[..., 0]).any(axis=0)
+    common: Bool = np.asarray(np.isfinite(points[..., 0]).any(axis=0))
     points = points[:, common]
     places = {name: place for (name, place), there in zip(places.items(), common, strict=True) if there}
     names = tuple(places)

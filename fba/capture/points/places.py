@@ -105,7 +105,7 @@ def take_points(positions: Float64, names: tuple[str, ...]) -> Float64:
 
 
 def fill_points(positions: Float64) -> Float64:
-    """Return points (T, M, D) without gaps: a missing one goes straight on, and moves as the face's middle does.
+    """Return points (T, M, D) without gaps: missing ones go straight on, as the face's middle moves.
 
     positions: NaN where a point is missing; each is there in one frame at least, as is a point in each frame.
     """
