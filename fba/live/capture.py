@@ -127,7 +127,7 @@ class Capture:
             self._begin(sender, sample)
         if sender != self._sender or self._order is None:
             if self.summary.leave_out(sender.label):
-                self._say(f"{sender.label} sends, too, and is left out; --sender chooses one")
+                self._say(f"{sender.label} sends, too, and is left out")
             return
         self._convert(self._order.push(sample, now))
 

@@ -72,7 +72,7 @@ class Summary:
             )
         if self.other_senders:
             names = ", ".join(f"{name} ({count})" for name, count in self.other_senders.most_common())
-            lines.append(f"of other senders, left out: {names}; --sender NAME chooses one")
+            lines.append(f"of other senders, left out: {names}")
         return lines + self.notes
 
     def values(self) -> dict[str, Any]:

@@ -90,12 +90,12 @@ def test_a_head_that_turns_does_not_smile() -> None:
 
 
 def test_the_aspect_of_the_picture_is_found() -> None:
-    with pytest.warns(FbaWarning, match="taken as 16:9"):
+    with pytest.warns(FbaWarning, match="size: 16:9 makes"):
         found = find_point_face(deep_take().motion, neutral="first")
     given = find_point_face(deep_take().motion, neutral="first", aspect=16 / 9)
     np.testing.assert_array_equal(found.faps, given.faps)
     upright = film(actor(), 478, frames=30, share=True, aspect=9 / 16)
-    with pytest.warns(FbaWarning, match="taken as 9:16"):
+    with pytest.warns(FbaWarning, match="size: 9:16 makes"):
         find_point_face(upright.motion)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture.points.poses import fit_poses
-from fba.errors import FbaWarning, ModelError
+from fba.errors import FbaWarning, ModelError, Remedy
 
 ASPECTS = {"16:9": 16 / 9, "4:3": 4 / 3, "1:1": 1.0, "3:4": 3 / 4, "9:16": 9 / 16}
 """Pictures that cameras take, width / height."""
@@ -100,10 +100,12 @@ def _find_aspect(points: Float64, template: Float64) -> float:
     for name, ratio in ASPECTS.items():
         left[name] = face_misfit(some * np.array([ratio, 1.0, ratio])[: some.shape[2]], template[known])
     best, next_best = sorted(left, key=lambda name: left[name])[:2]
-    sure = "" if left[best] < SURE * left[next_best] else f", or {next_best}"
+    sure = "" if left[best] < SURE * left[next_best] else f", but {next_best} does nearly as well"
+    text = f"the points are shares of a picture of unknown size: {best} makes them most like a face"
     warnings.warn(
-        f"the points are shares of a picture of unknown size: taken as {best}{sure}, which makes them a "
-        "face; --aspect says it",
-        FbaWarning, stacklevel=6,
-    )  # fmt: skip
+        FbaWarning(text + sure).with_remedies(
+            Remedy("aspect", "give its aspect with {}", f"{ASPECTS[best]:.4g}")
+        ),
+        stacklevel=6,
+    )
     return ASPECTS[best]

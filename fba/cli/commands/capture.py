@@ -261,6 +261,8 @@ def _report(
         return
     for line in summary.lines():
         outputs.say(f"fba: {line}")
+    if summary.other_senders:
+        outputs.say("fba: --sender NAME chooses one of them")
     if output is not None:
         outputs.say(
             f"{display_name(output)}: {summary.frames} frames, {seconds_text(seconds)} at "

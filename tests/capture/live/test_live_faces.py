@@ -140,7 +140,7 @@ def test_of_two_senders_the_first_or_the_one_that_is_named() -> None:
     assert dict(summary.other_senders) == {"'Bo' (10.0.0.2)": ROWS}
     assert said == [
         "receiving from 'iPhone' (10.0.0.2)",
-        "'Bo' (10.0.0.2) sends, too, and is left out; --sender chooses one",
+        "'Bo' (10.0.0.2) sends, too, and is left out",
     ]
     named, _ = captured("livelink", mixed, sender="Bo")
     assert named == captured("livelink", at_rate(other))[0]
@@ -318,7 +318,7 @@ def test_the_summary_says_everything_once() -> None:
         "2 gaps, 0.50 s at most, are bridged",
         "the sender's clock was set 2 times; the stream goes on by ours",
         "left out: 1 cut short",
-        "of other senders, left out: 'Bo' (10.0.0.3) (1); --sender NAME chooses one",
+        "of other senders, left out: 'Bo' (10.0.0.3) (1)",
         "a note",
     ]
     assert summary.values()["refused"] == {"cut short": 1}
