@@ -161,6 +161,7 @@ def test_motion_capture(run: Run, tmp_path: Path, bvh: Path) -> None:
     assert code == 0
     assert "--bap-steps visage" in err
     assert run("encode", bvh, "-o", stream)[::2] == (0, "")
+    assert run("encode", bvh, "-o", stream, "--no-plant")[::2] == (0, "")  # planted feet bend knees a little
     decoded = fba.read(stream)
     assert decoded.rate == 10
     knee = decoded.body.values[:, 10 - 1]  # type: ignore[union-attr]  # BAP 10 l_knee_flexion
