@@ -691,6 +691,9 @@ MUTANTS = (
     ),
     Mutant(OBJECT_BORDERS, "code == USER_DATA and directly and self.ended", "code == USER_DATA", MARK_TEST),
     Mutant("fba/body/gait/_plan.py", "_SOFT = 0.85", "_SOFT = 0.7", MEASURED_TEST),
+    Mutant("fba/body/gait/_plan.py", 'self._correction("knee", swing)', "0.0", MEASURED_TEST),
+    Mutant("fba/body/gait/_plan.py", 'self._correction("thigh", swing)', "0.0", MEASURED_TEST),
+    Mutant("fba/body/gait/_plan.py", 'self._correction("foot", phase)', "0.0", MEASURED_TEST),
     Mutant(
         "fba/mesh/polygons.py", "turned = (third - begin[third]) % 2 == 1", "turned = third < 0", STRIPS_TEST
     ),

@@ -1,5 +1,8 @@
 """Characters of walkers: four characteristic poses and a posture each, from poses.csv and characters.json.
 
+corrections.csv has what is added to the curves through the poses; `tools/fit_gait.py` fits that of `normal`
+to measured people.
+
 Digest faces-and-emotions.md, 2.3 and 2.6. The poses describe half a cycle: `stance` is the leg that carries
 the body, `swing` the other one (in the extended pose the rear one, which swings next). In the other half the
 sides are exchanged. A cell that a character leaves empty is as in `normal`.
@@ -11,7 +14,7 @@ import csv
 import difflib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -111,13 +114,19 @@ class Arms:
     curl: float
 
 
+Corrections = Mapping[str, tuple[tuple[float, float], ...]]
+"""What is added to the curves through the poses, by `CORRECTED`: (phase, degrees), while the leg swings."""
+CORRECTED = ("thigh", "knee", "foot")
+"""Degrees of a swinging thigh, of its knee, and of the pitch of its foot, at phases of that leg's cycle."""
+
+
 @dataclass(frozen=True)
 class Character:
     """A way to walk.
 
     seconds: of a cycle. stride: metres from one contact of a foot to its next; width: metres between the
     lines of the two feet; both for the default body, whose hips are 0.936 m high. toes_out: degrees.
-    poses: by (pose, leg), all eight.
+    poses: by (pose, leg), all eight. corrections: what is added to the curves through them, mostly nothing.
 
     ModelError where a pose is missing, or a number is not finite or too large.
     """
@@ -133,6 +142,7 @@ class Character:
     spine: Spine
     arms: Arms
     poses: Mapping[tuple[str, str], Pose]
+    corrections: Corrections = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         missing = [f"{pose} {leg}" for pose in POSES for leg in LEGS if (pose, leg) not in self.poses]
@@ -151,10 +161,10 @@ class Character:
             ("feet", self.feet), ("pelvis", self.pelvis), ("spine", self.spine), ("arms", self.arms),
             *((" ".join(key), pose) for key, pose in self.poses.items()),
         ):  # fmt: skip
-            for field, value in vars(part).items():
+            for name, value in vars(part).items():
                 if not (np.isfinite(value) and abs(value) <= _MAX_DEGREES):
                     raise ModelError(
-                        f"gait character {self.name!r}: {group}, {field} must be a number of at most "
+                        f"gait character {self.name!r}: {group}, {name} must be a number of at most "
                         f"{_MAX_DEGREES:g}, not {value!r}"
                     )
         feet = self.feet
@@ -176,7 +186,10 @@ class Character:
         return known[name]
 
     def edited(self, pose: str, leg: str, **changes: float) -> Character:
-        """Return the character with changed values in one pose: `edited("passing", "swing", knee=80)`."""
+        """Return the character with changed values in one pose: `edited("passing", "swing", knee=80)`.
+
+        Corrections of these curves are left out: they were fitted to the poses as they were.
+        """
         if (pose, leg) not in self.poses:
             raise ModelError(
                 f"no pose {pose!r} of a {leg!r} leg; poses are {', '.join(POSES)}, legs {', '.join(LEGS)}"
@@ -186,7 +199,8 @@ class Character:
             raise ModelError(f"a pose has no {sorted(unknown)[0]!r}; it has {', '.join(_FIELDS)}")
         poses = dict(self.poses)
         poses[pose, leg] = replace(poses[pose, leg], **changes)
-        return replace(self, poses=poses)
+        corrections = {curve: points for curve, points in self.corrections.items() if curve not in changes}
+        return replace(self, poses=poses, corrections=corrections)
 
     def curve(self, field: str) -> list[float]:
         """Return eight values of a field in one cycle of a leg, from the contact of its foot on."""
@@ -207,6 +221,10 @@ def _characters() -> dict[str, Character]:
         base = poses.get(("normal", row["pose"], row["leg"]))
         cells = {f: float(row[f]) if row[f] else getattr(base, f, 0.0) for f in _FIELDS}
         poses[row["character"], row["pose"], row["leg"]] = Pose(**cells)
+    corrections: dict[str, dict[str, tuple[tuple[float, float], ...]]] = {}
+    for row in csv.DictReader((folder / "corrections.csv").read_text(encoding="utf-8").splitlines()):
+        curves = corrections.setdefault(row["character"], {})
+        curves[row["curve"]] = (*curves.get(row["curve"], ()), (float(row["phase"]), float(row["value"])))
     result = {}
     normal = table["normal"]
     for name, own in table.items():
@@ -224,5 +242,6 @@ def _characters() -> dict[str, Character]:
             Spine(**parts["spine"]),
             Arms(**parts["arms"]),
             {(p, g): poses.get((name, p, g), poses["normal", p, g]) for p in POSES for g in LEGS},
+            corrections.get(name, {}),
         )
     return result

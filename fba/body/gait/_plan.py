@@ -93,7 +93,22 @@ class Plan:
             np.array([self._foot[0], flat, *self._foot[1:]]),
         )
         later = periodic_curve(knots, values, phase, self.interpolation)
-        return np.where(phase < self.character.feet.flat, landing, later)
+        pitch = np.where(phase < self.character.feet.flat, landing, later)
+        return pitch + np.radians(self._correction("foot", phase))
+
+    def _correction(self, part: str, phase: Float64) -> Float64:
+        """Return degrees (T,) added to a curve at phases of a leg, see `CORRECTED`; less in short strides.
+
+        None while the foot stands.
+        """
+        points = self.character.corrections.get(part, ())
+        if not points:
+            return np.zeros_like(phase)
+        knots, values = np.array([(0.0, 0.0), (self._toe_off, 0.0), *points]).T
+        share = np.clip(self.stride_ratio, 0.0, 1.0)
+        degrees = periodic_curve(knots, values, np.mod(phase, 1.0), self.interpolation)
+        result: Float64 = share * degrees
+        return result
 
     def knee(self, phase: Float64) -> Float64:
         """Return (T,) bend of the knee by the poses, at phases of its own leg, radians."""
@@ -287,6 +302,8 @@ class Plan:
             x, z, bend = (np.interp(swing, knots, column) for column in values.T)
         else:
             x, z, bend = np.moveaxis(spline(knots, values, off, on, swing), -1, 0)
+        x = x - np.radians(self._correction("thigh", swing))
+        bend = bend + np.radians(self._correction("knee", swing))
         thigh = axis_matrices(0, x) @ axis_matrices(2, z) @ axis_matrices(1, np.full(x.shape, yaw))
         hip = self.hip(side, root, phase)
         swinging = ground.place_swinging_foot(side, hip, thigh, bend, ground.foot_turn(self.pitch(own), yaw))
