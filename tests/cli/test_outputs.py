@@ -70,7 +70,7 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
                 assert "--no-clobber" in options, f"fba {name}"
     assert writing == {
         "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
-        "conformance",
+        "conformance", "capture", "markers",
     }  # fmt: skip
 
 
@@ -98,6 +98,9 @@ OVERWRITING = [
     "model fit IN.csv -o OUT",
     "model points IN.csv -o OUT",
     "model fit both.fba --model IN.glb -o OUT",
+    "markers IN.png -o OUT",
+    "markers both.fba IN.glb -o OUT",
+    "capture livelink --play --model IN.glb -o OUT",
 ]
 
 

@@ -124,7 +124,8 @@ def command(
         raise click.UsageError("give -o OUT.fba to record, --play to see it, or both")
     if model is not None and not play:
         raise click.UsageError("--model goes with --play")
-    outputs = Outputs([] if output is None else [Output("-o", output)], no_clobber=no_clobber)
+    written = [] if output is None else [Output("-o", output)]
+    outputs = Outputs(written, [] if model is None else [model], no_clobber=no_clobber)
     if play:
         from fba import player
 

@@ -147,7 +147,7 @@ def test_arrays_of_objects_are_not_run(tmp_path: Path) -> None:
 def test_real_tracks(shared: Path) -> None:
     found = read_points(shared / "data/capture/mediapipe_single_face.csv")
     assert (len(found), found.count, found.share, found.flat) == (72, 478, True, False)
-    with pytest.warns(FbaWarning, match="taken as 16:9"):
+    with pytest.warns(FbaWarning, match="size: 16:9 makes"):
         smile = fba.read(shared / "data/capture/mediapipe_single_face.csv")
     assert smile.face is not None
     assert smile.face.values[10, [52, 58]].max() < 50  # before the smile

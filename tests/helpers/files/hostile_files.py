@@ -537,9 +537,8 @@ def read_markers(path: Path) -> object:
 
 
 def _markers() -> dict[str, HostileFile]:
-    from marker_files import c3d, qualisys, trc
-
     from fba.capture.markers.motion import MarkerMotion
+    from fba_conformance.captures.marker_files import c3d, qualisys, trc
 
     def take(markers: int, frames: int) -> MarkerMotion:
         positions = np.full((frames, markers, 3), 0.5)
