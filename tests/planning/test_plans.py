@@ -13,7 +13,7 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
-from fba.codec import coarsest_quantisers, code_lengths, quantise
+from fba.codec import coarsest_quantisers, quantise
 from fba.face.resolve import resolve, shown_faps
 from fba.parameters import bap_steps, fap_groups, faps
 from fba.planning import encode_planned, plan_compact, plan_exact
@@ -183,32 +183,6 @@ def test_a_viseme_that_shows_nothing_is_left_out() -> None:
     track = plan_exact(Animation(25, np.arange(20), FaceTrack(values, mask))).animation.face
     assert track is not None
     assert np.flatnonzero(track.mask.any(axis=0)).tolist() == [30]
-
-
-def test_estimated_lengths_are_those_of_the_coder() -> None:
-    rng = np.random.default_rng(5)
-    face = made_face(rng, 800)
-    sent = FaceTrack(face.values, np.broadcast_to(face.values.any(axis=0), face.values.shape))
-    options = EncoderOptions()
-    estimated = code_lengths(sent, np.array([0, 800]), options)[:, 0, 1].sum() / 8
-    planes = 799 * 6 / 8  # a header of 4 bits, and 2 that end the segment
-    length = len(fba.encode(Animation(25, np.arange(800), sent), options))
-    assert length == pytest.approx(estimated + planes, rel=0.01)
-
-
-def test_estimates_between_any_cuts_are_those_of_the_frames_alone() -> None:
-    rng = np.random.default_rng(6)
-    values = np.cumsum(rng.integers(-9, 10, (90, 296)), axis=0).astype(np.int32) * 128
-    values[:, 20:] = 0
-    cuts = np.array([0, 17, 40, 90])
-    options = EncoderOptions(bap_quant=3)
-    all_bits = code_lengths(BodyTrack(values, values != 0), cuts, options)
-    assert not all_bits[20:].any()
-    for a in range(3):
-        for b in range(a + 1, 4):
-            part = values[cuts[a] : cuts[b]]
-            alone = code_lengths(BodyTrack(part, part != 0), np.array([0, len(part)]), options)
-            assert alone[:20, 0, 1] == pytest.approx(all_bits[:20, a, b])
 
 
 def test_segments_are_the_cheapest_of_all() -> None:
