@@ -150,6 +150,14 @@ def choice_option(flag: str, text: str, *choices: str) -> Callable[[Decorated], 
     return click.option(flag, type=click.Choice(choices), default=choices[0], show_default=True, help=text)
 
 
+fap_quant_option = click.option(
+    "--quant",
+    "fap_quant",
+    type=click.IntRange(0, 31),
+    default=1,
+    show_default=True,
+    help="Quantiser of FAPs (fap_quant); 0: unquantised.",
+)
 bap_steps_option = choice_option(
     "--bap-steps",
     "Table of BAP steps of a stream, the standard's or one vendor's; auto: the one that it names, else "

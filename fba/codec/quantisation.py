@@ -51,11 +51,12 @@ def coarsest_quantisers(animation: Animation, options: EncoderOptions) -> Encode
         own = options.quant(part)
         if track is None or not own:
             continue
-        divisor = int(np.gcd.reduce(levels(track, options), axis=None)) * quantiser.scale(part, own)
+        scale, coded = quantiser.scale(part, own), levels(track, options)
+        divisor = int(np.gcd.reduce(coded, axis=None)) * scale
         if part == slots.FACE_BIT:
             assert animation.face is not None
             divisor = int(np.gcd.reduce(_amounts(animation.face), initial=divisor))
-        largest = int(np.abs(levels(track, options)).max(initial=0)) * quantiser.scale(part, own)
+        largest = int(np.abs(coded).max(initial=0)) * scale
         chosen[name] = max(
             quant
             for quant in range(own, QUANT_MAX + 1)

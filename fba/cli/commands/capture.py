@@ -83,13 +83,7 @@ LONGEST_NEUTRAL = 60.0
     "T-pose. Default: all counts as it is sent.",
 )
 @click.option("--swap", is_flag=True, help="MouthLeft and MouthRight, JawLeft and JawRight change places.")
-@click.option(
-    "--quant",
-    type=click.IntRange(0, 31),
-    default=1,
-    show_default=True,
-    help="Quantiser of FAPs (fap_quant); 0: unquantised.",
-)
+@options.fap_quant_option
 @click.option(
     "--model",
     type=click.Path(exists=True, path_type=Path),
@@ -110,7 +104,7 @@ def command(
     fps: Fraction | None,
     neutral: float | None,
     swap: bool,
-    quant: int,
+    fap_quant: int,
     model: Path | None,
     as_json: bool,
 ) -> None:
@@ -140,7 +134,7 @@ def command(
     warm_up(bodies=found.bodies)
     targets, stream = _targets(output, play=play)
     recorder = StreamRecorder(
-        targets, EncoderOptions(fap_quant=quant, clamp=True, bap_steps="visage", mark=True)
+        targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage", mark=True)
     )
     capture = Capture(
         found, recorder.push, sender=sender, rate=fps, swap=swap, neutral=neutral,

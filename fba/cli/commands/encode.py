@@ -81,14 +81,7 @@ class _EncodeCommand(Command):
 @options.from_option
 @options.clip_option
 @click.option("--name", help="Name of the sequence, for input without a header.")
-@click.option(
-    "--quant",
-    "fap_quant",
-    type=click.IntRange(0, 31),
-    default=1,
-    show_default=True,
-    help="Quantiser of FAPs (fap_quant); 0: unquantised.",
-)
+@options.fap_quant_option
 @click.option(
     "--bap-quant",
     type=click.IntRange(0, 31),

@@ -84,8 +84,7 @@ def read(
     """Return the motion of a BVH file as BAPs; see `fba.capture.from_skeleton` for the options.
 
     Raises FormatError for anything that is not BVH or whose skeleton is not a body, LimitError for more than
-    the limits allow; warns (FbaWarning) of
-    irregularities.
+    the limits allow; warns (FbaWarning) of irregularities.
     """
     motion = read_motion(path, limits=limits)
     with naming_file(path):
