@@ -104,6 +104,7 @@ fba_player
 fba.player
 fba.cli
 fba.cli.recordings
+fba.cli.coding
 fba.cli.commands
 fba.__main__
 """

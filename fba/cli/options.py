@@ -145,6 +145,12 @@ limit_option = click.option(
 """`--limit`, several times if need be; its value is `Limits`."""
 
 
+def is_given(option: str) -> bool:
+    """Whether an option of the running command, by the name of its parameter, was given and is no default."""
+    source = click.get_current_context().get_parameter_source(option)
+    return source is not None and source is not click.core.ParameterSource.DEFAULT
+
+
 def choice_option(flag: str, text: str, *choices: str) -> Callable[[Decorated], Decorated]:
     """Return an option with choices, of which the first is the default. text: its help."""
     return click.option(flag, type=click.Choice(choices), default=choices[0], show_default=True, help=text)

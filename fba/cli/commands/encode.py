@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import click
 
 from fba.animation import Animation
 from fba.cli import capture_report, joint_options, marker_options, options, step_tables
-from fba.cli.clamped_values import bring_near, clamped_lines, clamped_values
+from fba.cli.clamped_values import bring_near, clamped_lines
+from fba.cli.coding import capture_options, size_options
+from fba.cli.coding.coded_streams import encode_as_epf, encode_stream
 from fba.cli.command import Command, examples
-from fba.cli.inputs import (
-    EXISTING,
-    check_capture_options,
-    check_clip,
-    has_markers,
-    has_skeleton,
-    input_file,
-)
+from fba.cli.inputs import EXISTING, check_clip, has_markers, has_skeleton
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
-from fba.cli.printing import Progress, rate_text, seconds_text
+from fba.cli.printing import Progress
 from fba.cli.recordings import voice
 from fba.cli.recordings.inputs import (
     Moment,
@@ -33,13 +27,6 @@ from fba.cli.recordings.inputs import (
     together_values,
 )
 from fba.limits import Limits
-
-if TYPE_CHECKING:
-    from fba.codec import ClampedParameter
-
-CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "scale", "swap", "face", "neutral", "gaze",
-           "head_path", "aspect")  # fmt: skip
-"""Options that say how a capture becomes BAPs and FAPs: those that its reader takes count."""
 
 
 class _EncodeCommand(Command):
@@ -81,14 +68,7 @@ class _EncodeCommand(Command):
 @options.from_option
 @options.clip_option
 @click.option("--name", help="Name of the sequence, for input without a header.")
-@options.fap_quant_option
-@click.option(
-    "--bap-quant",
-    type=click.IntRange(0, 31),
-    default=1,
-    show_default=True,
-    help="Quantiser of BAPs (bap_quant); 0: unquantised.",
-)
+@size_options.size_options
 @click.option(
     "--intra-period",
     type=options.PeriodType(),
@@ -108,12 +88,6 @@ class _EncodeCommand(Command):
 )
 @options.written_bap_steps_option
 @options.mark_option
-@options.choice_option(
-    "--preset",
-    "What is sent: all that is given (reference); not what never moves (exact); of the FAPs only those that "
-    "players do not derive from others (compact).",
-    "reference", "exact", "compact",
-)  # fmt: skip
 @options.choice_option("--unsent", "What a player shows for FAPs that are not sent.", "keep", "interpolate")
 @click.option(
     "--gender",
@@ -129,50 +103,7 @@ class _EncodeCommand(Command):
     help="Limit values to the codable range instead of failing; default: for motion capture only.",
 )
 @click.option("--epf", type=EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says.")
-@options.choice_option(
-    "--spine",
-    "Motion capture: turn a dozen vertebrae, all, four, or one for each joint of the source.",
-    "spread", "full", "simple", "joints",
-)  # fmt: skip
-@options.choice_option(
-    "--ground",
-    "Motion capture: feet stand at height 0, at the height of the source's ground, or uncorrected.",
-    "floor", "source", "none",
-)  # fmt: skip
-@click.option(
-    "--plant/--no-plant",
-    default=True,
-    show_default=True,
-    help="Motion capture: bend legs a little where feet would otherwise miss the ground, or slip on it.",
-)
-@options.choice_option(
-    "--origin", "Motion capture: what is placed at the default position.", "source", "start", "middle"
-)
-@joint_options.map_options(out=True)
-@click.option(
-    "--rest",
-    type=joint_options.RestType(),
-    default="auto",
-    show_default=True,
-    metavar="auto|file|first|motion|N",
-    help="Motion capture: the rest pose is the file's own, its first frame, frame N, or found in the motion.",
-)
-@options.choice_option(
-    "--up", "Motion capture: the axis that points up.", "auto", "+x", "-x", "+y", "-y", "+z", "-z"
-)
-@click.option(
-    "--scale",
-    type=click.FloatRange(1e-6, 1e6),
-    metavar="METRES",
-    help="Motion capture: metres of the person shown in one unit of the file, in place of what its legs say.",
-)
-@options.choice_option(
-    "--swap",
-    "Live Link Face's tables: MouthLeft and MouthRight, JawLeft and JawRight change places.",
-    "auto", "yes", "no",
-)  # fmt: skip
-@options.face_option
-@marker_options.marker_options
+@capture_options.capture_options
 @sync_options
 @voice.audio_options
 @options.choice_option(
@@ -215,7 +146,6 @@ def command(
     limit: Limits,
     mark: bool | None,
     bap_steps: str,
-    preset: str,
     **settings: Any,
 ) -> None:
     """Encode FAP and BAP files, motion capture or captured faces as an FBA stream.
@@ -225,8 +155,8 @@ def command(
     an error; --clamp limits it to the codable range. With --epf, only what that file says is written, and no
     mark unless you ask for one.
     """
-    if epf is not None:
-        _refuse_beside_epf()
+    size_options.check_sizes()
+    size = size_options.Size.take(settings)
     check_clip(clip, inputs, format)
     page = _report_file(report)
     written = [Output("--output", output), *([Output("--report", page)] if page is not None else [])]
@@ -236,8 +166,7 @@ def command(
     outputs = Outputs([*written, *saved, *sounds], read, no_clobber=no_clobber)
     captures = [path for path in inputs if has_skeleton(path, format)]
     marked = [path for path in inputs if has_markers(path, format)]
-    typed = {name: f"--{name.replace('_', '-')}" for name in CAPTURE if not _is_left_open(name)}
-    check_capture_options(typed, inputs, format)
+    capture = capture_options.take_capture_options(settings, inputs, format)
     if map_out is not None and not (captures or marked):
         raise click.UsageError("--map-out goes with motion capture: joints of a body, or markers on a face")
     if (maps or map_out is not None) and captures and marked:
@@ -247,9 +176,7 @@ def command(
         places = marker_options.read_places(maps, marked, format, limit)
     else:
         joints = joint_options.read_joints(maps, captures, format, clip, limit)
-    capture = {option: settings.pop(option) for option in CAPTURE} | {"joints": joints, "markers": places}
-    if capture["head_path"] is None:
-        capture["head_path"] = len(inputs) == 1  # of two files, the other has a body
+    capture |= {"joints": joints, "markers": places}
     taken = read_inputs(
         inputs, capture=capture, sync=sync, offset=offset, trim=trim, fps=fps, format=format, limits=limit,
         timed=audio is not None, name=name, bap_steps=bap_steps, salvage=salvage, clip=clip,
@@ -268,13 +195,13 @@ def command(
         bap_steps, made=taken.has_captured_body, marked=mark, read=taken.tables[0] if taken.tables else None
     )
     settings |= {"bap_steps": table, "mark": mark}
-    if captures and _is_left_open("origin"):
+    if captures and not options.is_given("origin"):
         animation = bring_near(animation, table, settings["bap_quant"])
     with Progress("encoding", None):
         if epf is not None:
-            coded = _encode_as_epf(epf, animation, settings, limit)
+            coded = encode_as_epf(epf, animation, settings, limit)
         else:
-            coded = _encode(animation, settings, preset)
+            coded = encode_stream(animation, settings, size)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
     if spoken is not None:
@@ -308,7 +235,7 @@ def command(
         said: dict[str, Any] = {"verdict": reports[0].comparison.verdict} if reports else {}
         if detailed:
             said["captures"] = [capture_report.report_values(one) for one in reports]
-        figures = _figures(coded, animation)
+        figures = coded.figures(animation)
         if taken.together is not None:
             figures |= together_values(inputs, taken.together)
         if spoken is not None:
@@ -316,7 +243,7 @@ def command(
         outputs.print_json({"output": str(output), **figures, **used, **said, **limit_values})
         return
     for line in (
-        _summary(output, coded, animation),
+        coded.summary(output, animation),
         *(together_lines(inputs, taken.together) if taken.together is not None else ()),
         *((voice.voice_line(spoken),) if spoken is not None else ()),
         *clamped_lines(coded.clamped),
@@ -325,12 +252,6 @@ def command(
     ):
         outputs.say(line)
     step_tables.remind(output, animation, table, coded.bap_quant, marked=mark)
-
-
-def _is_left_open(option: str) -> bool:
-    """Whether an option has its default value because nobody gave it."""
-    source = click.get_current_context().get_parameter_source(option)
-    return source is click.core.ParameterSource.DEFAULT
 
 
 def _report_file(report: str | None) -> Path | None:
@@ -343,110 +264,7 @@ def _report_file(report: str | None) -> Path | None:
     return path
 
 
-class _Encoded(NamedTuple):
-    """A stream, and what it took.
-
-    clamped: parameters with values that no plane could carry, by label. bap_quant: the largest of any plane;
-    0 if BAPs are unquantised.
-    """
-
-    data: bytes
-    planes: int
-    intra_planes: int
-    clamped: dict[str, ClampedParameter]
-    bap_quant: int
-
-    @property
-    def clamped_count(self) -> int:
-        return sum(one.count for one in self.clamped.values())
-
-
-def _encode(animation: Animation, settings: Mapping[str, Any], preset: str) -> _Encoded:
-    """Return the stream of an animation. settings: fields of EncoderOptions."""
-    from fba.codec import EncoderOptions, encode_with_statistics
-
-    options = EncoderOptions(**settings)
-    if preset == "reference":
-        data, statistics = encode_with_statistics(animation, options)
-    else:
-        from fba.planning import encode_planned
-
-        data, statistics = encode_planned(animation, options, preset=preset)
-    return _Encoded(
-        data,
-        statistics.planes,
-        statistics.intra_planes,
-        statistics.clamped_parameters,
-        settings["bap_quant"],
-    )
-
-
 def _decode(data: bytes, bap_steps: str) -> Animation:
     from fba.codec import decode
 
     return decode(data, bap_steps=bap_steps)
-
-
-def _encode_as_epf(epf: Path, animation: Animation, settings: Mapping[str, Any], limits: Limits) -> _Encoded:
-    """Return the stream of an animation, coded plane by plane as an EPF file says."""
-    from fba.codec import encode_planes, write_mark
-    from fba.formats.epf.epf import read_epf
-
-    with input_file(epf) as file:
-        planes = read_epf(file, limits=limits)
-    table = settings["bap_steps"]
-    data = encode_planes(animation, planes, bap_steps=table)
-    quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
-    if settings["mark"] and quant:
-        data += write_mark(table)
-    return _Encoded(data, len(planes), sum(plane.intra for plane in planes), {}, quant)
-
-
-def _refuse_beside_epf() -> None:
-    """Raise click.UsageError for an option that the EPF file replaces."""
-    context = click.get_current_context()
-    own = (
-        "fap_quant",
-        "bap_quant",
-        "intra_period",
-        "start_codes",
-        "time_codes",
-        "preset",
-        "unsent",
-        "gender",
-        "clamp",
-    )
-    for parameter in context.command.params:
-        origin = context.get_parameter_source(parameter.name or "")
-        if parameter.name in own and origin is click.core.ParameterSource.COMMANDLINE:
-            raise click.UsageError(
-                f"{parameter.opts[0]} and --epf contradict each other: the EPF file says how planes are coded"
-            )
-
-
-def _bits_per_second(coded: _Encoded, animation: Animation) -> float:
-    return 8 * len(coded.data) / float(animation.duration)
-
-
-def _figures(coded: _Encoded, animation: Animation) -> dict[str, Any]:
-    return {
-        "size": len(coded.data),
-        "frames": coded.planes,
-        "intra_planes": coded.intra_planes,
-        "rate": str(animation.rate),
-        "duration": float(animation.duration),
-        "bits_per_second": round(_bits_per_second(coded, animation), 3),
-        "clamped": coded.clamped_count,
-        "clamped_parameters": clamped_values(coded.clamped),
-    }
-
-
-def _summary(output: Path, coded: _Encoded, animation: Animation) -> str:
-    text = (
-        f"{display_name(output)}: {coded.planes} frames, {seconds_text(animation.duration)} at "
-        f"{rate_text(animation.rate)} frames/s, {len(coded.data)} bytes, "
-        f"{_bits_per_second(coded, animation) / 1000:.2f} kbit/s, "
-        f"{coded.intra_planes} I plane{'s' if coded.intra_planes != 1 else ''}"
-    )
-    count = coded.clamped_count
-    return f"{text}; {count} value{'s' if count != 1 else ''} clamped" if count else text

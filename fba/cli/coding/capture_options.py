@@ -1,0 +1,93 @@
+"""How a capture becomes BAPs and FAPs: the options of `fba encode` that say it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fba.cli import joint_options, marker_options, options
+from fba.cli.command import Decorated
+from fba.cli.inputs import check_capture_options
+
+CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "scale", "swap", "face", "neutral", "gaze",
+           "head_path", "aspect")  # fmt: skip
+"""Those that the reader of a capture takes."""
+
+
+def capture_options(command: Decorated) -> Decorated:
+    """Add the options; the command takes them as keywords: `CAPTURE`, and those of maps."""
+    for option in reversed(
+        (
+            options.choice_option(
+                "--spine",
+                "Motion capture: turn a dozen vertebrae, all, four, or one for each joint of the source.",
+                "spread", "full", "simple", "joints",
+            ),
+            options.choice_option(
+                "--ground",
+                "Motion capture: feet stand at height 0, at the height of the source's ground, or "
+                "uncorrected.",
+                "floor", "source", "none",
+            ),
+            click.option(
+                "--plant/--no-plant",
+                default=True,
+                show_default=True,
+                help="Motion capture: bend legs a little where feet would otherwise miss the ground, or "
+                "slip on it.",
+            ),
+            options.choice_option(
+                "--origin",
+                "Motion capture: what is placed at the default position.",
+                "source", "start", "middle",
+            ),
+            joint_options.map_options(out=True),
+            click.option(
+                "--rest",
+                type=joint_options.RestType(),
+                default="auto",
+                show_default=True,
+                metavar="auto|file|first|motion|N",
+                help="Motion capture: the rest pose is the file's own, its first frame, frame N, or found in "
+                "the motion.",
+            ),
+            options.choice_option(
+                "--up",
+                "Motion capture: the axis that points up.",
+                "auto", "+x", "-x", "+y", "-y", "+z", "-z",
+            ),
+            click.option(
+                "--scale",
+                type=click.FloatRange(1e-6, 1e6),
+                metavar="METRES",
+                help="Motion capture: metres of the person shown in one unit of the file, in place of what "
+                "its legs say.",
+            ),
+            options.choice_option(
+                "--swap",
+                "Live Link Face's tables: MouthLeft and MouthRight, JawLeft and JawRight change places.",
+                "auto", "yes", "no",
+            ),
+            options.face_option,
+            marker_options.marker_options,
+        )
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+def take_capture_options(
+    settings: dict[str, Any], inputs: tuple[Path, ...], format: str | None
+) -> dict[str, Any]:
+    """Return what the options say for readers of captures, and remove them from those of a command.
+
+    Raises click.UsageError for one that was given and that no reader of the inputs takes.
+    """
+    given = {name: f"--{name.replace('_', '-')}" for name in CAPTURE if options.is_given(name)}
+    check_capture_options(given, inputs, format)
+    taken = {name: settings.pop(name) for name in CAPTURE}
+    if taken["head_path"] is None:
+        taken["head_path"] = len(inputs) == 1  # of two files, the other has a body
+    return taken

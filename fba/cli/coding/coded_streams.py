@@ -1,0 +1,100 @@
+"""Streams as `fba encode` makes them, and what it says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fba.animation import Animation
+from fba.cli.clamped_values import clamped_values
+from fba.cli.coding.size_options import Size
+from fba.cli.inputs import input_file
+from fba.cli.outputs import display_name
+from fba.cli.printing import rate_text, seconds_text
+from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.codec import ClampedParameter
+
+
+@dataclass(frozen=True, eq=False)
+class CodedStream:
+    """A stream, and what it took.
+
+    clamped: parameters with values that no plane could carry, by label. bap_quant: the largest of any plane;
+    0 if BAPs are unquantised.
+    """
+
+    data: bytes
+    planes: int
+    intra_planes: int
+    clamped: dict[str, ClampedParameter]
+    bap_quant: int
+
+    @property
+    def clamped_count(self) -> int:
+        """Values that no plane could carry."""
+        return sum(one.count for one in self.clamped.values())
+
+    def bits_per_second(self, animation: Animation) -> float:
+        """Return the rate of the stream of this animation."""
+        return 8 * len(self.data) / float(animation.duration)
+
+    def figures(self, animation: Animation) -> dict[str, Any]:
+        """Return what is said of the stream of this animation, for programs."""
+        return {
+            "size": len(self.data),
+            "frames": self.planes,
+            "intra_planes": self.intra_planes,
+            "rate": str(animation.rate),
+            "duration": float(animation.duration),
+            "bits_per_second": round(self.bits_per_second(animation), 3),
+            "clamped": self.clamped_count,
+            "clamped_parameters": clamped_values(self.clamped),
+        }
+
+    def summary(self, output: Path, animation: Animation) -> str:
+        """Return the same in one line. output: its file."""
+        text = (
+            f"{display_name(output)}: {self.planes} frames, {seconds_text(animation.duration)} at "
+            f"{rate_text(animation.rate)} frames/s, {len(self.data)} bytes, "
+            f"{self.bits_per_second(animation) / 1000:.2f} kbit/s, "
+            f"{self.intra_planes} I plane{'s' if self.intra_planes != 1 else ''}"
+        )
+        count = self.clamped_count
+        return f"{text}; {count} value{'s' if count != 1 else ''} clamped" if count else text
+
+
+def encode_stream(animation: Animation, settings: Mapping[str, Any], size: Size) -> CodedStream:
+    """Return the stream of an animation. settings: fields of EncoderOptions."""
+    from fba.codec import EncoderOptions, encode_with_statistics
+
+    options = EncoderOptions(**settings)
+    if size.preset == "reference":
+        data, statistics = encode_with_statistics(animation, options)
+    else:
+        from fba.planning import encode_planned
+
+        data, statistics = encode_planned(animation, options, preset=size.preset)
+    return CodedStream(
+        data, statistics.planes, statistics.intra_planes, statistics.clamped_parameters, options.bap_quant
+    )
+
+
+def encode_as_epf(
+    epf: Path, animation: Animation, settings: Mapping[str, Any], limits: Limits
+) -> CodedStream:
+    """Return the stream of an animation, coded plane by plane as an EPF file says."""
+    from fba.codec import encode_planes, write_mark
+    from fba.formats.epf.epf import read_epf
+
+    with input_file(epf) as file:
+        planes = read_epf(file, limits=limits)
+    table = settings["bap_steps"]
+    data = encode_planes(animation, planes, bap_steps=table)
+    quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
+    if settings["mark"] and quant:
+        data += write_mark(table)
+    return CodedStream(data, len(planes), sum(plane.intra for plane in planes), {}, quant)
