@@ -17,7 +17,7 @@ from fba.codec._stream.damage import Damage
 from fba.codec._stream.mark import marked_table, write_mark
 from fba.codec._whole_stream import decode
 from fba.codec.block import Block
-from fba.codec.code_length import INTRA_BITS, code_lengths
+from fba.codec.code_length import INTRA_BITS, code_lengths, level_bits, range_limit, step_scale
 from fba.codec.frame_buffer import DecodedFrames, FrameBuffer
 from fba.codec.quantisation import coarsest_quantisers, quantise
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
@@ -51,9 +51,12 @@ __all__ = [
     "encode",
     "encode_planes",
     "encode_with_statistics",
+    "level_bits",
     "marked_table",
     "probe_stream",
     "quantise",
+    "range_limit",
+    "step_scale",
     "verify_stream",
     "write_mark",
 ]

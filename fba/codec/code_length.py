@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from fba.arrays import Float64, Int64
@@ -34,13 +36,44 @@ def code_lengths(track: FaceTrack | BodyTrack, cuts: Int64, options: EncoderOpti
     scale = quantiser.scale(part, options.quant(part))
     values = levels(track, options)
     result = np.zeros((values.shape[1], len(cuts), len(cuts)))
-    symbols = 2 * RANGE_CODE_MAX * RANGE_UNIT + 1
-    logarithms = np.log2(np.maximum(np.arange(len(values) + symbols + 1, dtype=np.float64), 1))
-    factorials = np.cumsum(logarithms)
+    logarithms, factorials = _logarithms(len(values))
     for column in np.flatnonzero(values.any(axis=0)).tolist():
         one = np.ascontiguousarray(values[:, column])
         _add_lengths(one, cuts, scale, logarithms, factorials, result[column])
     return result
+
+
+def level_bits(values: Int64, scale: int) -> float:
+    """Return the bits of one parameter's levels (T,), an I plane and the P planes after it.
+
+    As `code_lengths` counts them. scale: `step_scale` of the part.
+    """
+    if not values.any():
+        return 0.0
+    logarithms, factorials = _logarithms(len(values))
+    result = np.zeros((2, 2))
+    cuts = np.array([0, len(values)])
+    _add_lengths(np.ascontiguousarray(values), cuts, scale, logarithms, factorials, result)
+    return float(result[0, 1])
+
+
+def step_scale(options: EncoderOptions, *, body: bool) -> int:
+    """Return how many table steps the quantiser of BAPs, or of FAPs, takes: the divisor of range limits."""
+    part = slots.BODY_BIT if body else slots.FACE_BIT
+    return quantiser.scale(part, options.quant(part))
+
+
+def range_limit(level: int, scale: int) -> int:
+    """Return the limit of the tightest range that holds a level from 0 up, in levels."""
+    return int(_limit(level, scale))
+
+
+@lru_cache(maxsize=4)
+def _logarithms(count: int) -> tuple[Float64, Float64]:
+    """Return log2(n) and log2(n!) for n from 0 on, as many as `count` planes and all symbols need."""
+    symbols = 2 * RANGE_CODE_MAX * RANGE_UNIT + 1
+    logarithms = np.log2(np.maximum(np.arange(count + symbols + 1, dtype=np.float64), 1))
+    return logarithms, np.cumsum(logarithms)
 
 
 @compiled
