@@ -15,7 +15,7 @@ TYPE_CHECKING = False  # as typing has it, whose import takes longer than all of
 if TYPE_CHECKING:
     from typing import Any
 
-    from fba import body, capture, face
+    from fba import body, capture, emotion, face
     from fba.animation import Animation, BodyTrack, FaceTrack, Frame
     from fba.codec import Decoder, Encoder, EncoderOptions, StreamInfo, decode, encode
     from fba.errors import (
@@ -61,7 +61,7 @@ _MODULE_OF = {
     "read": "fba.formats",
     "write": "fba.formats",
 }
-_MODULES = ("body", "capture", "codec", "face", "formats", "parameters", "player")
+_MODULES = ("body", "capture", "codec", "emotion", "face", "formats", "parameters", "player")
 
 __all__ = [
     "Animation",
@@ -86,6 +86,7 @@ __all__ = [
     "body",
     "capture",
     "decode",
+    "emotion",
     "encode",
     "face",
     "probe",

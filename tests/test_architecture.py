@@ -51,6 +51,7 @@ fba.face.importers.points
 fba.face.importers.makehuman
 fba.face.importers
 fba.face.calibration
+fba.emotion
 fba.body.skeleton
 fba.body.solve
 fba.body.skin

@@ -1,0 +1,33 @@
+"""Emotions as FAPs: named expressions, measured profiles, mixtures by rules, the plane of emotions.
+
+Digest faces-and-emotions.md, sections 7 and 8. `expression` gives one by name, `combine` mixes them,
+`expression_at` finds one for an activation and an evaluation, `perform` makes an `Animation` of them.
+"""
+
+from fba.emotion.blending import Blend, combine, parse_weights
+from fba.emotion.expression import FAMILIES, NEUTRAL_POINT, Expression
+from fba.emotion.expressions import expression, expressions
+from fba.emotion.performance import perform
+from fba.emotion.plane import expression_at, known_points
+from fba.emotion.profiles import Measurement, Movement, measured_faps, measurements, vocabulary
+from fba.emotion.rules import Rules
+
+__all__ = [
+    "FAMILIES",
+    "NEUTRAL_POINT",
+    "Blend",
+    "Expression",
+    "Measurement",
+    "Movement",
+    "Rules",
+    "combine",
+    "expression",
+    "expression_at",
+    "expressions",
+    "known_points",
+    "measured_faps",
+    "measurements",
+    "parse_weights",
+    "perform",
+    "vocabulary",
+]

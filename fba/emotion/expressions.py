@@ -1,0 +1,96 @@
+"""The table of named expressions: `expressions.csv`, with the FAPs in `expression_faps.csv`.
+
+The six universal expressions are FAP 2's own (`fba.face.expressions`). An expression with a recipe is made
+from others by the rules; its FAPs in the table are added.
+"""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from fba.arrays import Bool, Float32
+from fba.emotion.expression import FAMILIES, Expression
+from fba.emotion.mixing import mix
+from fba.emotion.rules import Rules, limited
+from fba.emotion.whissel import whissel_points
+from fba.errors import OptionError, did_you_mean
+from fba.face.expressions import Definitions
+from fba.face.mates import fill
+from fba.parameters import EXPRESSIONS, FAP_COUNT, fap_numbers
+
+
+def expressions() -> tuple[Expression, ...]:
+    """Return all named expressions, family by family."""
+    return tuple(_by_name().values())
+
+
+def expression(name: str) -> Expression:
+    """Return the expression with this name or alias.
+
+    Case does not matter, and an underscore or a hyphen stands for a space. Raises OptionError, which suggests
+    the nearest name, if there is none.
+    """
+    word = " ".join(name.lower().replace("_", " ").replace("-", " ").split())
+    known = _by_any_name()
+    if word not in known:
+        raise OptionError(
+            f"there is no expression {name!r}{did_you_mean(word, known)}; they are {', '.join(_by_name())}"
+        )
+    return known[word]
+
+
+@cache
+def _by_name() -> dict[str, Expression]:
+    with (files(__package__) / "expressions.csv").open(encoding="utf-8") as file:
+        rows = {row["name"]: row for row in csv.DictReader(file)}
+    drawn = _drawn_faps()
+    result: dict[str, Expression] = {}
+    for made in (False, True):  # recipes need what is drawn
+        for name, row in rows.items():
+            if bool(row["recipe"]) == made:
+                result[name] = _build(row, drawn.get(name, np.zeros(FAP_COUNT, dtype=np.float32)), result)
+    return {name: result[name] for name in rows}
+
+
+def _build(row: dict[str, str], faps: Float32, known: dict[str, Expression]) -> Expression:
+    """Return the expression of a row. faps: those listed for it. known: what a recipe may name."""
+    name, recipe = row["name"], _recipe(row["recipe"])
+    select = EXPRESSIONS.index(name) if name in FAMILIES else 0
+    if select:
+        faps = Definitions.default().expressions[select]
+    elif recipe:
+        faps = limited(mix([(known[word], intensity) for word, intensity in recipe], Rules()) + faps)
+    activation, evaluation = whissel_points().get(name, (None, None))
+    aliases = tuple(row["aliases"].split(", ")) if row["aliases"] else ()
+    return Expression(
+        name, row["family"], row["about"], faps, activation, evaluation, select, aliases, recipe
+    )
+
+
+@cache
+def _by_any_name() -> dict[str, Expression]:
+    known: dict[str, Expression] = {}
+    for one in expressions():
+        known |= dict.fromkeys((one.name, *one.aliases), one)
+    return known
+
+
+def _drawn_faps() -> dict[str, Float32]:
+    values: dict[str, Float32] = {}
+    listed: dict[str, Bool] = {}
+    with (files(__package__) / "expression_faps.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            name, column = row["expression"], fap_numbers()[row["fap"]] - 1
+            values.setdefault(name, np.zeros(FAP_COUNT, dtype=np.float32))[column] = float(row["value"])
+            listed.setdefault(name, np.zeros(FAP_COUNT, dtype=bool))[column] = True
+    return {name: fill(row, listed[name])[0].astype(np.float32) for name, row in values.items()}
+
+
+def _recipe(text: str) -> tuple[tuple[str, float], ...]:
+    """Return "fear=50 joy=40" as pairs."""
+    pairs = (word.rpartition("=") for word in text.split(", ") if word)
+    return tuple((name, float(amount)) for name, _, amount in pairs)

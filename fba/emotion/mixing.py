@@ -1,0 +1,50 @@
+"""FAPs of several expressions at once: of one family by the first rule, then families by the second."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fba.arrays import Float32, Float64
+from fba.emotion.expression import Expression
+from fba.emotion.rules import Part, Rules, limited, mix_families, mix_within_family, part
+from fba.emotion.whissel import family_point
+from fba.face.expressions import Definitions
+from fba.parameters import EXPRESSIONS, FAP_COUNT
+
+
+def mix(weights: Sequence[tuple[Expression, float]], rules: Rules) -> Float32:
+    """Return the FAPs of expressions at intensities of 0 to 100: float32 (68,), within the standard's limits.
+
+    Two at a time: those of a family first, then families in falling order of activation.
+    """
+    families: dict[str, Part] = {}
+    for expression, intensity in weights:
+        if not intensity:
+            continue
+        one = part(expression, intensity / 100, activation_of(expression), rules.presence)
+        key = expression.family or expression.name
+        families[key] = (
+            one if key not in families else mix_within_family(families[key], one, _centre(expression), rules)
+        )
+    if not families:
+        return np.zeros(FAP_COUNT, dtype=np.float32)
+    ordered = sorted(families.values(), key=lambda one: -one.shown_activation)
+    result = ordered[0]
+    for other in ordered[1:]:
+        result = mix_families(result, other, rules)
+    return limited(result.shown)
+
+
+def activation_of(expression: Expression) -> float | None:
+    """Return the activation of an expression, else that of its family; None if it has neither."""
+    if expression.activation is not None:
+        return expression.activation
+    return family_point(expression.family)[0] if expression.family else None
+
+
+def _centre(expression: Expression) -> Float64:
+    select = EXPRESSIONS.index(expression.family)
+    centre: Float64 = Definitions.default().expressions[select].astype(np.float64)
+    return centre

@@ -1,0 +1,79 @@
+"""The plane of activation and evaluation: which expressions lie near a point of it."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from fba.arrays import Float64, Intp
+from fba.emotion.blending import Blend, combine
+from fba.emotion.expression import NEUTRAL_POINT
+from fba.emotion.expressions import expressions
+from fba.emotion.rules import Rules
+from fba.errors import OptionError
+
+LOWEST, HIGHEST = 1.0, 7.0
+"""Ends of both of Whissel's scales."""
+
+
+def known_points() -> dict[str, tuple[float, float]]:
+    """Return (activation, evaluation) of the expressions that have them, by name."""
+    return {one.name: one.point for one in expressions() if one.point is not None}
+
+
+def expression_at(activation: float, evaluation: float, rules: Rules | None = None) -> Blend:
+    """Return the expression for a point of the plane: up to three named ones around it, mixed by the rules.
+
+    The named ones and `NEUTRAL_POINT` span triangles (Delaunay); a point's intensities are its barycentric
+    coordinates, so that they are 100 at the point of a named expression, low near neutral, and change without
+    a jump along any path. A point outside all triangles has the expression of the nearest on their outline.
+
+    activation, evaluation: 1 to 7 each. Raises OptionError beyond that.
+    """
+    for name, value in (("activation", activation), ("evaluation", evaluation)):
+        if not math.isfinite(value) or not LOWEST <= value <= HIGHEST:
+            raise OptionError(f"the {name} must be from {LOWEST:g} to {HIGHEST:g}, not {value:g}")
+    names, points, triangles, outline = _triangulation()
+    point = np.array([activation, evaluation])
+    shares = _in_triangle(point, points, triangles)
+    if shares is None:
+        shares = _on_outline(point, points, outline)
+    weights = {
+        names[corner]: 100 * min(share, 1.0) for corner, share in shares if share > 1e-9 and names[corner]
+    }
+    return combine(weights, rules)
+
+
+@cache
+def _triangulation() -> tuple[tuple[str, ...], Float64, Intp, Intp]:
+    """Names ("" for neutral), points (N, 2), triangles (T, 3) and edges of the outline (E, 2)."""
+    from scipy.spatial import Delaunay
+
+    known = known_points()
+    points = np.array([NEUTRAL_POINT, *known.values()], dtype=np.float64)
+    made = Delaunay(points)
+    return ("", *known), points, made.simplices.astype(np.intp), made.convex_hull.astype(np.intp)
+
+
+def _in_triangle(point: Float64, points: Float64, triangles: Intp) -> list[tuple[int, float]] | None:
+    """Return corners and barycentric coordinates of the triangle around a point; None outside all."""
+    corners = points[triangles]
+    edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+    second_third = np.linalg.solve(edges, (point - corners[:, 0])[..., None])[..., 0]
+    shares = np.column_stack([1 - second_third.sum(axis=1), second_third])
+    best = int(shares.min(axis=1).argmax())
+    if shares[best].min() < -1e-9:
+        return None
+    return list(zip(triangles[best].tolist(), shares[best].tolist(), strict=True))
+
+
+def _on_outline(point: Float64, points: Float64, outline: Intp) -> list[tuple[int, float]]:
+    """Return the ends of the nearest edge of the outline, and the shares of its point nearest to this one."""
+    start, end = points[outline[:, 0]], points[outline[:, 1]]
+    along = end - start
+    share = np.clip(((point - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
+    best = int(np.hypot(*(start + share[:, None] * along - point).T).argmin())
+    first, second = outline[best].tolist()
+    return [(first, float(1 - share[best])), (second, float(share[best]))]

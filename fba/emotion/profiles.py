@@ -1,0 +1,125 @@
+"""What moves in each of the six families, and how far it was measured to move.
+
+Digest faces-and-emotions.md, Tables 8-3 (`vocabulary.csv`) and 8-4 (`measured.csv`). The measured values are
+changes of distances on a face, in FAPU; `sign` turns them into FAPs (section 8.5 of the digest).
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from fba.arrays import Float32
+from fba.emotion.expression import FAMILIES
+from fba.errors import OptionError, did_you_mean
+from fba.parameters import FAP_COUNT, fap_numbers
+
+UPPER_LID_SHARE = 0.7
+"""Share of the upper lid in a change of the eye's opening. The source measured the opening alone."""
+
+
+@dataclass(frozen=True)
+class Movement:
+    """A FAP that takes part in a family, by Table 8-3.
+
+    fap: its number. sign: +1 or -1. alternative: FAPs of one number exclude those of another; 0: it always
+    takes part. note: where the table as printed is wrong, what it says.
+    """
+
+    fap: int
+    sign: int
+    alternative: int
+    note: str
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A measured change, by Table 8-4.
+
+    feature: number of the row, 1..15; not a FAP's. faps: numbers of the FAPs that make up the change
+    together: one, or two that share it. mean, deviation: as printed, in FAPU. sign: what mean is multiplied
+    by to get FAPs.
+    """
+
+    feature: int
+    faps: tuple[int, ...]
+    mean: float
+    deviation: float
+    sign: int
+
+    @property
+    def fap_mean(self) -> float:
+        """The mean as a FAP, or as the sum of two."""
+        return self.sign * self.mean
+
+
+@cache
+def vocabulary(family: str) -> tuple[Movement, ...]:
+    """Return the FAPs that take part in a family, with their signs. OptionError for an unknown family."""
+    _check(family)
+    return tuple(
+        Movement(fap_numbers()[row["fap"]], int(row["sign"]), int(row["alternative"]), row["note"])
+        for row in _rows("vocabulary.csv")
+        if row["family"] == family
+    )
+
+
+@cache
+def measurements(family: str) -> tuple[Measurement, ...]:
+    """Return what was measured of a family; OptionError for an unknown family."""
+    _check(family)
+    return tuple(
+        Measurement(
+            int(row["feature"]),
+            tuple(fap_numbers()[name] for name in row["faps"].split()),
+            float(row["mean"]),
+            float(row["deviation"]),
+            int(row["sign"]),
+        )
+        for row in _rows("measured.csv")
+        if row["family"] == family
+    )
+
+
+def measured_faps(family: str, deviations: dict[int, float] | None = None) -> Float32:
+    """Return the measured profile of a family as FAPs: float32 (68,).
+
+    deviations: how many standard deviations each feature lies above its mean, by the feature's number;
+    default: none does. Of the opening of an eye the upper lid takes `UPPER_LID_SHARE`, the widening of the
+    mouth and the distance of the brows are shared equally. Where both brows and their distance were measured,
+    the brows' own values hold.
+    """
+    values = np.zeros(FAP_COUNT, dtype=np.float32)
+    listed = measurements(family)
+    single = {m.faps[0] for m in listed if len(m.faps) == 1}
+    for one in listed:
+        amount = one.sign * (one.mean + (deviations or {}).get(one.feature, 0.0) * one.deviation)
+        if len(one.faps) == 2 and single.issuperset(one.faps):
+            continue
+        for fap, share in zip(one.faps, _shares(one.faps), strict=True):
+            values[fap - 1] += amount * share
+    return values
+
+
+def _shares(numbers: tuple[int, ...]) -> tuple[float, ...]:
+    if len(numbers) == 1:
+        return (1.0,)
+    lids = numbers[0] == fap_numbers()["close_t_l_eyelid"] or numbers[0] == fap_numbers()["close_t_r_eyelid"]
+    return (UPPER_LID_SHARE, 1 - UPPER_LID_SHARE) if lids else (0.5, 0.5)
+
+
+def _check(family: str) -> None:
+    if family not in FAMILIES:
+        raise OptionError(
+            f"there is no family {family!r}{did_you_mean(family, FAMILIES)}; they are {', '.join(FAMILIES)}"
+        )
+
+
+@cache
+def _rows(name: str) -> tuple[dict[str, str], ...]:
+    with (files(__package__) / name).open(encoding="utf-8") as file:
+        return tuple(csv.DictReader(file))

@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fba import emotion
+from fba.emotion.rules import fap_limits
+from fba.errors import OptionError
+from fba.face.expressions import Definitions
+from fba.parameters import fap_numbers
+
+
+def column(name: str) -> int:
+    return fap_numbers()[name] - 1
+
+
+def test_there_are_at_least_24_of_six_families() -> None:
+    named = emotion.expressions()
+    assert len(named) >= 24
+    assert {one.family for one in named} == {*emotion.FAMILIES, ""}
+    assert len({name for one in named for name in (one.name, *one.aliases)}) == sum(
+        1 + len(one.aliases) for one in named
+    )
+
+
+@pytest.mark.parametrize("select", range(1, 7))
+def test_the_six_are_those_of_fap_2(select: int) -> None:
+    one = emotion.expression(emotion.FAMILIES[select - 1])
+    assert one.select == select
+    assert np.array_equal(one.faps, Definitions.default().expressions[select])
+
+
+def test_no_expression_leaves_the_limits_of_the_standard() -> None:
+    low, high = fap_limits()
+    for one in emotion.expressions():
+        assert (one.faps >= low).all(), one
+        assert (one.faps <= high).all(), one
+        assert one.faps[2:].any(), one
+
+
+def test_no_two_look_the_same() -> None:
+    table = np.array([one.faps for one in emotion.expressions()])
+    apart = np.abs(table[:, None] - table).max(axis=2)
+    assert apart[~np.eye(len(table), dtype=bool)].min() > 40
+
+
+def test_whissels_table() -> None:
+    points = emotion.known_points()
+    assert points["fear"] == (4.9, 3.4)
+    assert points["shame"] == (2, 2.7)
+    assert points["guilt"] == (4, 1.1)
+    assert points["delight"] == (4.2, 6.4)
+    assert len(points) == 11
+
+
+@pytest.mark.parametrize("name", ["Afraid", "fear", " FEAR ", "scared"])
+def test_names_and_aliases(name: str) -> None:
+    assert emotion.expression(name).name == "fear"
+
+
+def test_words_may_be_joined() -> None:
+    assert emotion.expression("fake_smile") is emotion.expression("Fake-smile")
+
+
+def test_an_unknown_name_suggests_the_nearest() -> None:
+    with pytest.raises(OptionError, match=r"no expression 'disgusst' \(did you mean 'disgust'\?\)"):
+        emotion.expression("disgusst")
+
+
+def test_a_fake_smile_lifts_no_cheeks() -> None:
+    smile, fake = emotion.expression("smile").faps, emotion.expression("fake smile").faps
+    lifted, lower_lid = column("lift_l_cheek"), column("close_b_l_eyelid")
+    assert smile[lifted] >= 200
+    assert fake[lifted] == 0
+    assert smile[lower_lid] >= 200
+    assert fake[lower_lid] <= 0
+
+
+@pytest.mark.parametrize("name", ["contempt", "sneer", "sarcasm"])
+def test_a_sneer_is_one_sided(name: str) -> None:
+    faps = emotion.expression(name).faps
+    left, right = column("raise_l_cornerlip"), column("raise_r_cornerlip")
+    assert abs(faps[left] - faps[right]) > 100
+
+
+def test_the_eyes_tell_worry_fear_and_terror_apart() -> None:
+    lid = column("close_t_l_eyelid")
+    openings = [-emotion.expression(name).faps[lid] for name in ("worry", "fear", "terror")]
+    assert openings == sorted(openings)
+
+
+def test_all_measurements_of_table_8_4() -> None:
+    listed = {family: emotion.measurements(family) for family in emotion.FAMILIES}
+    assert sum(map(len, listed.values())) == 48
+    jaw = next(one for one in listed["surprise"] if one.feature == 11)
+    assert (jaw.faps, jaw.mean, jaw.deviation) == ((3,), 885, 316)
+
+
+@pytest.mark.parametrize(
+    ("family", "faps", "total"),
+    [
+        ("anger", ["squeeze_l_eyebrow"], 57),
+        ("anger", ["raise_l_m_eyebrow"], -149),
+        ("sadness", ["close_t_l_eyelid", "close_b_l_eyelid"], 153),
+        ("fear", ["close_t_r_eyelid", "close_b_r_eyelid"], -249),
+        ("fear", ["raise_b_midlip"], -218),
+        ("disgust", ["raise_b_midlip"], 177),
+        ("joy", ["lower_t_midlip"], -271),
+        ("joy", ["stretch_l_cornerlip", "stretch_r_cornerlip"], 234),
+        ("surprise", ["squeeze_l_eyebrow", "squeeze_r_eyebrow"], -86),
+    ],
+)
+def test_measured_distances_become_faps_with_the_standards_signs(
+    family: str, faps: list[str], total: float
+) -> None:
+    values = emotion.measured_faps(family)
+    assert values[[column(name) for name in faps]].sum() == pytest.approx(total)
+
+
+def test_a_measured_profile_moves_by_its_deviations() -> None:
+    assert emotion.measured_faps("surprise", {11: 1.0})[2] == 885 + 316
+    assert emotion.measured_faps("fear", {4: -1.0})[4] == -(218 - 135)
+
+
+def test_vocabularies_and_measurements_agree_in_sign() -> None:
+    """Except where the digest (8.5) says that Table 8-3 and 8-4 differ: disgust's brows are not listed."""
+    for family in emotion.FAMILIES:
+        measured = emotion.measured_faps(family)
+        listed = {one.fap: one.sign for one in emotion.vocabulary(family)}
+        both = [fap for fap in listed if measured[fap - 1]]
+        assert len(both) >= 3, family
+        assert [fap for fap in both if np.sign(measured[fap - 1]) != listed[fap]] == []
+
+
+def test_an_unknown_family_is_an_error() -> None:
+    with pytest.raises(OptionError, match="no family 'joi'"):
+        emotion.vocabulary("joi")
