@@ -183,6 +183,7 @@ STEP_CHOICE_TEST = "tests/formats/test_step_choice.py -k 'round or coarse'"
 SLIDE_TEST = "tests/formats/test_step_choice.py -k 'slide or sways'"
 ORIGIN_TEST = "tests/formats/test_step_choice.py -k origin"
 TRANSPARENCY_TEST = "tests/player/gl/test_transparency.py"
+WRINKLES_TEST = "tests/player/figure/test_wrinkles.py"
 HEAD_TURN_TEST = "tests/formats/test_step_choice.py -k head"
 MEASURED_TEST = "tests/body/gait/test_measured.py"
 STRIPS_TEST = "tests/mesh/test_ply.py -k strips"
@@ -667,6 +668,10 @@ MUTANTS = (
     Mutant(SLIDING, "_to_and_fro(root[run]) - quantum", "_to_and_fro(root[run])", SLIDE_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 0.9", JUMP_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 1.1", JUMP_TEST),
+    Mutant("player/fba_player/figure/wrinkles.py", "BEGINNING = 0.5", "BEGINNING = 0.4", WRINKLES_TEST),
+    Mutant("player/fba_player/figure/wrinkles.py", "BEGINNING = 0.5", "BEGINNING = 0.7", WRINKLES_TEST),
+    Mutant("player/fba_player/figure/wrinkles.py", "DEEPEST = 0.75", "DEEPEST = 1.5", WRINKLES_TEST),
+    Mutant("player/fba_player/figure/wrinkles.py", "STIFFNESS = 1e-4", "STIFFNESS = 1.0", WRINKLES_TEST),
     Mutant("player/fba_player/gl/_mesh_renderer.py", "CORE = 0.9", "CORE = 1.0", TRANSPARENCY_TEST),
     Mutant("player/fba_player/gl/_mesh_renderer.py", "CORE = 0.9", "CORE = 0.1", TRANSPARENCY_TEST),
     Mutant(ROUND_ANGLES, "ROUND_RADIANS = 5.0, 0.1", "ROUND_RADIANS = 6.0, 0.1", STEP_CHOICE_TEST),

@@ -80,6 +80,7 @@ def model_as_json(model: FaceModel) -> dict[str, Any]:
         "faps": sorted(model.table_of),
         "lost": {str(number): reason for number, reason in sorted(model.lost.items())},
         "fit": model.fit is not None,
+        "wrinkles": model.wrinkles,
     }
 
 
@@ -98,6 +99,7 @@ def print_model(model: FaceModel) -> None:
         click.echo(f"  {key:<8} {text}")
     if model.fit is not None:
         click.echo("  FIT      its own table, by which unsent FAPs are estimated")
+    click.echo(f"  wrinkles {'drawn on the skin as it moves' if model.wrinkles else 'none'}")
     bound = int((model.bound >= 0).sum())
     click.echo(
         f"  points   {len(model.points) - len(model.missing)} of {len(model.points)}, {bound} on a vertex"

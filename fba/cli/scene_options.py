@@ -111,7 +111,7 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]
             multiple=True,
             metavar="SWITCH[=VALUE]",
             help="What else is shown; repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, "
-            "normals; shadows=off, eyes=off, teeth=off, hair=off; background=grey or transparent.",
+            "normals; shadows, wrinkles, eyes, teeth, hair=off; background=grey or transparent.",
         ),
         options.choice_option(
             "--axes", "Which way BAPs turn: as the standard says, or as in some old files.", "iso", "vreng"

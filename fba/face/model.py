@@ -75,7 +75,8 @@ class FaceModel(Meshes[Part]):
     has none. bound: int32 (84,), the vertex that each is at, -1 for those on no mesh (the centre of the
     head, the thickness of hair). tables: the effect of each FAP, each FAP at most once. fit: how unsent
     FAPs follow from sent ones, or None for the standard's mates. definitions: the FAPs of visemes and
-    expressions. lost: FAPs without tables and why, by number. notes: origin, licence and the like.
+    expressions. lost: FAPs without tables and why, by number. notes: origin, licence and the like. wrinkles:
+    whether players draw wrinkles on the skin as FAPs move it; drawn faces look wrong with them.
 
     Axes: +x the subject's left, +y up, +z forward. Raises ModelError naming the part, point or FAP that is
     wrong.
@@ -90,6 +91,7 @@ class FaceModel(Meshes[Part]):
     name: str = ""
     lost: Mapping[int, str] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)
+    wrinkles: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parts", tuple(self.parts))

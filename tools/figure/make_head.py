@@ -207,7 +207,8 @@ def head() -> FaceModel:
         "licence": "Apache-2.0",
         "made by": "tools/figure/make_head.py",
     }
-    return compact(author(parts, points, bound=bound, name="built-in head", notes=notes))
+    made = author(parts, points, bound=bound, name="built-in head", notes=notes)
+    return compact(replace(made, wrinkles=True))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -160,6 +161,11 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
 @PART
 @click.option("--name", help="Name of the model. Default: the name of the file.")
 @click.option(
+    "--wrinkles",
+    is_flag=True,
+    help="Let players draw wrinkles on the skin as it moves. For lifelike heads, not for drawn ones.",
+)
+@click.option(
     "--sheet",
     metavar="FILE.png|.jpg",
     type=OutputType(),
@@ -176,6 +182,7 @@ def import_(
     up: str,
     kinds: tuple[str, ...],
     name: str | None,
+    wrinkles: bool,
 ) -> None:
     """Turn a mesh into a face model that plays FAPs, and write it as glTF.
 
@@ -193,6 +200,7 @@ def import_(
     part_kinds = _parse_kinds(kinds) or None
     with Progress("importing", None):
         model = import_model(source, kind=kind, points=points, unit=unit, up=up, kinds=part_kinds, name=name)
+    model = replace(model, wrinkles=wrinkles)
     with Progress("checking", None):
         findings = [*checks.check_neutral(model), *checks.check_faps(model)]
     _write(model, output, outputs)
@@ -200,6 +208,8 @@ def import_(
         with Progress("rendering", None), outputs.file(sheet) as file:
             _draw_sheet(model, file)
         outputs.say(f"{display_name(sheet)}: the face at rest and in its main motions")
+    if not wrinkles:
+        outputs.say("  wrinkles none; --wrinkles lets players draw them on a lifelike skin")
     for line in model_text.error_lines(findings):
         outputs.say(f"  {line}")
     verdict, reason = model_text.judge_import(findings)

@@ -39,6 +39,8 @@ def extension(builder: Builder, model: FaceModel, nodes: list[int]) -> dict[str,
         "expressions": _definitions(model.definitions.expressions, EXPRESSION_NAMES),
         "morphValues": {_fap(table.fap): morph_values()[table.fap] for table in model.tables},
     }
+    if model.wrinkles:
+        content["wrinkles"] = True
     if model.fit is not None:
         content["fit"] = model.fit.to_dict()
     return content

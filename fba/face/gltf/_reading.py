@@ -48,7 +48,7 @@ def read_model(document: Document) -> FaceModel:
     for name, value in content.entries("morphValues", FAP_COUNT):  # only other programs use these
         _fap_number(name, value)
         value.number()
-    fit = content.get("fit")
+    fit, wrinkles = content.get("fit"), content.get("wrinkles")
     with locating_errors(content), np.errstate(all="ignore"):  # absurd sizes may overflow
         return FaceModel(
             parts=parts,
@@ -60,6 +60,7 @@ def read_model(document: Document) -> FaceModel:
             name=_text(content, "name"),
             lost={_fap_number(key, value): value.text() for key, value in content.entries("lost", FAP_COUNT)},
             notes={key: value.text() for key, value in content.entries("notes", MAX_NOTES)},
+            wrinkles=wrinkles is not None and wrinkles.boolean(),
         )
 
 

@@ -22,6 +22,7 @@ from fba_player.figure._face_parts import (
     with_triangles,
 )
 from fba_player.figure.face_light import MOUTH_OPEN, FaceLight
+from fba_player.figure.wrinkles import place_wrinkles, wrinkle_strengths
 from fba_player.view.camera import Subject
 from fba_player.view.geometry import rotation_vector
 from fba_player.view.view import Eye, FaceMesh, FaceShape
@@ -112,13 +113,16 @@ class FaceFigure:
         pose = self.pose(faps)
         light = self.light.shade(pose.positions, pose.turn[:3, :3], matrix[:3, :3])
         axis = rotation_vector(pose.turn[:3, :3])
+        wrinkles = wrinkle_strengths(faps)
         meshes = []
         for name, shape in (self._shapes_on_body if on_body else self.shapes).items():
             if self.model.part(name).kind in without or not len(shape.triangles):
                 continue
             rows = self.rows(name)
             positions, normals = pose.positions[rows], pose.normals[rows]
-            meshes.append(FaceMesh(shape, positions, normals, light[rows], matrix, axis, self.centre))
+            meshes.append(
+                FaceMesh(shape, positions, normals, light[rows], matrix, axis, self.centre, wrinkles=wrinkles)
+            )
         return meshes
 
     def rows(self, name: str) -> slice:
@@ -172,7 +176,7 @@ def build_figure(model: FaceModel) -> FaceFigure:
             eyeballs.append((part, eyeball))
             continue
         rows = part_rows(model, part.name)
-        shape = make_shape(part, sway[rows])
+        shape = replace(make_shape(part, sway[rows]), wrinkle_places=place_wrinkles(model, part))
         if shape.across is None:  # single hairs are not simplified
             shape = replace(shape, coarser=detail_levels(part, [positions[rows] for positions in extremes]))
         shapes[part.name] = shape

@@ -14,6 +14,7 @@ from fba.face.model import Part, point_row
 from fba_player.figure._face_parts import detail_levels, make_shape, part_rows, with_triangles
 from fba_player.figure.body_light import BodyLight, build_body_light
 from fba_player.figure.face import FaceFigure
+from fba_player.figure.wrinkles import wrinkle_strengths
 from fba_player.view.view import Eye, FaceMesh, FaceShape
 
 SCATTER = {"skin": 1.0, "neck": 1.0}
@@ -89,8 +90,10 @@ class Person:
         positions, normals = np.empty_like(pose.positions), np.empty_like(pose.positions)
         self.head.skin(pose.positions, joints, positions, local_normals=pose.normals, normals=normals)
         light = self.figure.shade(faps, self.frame(joints))
+        wrinkles = wrinkle_strengths(faps)
         for name, shape in self.face_shapes.items():
-            meshes.append(_mesh_in_world(shape, self.figure.rows(name), positions, normals, light))
+            mesh = _mesh_in_world(shape, self.figure.rows(name), positions, normals, light)
+            meshes.append(replace(mesh, wrinkles=wrinkles))
         return meshes
 
     def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fba.arrays import Float64, UInt8
+from fba.arrays import Float32, Float64, Int32, UInt8
 from fba_player.gl._textures import Pictures, count_halvings
 from fba_player.gl.lod import distance, share_memory
 from fba_player.gl.resources import (
@@ -17,13 +17,17 @@ from fba_player.gl.resources import (
     set_uniform,
     write_buffer,
 )
-from fba_player.mesh.textures import RELIEF, skin_relief
+from fba_player.mesh.textures import RELIEF, skin_relief, texture_breadth
+from fba_player.mesh.wrinkle_map import BOTTOM, TEXELS, TOP, WIDTH, wrinkle_map
+from fba_player.mesh.wrinkle_map import SHAPE as WRINKLE_SHAPE
 from fba_player.view.view import FaceMesh, FaceShape
 
 MOST_SHAPES = 64
 """Number of parts whose buffers are cached; the least recently used goes first."""
 CORE = 0.9
 """Opacity from which pixels of blended parts are drawn as opaque ones, before all others are blended."""
+FAINTEST_WRINKLE = 0.01
+"""Strength from which wrinkles are drawn."""
 FAINTEST = 0.25
 """The skin's relief is not drawn if it is reduced to less than this share of its size."""
 
@@ -36,6 +40,7 @@ class FaceRenderer:
         self._programs: dict[tuple[str, ...], Any] = {}
         self._shapes = RecentlyUsed[dict[str, Any]](MOST_SHAPES, _release)
         self._reliefs: dict[int, Any] = {}
+        self._wrinkles: dict[int, Any] = {}
         self._pixels: UInt8 | None = None
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
 
@@ -74,9 +79,10 @@ class FaceRenderer:
     def close(self) -> None:
         """Free all OpenGL objects."""
         self._shapes.clear()
-        for part in (*self._reliefs.values(), *self._programs.values()):
+        for part in (*self._reliefs.values(), *self._wrinkles.values(), *self._programs.values()):
             part.release()
         self._reliefs.clear()
+        self._wrinkles.clear()
         self._programs.clear()
 
     def _program(self, options: tuple[str, ...]) -> Any:
@@ -97,6 +103,8 @@ class FaceRenderer:
                 attributes.append((parts["still"], "4f 2f 1f", "in_colour", "in_texture", "in_sway"))
             else:
                 attributes.append((parts["still"], "4f 8x 1f", "in_colour", "in_sway"))
+            if "WRINKLED" in options:
+                attributes.append((parts["wrinkles"], "2f", "in_wrinkle"))
             if parts["across"] is not None:
                 attributes.append((parts["across"], "4f 4f", "in_across", "in_along"))
             program, triangles = self._program(options), parts["triangles"]
@@ -121,12 +129,14 @@ class FaceRenderer:
         wide = self._camera[2] * away
         picture = parts["pictures"].choose(wide)
         repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None
+        wrinkles = self._wrinkle_map(mesh, parts, wide)
         options = tuple(
             option
             for option, used in (
                 ("SMOOTH", shape.smooth),
                 ("HAIRS", shape.across is not None),
                 ("TEXTURED", picture is not None),
+                ("WRINKLED", wrinkles is not None),
                 ("FINE", repeats is not None),
                 ("SOLID", shape.alpha == "opaque"),
                 ("CUT", shape.alpha == "mask" or core),
@@ -143,6 +153,9 @@ class FaceRenderer:
             picture.use(0)
         if repeats is not None:
             repeats.use(1)
+        if wrinkles is not None:
+            wrinkles.use(2)
+            _set_wrinkles(program, mesh)
         if shape.closed:
             self._gl.enable(self._gl.CULL_FACE)
         array.render()
@@ -163,10 +176,35 @@ class FaceRenderer:
         parts["across"] = None
         if shape.across is not None:
             parts["across"] = gl.buffer(np.ascontiguousarray(shape.across, dtype="f4").tobytes())
+        parts["wrinkles"], parts["wrinkle_texel"] = None, 0.0
+        if shape.wrinkle_places is not None:
+            parts["wrinkles"] = gl.buffer(np.ascontiguousarray(shape.wrinkle_places, dtype="f4").tobytes())
+            parts["wrinkle_texel"] = texture_breadth(*_in_map(shape, mesh.positions)) / TEXELS
         parts["arrays"] = {}
         parts["pictures"] = Pictures(gl, shape, mesh.positions)
         parts["lit"] = None
         return parts
+
+    def _wrinkle_map(self, mesh: FaceMesh, parts: dict[str, Any], wide: float) -> Any:
+        """The map of wrinkles for pixels of this width (m), or None where there is nothing to see."""
+        if mesh.wrinkles is None or parts["wrinkles"] is None or mesh.wrinkles.max() < FAINTEST_WRINKLE:
+            return None
+        halvings = count_halvings(parts["wrinkle_texel"], wide, max(WRINKLE_SHAPE))
+        if halvings not in self._wrinkles:
+            from PIL import Image
+
+            pixels = wrinkle_map()
+            smaller = np.stack(
+                [
+                    np.asarray(Image.fromarray(channel).reduce(2**halvings))
+                    for channel in np.moveaxis(pixels, 2, 0)
+                ],
+                axis=2,
+            )
+            texture = make_texture(self._gl, smaller)
+            texture.repeat_x = texture.repeat_y = False
+            self._wrinkles[halvings] = texture
+        return self._wrinkles[halvings]
 
     def _relief_texture(self, wide: float) -> Any:
         """The skin's relief for pixels of this width (m), or None if it would be too fine to see."""
@@ -217,10 +255,28 @@ def _set_pose(program: Any, mesh: FaceMesh) -> None:
     set_uniform(program, "centre", tuple(mesh.centre.tolist()))
 
 
+def _set_wrinkles(program: Any, mesh: FaceMesh) -> None:
+    """Set the uniforms for a mesh's wrinkles."""
+    assert mesh.wrinkles is not None
+    left, right = (tuple(float(strength) for strength in side) for side in mesh.wrinkles)
+    set_uniform(program, "wrinkles_left", left)
+    set_uniform(program, "wrinkles_right", right)
+    set_uniform(program, "wrinkle_map", 2)
+    height = TOP - BOTTOM
+    set_uniform(program, "wrinkle_window", (1 / WIDTH, -1 / height, 0.0, TOP / height))
+
+
+def _in_map(shape: FaceShape, positions: Float32) -> tuple[Float32, Float32, Int32]:
+    """A shape's positions, places in the map of wrinkles, and triangles inside of the map."""
+    assert shape.wrinkle_places is not None
+    inside = (np.abs(shape.wrinkle_places[shape.triangles]) < max(WIDTH, TOP)).all(axis=(1, 2))
+    return positions, shape.wrinkle_places, shape.triangles[inside]
+
+
 def _release(parts: dict[str, Any]) -> None:
     for array in parts["arrays"].values():
         array.release()
-    for name in ("positions", "normals", "light", "still", "triangles", "across"):
+    for name in ("positions", "normals", "light", "still", "triangles", "across", "wrinkles"):
         if parts[name] is not None:
             parts[name].release()
     parts["pictures"].close()

@@ -78,6 +78,9 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
         colours=np.ascontiguousarray(shape.colours[rows]),
         sway=np.ascontiguousarray(shape.sway[rows]),
         texcoords=None if shape.texcoords is None else np.ascontiguousarray(shape.texcoords[rows]),
+        wrinkle_places=None
+        if shape.wrinkle_places is None
+        else np.ascontiguousarray(shape.wrinkle_places[rows]),
         coarser=None,
     )
     return _Level(coarser, rows.astype(np.intp))

@@ -108,6 +108,8 @@ class DisplayOptions:
             view = replace(view, faces=[mesh for mesh in view.faces if mesh.shape.kind not in hidden])
         if "eye" in hidden:
             view = replace(view, eyes=[])
+        if not switches["wrinkles"]:
+            view = replace(view, faces=[replace(mesh, wrinkles=None) for mesh in view.faces])
         if not switches["shadows"]:
             unshaded = np.array(UNSHADED, dtype=np.float32)
             faces = [

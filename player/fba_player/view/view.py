@@ -68,7 +68,9 @@ class FaceShape:
     tip, and 1 or -1 for its side; hairs narrower than a pixel are drawn a pixel wide and fainter. closed:
     whether the inside is never visible and not drawn. name, kind: of the model's part, "" if there is none.
     coarser: levels of detail for small sizes, None if there are none. smooth: False if triangles are so large
-    that light changes visibly within them. alpha, opacity, cutoff: as of `fba.mesh.meshes.Material`.
+    that light changes visibly within them. wrinkle_places: float32 (V, 2), where each vertex lies in
+    `fba_player.mesh.wrinkle_map`, None for a part without wrinkles. alpha, opacity, cutoff: as of
+    `fba.mesh.meshes.Material`.
     """
 
     triangles: Int32
@@ -85,6 +87,7 @@ class FaceShape:
     kind: str = ""
     coarser: DetailLevels | None = None
     smooth: bool = True
+    wrinkle_places: Float32 | None = None
     alpha: Alpha = "auto"
     opacity: float = 1.0
     cutoff: float = 0.5
@@ -106,7 +109,8 @@ class FaceMesh:
     light that reaches each vertex past the rest of the figure: key light, open sky, light through the skin
     from behind, rim light. matrix: (4, 4), into the world. turn: (3,), the axis of the head's rotation times
     its angle, about `centre` (3,), in the frame of the positions. away: distance from the camera that the
-    mesh is drawn for, in the mesh's own unit; None if not known. Do not write to the arrays: renderers
+    mesh is drawn for, in the mesh's own unit; None if not known. wrinkles: float32 (2, 4), 0..1, strength of
+    each wrinkle on the left and the right side; None for none. Do not write to the arrays: renderers
     recognise by their identity what they have uploaded.
     """
 
@@ -118,6 +122,7 @@ class FaceMesh:
     turn: Float64
     centre: Float64
     away: float | None = None
+    wrinkles: Float32 | None = None
 
 
 @dataclass(frozen=True, eq=False)

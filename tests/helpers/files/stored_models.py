@@ -69,6 +69,7 @@ def face(**changes: Any) -> FaceModel:
         "name": "Näme",
         "lost": {65: "no ears", 66: "no ears"},
         "notes": {"licence": "MIT", "origin": "made for a test"},
+        "wrinkles": True,
     }
     settings |= changes
     return FaceModel(**settings)
@@ -157,6 +158,7 @@ def models(draw: st.DrawFn) -> FaceModel:
         bound=bound,
         tables=tuple(draw(table(number, meshes)) for number in numbers),
         fit=draw(st.sampled_from([None, fit()])),
+        wrinkles=draw(st.booleans()),
         definitions=Definitions(given[:15], given[15:]),
         name=draw(TEXTS),
         lost=draw(st.dictionaries(st.integers(3, 68), TEXTS, max_size=3)),
@@ -203,7 +205,12 @@ def assert_same(one: FaceModel, other: FaceModel) -> None:
     assert one.fit == other.fit
     assert np.array_equal(one.definitions.visemes, other.definitions.visemes)
     assert np.array_equal(one.definitions.expressions, other.definitions.expressions)
-    assert (one.name, one.lost, one.notes) == (other.name, other.lost, other.notes)
+    assert (one.name, one.lost, one.notes, one.wrinkles) == (
+        other.name,
+        other.lost,
+        other.notes,
+        other.wrinkles,
+    )
 
 
 def vars_of(part: Part) -> dict[str, Any]:

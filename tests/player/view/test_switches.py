@@ -54,8 +54,8 @@ def shown(subject: Animation, view: str = "figure") -> Scene:
 class TestTable:
     def test_every_switch_says_what_it_is(self) -> None:
         assert set(SWITCHES) == {
-            "wireframe", "points", "influence", "skeleton", "grid", "normals", "shadows", "eyes", "teeth",
-            "hair", "background",
+            "wireframe", "points", "influence", "skeleton", "grid", "normals", "shadows", "wrinkles", "eyes",
+            "teeth", "hair", "background",
         }  # fmt: skip
         keys = [switch.key for switch in SWITCHES.values() if switch.key]
         assert len(keys) == len(set(keys))

@@ -11,6 +11,13 @@ uniform float opacity;
 #ifdef CUT
 uniform float cut;         // pixels that are less opaque are holes
 #endif
+#ifdef WRINKLED
+uniform sampler2D wrinkle_map;
+uniform vec4 wrinkle_window; // of a place: factors and offsets to the map's coordinates
+const vec3 DARKENS = vec3(0.50, 0.58, 0.60); // light in a groove comes through the skin, and is redder
+in vec2 wrinkle_place;
+in vec4 wrinkles;
+#endif
 in vec4 upright;
 in vec4 coordinates;
 #ifdef SMOOTH
@@ -44,6 +51,11 @@ void main() {
 #ifdef CUT
     if (opaque < cut) discard;
     opaque = 1.0;
+#endif
+#ifdef WRINKLED
+    vec2 spot = vec2(abs(wrinkle_place.x), wrinkle_place.y) * wrinkle_window.xy + wrinkle_window.zw;
+    float depth = dot(texture(wrinkle_map, spot) - 128.0 / 255.0, wrinkles) * 2.0;
+    albedo *= max(1.0 + DARKENS * depth, 0.2);
 #endif
 #ifdef SMOOTH
     vec3 n = upright.xyz;

@@ -1,6 +1,6 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
-// multiplies the colour by a picture; FINE adds the skin's relief; SOLID ignores alpha, CUT makes holes where
+// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds the skin's relief; SOLID ignores alpha, CUT makes holes where
 // it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
@@ -19,6 +19,13 @@ in vec4 in_colour;
 in vec2 in_texture;
 in vec4 in_light;       // light that reaches the vertex: key light, open sky, through the skin, rim light
 in float in_sway;       // how far it turns with the head
+#ifdef WRINKLED
+in vec2 in_wrinkle;     // place in the map of wrinkles, x positive on the left
+uniform vec4 wrinkles_left;  // strength of each wrinkle
+uniform vec4 wrinkles_right;
+out vec2 wrinkle_place;
+out vec4 wrinkles;
+#endif
 #ifdef HAIRS
 in vec4 in_across;      // of hairs: from the opposite vertex to this one, and half the width; else 0, 0, 0, 1
 in vec4 in_along;       // of hairs: direction to the tip, and which of the two sides this is
@@ -75,6 +82,10 @@ void main() {
     upright = vec4(n, facing);
     coordinates = vec4(in_texture, cover, widths(in_colour.a));
     gl_Position = camera * stands;
+#ifdef WRINKLED
+    wrinkle_place = in_wrinkle;
+    wrinkles = mix(wrinkles_right, wrinkles_left, smoothstep(-0.1, 0.1, in_wrinkle.x));
+#endif
 #ifdef SMOOTH
 #ifdef TEXTURED
     vec3 albedo = SKIN * in_colour.rgb;

@@ -1,0 +1,118 @@
+"""The map of wrinkles that all faces share: forehead, frown, corner of the eye, cheek.
+
+It shows the left half of a face from the front, in eye separations (ES) from the middle of the pupils.
+Wrinkles are drawn as shading, not as geometry: a dark groove with a lighter lower edge, as under light from
+above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fba.arrays import Float64, UInt8
+from fba.cache import load_or_make, make_key
+
+WRINKLES = ("forehead", "frown", "eye corner", "cheek")
+"""One channel of the map each."""
+WIDTH, TOP, BOTTOM = 1.25, 1.25, -1.55
+"""What the map shows, in eye separations: to the left of the middle, above and below the pupils."""
+TEXELS = 256
+"""Texels of an eye separation."""
+SHAPE = (round((TOP - BOTTOM) * TEXELS), round(WIDTH * TEXELS))
+PLAIN = 128
+"""Value where there is no wrinkle; lower is darker."""
+EDGE = 0.42
+"""Brightness of the lower edge, of the groove's darkness."""
+EDGE_BELOW, EDGE_BREADTH = 1.7, 1.5
+"""How far below the groove the edge is brightest, and its breadth, in widths of the groove."""
+FADE = 4.0
+"""How steeply lines thin out towards their ends: over a quarter of their length each."""
+MAKING = 1
+"""Cache version; increment when `wrinkle_map` gives other pixels."""
+
+Stroke = tuple[Sequence[tuple[float, float]], float, float]
+"""Points of a line, its width (both in eye separations), and its darkness, 0..1."""
+
+STROKES: dict[str, tuple[Stroke, ...]] = {
+    "forehead": (
+        (((-0.30, 0.595), (0.00, 0.575), (0.25, 0.590), (0.50, 0.640), (0.72, 0.610)), 0.016, 0.75),
+        (((-0.55, 0.735), (-0.25, 0.715), (0.00, 0.690), (0.30, 0.720), (0.55, 0.745), (0.78, 0.700)), 0.019,
+         1.0),
+        (((-0.50, 0.850), (-0.20, 0.835), (0.00, 0.815), (0.35, 0.845), (0.66, 0.830)), 0.018, 0.85),
+        (((-0.30, 0.955), (0.00, 0.935), (0.28, 0.955), (0.50, 0.950)), 0.016, 0.5),
+    ),
+    "frown": (
+        (((0.105, 0.095), (0.118, 0.200), (0.125, 0.300), (0.150, 0.400), (0.165, 0.480)), 0.020, 1.0),
+        (((0.205, 0.250), (0.225, 0.330), (0.255, 0.410)), 0.015, 0.50),
+        (((-0.130, 0.050), (0.000, 0.035), (0.130, 0.050)), 0.016, 0.60),
+    ),
+    "eye corner": (
+        (((0.800, 0.020), (0.900, 0.062), (1.000, 0.115)), 0.012, 0.70),
+        (((0.790, -0.030), (0.890, -0.018), (1.010, 0.005)), 0.013, 0.95),
+        (((0.775, -0.080), (0.870, -0.112), (0.980, -0.155)), 0.013, 0.95),
+        (((0.740, -0.130), (0.820, -0.190), (0.910, -0.270)), 0.012, 0.75),
+        (((0.300, -0.150), (0.400, -0.225), (0.530, -0.255), (0.670, -0.215)), 0.014, 0.65),
+        (((0.330, -0.240), (0.430, -0.305), (0.560, -0.325), (0.680, -0.290)), 0.014, 0.35),
+    ),
+    "cheek": (
+        (((0.265, -0.440), (0.325, -0.520), (0.400, -0.640), (0.475, -0.770), (0.540, -0.900),
+          (0.575, -1.020), (0.575, -1.110)), 0.030, 1.0),
+        (((0.300, -0.500), (0.345, -0.560), (0.400, -0.640)), 0.022, 0.40),
+    ),
+}  # fmt: skip
+"""The lines of each wrinkle. Those that cross the face's middle begin on the other side of it."""
+
+
+def wrinkle_map() -> UInt8:
+    """uint8 (H, W, 4): the wrinkles, each in its own channel, around `PLAIN`; stored in the disk cache."""
+    key = make_key("wrinkles", MAKING, TEXELS, EDGE, EDGE_BELOW, EDGE_BREADTH, FADE, repr(STROKES))
+    (pixels,) = load_or_make(key, ((*SHAPE, len(WRINKLES)),), lambda: [_draw()], np.uint8)
+    return pixels
+
+
+def _draw() -> UInt8:
+    y, x = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]]
+    across, up = (x + 0.5) / TEXELS, TOP - (y + 0.5) / TEXELS
+    pixels = np.empty((*SHAPE, len(WRINKLES)), dtype=np.uint8)
+    for channel, name in enumerate(WRINKLES):
+        shade = np.zeros(SHAPE)
+        for points, width, darkness in STROKES[name]:
+            groove = _stroke(across, up, points, width)
+            edge = _stroke(across, up + EDGE_BELOW * width, points, EDGE_BREADTH * width)
+            shade += darkness * (EDGE * edge - groove)
+        pixels[..., channel] = np.clip(np.round(PLAIN + 127 * shade), 0, 255)
+    return pixels
+
+
+def _stroke(across: Float64, up: Float64, points: Sequence[tuple[float, float]], width: float) -> Float64:
+    """(H, W), 0..1: a soft line through points, which thins out towards its ends."""
+    line = _smooth(np.array(points))
+    along = np.linspace(0, 1, len(line))
+    strength = np.zeros(across.shape)
+    for (x, y), where in zip(line, along, strict=True):
+        fade = min(1.0, FADE * min(where, 1 - where) + 0.05)
+        sigma = width * (0.55 + 0.45 * fade)
+        reach = 3 * sigma
+        near = (np.abs(across[0] - x) < reach).nonzero()[0]
+        rows = (np.abs(up[:, 0] - y) < reach).nonzero()[0]
+        if not len(near) or not len(rows):
+            continue
+        box = np.s_[rows[0] : rows[-1] + 1, near[0] : near[-1] + 1]
+        squared = (across[box] - x) ** 2 + (up[box] - y) ** 2
+        np.maximum(strength[box], fade * np.exp(-squared / (2 * sigma**2)), out=strength[box])
+    return strength
+
+
+def _smooth(points: Float64) -> Float64:
+    """(N, 2): points on a Catmull-Rom curve through `points`, about two a texel."""
+    ends = np.vstack([2 * points[0] - points[1], points, 2 * points[-1] - points[-2]])
+    pieces = []
+    for a, b, c, d in zip(ends, ends[1:], ends[2:], ends[3:], strict=False):
+        steps = max(int(np.linalg.norm(c - b) * TEXELS * 2), 2)
+        t = np.arange(steps)[:, None] / steps
+        pieces.append(
+            0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3)
+        )
+    return np.vstack([*pieces, points[-1:]])
