@@ -93,7 +93,7 @@ class TestPlaces:
         wide = replace(model, points=_stretch(model.points), parts=parts)
         places = place_wrinkles(wide, wide.part("skin"))
         assert places is not None
-        rows = slice(wide.starts["skin"], wide.starts["skin"] + len(skin.vertices))
+        rows = slice(wide.starts["skin"], wide.starts["skin"] + len(places))
         checked = 0
         for name, (x, y) in MAP_POINTS.items():
             for side, point in ((1, name), (-1, MIRRORED.get(name, name))):
