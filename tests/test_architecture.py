@@ -60,6 +60,7 @@ fba.body.builtin
 fba.body.gait
 fba.body.importers
 fba.planning
+fba.study
 fba.capture.markers
 fba.capture.virtual_markers
 fba.capture.motion

@@ -247,9 +247,8 @@ def accept(arguments: list[str]) -> None:
     command: click.Command = group
     context = click.Context(group, info_name="fba")
     while isinstance(command, click.Group) and arguments and not arguments[0].startswith("-"):
-        name, *arguments = arguments
-        found = command.get_command(context, name)
-        assert found is not None, f"there is no command {name}"
+        _, found, arguments = command.resolve_command(context, arguments)
+        assert found is not None
         command = found
     arguments = [word.replace("*", "any") for word in arguments]
     for word in arguments:  # files and folders that only the reader has

@@ -32,7 +32,7 @@ _COMMANDS = {
     "verify": "Check FBA streams for damage, and compute digests of their values.",
     "stats": "Show where the bits of FBA streams go.",
     "conformance": "Check this codec, or another program, against test vectors.",
-    "bench": "Measure the speed of this codec on a stream.",
+    "bench": "Measure the speed of this codec on a stream, and what bit rates others need.",
     "gait": "Generate a walk by stride and character, or find the steps in one.",
     "markers": "Let captured markers move any head: map them onto it, play, export.",
     "model": "Inspect face models, check them, import them, fit them to a person.",

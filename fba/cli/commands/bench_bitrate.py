@@ -1,0 +1,133 @@
+"""`fba bench bitrate`: what faces and bodies take as FBA, and in other ways, at the same error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.resources import files as package_files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fba.cli import options
+from fba.cli.command import Command, EachFile, examples
+from fba.cli.inputs import EXISTING, read_input
+from fba.cli.outputs import Output, Outputs
+from fba.limits import Limits
+from fba.parameters import BAP_STEPS_AUTO
+
+if TYPE_CHECKING:
+    from fba.study import Result, Subject
+
+SAMPLES = ("hello.fap", "talk.c3d", "hello.bvh")
+"""What is measured where no file is given: it comes with fba."""
+FINE = "visage"
+"""The table of BAP steps for what is no stream."""
+TABLE = "results.csv"
+PAGE = "bitrate.md"
+
+
+@click.command(
+    "bitrate",
+    cls=Command,
+    epilog=examples(
+        "fba bench bitrate --summary",
+        "fba bench bitrate talk.fba walk.bvh -o study",
+        "fba bench bitrate --results study/results.csv --summary",
+    ),
+)
+@click.argument("files", metavar="[FILE...]", nargs=-1, type=EXISTING)
+@click.option(
+    "-o",
+    "folder",
+    metavar="FOLDER",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the page bitrate.md, its pictures, and results.csv.",
+)
+@click.option("--summary", is_flag=True, help="Print the main results as a Markdown table.")
+@click.option(
+    "--results",
+    "tables",
+    metavar="FILE.csv",
+    multiple=True,
+    type=EXISTING,
+    help="Results measured before, instead of measuring; repeatable.",
+)
+@click.option(
+    "--only", type=click.Choice(("face", "body")), help="Measure only the faces, or only the bodies."
+)
+@options.bap_steps_option
+@options.no_clobber_option
+@options.limit_option
+def command(
+    files: tuple[Path, ...],
+    folder: Path | None,
+    summary: bool,
+    tables: tuple[Path, ...],
+    only: str | None,
+    bap_steps: str,
+    no_clobber: bool,
+    limit: Limits,
+) -> None:
+    """Measure bit rates and errors of faces and bodies, beside other ways to send the same.
+
+    FILE: streams, captures, any file with an animation; without one, the samples that come with fba. Each
+    is coded by fba at many settings, and the same values by general-purpose compressors, as a file and live.
+    Takes about a second for each second of animation; needs the packages of the extra `study`.
+    """
+    from fba.study import make_page, make_pictures, results_csv, summary_lines
+    from fba.study.page import PICTURES
+
+    if tables and files:
+        raise click.UsageError("give files to measure or --results, not both")
+    outputs = None
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        names = [TABLE, PAGE, *PICTURES]
+        outputs = Outputs([Output("-o", folder / name) for name in names], files, no_clobber=no_clobber)
+    results = _read_results(tables) if tables else _measure(files, only, bap_steps, limit)
+    if folder is not None and outputs is not None:
+        outputs.write(folder / TABLE, results_csv(results).encode())
+        for name, data in make_pictures(results).items():
+            outputs.write(folder / name, data)
+        outputs.write(folder / PAGE, make_page(results).encode())
+        click.echo(f"made {folder / PAGE}", err=True)
+    if summary or folder is None:
+        click.echo("\n".join(summary_lines(results)))
+
+
+def _read_results(tables: Sequence[Path]) -> list[Result]:
+    from fba.study import read_results
+
+    return [result for table in tables for result in read_results(table)]
+
+
+def _measure(files: Sequence[Path], only: str | None, bap_steps: str, limits: Limits) -> list[Result]:
+    """Return the results of files, or of the samples."""
+    from fba.study.measurement import measure
+    from fba.study.packages import EXTRA
+    from fba.study.rivals import missing_packages
+
+    for package in missing_packages():
+        click.echo(f"fba: {package} is not installed, so its rows are left out: {EXTRA}", err=True)
+    subjects: list[Subject] = []
+    paths = list(files) or [Path(str(package_files("fba") / "samples" / name)) for name in SAMPLES]
+    each = EachFile(paths)
+    for path in paths:
+        with each.file(path):
+            subjects += _subjects_of(path, only, bap_steps, limits)
+    each.finish()
+    return measure(subjects, lambda line: click.echo(f"fba: {line}", err=True))
+
+
+def _subjects_of(path: Path, only: str | None, bap_steps: str, limits: Limits) -> list[Subject]:
+    """Return the face and the body of a file, if they move and are asked for."""
+    from fba.study import split_subjects
+
+    tables: list[str] = []
+    animation = read_input(path, bap_steps=bap_steps, limits=limits, tables=tables)
+    steps = tables[0] if tables else FINE if bap_steps == BAP_STEPS_AUTO else bap_steps
+    found = split_subjects(path.name, animation, steps)
+    if not found:
+        click.echo(f"fba: {path}: nothing moves; left out", err=True)
+    return [one for one in found if only in (None, one.kind)]

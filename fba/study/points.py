@@ -1,0 +1,121 @@
+"""Operating points: each a setting of this encoder, and what a receiver of its stream shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fba.arrays import Float64, Int64
+from fba.codec import Encoder, EncoderOptions, decode, encode_with_statistics, probe_stream
+from fba.face.resolve import known_faps, resolve
+from fba.planning import encode_planned
+from fba.study.subjects import FACE, Subject
+
+QUANTISERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 31)
+WITH_RIVALS = (1, 2, 4, 6, 12, 24)
+"""Quantisers at which rivals code the same numbers."""
+
+
+class Point(NamedTuple):
+    """A setting of this encoder.
+
+    method, setting: its name. encode: returns the stream of a subject. rivals: whether the others code the
+    values that come of it, too.
+    """
+
+    method: str
+    setting: str
+    encode: Callable[[Subject], bytes]
+    rivals: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Coded:
+    """A subject's stream and what comes of it.
+
+    size: bytes of the stream. plane_bytes: int64 (P,), of each plane, a packet by itself, in whole bytes.
+    shown: float64 (T, 68 or 296), at every frame of the source. values: int64 (P, 68 or 296), what a decoder
+    knows with each plane. used: columns that the stream carries.
+    """
+
+    size: int
+    plane_bytes: Int64
+    shown: Float64
+    values: Int64
+    used: Int64
+
+
+def decode_subject(subject: Subject, data: bytes) -> Coded:
+    """Return what a receiver of a subject's stream shows.
+
+    Over frames that the stream leaves out, it goes straight from one plane to the next.
+    """
+    info = probe_stream(data)
+    assert info.plane_bits is not None
+    received = decode(data, bap_steps=subject.bap_steps)
+    if subject.kind == FACE:
+        assert received.face is not None
+        shown = resolve(received.face).astype(np.float64)
+        values = known_faps(received.face)[0]
+        mask = received.face.mask
+    else:
+        assert received.body is not None
+        shown = received.body.values.astype(np.float64)
+        values, mask = received.body.values, received.body.mask
+    index = subject.animation.index - subject.animation.index[0]
+    own = received.index - received.index[0]
+    if len(own) != len(index) or (own != index).any():
+        shown = np.stack([np.interp(index, own, column) for column in shown.T], axis=1)
+    return Coded(
+        len(data), -(-info.plane_bits // 8), shown, values.astype(np.int64), np.flatnonzero(mask.any(axis=0))
+    )
+
+
+def options_for(subject: Subject, quant: int) -> EncoderOptions:
+    """Return the options of an encoder for a subject, with one quantiser."""
+    return EncoderOptions(fap_quant=quant, bap_quant=quant, bap_steps=subject.bap_steps, clamp=True)
+
+
+def encode_as_reference(subject: Subject, quant: int) -> bytes:
+    """Return the stream of a plain encoder, with ranges that fit."""
+    return encode_with_statistics(subject.animation, options_for(subject, quant))[0]
+
+
+def encode_with_preset(subject: Subject, preset: str, quant: int) -> bytes:
+    """Return the stream of a preset."""
+    return encode_planned(subject.animation, options_for(subject, quant), preset=preset)[0]
+
+
+def encode_live(subject: Subject, quant: int) -> bytes:
+    """Return the stream of an encoder that gets one frame at a time and knows nothing of the next."""
+    encoder = Encoder(options_for(subject, quant))
+    return b"".join(encoder.push(frame) for frame in subject.animation) + encoder.finish()
+
+
+def _live(quant: int) -> Callable[[Subject], bytes]:
+    return lambda subject: encode_live(subject, quant)
+
+
+def _reference(quant: int) -> Callable[[Subject], bytes]:
+    return lambda subject: encode_as_reference(subject, quant)
+
+
+def _preset(preset: str, quant: int) -> Callable[[Subject], bytes]:
+    return lambda subject: encode_with_preset(subject, preset, quant)
+
+
+def operating_points(kind: str) -> tuple[Point, ...]:
+    """Return all settings for a face or a body. The first is the one without loss."""
+    found = [
+        Point("FBA exact", "quantiser 1", _preset("exact", 1)),
+        Point("FBA reference", "quantiser 1", _reference(1)),
+        Point("FBA without look-ahead", "quantiser 1", _live(1)),
+    ]
+    name, preset = ("FBA compact", "compact") if kind == FACE else ("FBA exact", "exact")
+    for quant in QUANTISERS:
+        point = Point(name, f"quantiser {quant}", _preset(preset, quant), quant in WITH_RIVALS)
+        found = [one for one in found if one[:2] != point[:2]] + [point]
+    return tuple(found)

@@ -1,0 +1,180 @@
+"""The study on a short sample: its rows, its files, its page; and what it says about bad input."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation, FaceTrack
+from fba.cli.main import main
+from fba.errors import FormatError, OptionError
+from fba.study import (
+    Result,
+    make_page,
+    make_pictures,
+    measure,
+    read_results,
+    results_csv,
+    split_subjects,
+    summary_lines,
+)
+from fba.study.points import operating_points
+
+SAMPLES = files("fba") / "samples"
+
+
+@pytest.fixture(scope="session")
+def short_face() -> Animation:
+    """Twelve frames of the sample that speaks."""
+    return replace(fba.read(str(SAMPLES / "hello.fap"))[60:72], index=np.arange(12))
+
+
+@pytest.fixture(scope="session")
+def results(short_face: Animation) -> list[Result]:
+    lines: list[str] = []
+    found = measure(split_subjects("short", short_face, "iso"), lines.append)
+    assert lines == ["1 of 1: the face of short, 0.5 s"]
+    return found
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as stop:
+            main([str(one) for one in arguments])
+        captured = capsys.readouterr()
+        return int(stop.value.code or 0), captured.out, " ".join(captured.err.split())
+
+    return call
+
+
+def test_every_setting_has_a_row_and_the_others_have_one_for_its_values(results: list[Result]) -> None:
+    own = {(one.method, one.point) for one in results if not one.numbers}
+    assert own == {point[:2] for point in operating_points("face")}
+    with_rivals = {f"{one.method}, {one.setting}" for one in operating_points("face") if one.rivals}
+    for numbers in ("all", "sent"):
+        deflate = [one for one in results if (one.method, one.numbers) == ("deflate, rows", numbers)]
+        assert {one.point for one in deflate} == with_rivals
+    assert {one.packets for one in results} == {12}
+    assert {one.seconds for one in results} == {0.48}
+
+
+def test_rates_are_of_whole_streams_and_of_whole_packets(
+    short_face: Animation, results: list[Result]
+) -> None:
+    data = fba.encode(short_face, fba.EncoderOptions(clamp=True))
+    (reference,) = [one for one in results if one.method == "FBA reference"]
+    assert reference.file_bytes == len(data)
+    assert reference.file_rate == pytest.approx(len(data) * 8 / 480)
+    assert reference.live_bytes is not None
+    bits = fba.probe(data).plane_bits
+    assert bits is not None
+    assert 0 <= 8 * reference.live_bytes - bits.sum() < 8 * 12
+    assert reference.header_rate == pytest.approx(8.0)  # 40 bytes, 25 times a second
+
+
+def test_a_coarser_quantiser_is_smaller_and_further_off(results: list[Result]) -> None:
+    compact = {one.point: one for one in results if one.method == "FBA compact"}
+    fine, coarse = compact["quantiser 1"], compact["quantiser 31"]
+    assert fine.live_bytes is not None
+    assert coarse.live_bytes is not None
+    assert coarse.live_bytes < fine.live_bytes
+    assert 0 < fine.max_mm < 0.1 < coarse.max_mm
+    assert fine.under == 1.0
+
+
+def test_results_are_read_as_they_were_written(results: list[Result], tmp_path: Path) -> None:
+    path = tmp_path / "results.csv"
+    path.write_text(results_csv(results), encoding="utf-8")
+    again = read_results(path)
+    assert results_csv(again) == results_csv(results)
+    assert [replace(one, max_mm=0, p99_mm=0, under=0, degrees=0) for one in again] == [
+        replace(one, max_mm=0, p99_mm=0, under=0, degrees=0) for one in results
+    ]
+    path.write_text("a,b\n1,2\n", encoding="utf-8")
+    with pytest.raises(FormatError, match="no results of `fba bench bitrate`"):
+        read_results(path)
+    path.write_text(results_csv(results).replace(",12,", ",twelve,", 1), encoding="utf-8")
+    with pytest.raises(FormatError, match=r"results.csv:2: "):
+        read_results(path)
+
+
+def test_the_command_writes_page_pictures_and_numbers(
+    results: list[Result], tmp_path: Path, run: Callable[..., tuple[int, str, str]]
+) -> None:
+    pytest.importorskip("matplotlib")
+    path = tmp_path / "before.csv"
+    path.write_text(results_csv(results), encoding="utf-8")
+    code, out, _ = run("bench", "bitrate", "--results", path, "-o", tmp_path / "study", "--summary")
+    assert code == 0
+    assert out.splitlines() == summary_lines(read_results(path))
+    made = {one.name: one.read_text(encoding="utf-8") for one in (tmp_path / "study").iterdir()}
+    assert set(made) == {"results.csv", "bitrate.md", "faces.svg", "faces-bars.svg"}
+    assert made["results.csv"] == path.read_text(encoding="utf-8")
+    assert made["bitrate.md"] == make_page(read_results(path))
+    assert made["faces.svg"].encode() == make_pictures(read_results(path))["faces.svg"]  # the same every time
+    code, _, err = run("bench", "bitrate", "--results", path, "-o", tmp_path / "study", "--no-clobber")
+    assert code == 1
+    assert "results.csv" in err
+
+
+def test_what_cannot_be_measured_is_said(
+    tmp_path: Path, run: Callable[..., tuple[int, str, str]], short_face: Animation
+) -> None:
+    (tmp_path / "notes.txt").write_text("shopping list")
+    code, out, err = run("bench", "bitrate", tmp_path / "notes.txt")
+    assert (code, out) == (1, "")
+    assert "notes.txt" in err
+    still = Animation(25, np.arange(3), FaceTrack.empty(3))
+    fba.write(tmp_path / "still.fap", still)
+    code, out, err = run("bench", "bitrate", tmp_path / "still.fap")
+    assert (code, out) == (1, "")
+    assert "still.fap: nothing moves; left out" in err
+    assert "there is no face and no body to measure" in err
+    code, _, err = run("bench", "bitrate", tmp_path / "still.fap", "--results", tmp_path / "notes.txt")
+    assert code == 2
+    assert "not both" in err
+    (tmp_path / "taken").write_text("a file")
+    code, _, err = run("bench", "bitrate", SAMPLES / "hello.fap", "-o", tmp_path / "taken")
+    assert code == 2
+    with pytest.raises(OptionError, match="nothing moves"):
+        measure([])
+    with pytest.raises(OptionError, match="short has no frames"):
+        split_subjects("short", short_face[:0], "iso")
+
+
+def test_without_its_packages_the_study_says_how_to_get_them(
+    results: list[Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, short_face: Animation
+) -> None:
+    for name in ("matplotlib", "zstandard", "brotli"):
+        monkeypatch.setitem(sys.modules, name, None)  # as if it were not installed
+    with pytest.raises(OptionError, match=r"needs the package matplotlib.*pip install '\.\[study\]'"):
+        make_pictures(results)
+    from fba.study.rivals import installed_rivals, missing_packages
+
+    assert missing_packages() == ("zstandard", "brotli")
+    assert {one.name.partition(",")[0] for one in installed_rivals()} == {
+        "int16", "varints of differences", "deflate", "xz",
+    }  # fmt: skip
+
+
+def test_bench_without_the_name_of_a_subcommand_measures_speed(
+    tmp_path: Path, run: Callable[..., tuple[int, str, str]], short_face: Animation
+) -> None:
+    (tmp_path / "bitrate").write_bytes(fba.encode(short_face))
+    code, out, _ = run("bench", "--rounds", 1, tmp_path / "bitrate")
+    assert code == 0
+    assert "12 frames" in out
+    code, out, _ = run("bench", tmp_path / "bitrate", "--rounds", 1)
+    assert code == 0
+    assert "12 frames" in out
+    code, _, err = run("bench")
+    assert code == 2
+    assert "Missing argument" in err
