@@ -54,11 +54,12 @@ TIMELINE = "player/fba_player/playback/timeline.py"
 LIVE = "player/fba_player/playback/live.py"
 MIXER = "player/fba_player/sound/_mixer.py"
 DEVICE_CLOCK = "player/fba_player/sound/_device_clock.py"
-GROUND = "fba/capture/limbs/ground.py"
+GROUND = "fba/body/ground.py"
 PLACEMENT = "player/fba_player/scene/point_placement.py"
 SESSION = "player/fba_player/session/session.py"
 TAKES = "player/fba_player/session/takes.py"
 SOLES = "fba/capture/limbs/soles.py"
+STANCE = "fba/body/stance.py"
 TOES = "fba/capture/limbs/toes.py"
 RENDER = "player/fba_player/export/render.py"
 GLTF_READER = "fba/formats/gltf/reader.py"
@@ -439,23 +440,23 @@ MUTANTS = (
     Mutant(FOUND_REST, "LOW_ARM = 0.6", "LOW_ARM = 2.0", PREPARATION_TEST),
     Mutant(REST_CORRECTION, "OWN_CLAVICLE = 5.0", "OWN_CLAVICLE = 90.0", PREPARATION_TEST),
     Mutant(BVH, "MOST_OF_BODY = 0.75", "MOST_OF_BODY = 2.0", ZOO_TEST),
-    Mutant(SOLES, "HEEL = 0.045", "HEEL = 0.05", CAPTURE_TEST),
+    Mutant(STANCE, "HEEL = 0.045", "HEEL = 0.05", CAPTURE_TEST),
     Mutant(SOLES, "WITHIN = 0.012", "WITHIN = 0.01", CAPTURE_TEST),
     Mutant(SOLES, "TOLERATED, SUNK = 0.004, 0.003", "TOLERATED, SUNK = 0.005, 0.003", CAPTURE_TEST),
     Mutant(SOLES, "TOLERATED, SUNK = 0.004, 0.003", "TOLERATED, SUNK = 0.004, 0.004", CAPTURE_TEST),
     Mutant(
-        SOLES, "PLACED, PLACED_SECONDS = 0.025, 0.5", "PLACED, PLACED_SECONDS = 0.024, 0.5", PLANTING_TEST
+        STANCE, "PLACED, PLACED_SECONDS = 0.025, 0.5", "PLACED, PLACED_SECONDS = 0.024, 0.5", PLANTING_TEST
     ),
     Mutant(
-        SOLES, "PLACED, PLACED_SECONDS = 0.025, 0.5", "PLACED, PLACED_SECONDS = 0.027, 0.5", PLANTING_TEST
+        STANCE, "PLACED, PLACED_SECONDS = 0.025, 0.5", "PLACED, PLACED_SECONDS = 0.027, 0.5", PLANTING_TEST
     ),
     Mutant(
-        SOLES, "PLACED, PLACED_SECONDS = 0.025, 0.5", "PLACED, PLACED_SECONDS = 0.025, 0.1", PLANTING_TEST
+        STANCE, "PLACED, PLACED_SECONDS = 0.025, 0.5", "PLACED, PLACED_SECONDS = 0.025, 0.1", PLANTING_TEST
     ),
-    Mutant(SOLES, "LEVEL = 0.15", "LEVEL = 0.05", PLANTING_TEST),
-    Mutant(SOLES, "LEVEL = 0.15", "LEVEL = 0.17", PLANTING_TEST),
-    Mutant(SOLES, "SUPPORT = 0.08", "SUPPORT = 0.082", PLANTING_TEST),
-    Mutant(SOLES, "& ~near[::-1]", "", PLANTING_TEST),
+    Mutant(STANCE, "LEVEL = 0.15", "LEVEL = 0.05", PLANTING_TEST),
+    Mutant(STANCE, "LEVEL = 0.15", "LEVEL = 0.17", PLANTING_TEST),
+    Mutant(STANCE, "SUPPORT = 0.08", "SUPPORT = 0.082", PLANTING_TEST),
+    Mutant(STANCE, "& ~near[::-1]", "", PLANTING_TEST),
     Mutant(SOLES, "FARTHEST = 0.03", "FARTHEST = 0.04", CAPTURE_TEST),
     Mutant(SOLES, "FARTHEST_UP = 0.025", "FARTHEST_UP = 0.035", CAPTURE_TEST),
     Mutant(SOLES, "np.maximum(depth - UNDER, 0.0)", "0.0 * depth", PLANTING_TEST),

@@ -10,9 +10,9 @@ import numpy as np
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.body import BapSolver
+from fba.body import BapSolver, ground
 from fba.capture import _rest_alignment as rest_alignment
-from fba.capture.limbs import ground, soles
+from fba.capture.limbs import soles
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare
 from fba.errors import ModelError

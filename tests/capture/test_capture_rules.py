@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fba.body import BapSolver, Skeleton
+from fba.body import BapSolver, Skeleton, ground
 from fba.capture import matching, retarget
 from fba.capture.limbs import _leg_ik as leg_ik
-from fba.capture.limbs import ground, hinges, soles
+from fba.capture.limbs import hinges, soles
 from fba.capture.limbs.foot_planting import turn_foot
 from fba.capture.limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion

@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 from test_from_skeleton import NAMES
 
 from capture_bodies import bone_errors, limb_bones, motion
-from fba.body import BapSolver, Skeleton
+from fba.body import BapSolver, Skeleton, ground
 from fba.body.footing import lowest_sole
 from fba.body.model import BodyModel
 from fba.capture import SkeletonMotion, from_skeleton, retarget_report
 from fba.capture.limbs import _leg_ik as leg_ik
-from fba.capture.limbs import ground, soles
+from fba.capture.limbs import soles
 from fba.parameters import bap_numbers
 
 THIGH, SHANK = 0.36, 0.54

@@ -6,8 +6,9 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64
+from fba.body import ground
 from fba.capture.limbs import _leg_ik as leg_ik
-from fba.capture.limbs import bone_ik, ground, soles, toes
+from fba.capture.limbs import bone_ik, soles, toes
 from fba.capture.limbs.targets import Targets
 
 STEPS = 4

@@ -19,27 +19,16 @@ from fba.arrays import Bool, Float64
 from fba.body.footing import OUTLINE, TIP
 from fba.body.model import BodyModel
 from fba.body.skeleton import Skeleton
+from fba.body.stance import HEEL, SIDES, find_standing, sole_points
 from fba.capture.limbs._coupled_paths import chain
 from fba.capture.motion import SkeletonMotion
 
-STILL = 0.15
-"""Speed in metres per second below which a heel or a ball stands."""
-LEVEL = 0.15
-"""Speed in metres per second, up or down, below which the lower foot stands, wherever it slides."""
-STILL_SECONDS = 0.1
-"""For so long at least: at the top of a leap, feet are still for less."""
-SUPPORT = 0.08
-"""Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
-PLACED, PLACED_SECONDS = 0.025, 0.5
-"""Metres above the lower foot up to which a foot that is still for so many seconds stands on its ground."""
 LEVEL_SECONDS = 0.2
 """Seconds over which the height of the ground under feet that stand is averaged."""
 FRONT = 0.05
 """Metres from an ankle ahead up to which a source's foot has no front."""
 ANKLE_HEIGHT, BALL = 0.076, 0.15
 """Metres from the default skeleton's ankle down to the ground, and ahead to the ball."""
-HEEL = 0.045
-"""Metres from an ankle back to the heel."""
 ON_GROUND = 0.015
 """Height in metres at which the influence of a foot on the height of the body falls to 1/e."""
 SETTLED = 0.02
@@ -158,19 +147,13 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
     lows, points, balls = [], [], []
     shown = BodyModel.default().skeleton if skeleton is Skeleton.default() else skeleton
     seen = []
-    for side in "lr":
-        parts = [f"{side}_ankle", f"{side}_subtalar", f"{side}_midtarsal", f"{side}_metatarsal"]
-        if not all(joint in skeleton for joint in parts):
+    for side in SIDES:
+        soles, last = sole_points(skeleton, side), f"{side}_metatarsal"
+        if soles is None:
             return None
         centres = skeleton.centres
-        ankle, ball = centres[skeleton.number(parts[0])], centres[skeleton.number(parts[3])]
-        soles = {
-            parts[1]: np.array([ankle[0], 0.0, ankle[2] - HEEL]),
-            parts[2]: np.array([ball[0], 0.0, ball[2]]),
-        }
         frames = {
-            name: (position, frame)
-            for name, position, frame in joint_frames(skeleton, wanted, root, parts[3])
+            name: (position, frame) for name, position, frame in joint_frames(skeleton, wanted, root, last)
         }
         points.append([
             frames[name][0] + frames[name][1] @ (sole - centres[skeleton.number(name)])
@@ -180,8 +163,7 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
         balls.append(points[-1][1][:, 1] - lows[-1])
         if shown is not skeleton:
             frames = {
-                name: (position, frame)
-                for name, position, frame in joint_frames(shown, wanted, root, parts[3])
+                name: (position, frame) for name, position, frame in joint_frames(shown, wanted, root, last)
             }
             seen.append(lowest_edge(shown, frames, side, (*OUTLINE, *TIP)))
     lowest = np.array(lows)
@@ -253,35 +235,19 @@ def lift(above: Float64, body: Float64, stiff: Float64, rate: float) -> Float64:
 def settle(above: Float64, points: Float64, rate: float) -> Float64:
     """Return heights (2, T) of soles above the ground without what captures leave of it in feet that stand.
 
-    above: (2, T), metres. points: (2, 2, T, 3), of the soles. The lower foot, while it is level and not far
-    from the ground, stands on it, even if it slides or a treadmill carries it; so does the other one while an
-    end of it is still, up to `PLACED` higher, by which captures of feet are often off. In between, the ground
-    of a foot goes from one such height to the next. Nobody is under the ground.
+    above: (2, T), metres. points: (2, 2, T, 3), of the soles. The ground of a foot goes from its height
+    where it stands (`fba.body.stance.find_standing`) to that where it stands next. Nobody is under the
+    ground.
     """
-    count = above.shape[1]
-    if count > 1:
-        speed = np.linalg.norm(np.gradient(points, axis=2), axis=3).min(axis=1) * rate
-        rising = np.abs(np.gradient(above, axis=1)) * rate
+    if above.shape[1] > 1:
         lowest = above.min(axis=0)
-        lower, near = above <= lowest, above <= lowest + PLACED
-        still = _fastest(speed, rate, STILL_SECONDS) < STILL
-        alone = (_fastest(rising, rate, STILL_SECONDS) < LEVEL) & ~near[::-1]
-        placed = (_fastest(speed, rate, PLACED_SECONDS) < STILL) & near
-        stands = (above < SUPPORT) & np.where(lower, still | alone, placed)
-        support = _levels(lowest, (stands & lower).any(axis=0), rate)
+        stands = find_standing(above, points, rate)
+        support = _levels(lowest, (stands & (above <= lowest)).any(axis=0), rate)
         own = [
             _levels(foot, on, rate) if on.any() else support for foot, on in zip(above, stands, strict=True)
         ]
         above = above - np.array(own)
     result: Float64 = np.maximum(above, 0.0)
-    return result
-
-
-def _fastest(speed: Float64, rate: float, seconds: float) -> Float64:
-    """Return the highest of speeds (2, T) within so many seconds around each frame."""
-    half = round(seconds * rate / 2)
-    around = np.pad(speed, ((0, 0), (half, half)), mode="edge")
-    result: Float64 = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2)
     return result
 
 

@@ -1,0 +1,102 @@
+"""Which feet stand: heights and ways of soles, and when a foot is on the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fba.arrays import Bool, Float64
+from fba.body import ground
+from fba.body.footing import OUTLINE, TIP
+from fba.body.skeleton import Skeleton
+
+HEEL = 0.045
+"""Metres from an ankle back to the heel."""
+STILL = 0.15
+"""Speed in metres per second below which a heel or a ball stands."""
+LEVEL = 0.15
+"""Speed in metres per second, up or down, below which the lower foot stands, wherever it slides."""
+STILL_SECONDS = 0.1
+"""For so long at least: at the top of a leap, feet are still for less."""
+SUPPORT = 0.08
+"""Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
+PLACED, PLACED_SECONDS = 0.025, 0.5
+"""Metres above the lower foot up to which a foot that is still for so many seconds stands on its ground."""
+SIDES = ("l", "r")
+
+
+def sole_points(skeleton: Skeleton, side: str) -> dict[str, Float64] | None:
+    """Return the points (3,) of a sole under heel and ball, by the joint that each moves with.
+
+    In the default posture, metres. side: "l" or "r". None for a skeleton that lacks a joint of the foot.
+    """
+    ankle, heel, middle, ball = (
+        f"{side}_{joint}" for joint in ("ankle", "subtalar", "midtarsal", "metatarsal")
+    )
+    if not all(joint in skeleton for joint in (ankle, heel, middle, ball)):
+        return None
+    above, front = (skeleton.centres[skeleton.number(joint)] for joint in (ankle, ball))
+    return {
+        heel: np.array([above[0], 0.0, above[2] - HEEL]),
+        middle: np.array([front[0], 0.0, front[2]]),
+    }
+
+
+def find_stance(skeleton: Skeleton, matrices: Float64, rate: float) -> Bool:
+    """Return bool (2, T): when the left and the right foot of a body stand on the ground, by their own ways.
+
+    matrices: (T, J, 4, 4), as `BapSolver.pose` returns them. rate: frames a second. All False for a skeleton
+    without feet.
+    """
+    count = len(matrices)
+    soles = [sole_points(skeleton, side) for side in SIDES]
+    if count < 2 or None in soles:
+        return np.zeros((2, count), dtype=np.bool_)
+    points = np.zeros((2, 2, count, 3))
+    lowest = np.full((2, count), np.inf)
+    for foot, (side, sole) in enumerate(zip(SIDES, soles, strict=True)):
+        for place, (joint, point) in enumerate((sole or {}).items()):
+            points[foot, place] = _moved(skeleton, matrices, joint, point)
+        for joint, x, y, z in (*OUTLINE, *TIP):
+            name = f"{side}_{joint}"
+            centre = skeleton.centres[skeleton.number(name)]
+            edge = np.array([centre[0] + (x if side == "l" else -x), y, centre[2] + z])
+            lowest[foot] = np.minimum(lowest[foot], _moved(skeleton, matrices, name, edge)[:, 1])
+    middles = points.mean(axis=1)
+    return find_standing(lowest - ground.find(lowest, middles).under(middles), points, rate)
+
+
+def find_standing(above: Float64, points: Float64, rate: float) -> Bool:
+    """Return bool (2, T): when feet stand on the ground.
+
+    above: (2, T), heights of the soles above the ground, metres. points: (2, 2, T, 3), heels and balls. The
+    lower foot, while it is level and not far from the ground, stands on it, even if it slides or a treadmill
+    carries it; so does the other one while an end of it is still, up to `PLACED` higher, by which captures
+    of feet are often off.
+    """
+    if above.shape[1] < 2:
+        return np.zeros(above.shape, dtype=np.bool_)
+    speed = np.linalg.norm(np.gradient(points, axis=2), axis=3).min(axis=1) * rate
+    rising = np.abs(np.gradient(above, axis=1)) * rate
+    lowest = above.min(axis=0)
+    lower, near = above <= lowest, above <= lowest + PLACED
+    still = _fastest(speed, rate, STILL_SECONDS) < STILL
+    alone = (_fastest(rising, rate, STILL_SECONDS) < LEVEL) & ~near[::-1]
+    placed = (_fastest(speed, rate, PLACED_SECONDS) < STILL) & near
+    stands: Bool = (above < SUPPORT) & np.where(lower, still | alone, placed)
+    return stands
+
+
+def _fastest(speed: Float64, rate: float, seconds: float) -> Float64:
+    """Return the highest of speeds (2, T) within so many seconds around each frame."""
+    half = round(seconds * rate / 2)
+    around = np.pad(speed, ((0, 0), (half, half)), mode="edge")
+    result: Float64 = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2)
+    return result
+
+
+def _moved(skeleton: Skeleton, matrices: Float64, joint: str, point: Float64) -> Float64:
+    """Return where a point of the default posture (3,) that moves with a joint is: (T, 3)."""
+    number = skeleton.number(joint)
+    own = matrices[:, number]
+    moved: Float64 = own[:, :3, 3] + own[:, :3, :3] @ (point - skeleton.centres[number])
+    return moved
