@@ -106,6 +106,7 @@ fba_player
 fba.player
 fba.cli
 fba.cli.recordings
+fba.cli.emotions
 fba.cli.coding
 fba.cli.commands
 fba.__main__

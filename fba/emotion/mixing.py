@@ -17,7 +17,7 @@ from fba.parameters import EXPRESSIONS, FAP_COUNT
 def mix(weights: Sequence[tuple[Expression, float]], rules: Rules) -> Float32:
     """Return the FAPs of expressions at intensities of 0 to 100: float32 (68,), within the standard's limits.
 
-    Two at a time: those of a family first, then families in falling order of activation.
+    Those of a family first, two at a time, then the families.
     """
     families: dict[str, Part] = {}
     for expression, intensity in weights:
@@ -30,11 +30,7 @@ def mix(weights: Sequence[tuple[Expression, float]], rules: Rules) -> Float32:
         )
     if not families:
         return np.zeros(FAP_COUNT, dtype=np.float32)
-    ordered = sorted(families.values(), key=lambda one: -one.shown_activation)
-    result = ordered[0]
-    for other in ordered[1:]:
-        result = mix_families(result, other, rules)
-    return limited(result.shown)
+    return limited(mix_families(list(families.values()), rules))
 
 
 def activation_of(expression: Expression) -> float | None:

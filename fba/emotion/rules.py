@@ -6,6 +6,7 @@ Digest faces-and-emotions.md, section 8.7. The source gives no numbers; those he
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 
@@ -57,12 +58,12 @@ class Rules:
 class Part:
     """An expression at an intensity, on its way into a mix.
 
-    faps: float64 (68,), at full intensity. moved: bool (68,), the FAPs that it moves. activation: at full
-    intensity. intensity: 0 to 1. family: "" for none.
+    faps: float64 (68,), at full intensity. moved: float64 (68,), 1 for the FAPs that it moves, 0 for others;
+    a mix moves some in part. activation: at full intensity. intensity: 0 to 1. family: "" for none.
     """
 
     faps: Float64
-    moved: Bool
+    moved: Float64
     activation: float
     intensity: float
     family: str
@@ -85,7 +86,7 @@ def part(expression: Expression, intensity: float, activation: float | None, pre
     """
     return Part(
         expression.faps.astype(np.float64),
-        moved_faps(expression, presence),
+        moved_faps(expression, presence).astype(np.float64),
         LEAST_ACTIVATION if activation is None else activation,
         intensity,
         expression.family,
@@ -120,44 +121,59 @@ def mix_within_family(first: Part, second: Part, centre: Float64, rules: Rules) 
     total = first.intensity + second.intensity
     share = second.intensity / total if rules.interpolation is None else rules.interpolation
     interpolated = (1 - share) * first.faps + share * second.faps
-    ruled = interpolated.copy()
+    ruled = interpolated
     for own, other in ((first, second), (second, first)):
         near = np.abs(own.faps - centre) <= rules.nearness * np.abs(centre)
         kept = np.where(near, rules.reduction * own.faps, 0.0)
-        ruled = np.where(own.moved & ~other.moved, kept, ruled)
+        alone = own.moved * (1 - other.moved)
+        ruled = ruled + alone * (kept - interpolated)
     hold = _grow(min(share, 1 - share), rules.crossover)
     return Part(
         hold * ruled + (1 - hold) * interpolated,
-        first.moved | second.moved,
+        (1 - share) * first.moved + share * second.moved,
         (1 - share) * first.activation + share * second.activation,
         max(first.intensity, second.intensity),
         first.family,
     )
 
 
-def mix_families(first: Part, second: Part, rules: Rules) -> Part:
-    """Return two expressions of different families as one, at an intensity of 1.
+def mix_families(parts: Sequence[Part], rules: Rules) -> Float64:
+    """Return the FAPs of expressions of different families: float64 (68,).
 
-    The one with the larger activation, as shown, dominates: its FAPs stay, and to those that it does not move
-    the other's are added, reduced.
+    The one with the largest activation, as shown, dominates: its FAPs stay, and to those that it does not
+    move the others' are added, reduced. The others are mixed in the same way before.
     """
-    total = first.shown_activation + second.shown_activation
-    lead = (first.shown_activation - second.shown_activation) / total if total else 0.0
-    hold = _grow(abs(lead), rules.crossover)
-    weight = 0.5 + 0.5 * hold if lead >= 0 else 0.5 - 0.5 * hold
-    dominant = first if lead >= 0 else second
-    mixed = weight * _dominate(first, second, rules) + (1 - weight) * _dominate(second, first, rules)
-    return Part(
-        mixed,
-        first.moved | second.moved,
-        weight * first.shown_activation + (1 - weight) * second.shown_activation,
-        1.0,
-        dominant.family,
-    )
+    return _mix(tuple(parts), rules, {})[0]
 
 
-def _dominate(dominant: Part, other: Part, rules: Rules) -> Float64:
-    return dominant.shown + np.where(other.moved & ~dominant.moved, rules.reduction * other.shown, 0.0)
+def _mix(
+    parts: tuple[Part, ...], rules: Rules, known: dict[tuple[Part, ...], tuple[Float64, Float64]]
+) -> tuple[Float64, Float64]:
+    """Return FAPs (68,), and how far each is moved, 0 to 1. known: mixtures that were made before."""
+    if len(parts) == 1:
+        return parts[0].shown, parts[0].moved
+    if parts in known:
+        return known[parts]
+    values, moved = np.zeros(FAP_COUNT), np.zeros(FAP_COUNT)
+    for number, weight in enumerate(_dominance([one.shown_activation for one in parts], rules)):
+        if not weight:
+            continue
+        leader, others = parts[number], parts[:number] + parts[number + 1 :]
+        added, added_moved = _mix(others, rules, known)
+        free = added_moved * (1 - leader.moved)
+        activation = max(one.shown_activation for one in others)
+        part_of = _grow(activation / (activation + leader.shown_activation or 1.0), rules.crossover)
+        values += weight * (leader.shown + rules.reduction * free * added)
+        moved += weight * (leader.moved + free * part_of)
+    known[parts] = values, moved
+    return values, moved
+
+
+def _dominance(activations: list[float], rules: Rules) -> list[float]:
+    """Return the share of each in the lead: 1 for the largest activation, less where others are near it."""
+    largest = max(activations) or 1.0
+    near = [1 - _grow((largest - one) / (largest + one), rules.crossover) for one in activations]
+    return [one / sum(near) for one in near]
 
 
 def _grow(value: float, crossover: float) -> float:

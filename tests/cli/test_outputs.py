@@ -70,7 +70,7 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
                 assert "--no-clobber" in options, f"fba {name}"
     assert writing == {
         "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
-        "conformance", "capture", "markers",
+        "conformance", "capture", "markers", "express",
     }  # fmt: skip
 
 
@@ -243,6 +243,7 @@ STANDARD = [
     "convert body.bap {} --to fba",
     "convert body.bap {} --to glb --no-mesh",
     "gait --cycles 1 -o {} --to bap",
+    "express fear -o {} --to fap",
 ]
 
 
@@ -386,6 +387,7 @@ CLOBBERING = [
     "decode there.fba both.fba --fap out",
     "convert face.fap there.fba",
     "gait -o there.fba",
+    "express fear -o there.fba",
     "render both.fba -o there.fba --to png",
     "render --contact-sheet faps -o there.fba --to png",
     "model import face.fap -o there.glb",

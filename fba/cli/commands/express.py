@@ -1,0 +1,254 @@
+"""`fba express`: named expressions and their mixtures, as streams, pictures and films."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli import options
+from fba.cli.command import Command, examples, usage_errors
+from fba.cli.emotions import tables
+from fba.cli.inputs import read_model
+from fba.cli.outputs import STANDARD, TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.printing import Progress, seconds_text
+from fba.errors import OptionError
+
+if TYPE_CHECKING:
+    from fba.animation import Animation
+    from fba.emotion import Blend
+
+PICTURES, FILMS = ("png", "jpg", "jpeg"), ("mp4", "gif")
+DEFAULT_RATE = Fraction(25)
+DEFAULT_SECONDS, DEFAULT_EASE = 3.0, 0.5
+"""Length of an animation, and how long it takes from neutral to the expression and back."""
+SENDING = ("auto", "expression", "faps")
+
+
+class PointType(click.ParamType[tuple[float, float]]):
+    """A point of the plane: activation and evaluation, "4.0,1.1"."""
+
+    name = "point"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        try:
+            activation, evaluation = (float(part) for part in str(value).split(","))
+        except ValueError:
+            self.fail(f"{value!r} is no activation and evaluation; write e.g. 4.0,1.1", param, ctx)
+        return activation, evaluation
+
+
+@click.command(
+    cls=Command,
+    epilog=examples(
+        'fba express "fear=60 joy=30" -o uneasy.fba',
+        "fba express terror -o terror.png",
+        "fba express --at 4.0,1.1 -o guilt.mp4 --seconds 4 --ease 1",
+        'fba express "anger=80 surprise=40"',
+        "fba express --list",
+    ),
+)
+@click.argument("weights", nargs=-1, metavar="[NAME=INTENSITY...]")
+@click.option(
+    "--at",
+    "point",
+    type=PointType(),
+    metavar="A,E",
+    help="Instead of names: activation and evaluation, 1 to 7 each; the named expressions around that point "
+    "are mixed.",
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    type=OutputType(),
+    help="File to write: .fba, .fap or another format of animations, .png, .jpg, .mp4, .gif. - for standard "
+    "output.",
+)
+@options.to_option
+@options.no_clobber_option
+@click.option("--seconds", type=float, help=f"Length of a stream or a film; default: {DEFAULT_SECONDS:g}.")
+@click.option(
+    "--ease",
+    type=float,
+    metavar="SECONDS",
+    help=f"Time from neutral to the expression, and back at the end; default: {DEFAULT_EASE:g}.",
+)
+@options.fps_option(f"Frame rate; default: {DEFAULT_RATE}.")
+@click.option(
+    "--send",
+    type=click.Choice(SENDING),
+    default=SENDING[0],
+    show_default=True,
+    help="expression: by FAP 2, which adds up two of its six expressions. faps: by low-level FAPs, mixed by "
+    "the rules. auto: by FAP 2 where that can say it.",
+)
+@click.option("--interpolation", type=float, help="One family: share of the second; default: by intensities.")
+@click.option("--reduction", type=float, help="What remains of a FAP that only one expression moves; 0 to 1.")
+@click.option("--nearness", type=float, help="One family: how near such a FAP must be to stay; 0 to 1.")
+@click.option(
+    "--model",
+    type=click.Path(exists=True, path_type=Path),
+    metavar="FILE",
+    help="Pictures: the face; default: the built-in head.",
+)
+@click.option("--size", type=options.SizeType(), metavar="WIDTHxHEIGHT", help="Pictures: default 1280x720.")
+@click.option("--list", "listed", is_flag=True, help="List the named expressions.")
+@options.json_option
+def command(
+    weights: tuple[str, ...],
+    point: tuple[float, float] | None,
+    output: Path | None,
+    to: str | None,
+    no_clobber: bool,
+    seconds: float | None,
+    ease: float | None,
+    fps: Fraction | None,
+    send: str,
+    interpolation: float | None,
+    reduction: float | None,
+    nearness: float | None,
+    model: Path | None,
+    size: tuple[int, int] | None,
+    listed: bool,
+    as_json: bool,
+) -> None:
+    """Show expressions: named ones, mixtures of them, or a point of the plane of activation and evaluation.
+
+    NAME=INTENSITY: an intensity of 0 to 100; a name alone has 100. Without -o, what moves is printed.
+    """
+    if sum((bool(weights), point is not None, listed)) != 1:
+        raise click.UsageError("give one of expressions (fear=60), --at A,E and --list")
+    if listed:
+        if output is not None:
+            raise click.UsageError("--list prints a table; -o goes with an expression")
+        tables.print_expressions(as_json)
+        return
+    drawn = {"--model": model, "--size": size}
+    moving = {"--seconds": seconds, "--ease": ease, "--fps": fps, "--to": to}
+    kind = "" if output is None else _picture_kind(output, to)
+    for option, value in {**(drawn if not kind else {}), **(moving if output is None else {})}.items():
+        if value is not None:
+            what = "a picture or a film" if option in drawn else "-o"
+            raise click.UsageError(f"{option} goes with {what}")
+    blend = _make_blend(weights, point, interpolation, reduction, nearness)
+    if output is None:
+        tables.print_blend(blend, as_json)
+        return
+    still = kind in PICTURES
+    if still and (seconds or ease):
+        raise click.UsageError("a picture shows the full expression; --seconds and --ease are for films")
+    length = 0.0 if still else DEFAULT_SECONDS if seconds is None else seconds
+    easing = min(DEFAULT_EASE, length / 2) if ease is None else ease
+    with _option_errors():
+        animation = _perform(blend, length, easing, fps, send)
+    if kind:
+        outputs = Outputs([Output("--output", output)], [model], no_clobber=no_clobber)
+        _draw(animation, output, outputs, kind, model, size)
+        report = {"file": display_name(output), **tables.blend_record(blend)}
+        text = f"{display_name(output)}: {blend}"
+    else:
+        writing = find_writer(output, to)
+        outputs = Outputs([Output("--output", output, writing.name in TEXT_FORMATS)], no_clobber=no_clobber)
+        from fba.formats import write
+
+        with outputs.file(output) as file:
+            write(file, animation, format=writing.name)
+        bits = _count_bits(blend, length, easing, fps)
+        report = {"file": display_name(output), **tables.blend_record(blend)}
+        report |= {"frames": len(animation), "sent": _sent(animation), "bits": bits}
+        text = f"{display_name(output)}: {blend}, {len(animation)} frames, {seconds_text(animation.duration)}"
+        text += f"; {_bits_text(animation, bits)}"
+    if as_json:
+        outputs.print_json(report)
+    else:
+        outputs.say(text)
+
+
+def _picture_kind(output: Path, to: str | None) -> str:
+    """Return which kind of picture or film is asked for, "" for a format of animations."""
+    kind = to.lower() if to is not None else output.suffix.lower().removeprefix(".")
+    if output == STANDARD and to is None:
+        return ""
+    return kind if kind in PICTURES + FILMS else ""
+
+
+@contextmanager
+def _option_errors() -> Iterator[None]:
+    """What the library says about values that were typed is bad usage."""
+    try:
+        yield
+    except OptionError as error:
+        raise click.UsageError(str(error)) from error
+
+
+def _make_blend(
+    weights: tuple[str, ...],
+    point: tuple[float, float] | None,
+    interpolation: float | None,
+    reduction: float | None,
+    nearness: float | None,
+) -> Blend:
+    from fba import emotion
+
+    given = {"interpolation": interpolation, "reduction": reduction, "nearness": nearness}
+    with _option_errors():
+        rules = emotion.Rules(**{name: value for name, value in given.items() if value is not None})
+        if point is not None:
+            return emotion.expression_at(*point, rules)
+        return emotion.combine(emotion.parse_weights(" ".join(weights)), rules)
+
+
+def _perform(blend: Blend, seconds: float, ease: float, fps: Fraction | None, send: str) -> Animation:
+    from fba.emotion import perform
+
+    return perform(blend, seconds=seconds, ease=ease, rate=fps or DEFAULT_RATE, send=send)
+
+
+def _count_bits(blend: Blend, seconds: float, ease: float, fps: Fraction | None) -> dict[str, int | None]:
+    """Return the bits of the stream for each way of sending; None where FAP 2 cannot say it."""
+    from fba.codec import encode
+
+    ways = {"expression": blend.fields is not None, "faps": True}
+    return {
+        way: 8 * len(encode(_perform(blend, seconds, ease, fps, way))) if possible else None
+        for way, possible in ways.items()
+    }
+
+
+def _sent(animation: Animation) -> str:
+    assert animation.face is not None
+    return "expression" if animation.face.mask[:, 1].any() else "faps"
+
+
+def _bits_text(animation: Animation, bits: dict[str, int | None]) -> str:
+    by_faps = f"{bits['faps']:,} bits"
+    if bits["expression"] is None:
+        return f"low-level FAPs, {by_faps} as a stream (FAP 2 cannot say it)"
+    by_expression = f"{bits['expression']:,} bits"
+    if _sent(animation) == "expression":
+        return f"FAP 2, {by_expression} as a stream; low-level FAPs by the rules (--send faps): {by_faps}"
+    return f"low-level FAPs by the rules, {by_faps} as a stream; FAP 2 (--send expression): {by_expression}"
+
+
+def _draw(
+    animation: Animation,
+    output: Path,
+    outputs: Outputs,
+    kind: str,
+    model: Path | None,
+    size: tuple[int, int] | None,
+) -> None:
+    from fba_player.export.render import render
+    from fba_player.scene.scene import Scene
+
+    scene = Scene(animation, read_model(model))
+    suffix = f".{kind}"
+    with outputs.file(output, suffix) as file, Progress("rendering", None) as step, usage_errors():
+        render(scene, file, size=size, progress=step.show)

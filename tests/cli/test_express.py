@@ -1,0 +1,126 @@
+"""`fba express`: streams, pictures and tables of named expressions and mixtures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fba
+import graphics
+
+Run = Callable[..., Any]
+
+
+def read_face(path: Path) -> fba.FaceTrack:
+    face = fba.read(path).face
+    assert face is not None
+    return face
+
+
+def test_two_of_the_six_are_sent_as_fap_2(run: Run, tmp_path: Path) -> None:
+    done = run("express", "fear=60 joy=30", "-o", tmp_path / "a.fba", "--ease", "0")
+    assert done.code == 0
+    face = read_face(tmp_path / "a.fba")
+    assert np.flatnonzero(face.mask.any(axis=0)).tolist() == [1]
+    assert face.expression[40].tolist() == [4, 38, 1, 19, 0, 0]
+    assert "FAP 2, " in done.out
+    assert "--send faps" in done.out
+
+
+def test_the_bits_are_those_of_the_file(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "a.fba"
+    for way in ("expression", "faps"):
+        report = json.loads(run("express", "fear=60", "joy=30", "-o", path, "--send", way, "--json").out)
+        assert report["sent"] == way
+        assert report["bits"][way] == 8 * path.stat().st_size
+    assert report["bits"]["expression"] < report["bits"]["faps"] / 3
+
+
+def test_a_variant_is_sent_as_low_level_faps(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "a.fap"
+    done = run("express", "terror=50", "-o", path, "--seconds", "2", "--ease", "0.4", "--fps", "10")
+    assert "FAP 2 cannot say it" in done.out
+    face = read_face(path)
+    assert len(face) == 20
+    full = fba.emotion.expression("terror").faps / 2
+    assert np.abs(face.values[10] - full).max() <= 0.5
+    assert not face.values[[0, -1]].any()
+    moving = face.values[:, 18]
+    assert (np.diff(np.abs(moving[:5])) > 0).all()
+    assert run("express", "terror", "-o", path, "--send", "expression").code == 2
+
+
+def test_what_is_sent_shows_the_mixture_on_any_face(tmp_path: Path, run: Run) -> None:
+    """FAPs that are not sent copy no mate, though one-sided expressions move one side alone."""
+    from fba.face import resolve
+
+    for name in ("contempt", "sarcasm", "sneer", "crying"):
+        run("express", name, "-o", tmp_path / "a.fba", "--ease", "0")
+        shown = resolve(read_face(tmp_path / "a.fba"))[30]
+        assert np.abs(shown - fba.emotion.expression(name).faps).max() <= 90  # a step of the head's angles
+
+
+def test_a_point_of_the_plane(run: Run) -> None:
+    done = run("express", "--at", "4.0,1.1", "--json")
+    assert json.loads(done.out)["expressions"] == {"guilt": 100}
+    assert run("express", "--at", "4.0,1.1").out.startswith("guilt=100: activation 4.0, evaluation 1.1")
+
+
+def test_the_list_has_all_names(run: Run) -> None:
+    listed = json.loads(run("express", "--list", "--json").out)
+    assert [one["name"] for one in listed] == [one.name for one in fba.emotion.expressions()]
+    text = run("express", "--list").out
+    assert all(one["name"] in text for one in listed)
+
+
+def test_the_rules_have_parameters(run: Run) -> None:
+    for option in ("--interpolation", "--reduction", "--nearness"):
+        assert run("express", "fear", option, "1.5").code == 2
+    weak = json.loads(run("express", "fear=90 joy=60", "--reduction", "0", "--json").out)["faps"]
+    strong = json.loads(run("express", "fear=90 joy=60", "--reduction", "1", "--json").out)["faps"]
+    assert "lift_l_cheek" not in weak
+    assert strong["lift_l_cheek"] == 180
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("", "give one of expressions (fear=60), --at A,E and --list"),
+        ("fear --at 4,4", "give one of"),
+        ("fer=5", "there is no expression 'fer' (did you mean 'fear'?)"),
+        ("fear=101", "must be from 0 to 100, not 101"),
+        ("fear=nan", "must be from 0 to 100, not nan"),
+        ("fear=1 afraid=2", "'afraid' means 'fear', which is given already"),
+        ("--at 4", "write e.g. 4.0,1.1"),
+        ("--at 9,1", "the activation must be from 1 to 7"),
+        ("fear --seconds 2", "--seconds goes with -o"),
+        ("fear -o x.fba --size 30x30", "--size goes with a picture or a film"),
+        ("fear -o x.fba --seconds 1 --ease 0.6", "easing in and out takes 1.2 s"),
+        ("fear -o x.fba --seconds nan", "must be a number that is not negative"),
+        ("fear -o x.fba --seconds 1e12", "are more than"),
+        ("fear -o x.png --ease 1", "a picture shows the full expression"),
+        ("--list -o x.fba", "--list prints a table"),
+    ],
+)
+def test_mistakes(run: Run, line: str, message: str) -> None:
+    done = run("express", *line.split())
+    assert (done.code, done.out) == (2, "")
+    assert message in " ".join(done.err.split())
+
+
+def test_pictures_show_the_full_expression(run: Run, tmp_path: Path) -> None:
+    if (reason := graphics.missing_opengl()) is not None:
+        graphics.skip(reason)
+    from PIL import Image
+
+    for name in ("surprise", "anger"):
+        path = tmp_path / f"{name}.png"
+        assert run("express", name, "-o", path, "--size", "64x64").code == 0
+    shown = [np.asarray(Image.open(tmp_path / f"{name}.png").convert("L")) for name in ("surprise", "anger")]
+    assert shown[0].shape == (64, 64)
+    assert np.abs(shown[0].astype(int) - shown[1]).max() > 40
