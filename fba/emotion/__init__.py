@@ -7,6 +7,8 @@ Digest faces-and-emotions.md, sections 7 and 8. `expression` gives one by name, 
 from fba.emotion.blending import Blend, combine, parse_weights
 from fba.emotion.expression import FAMILIES, NEUTRAL_POINT, Expression
 from fba.emotion.expressions import expression, expressions
+from fba.emotion.modification import Damping, emote, modify
+from fba.emotion.moods import Mood, MoodCurve
 from fba.emotion.performance import perform
 from fba.emotion.plane import expression_at, known_points
 from fba.emotion.profiles import Measurement, Movement, measured_faps, measurements, vocabulary
@@ -16,17 +18,22 @@ __all__ = [
     "FAMILIES",
     "NEUTRAL_POINT",
     "Blend",
+    "Damping",
     "Expression",
     "Measurement",
+    "Mood",
+    "MoodCurve",
     "Movement",
     "Rules",
     "combine",
+    "emote",
     "expression",
     "expression_at",
     "expressions",
     "known_points",
     "measured_faps",
     "measurements",
+    "modify",
     "parse_weights",
     "perform",
     "vocabulary",
