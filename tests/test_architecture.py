@@ -38,6 +38,7 @@ fba.codec
 fba.face.interpolation
 fba.face
 fba.face.deform
+fba.face.learning
 fba.face.gltf
 fba.face.builtin
 fba.face.authoring.surface

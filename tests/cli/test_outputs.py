@@ -70,7 +70,7 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
                 assert "--no-clobber" in options, f"fba {name}"
     assert writing == {
         "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
-        "conformance", "capture", "markers", "express",
+        "model learn-fit", "conformance", "capture", "markers", "express",
     }  # fmt: skip
 
 
@@ -98,6 +98,9 @@ OVERWRITING = [
     "model fit IN.csv -o OUT",
     "model points IN.csv -o OUT",
     "model fit both.fba --model IN.glb -o OUT",
+    "model learn-fit IN.fap -o OUT",
+    "model learn-fit both.fba --model IN.glb -o OUT",
+    "model learn-fit IN.fap -o new.glb --fit OUT",
     "markers IN.png -o OUT",
     "markers both.fba IN.glb -o OUT",
     "capture livelink --play --model IN.glb -o OUT",
@@ -393,6 +396,7 @@ CLOBBERING = [
     "model import face.fap -o there.glb",
     "model fit face.fap -o there.glb",
     "model points face.fap -o there.csv",
+    "model learn-fit face.fap -o there.glb",
     "demo --out out",
 ]
 

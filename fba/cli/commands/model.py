@@ -13,6 +13,7 @@ import click
 
 from fba.cli import options
 from fba.cli.command import Group, examples
+from fba.cli.commands import model_learn_fit
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, colour_grade, print_json
 from fba.errors import FbaWarning
@@ -44,10 +45,14 @@ PART = click.option(
         "fba model points scan.obj -o scan.points.csv",
         "fba model import scan.obj --points scan.points.csv -o head.glb",
         "fba model fit person.fdp -o person.glb",
+        "fba model learn-fit talk.fba -o ada.glb",
     ),
 )
 def command() -> None:
     """Inspect face models, check them, import them, fit them to a person."""
+
+
+command.add_command(model_learn_fit.command)
 
 
 _output_option = click.option(

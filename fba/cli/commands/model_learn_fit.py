@@ -1,0 +1,161 @@
+"""`fba model learn-fit`: an interpolation table (FIT) from the streams of a performer."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli import options
+from fba.cli.command import Command, examples
+from fba.cli.inputs import EXISTING, read_input
+from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.printing import Progress
+from fba.errors import FbaError
+from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.animation import Animation
+    from fba.face.learning import LearntFit
+
+
+@click.command(
+    "learn-fit",
+    cls=Command,
+    short_help="Learn to compute most FAPs of a performer from a few.",
+    epilog=examples(
+        "fba model learn-fit monday.fba tuesday.fba -o ada.glb",
+        "fba model learn-fit talk.fba --model head.glb --faps 8 -o ada.glb --fit ada.json",
+        "fba model learn-fit talk.fba --tolerance 1mm -o ada.glb",
+    ),
+)
+@click.argument("streams", metavar="STREAM...", nargs=-1, required=True, type=EXISTING)
+@click.option(
+    "-o", "--output", metavar="OUT.glb", required=True, type=OutputType(),
+    help="The model with the table; - for standard output.",
+)  # fmt: skip
+@options.no_clobber_option
+@click.option(
+    "--model", metavar="FILE", type=click.Path(exists=True, path_type=Path),
+    help="Model that gets the table, in place of one that it has. Default: the built-in head.",
+)  # fmt: skip
+@click.option(
+    "--faps", "count", type=click.IntRange(1, 66), metavar="N",
+    help="FAPs to send, those of the head's rotation among them. Default: 10.",
+)  # fmt: skip
+@click.option(
+    "--tolerance", type=options.MillimetresType(), metavar="1mm",
+    help="Send as many FAPs as it takes to keep every vertex this near in 99 % of the frames held out.",
+)  # fmt: skip
+@click.option(
+    "--fit", metavar="FIT.json", type=OutputType(),
+    help="Write the table by itself, too: the fields of the standard's node FIT.",
+)  # fmt: skip
+@options.from_option
+@options.salvage_option
+@options.limit_option
+@options.json_option
+def command(
+    streams: tuple[Path, ...],
+    output: Path,
+    no_clobber: bool,
+    model: Path | None,
+    count: int | None,
+    tolerance: float | None,
+    fit: Path | None,
+    format: str | None,
+    salvage: bool,
+    limit: Limits,
+    as_json: bool,
+) -> None:
+    """Learn an interpolation table (FIT) from streams of a performer, and store it with a face model.
+
+    A stream then needs to send only a few FAPs; `fba play --model OUT.glb` computes the others. The printed
+    errors are those on each stream while the table is learned from the others (of one stream, on fifths of
+    it). Streams may be of any format with FAPs, captured faces too.
+    """
+    if count is not None and tolerance is not None:
+        raise click.UsageError(
+            "--faps and --tolerance contradict each other: each says how many FAPs to send"
+        )
+    written = [Output("--output", output), *([Output("--fit", fit)] if fit is not None else [])]
+    outputs = Outputs(written, [*streams, *([model] if model is not None else [])], no_clobber=no_clobber)
+    if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
+        name = output.with_suffix(".glb").name
+        raise click.UsageError(f"--output {output}: face models are written as glTF; name it {name}")
+    from fba.face.importers import import_model
+    from fba.face.learning import learn_fit
+    from fba.face.learning.learn import FAPS
+    from fba.face.model import FaceModel
+
+    head = FaceModel.default() if model is None else import_model(model)
+    animations = []
+    with Progress("reading", len(streams)) as step:
+        for path in streams:
+            animations.append(read_input(path, format=format, salvage=salvage, limits=limit))
+            step.advance()
+    tracks = [_face(animation, path) for animation, path in zip(animations, streams, strict=True)]
+    with Progress("learning", None):
+        learnt = learn_fit(tracks, head, count=count or FAPS, tolerance=tolerance)
+    with outputs.file(output) as file:
+        replace(head, fit=learnt.table).save(file)
+    if fit is not None:
+        outputs.write(fit, (json.dumps(learnt.table.to_node(), indent=1) + "\n").encode())
+    if as_json:
+        outputs.print_json({"output": str(output), **_values(learnt)})
+        return
+    outputs.say(
+        f"{display_name(output)}: {head.name or 'a face'} with a FIT learned from {learnt.frames} frames"
+        f"{', in place of its own' if head.fit is not None else ''}"
+    )
+    for line in _lines(learnt):
+        outputs.say(f"  {line}")
+
+
+def _face(animation: Animation, path: Path) -> Any:
+    if animation.face is None:
+        raise FbaError(f"{path}: there is no face in it; a FIT is learned from streams with FAPs")
+    return animation.face
+
+
+def _lines(learnt: LearntFit) -> list[str]:
+    from fba.parameters import faps
+
+    names = [one.name for one in faps()]
+    error = learnt.held_out
+    held = "the stream held out" if learnt.streams > 1 else "the fifth of the stream held out"
+    lines = [
+        f"{len(learnt.sent)} FAPs to send: {', '.join(f'{n} {names[n - 1]}' for n in learnt.sent)}",
+        f"{len(learnt.computed)} FAPs computed; errors on {held}:",
+        f"worst vertex of each frame {_millimetres(error)}",
+        f"{100 * error.explained:.1f} % of the motion of these FAPs explained",
+    ]
+    for one in error.faps:
+        spread = one.steps
+        lines.append(
+            f"  {one.fap:2} {names[one.fap - 1]:22} {spread.mean:6.1f} {spread.percentile_99:7.1f} "
+            f"{spread.largest:7.1f} steps, at most {one.millimetres:.2f} mm"
+        )
+    return lines
+
+
+def _millimetres(error: Any) -> str:
+    spread = error.millimetres
+    return (
+        f"{spread.mean:.2f} mm off on average, {spread.percentile_99:.2f} mm in the worst 1 %, "
+        f"{spread.largest:.2f} mm at most"
+    )
+
+
+def _values(learnt: LearntFit) -> dict[str, Any]:
+    """Return what was learned for programs; lengths in mm."""
+    return {
+        "sent": list(learnt.sent),
+        "computed": list(learnt.computed),
+        "frames": learnt.frames,
+        "streams": learnt.streams,
+        "held_out": asdict(learnt.held_out),
+    }

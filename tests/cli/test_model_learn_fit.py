@@ -1,0 +1,107 @@
+"""`fba model learn-fit`: what it prints and writes, and how it fails."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation, FaceTrack
+from fba.face import FaceModel, InterpolationTable
+from fba.face.learning import send_sources
+from fba.face.resolve import resolve
+from small_face import small_face
+
+Run = Callable[..., tuple[int, str, str]]
+JAW, CHIN, CORNER, LIP = 2, 17, 5, 3
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with head.glb, monday.fap, tuesday.fap: the lip is half the jaw."""
+    monkeypatch.chdir(tmp_path)
+    small_face().save("head.glb")
+    for name, seed in (("monday", 1), ("tuesday", 2)):
+        rng = np.random.default_rng(seed)
+        values = np.zeros((40, 68), dtype=np.int32)
+        values[:, [JAW, CHIN, CORNER]] = rng.integers(-100, 100, (40, 3)) * 4
+        values[:, LIP] = values[:, JAW] // 2
+        mask = np.tile(values.any(axis=0), (40, 1))
+        fba.write(f"{name}.fap", Animation(Fraction(25), np.arange(40), FaceTrack(values, mask)))
+    return tmp_path
+
+
+def test_a_table_is_learned_stored_and_written(run: Run, here: Path) -> None:
+    code, out, err = run(
+        "model", "learn-fit", "monday.fap", "tuesday.fap", "--faps", 3, "--model", "head.glb",
+        "-o", "ada.glb", "--fit", "ada.json",
+    )  # fmt: skip
+    assert code == 0
+    assert "the model does not show FAP 4 lower_t_midlip, 6 stretch_l_cornerlip, 18 depress_chin" in err
+    assert "a FIT learned from 80 frames" in out
+    assert "3 FAPs to send: " in out
+    assert "lower_t_midlip " in out
+    head = FaceModel.load("ada.glb")
+    assert head.fit is not None
+    assert head.fit == InterpolationTable.from_node(json.loads(Path("ada.json").read_text()))
+    monday = fba.read("monday.fap").face
+    shown = resolve(send_sources(monday, head.fit), head)
+    assert shown[:, LIP] == pytest.approx(monday.values[:, LIP], abs=1)
+    assert "its own table" in run("model", "info", "ada.glb")[1]
+    _, out, _ = run("model", "learn-fit", "monday.fap", "--faps", 3, "--model", "ada.glb", "-o", "again.glb")
+    assert "in place of its own" in out
+
+
+def test_figures_for_programs(run: Run, here: Path) -> None:
+    line = [
+        "model",
+        "learn-fit",
+        "monday.fap",
+        "tuesday.fap",
+        "--model",
+        "head.glb",
+        "-o",
+        "ada.glb",
+        "--json",
+    ]
+    code, out, _ = run(*line, "--tolerance", "0.5mm")
+    assert code == 0
+    said = json.loads(out)
+    assert said["output"] == "ada.glb"
+    assert (said["frames"], said["streams"]) == (80, 2)
+    assert said["held_out"]["millimetres"]["percentile_99"] <= 0.5
+    assert {one["fap"] for one in said["held_out"]["faps"]} == set(said["computed"])
+
+
+@pytest.mark.parametrize(
+    ("options", "status", "message"),
+    [
+        (["--faps", "3", "--tolerance", "1mm"], 2, "--faps and --tolerance contradict each other"),
+        (["--tolerance", "-1mm"], 2, "'-1mm' is not a length above 0"),
+        (["--tolerance", "nan"], 2, "'nan' is not a length above 0"),
+        (["--faps", "60"], 1, "different poses"),
+        (["walk.bap"], 1, "walk.bap: there is no face in it"),
+        (["still.fap"], 1, "nothing to learn from"),
+    ],
+)
+def test_mistakes(run: Run, here: Path, options: list[str], status: int, message: str) -> None:
+    body = fba.BodyTrack(np.zeros((5, 296), dtype=np.int32), np.ones((5, 296), dtype=bool))
+    fba.write("walk.bap", Animation(Fraction(25), np.arange(5), body=body))
+    still = FaceTrack(np.zeros((5, 68), dtype=np.int32), np.tile(np.arange(68) > 1, (5, 1)))
+    fba.write("still.fap", Animation(Fraction(25), np.arange(5), still))
+    streams = [] if options[0].endswith("ap") and not options[0].startswith("--") else ["monday.fap"]
+    code, _, err = run("model", "learn-fit", *streams, *options, "--model", "head.glb", "-o", "ada.glb")
+    assert code == status
+    assert message in " ".join(err.split())
+    assert not Path("ada.glb").exists()
+
+
+def test_a_model_is_named_as_one(run: Run, here: Path) -> None:
+    code, _, err = run("model", "learn-fit", "monday.fap", "-o", "ada.json")
+    assert code == 2
+    assert "name it ada.glb" in err
