@@ -107,6 +107,7 @@ def read_input(
     doubts: list[str] | None = None,
     tables: list[str] | None = None,
     readers: list[Format] | None = None,
+    rates: list[Fraction] | None = None,
     format: str | None = None,
     clip: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
@@ -120,7 +121,8 @@ def read_input(
     replace a header that a file lacks. capture: options for the readers of motion capture. doubts: that
     warning is appended to it. clip: of several animations in the file, the one to read, by name or number;
     without effect where the format holds one. tables: the table of a stream with a body is appended to it.
-    readers: the format is appended to it, which of standard input nothing else says.
+    readers: the format is appended to it, which of standard input nothing else says. rates: the rate before
+    it was resampled is appended to it.
     """
     from fba.formats import read
 
@@ -138,6 +140,8 @@ def read_input(
         (tables if tables is not None else []).append(str(options["bap_steps"]))
         if bap_steps != BAP_STEPS_AUTO and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
             (doubts if doubts is not None else []).append(doubt)
+    if rates is not None:
+        rates.append(animation.rate)
     if fps is not None and animation.rate != fps:
         animation = animation.resample(fps, limits=limits)
     return animation

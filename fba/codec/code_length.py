@@ -20,6 +20,8 @@ INTRA_BITS = 64
 """Bits of an I plane that no parameter pays for: its header, mask types, and the coder's flush."""
 UNCODABLE_BITS = 500
 """What a difference counts that no P plane carries: about an I plane for it alone."""
+IMPOSSIBLE_BITS = 1e9
+"""What a value counts that no I plane carries: no segment is to begin there if any other can."""
 
 
 def code_lengths(track: FaceTrack | BodyTrack, cuts: Int64, options: EncoderOptions) -> Float64:
@@ -91,6 +93,8 @@ def _add_lengths(
         learnt, coded, beyond, high, low = 0.0, 0, 0, 0, 0
         start = int(cuts[first])
         intra = RANGE_BITS + logarithms[_limit(abs(int(values[start])), scale) + 1]
+        if abs(int(values[start])) > largest:
+            intra += IMPOSSIBLE_BITS
         frame = start
         for last in range(first + 1, len(cuts)):
             while frame < int(cuts[last]):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Int32, Int64
+from fba.arrays import Bool, Int32, Int64
 from fba.codec._options import EncoderOptions
 from fba.codec._plane import quantiser, slots
 from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT
@@ -63,6 +64,51 @@ def coarsest_quantisers(animation: Animation, options: EncoderOptions) -> Encode
             if quant == own or _keeps(divisor, largest, quantiser.scale(part, quant))
         )
     return replace(options, **chosen)  # type: ignore[arg-type]
+
+
+def exact_quantisers(
+    animation: Animation, options: EncoderOptions, parts: Collection[str] = ("face", "body")
+) -> EncoderOptions:
+    """Return options that leave parts, "face" and "body", unquantised where that alone keeps their values.
+
+    That is where some lie between the quantiser's steps, and planes carry all of them as they are.
+    """
+    rounded = count_rounded(animation, options)
+    tracks = {"face": animation.face, "body": animation.body}
+    sent = [track.mask for track in tracks.values() if track is not None]
+    intra = np.append(True, np.logical_or.reduce([(one[1:] != one[:-1]).any(axis=1) for one in sent]))
+    names = {"face": "fap_quant", "body": "bap_quant"}
+    chosen = {
+        names[part]: 0
+        for part, track in tracks.items()
+        if part in parts and part in rounded and track is not None and _fits_unquantised(track, intra)
+    }
+    return replace(options, **chosen)  # type: ignore[arg-type]
+
+
+def _fits_unquantised(track: FaceTrack | BodyTrack, intra: Bool) -> bool:
+    """Whether planes carry all values of a track as they are. intra: bool (T,), frames that are I planes."""
+    values = track.values.astype(np.int64)
+    values[1:] -= np.where(intra[1:, None], 0, values[:-1])
+    return bool(np.abs(values[track.mask]).max(initial=0) <= RANGE_CODE_MAX * RANGE_UNIT)
+
+
+def count_rounded(animation: Animation, options: EncoderOptions) -> dict[str, int]:
+    """Return how many values that are sent lie between the quantiser's steps, by "face" and "body".
+
+    A part without any is missing. Blends and intensities count, too.
+    """
+    after, result = quantise(animation, options), {}
+    if animation.face is not None and after.face is not None:
+        before, sent = animation.face, animation.face.mask
+        result["face"] = int(
+            ((before.values != after.face.values) & sent).sum()
+            + ((before.viseme != after.face.viseme) & sent[:, :1]).sum()
+            + ((before.expression != after.face.expression) & sent[:, 1:2]).sum()
+        )
+    if animation.body is not None and after.body is not None:
+        result["body"] = int(((animation.body.values != after.body.values) & animation.body.mask).sum())
+    return {part: count for part, count in result.items() if count}
 
 
 def _keeps(divisor: int, largest: int, scale: int) -> bool:

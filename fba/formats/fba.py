@@ -64,13 +64,20 @@ def read_fba(
 
 
 def write_fba(
-    path: Path, animation: Animation, *, options: EncoderOptions | None = None, **settings: Any
+    path: Path,
+    animation: Animation,
+    *,
+    options: EncoderOptions | None = None,
+    preset: str = "reference",
+    **settings: Any,
 ) -> None:
     """Encode an animation into an FBA file.
 
     options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Unless they say otherwise, a
-    file whose BAP steps are not the standard's is marked (see `fba.codec.write_mark`). Raises OptionError if
-    both are given, RangeError for values that no stream can carry, FormatError if the file cannot be written.
+    file whose BAP steps are not the standard's is marked (see `fba.codec.write_mark`). preset: "reference"
+    sends all that the animation does; "exact" and "compact" leave out what a player shows without it (see
+    `fba.planning`). Raises OptionError if options and fields are given, or for an unknown preset, RangeError
+    for values that no stream can carry, FormatError if the file cannot be written.
     """
     from fba.codec import EncoderOptions, encode
 
@@ -80,16 +87,27 @@ def write_fba(
         mark = settings.get("bap_steps", BAP_STEPS_DEFAULT) != BAP_STEPS_DEFAULT
         options = EncoderOptions(**{"mark": mark, **settings})
     with naming_file(path):
-        data = encode(animation, options)
+        if preset == "reference":
+            data = encode(animation, options)
+        else:
+            data = _encode_planned(animation, options, preset)
     with atomic(path) as file:
         file.write(data)
+
+
+def _encode_planned(animation: Animation, options: EncoderOptions | None, preset: str) -> bytes:
+    from fba.planning import PRESETS, encode_planned
+
+    if preset not in PRESETS:
+        raise OptionError(f"preset must be one of reference, {', '.join(PRESETS)}, not {preset!r}")
+    return encode_planned(animation, options, preset=preset)[0]
 
 
 def _encoder_settings() -> tuple[str, ...]:
     """Return the names of the keywords of `write_fba`."""
     from fba.codec import EncoderOptions
 
-    return tuple(field.name for field in fields(EncoderOptions) if field.init)
+    return tuple(field.name for field in fields(EncoderOptions) if field.name != "preset")
 
 
 write_fba.extra_options = _encoder_settings  # type: ignore[attr-defined]

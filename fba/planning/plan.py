@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,16 +17,20 @@ from fba.codec import (
     EncoderStatistics,
     coarsest_quantisers,
     code_lengths,
+    count_rounded,
+    decode,
     encode_with_statistics,
     quantise,
 )
 from fba.errors import FbaWarning
 from fba.face.resolve import known_faps, resolve
+from fba.limits import Limits
 from fba.planning.derived_faps import Choice, choose_faps, interpolated_faps, related_faps
 from fba.planning.segments import Cuts, cheapest_segments, find_cuts
 from fba.tracks import BodyTrack, FaceTrack
 
 PRESETS = ("exact", "compact")
+_NO_LIMITS = Limits(frames=1 << 62, bytes=1 << 62)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,49 +54,97 @@ class Plan:
 
 
 def encode_planned(
-    animation: Animation, options: EncoderOptions | None = None, *, preset: str = "exact"
+    animation: Animation,
+    options: EncoderOptions | None = None,
+    *,
+    preset: str = "exact",
+    keep_masks: Collection[str] = (),
 ) -> tuple[bytes, EncoderStatistics]:
-    """Return the shorter of the stream of a plan and that of `fba.encode`, and what the encoder counted.
+    """Return the shortest of the streams of plans and that of `fba.encode`, and what the encoder counted.
 
-    preset: "exact" or "compact", the plan (see `plan_exact` and `plan_compact`).
-    Raises as `fba.codec.encode` does, ValueError for another preset.
+    preset: "exact" or "compact", the plans. Exact ones have the values of the stream of `fba.encode`. Where
+    those depend on what came before, compact ones may also have the values that each frame has by itself.
+    keep_masks: see `plan_exact` and `plan_compact`. Raises as `fba.codec.encode` does, ValueError for
+    another preset.
     """
     if preset not in PRESETS:
         raise ValueError(f"preset must be one of {', '.join(PRESETS)}, not {preset!r}")
-    animation = quantise(animation, options or EncoderOptions())  # so that both have the same values
+    options = options or EncoderOptions()
     unplanned = encode_with_statistics(animation, options)
+    given = _as_coded(animation, options, *unplanned)
+    if preset == "exact":
+        plans = [_plan_exact(given, options, keep_masks)]
+    else:
+        plans = [_plan_compact(given, options, keep_masks)]
+        by_itself = quantise(animation, options)
+        if by_itself != given:
+            plans.append(_plan_compact(by_itself, options, keep_masks))
+    planned = [one for one in (plan.encode() for plan in plans) if not one[1].clamped]
+    best, statistics = min([unplanned, *planned], key=lambda one: len(one[0]))
+    statistics.clamped_parameters = unplanned[1].clamped_parameters
+    return best, statistics
+
+
+def _as_coded(
+    animation: Animation, options: EncoderOptions, data: bytes, statistics: EncoderStatistics
+) -> Animation:
+    """Return an animation with the values that its stream has. statistics: of the encoder."""
+    if not statistics.clamped and not count_rounded(animation, options):
+        return animation
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # given above
-        planned = (plan_exact if preset == "exact" else plan_compact)(animation, options).encode()
-    # Plans rest on estimates, and on ranges that no value is limited by.
-    better = len(planned[0]) < len(unplanned[0]) and planned[1].clamped <= unplanned[1].clamped
-    return planned if better else unplanned
+        warnings.simplefilter("ignore", FbaWarning)
+        coded = decode(data, bap_steps=options.bap_steps, limits=_NO_LIMITS)
+    face, body = animation.face, animation.body
+    if face is not None and coded.face is not None:
+        one = coded.face
+        face = FaceTrack(one.values, face.mask, one.viseme, one.expression, face.interpolated)
+    if body is not None and coded.body is not None:
+        body = BodyTrack(coded.body.values, body.mask)
+    return replace(animation, face=face, body=body)
 
 
-def plan_exact(animation: Animation, options: EncoderOptions | None = None) -> Plan:
+def plan_exact(
+    animation: Animation, options: EncoderOptions | None = None, *, keep_masks: Collection[str] = ()
+) -> Plan:
     """Return a plan that keeps every value that is sent, with the quantisers in `options`.
 
-    What stays at 0 throughout is left out where a player shows the same without it.
+    What stays at 0 throughout is left out where a player shows the same without it. keep_masks: parts,
+    "face" and "body", of which nothing is left out, so that a decoder returns their masks, too.
     ValueError for an animation without frames.
     """
-    sent, options = _prepare(animation, options)
-    return _plan_as_sent(sent, options)
+    options = options or EncoderOptions()
+    return _plan_exact(quantise(animation, options), options, keep_masks)
 
 
-def plan_compact(animation: Animation, options: EncoderOptions | None = None) -> Plan:
+def plan_compact(
+    animation: Animation, options: EncoderOptions | None = None, *, keep_masks: Collection[str] = ()
+) -> Plan:
     """Return a plan that keeps every value that is shown, with the quantisers in `options`.
 
     Left out is what a player fills in by the standard's rules: a FAP that equals its left/right mate or its
     counterpart on the other contour of the lips. Which ones is decided anew at every I plane. On a face
     without an interpolation table of its own, `fba.face.resolve` gives the same for the decoded stream
-    as for the animation. ValueError for an animation without frames.
+    as for the animation. keep_masks: as for `plan_exact`; only "body" has an effect.
+    ValueError for an animation without frames.
     """
-    sent, options = _prepare(animation, options)
+    options = options or EncoderOptions()
+    return _plan_compact(quantise(animation, options), options, keep_masks)
+
+
+def _plan_exact(given: Animation, options: EncoderOptions, keep_masks: Collection[str]) -> Plan:
+    """Return the exact plan of a quantised animation."""
+    return _plan_as_sent(_without_unmoved(given, keep_masks), coarsest_quantisers(given, options))
+
+
+def _plan_compact(given: Animation, options: EncoderOptions, keep_masks: Collection[str]) -> Plan:
+    """Return the compact plan of a quantised animation."""
+    sent = _without_unmoved(given, {"body"} & set(keep_masks))
+    options = coarsest_quantisers(given, options)
     if sent.face is None:
         return _plan_as_sent(sent, options)
     values, known = known_faps(sent.face)
     high_level = sent.face.mask[:, :2]
-    cuts = find_cuts(_changes(known) | _changes(high_level) | _changes(_body_mask(sent)))
+    cuts = find_cuts(_changes(known) | _changes(high_level) | _changes(_mask(sent.body, len(sent))))
     if cuts is None:
         return _plan_as_sent(sent, options)
     choice = choose_faps(values, known, code_lengths(FaceTrack(values, known), cuts.frames, options), cuts)
@@ -103,23 +156,27 @@ def plan_compact(animation: Animation, options: EncoderOptions | None = None) ->
     return Plan(replace(sent, face=face), tuple(cuts.segment(*one) for one in borders), options)
 
 
-def _prepare(animation: Animation, options: EncoderOptions | None) -> tuple[Animation, EncoderOptions]:
-    """Return the animation as a decoder returns it, without what never moves, and quantisers for it."""
+def _without_unmoved(animation: Animation, keep_masks: Collection[str]) -> Animation:
+    """Return an animation that does not send what never moves. ValueError if it has no frames.
+
+    keep_masks: parts of which all is sent.
+    """
     if not len(animation):
         raise ValueError("there is no frame to encode")
-    options = options or EncoderOptions()
-    sent = quantise(animation, options)
-    face = None if sent.face is None else _without_unmoved_faps(sent.face)
-    body = None if sent.body is None else BodyTrack(sent.body.values, _body_mask(sent))
-    return replace(sent, face=face, body=body), coarsest_quantisers(sent, options)
+    face, body = animation.face, animation.body
+    if face is not None and "face" not in keep_masks:
+        face = _without_unmoved_faps(face)
+    if body is not None and "body" not in keep_masks:
+        body = BodyTrack(body.values, body.mask & body.values.any(axis=0))  # one never sent is 0, too
+    return replace(animation, face=face, body=body)
 
 
 def _plan_as_sent(sent: Animation, options: EncoderOptions) -> Plan:
     """Return a plan that sends everything, in segments that take the fewest bits."""
-    face = sent.face.mask if sent.face is not None else np.zeros((len(sent), 0), dtype=np.bool_)
-    cuts = find_cuts(_changes(face) | _changes(_body_mask(sent)))
+    count = len(sent)
+    cuts = find_cuts(_changes(_mask(sent.face, count)) | _changes(_mask(sent.body, count)))
     if cuts is None:
-        return Plan(sent, (slice(0, len(sent)),), options)
+        return Plan(sent, (slice(0, count),), options)
     bits = _code_lengths(sent.face, cuts, options) + _code_lengths(sent.body, cuts, options)
     borders = cheapest_segments(bits + INTRA_BITS, cuts)
     return Plan(sent, tuple(cuts.segment(*one) for one in borders), options)
@@ -144,12 +201,9 @@ def _without_unmoved_faps(face: FaceTrack) -> FaceTrack:
     return FaceTrack(face.values, mask, face.viseme, face.expression, interpolated)
 
 
-def _body_mask(animation: Animation) -> Bool:
-    """Return bool (T, 296), or (T, 0): BAPs that are sent and move; one never sent is 0, too."""
-    if animation.body is None:
-        return np.zeros((len(animation), 0), dtype=np.bool_)
-    mask: Bool = animation.body.mask & animation.body.values.any(axis=0)
-    return mask
+def _mask(track: FaceTrack | BodyTrack | None, count: int) -> Bool:
+    """Return the mask of a track of so many frames, bool (T, columns)."""
+    return np.zeros((count, 0), dtype=np.bool_) if track is None else track.mask
 
 
 def _changes(mask: Bool) -> Bool:

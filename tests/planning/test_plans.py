@@ -13,7 +13,7 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
-from fba.codec import coarsest_quantisers, quantise
+from fba.codec import coarsest_quantisers, count_rounded, exact_quantisers, quantise
 from fba.face.resolve import resolve, shown_faps
 from fba.parameters import bap_steps, fap_groups, faps
 from fba.planning import encode_planned, plan_compact, plan_exact
@@ -279,3 +279,66 @@ def test_real_streams(shared: Path) -> None:
         compact += 8 * len(small)
     assert exact <= 0.32 * before
     assert compact <= 1830 * seconds
+
+
+def test_values_between_steps_become_those_of_the_reference_encoder() -> None:
+    rng = np.random.default_rng(9)
+    values = np.cumsum(rng.integers(-9, 10, (80, 68)), axis=0).astype(np.int32)
+    values[:, :2] = 0
+    mask = np.tile(np.arange(68) > 1, (80, 1))
+    animation = Animation(25, np.arange(80), FaceTrack(values, mask))
+    expected = fba.encode(animation)
+    data, _ = encode_planned(animation)
+    assert len(data) <= len(expected)
+    face, reference = fba.decode(data).face, fba.decode(expected).face
+    assert face is not None
+    assert reference is not None
+    assert not np.array_equal(reference.values, quantise(animation, EncoderOptions()).face.values)  # type: ignore[union-attr]
+    assert np.array_equal(face.values, reference.values)
+
+
+def test_masks_are_kept_where_that_is_asked_for() -> None:
+    values = np.zeros((30, 68), dtype=np.int32)
+    values[:, 47] = np.arange(30) * 170
+    mask = np.ones((30, 68), dtype=bool)
+    turn = np.zeros((30, 296), dtype=np.int32)
+    turn[:, 183] = np.arange(30) * 64
+    animation = Animation(
+        25, np.arange(30), FaceTrack(values, mask), BodyTrack(turn, np.ones((30, 296), dtype=bool))
+    )
+    for kept in ((), ("face",), ("body",), ("face", "body")):
+        decoded = fba.decode(encode_planned(animation, keep_masks=kept)[0])
+        assert decoded.face is not None
+        assert decoded.body is not None
+        assert decoded.face.mask[5].sum() == (68 if "face" in kept else 1)
+        assert decoded.body.mask[5].sum() == (296 if "body" in kept else 1)
+
+
+def test_no_segment_begins_where_no_i_plane_carries_the_values() -> None:
+    """A walk of 9 m: I planes carry 3.7, and P planes the rest."""
+    values = np.zeros((600, 296), dtype=np.int32)
+    values[:, 182] = np.arange(600) * 16  # HumanoidRoot_tr_frontal, in steps of 2 mm
+    values[300:, 40] = np.random.default_rng(2).integers(-9, 9, 300) * 64  # begins to move in the middle
+    animation = Animation(25, np.arange(600), None, BodyTrack(values, np.tile(values.any(axis=0), (600, 1))))
+    options = EncoderOptions(bap_steps="visage")
+    decoded = fba.decode(encode_planned(animation, options)[0], bap_steps="visage").body
+    expected = fba.decode(fba.encode(animation, options), bap_steps="visage").body
+    assert decoded is not None
+    assert expected is not None
+    assert np.array_equal(decoded.values, expected.values)
+    assert len(plan_exact(animation, options).encode()[0]) > 0
+
+
+def test_quantisers_that_keep_archives() -> None:
+    def body(values: list[int]) -> Animation:
+        track = np.zeros((len(values), 296), dtype=np.int32)
+        track[:, 100] = values
+        return Animation(25, np.arange(len(values)), None, BodyTrack(track, track.any(axis=0) | (track != 0)))
+
+    options = EncoderOptions()
+    assert exact_quantisers(body([128, 256, 1280]), options).bap_quant == 1  # multiples of its step
+    assert exact_quantisers(body([5, 1860, 3720]), options).bap_quant == 0  # a P plane carries the last
+    assert exact_quantisers(body([5, 1860, 3721]), options).bap_quant == 1
+    assert exact_quantisers(body([1861, 5, 5]), options).bap_quant == 1  # the I plane cannot
+    assert exact_quantisers(body([5, 6]), options, parts=["face"]).bap_quant == 1
+    assert count_rounded(body([5, 128, 6]), options) == {"body": 2}

@@ -16,7 +16,8 @@ from fba.cli.printing import rate_text, seconds_text
 from fba.limits import Limits
 
 if TYPE_CHECKING:
-    from fba.codec import ClampedParameter
+    from fba.cli.recordings.inputs import Inputs
+    from fba.codec import ClampedParameter, EncoderOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,7 @@ class CodedStream:
     """A stream, and what it took.
 
     clamped: parameters with values that no plane could carry, by label. bap_quant: the largest of any plane;
-    0 if BAPs are unquantised.
+    0 if BAPs are unquantised. rounded: values of FAP and BAP files that no stream carries as they are.
     """
 
     data: bytes
@@ -32,6 +33,7 @@ class CodedStream:
     intra_planes: int
     clamped: dict[str, ClampedParameter]
     bap_quant: int
+    rounded: int = 0
 
     @property
     def clamped_count(self) -> int:
@@ -51,6 +53,7 @@ class CodedStream:
             "rate": str(animation.rate),
             "duration": float(animation.duration),
             "bits_per_second": round(self.bits_per_second(animation), 3),
+            "rounded": self.rounded,
             "clamped": self.clamped_count,
             "clamped_parameters": clamped_values(self.clamped),
         }
@@ -63,23 +66,39 @@ class CodedStream:
             f"{self.bits_per_second(animation) / 1000:.2f} kbit/s, "
             f"{self.intra_planes} I plane{'s' if self.intra_planes != 1 else ''}"
         )
-        count = self.clamped_count
-        return f"{text}; {count} value{'s' if count != 1 else ''} clamped" if count else text
+        for count, how in ((self.rounded, "rounded to quantiser steps"), (self.clamped_count, "clamped")):
+            if count:
+                text += f"; {count} value{'s' if count != 1 else ''} {how}"
+        return text
 
 
-def encode_stream(animation: Animation, settings: Mapping[str, Any], size: Size) -> CodedStream:
-    """Return the stream of an animation. settings: fields of EncoderOptions."""
-    from fba.codec import EncoderOptions, encode_with_statistics
+def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inputs: Inputs) -> CodedStream:
+    """Return the stream of an animation.
 
-    options = EncoderOptions(**settings)
-    if size.preset == "reference":
+    options: with quantisers as `size` says. inputs: where the animation comes from.
+    """
+    from fba.codec import count_rounded, encode_with_statistics, exact_quantisers
+    from fba.planning import encode_planned
+
+    preset = size.preset or ("compact" if inputs.has_captured_face else "exact")
+    kept = inputs.text_parts
+    rounded: dict[str, int] = {}
+    if preset == "exact":
+        given = {"face": size.fap_quant, "body": size.bap_quant}
+        to_keep = [part for part in kept if given[part] is None]
+        options = exact_quantisers(animation, options, to_keep)
+        rounded = {part: n for part, n in count_rounded(animation, options).items() if part in to_keep}
+    if preset == "reference":
         data, statistics = encode_with_statistics(animation, options)
     else:
-        from fba.planning import encode_planned
-
-        data, statistics = encode_planned(animation, options, preset=size.preset)
+        data, statistics = encode_planned(animation, options, preset=preset, keep_masks=kept)
     return CodedStream(
-        data, statistics.planes, statistics.intra_planes, statistics.clamped_parameters, options.bap_quant
+        data,
+        statistics.planes,
+        statistics.intra_planes,
+        statistics.clamped_parameters,
+        options.bap_quant,
+        sum(rounded.values()),
     )
 
 

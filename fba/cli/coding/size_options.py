@@ -11,42 +11,58 @@ import click
 from fba.cli import options
 from fba.cli.command import Decorated
 
+PRESETS = ("reference", "exact", "compact")
+
 
 @dataclass(frozen=True)
 class Size:
-    """How small a stream is to be, and what may be lost for that: the options but for the quantisers.
+    """How small a stream is to be, and what may be lost for that, as far as options say it; else None.
 
-    preset: what is sent.
+    preset: what is sent. fap_quant, bap_quant: how finely.
     """
 
-    preset: str = "reference"
+    preset: str | None = None
+    fap_quant: int | None = None
+    bap_quant: int | None = None
 
     @classmethod
     def take(cls, settings: dict[str, Any]) -> Size:
         """Return what the options say, and remove them from the values of a command's options."""
         return cls(**{field.name: settings.pop(field.name) for field in fields(cls)})
 
+    def quantisers(self) -> dict[str, int]:
+        """Return the quantisers, by default the finest."""
+        return {
+            "fap_quant": 1 if self.fap_quant is None else self.fap_quant,
+            "bap_quant": 1 if self.bap_quant is None else self.bap_quant,
+        }
+
 
 def size_options(command: Decorated) -> Decorated:
-    """Add the options; the command takes them as keywords: fields of `Size`, and the quantisers."""
+    """Add the options; the command takes them as keywords: the fields of `Size`."""
     for option in reversed(
         (
-            options.choice_option(
+            click.option(
                 "--preset",
-                "What is sent: all that is given (reference); not what never moves (exact); of the FAPs only "
-                "those that players do not derive from others (compact).",
-                "reference", "exact", "compact",
+                type=click.Choice(PRESETS),
+                help="What is sent: all that is given (reference); of streams, not what never moves (exact); "
+                "of the FAPs, only those that players do not derive from others (compact). Default: compact "
+                "for captured faces, else exact.",
             ),
-            options.fap_quant_option,
+            click.option(
+                "--quant",
+                "fap_quant",
+                type=click.IntRange(0, 31),
+                help="Quantiser of FAPs (fap_quant); 0: unquantised. Default: 1; 0 for FAP files with values "
+                "between its steps.",
+            ),
             click.option(
                 "--bap-quant",
                 type=click.IntRange(0, 31),
-                default=1,
-                show_default=True,
-                help="Quantiser of BAPs (bap_quant); 0: unquantised.",
+                help="Quantiser of BAPs (bap_quant); default as for FAPs.",
             ),
         )
-    ):  # fmt: skip
+    ):
         command = option(command)
     return command
 

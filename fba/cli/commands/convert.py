@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import joint_options, marker_options, options, step_tables, writer_options
+from fba.cli.coding.coded_streams import encode_stream
+from fba.cli.coding.size_options import Size
 from fba.cli.command import Command, examples
 from fba.cli.inputs import EXISTING, check_clip, has_markers, has_skeleton, read_input
 from fba.cli.outputs import (
@@ -19,7 +21,9 @@ from fba.cli.outputs import (
     display_name,
     find_writer,
 )
+from fba.cli.recordings.inputs import Inputs, formats_by_part
 from fba.limits import Limits
+from fba.source import naming_file
 
 if TYPE_CHECKING:
     from fba.formats.registry import Format
@@ -66,9 +70,9 @@ def command(
 ) -> None:
     """Convert a file into another format; the content of IN and the suffix of OUT say which.
 
-    - is standard input or output. A stream is written with the encoder's defaults: `fba encode` has its
-    options.
+    - is standard input or output. A stream is written as `fba encode` does without options.
     """
+    from fba.codec import EncoderOptions
     from fba.formats import write
 
     writing = find_writer(target, to)  # refuses what cannot be written before anything is read
@@ -92,18 +96,25 @@ def command(
         joints = joint_options.read_joints(maps, captures, format, clip, limit)
     tables: list[str] = []
     readers: list[Format] = []
+    rates: list[Fraction] = []
     animation = read_input(
         source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format, clip=clip,
-        tables=tables, readers=readers, capture={"joints": joints, "markers": places},
+        tables=tables, readers=readers, rates=rates, capture={"joints": joints, "markers": places},
     )  # fmt: skip
     marked = mark is not False
     if writing.name == "fba":
-        made = any(reader.is_capture for reader in readers)
+        parts = formats_by_part([animation], readers)
+        taken = Inputs(animation, None, None, tuple(tables), parts, animation.rate != rates[0])
+        made = taken.is_captured
         table = step_tables.table_to_write(bap_steps, made=made, marked=marked, read=next(iter(tables), None))
         step_tables.warn_of_coarse_steps(animation, table)
-        extra |= {"bap_steps": table, "mark": marked}
-    with outputs.file(target) as file:
-        write(file, animation, format=writing.name, **extra)
+        encoder = EncoderOptions(bap_steps=table, mark=marked)
+        with naming_file(target):
+            coded = encode_stream(animation, encoder, Size(), taken)
+        outputs.write(target, coded.data)
+    else:
+        with outputs.file(target) as file:
+            write(file, animation, format=writing.name, **extra)
     outputs.say(f"{display_name(target)}: {len(animation)} frames, {writing.written or writing.description}")
     if writing.name == "fba":
-        step_tables.remind(target, animation, extra["bap_steps"], marked=marked)
+        step_tables.remind(target, animation, table, marked=marked)

@@ -155,6 +155,8 @@ def command(
     an error; --clamp limits it to the codable range. With --epf, only what that file says is written, and no
     mark unless you ask for one.
     """
+    from fba.codec import EncoderOptions
+
     size_options.check_sizes()
     size = size_options.Size.take(settings)
     check_clip(clip, inputs, format)
@@ -194,14 +196,14 @@ def command(
     table = step_tables.table_to_write(
         bap_steps, made=taken.has_captured_body, marked=mark, read=taken.tables[0] if taken.tables else None
     )
-    settings |= {"bap_steps": table, "mark": mark}
+    settings |= size.quantisers() | {"bap_steps": table, "mark": mark}
     if captures and not options.is_given("origin"):
         animation = bring_near(animation, table, settings["bap_quant"])
     with Progress("encoding", None):
         if epf is not None:
             coded = encode_as_epf(epf, animation, settings, limit)
         else:
-            coded = encode_stream(animation, settings, size)
+            coded = encode_stream(animation, EncoderOptions(**settings), size, taken)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
     if spoken is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -86,25 +86,40 @@ class Inputs:
     """What was read.
 
     animation: of all inputs. start: time of day at its index 0, in seconds; None where unknown. together: how
-    two inputs with a capture among them were put together; None for others. tables, readers: see
-    `read_input`.
+    two inputs with a capture among them were put together; None for others. tables: see `read_input`.
+    formats: of the files that "face" and "body" come from. is_resampled: whether frames were interpolated.
     """
 
     animation: Animation
     start: float | None
     together: Together | None
     tables: tuple[str, ...]
-    readers: tuple[Format, ...]
+    formats: Mapping[str, Format]
+    is_resampled: bool
 
     @property
     def is_captured(self) -> bool:
         """Whether a capture is among the inputs."""
-        return any(reader.is_capture for reader in self.readers)
+        return any(one.is_capture for one in self.formats.values())
+
+    @property
+    def has_captured_face(self) -> bool:
+        """Whether the face is from a capture."""
+        return "face" in self.formats and self.formats["face"].is_capture
+
+    @property
+    def text_parts(self) -> tuple[str, ...]:
+        """The parts, "face" and "body", of which FAP and BAP files have just these frames."""
+        if self.is_resampled:
+            return ()
+        return tuple(part for part, one in self.formats.items() if one.name in ("fap", "bap"))
 
     @property
     def has_captured_body(self) -> bool:
         """Whether the body is, or may be, from a capture: from a skeleton, or from where a head went."""
-        return any(one.read_motion is not None or "head_path" in one.read_options for one in self.readers)
+        return any(
+            one.read_motion is not None or "head_path" in one.read_options for one in self.formats.values()
+        )
 
     def body_of(self, animation: Animation) -> tuple[Animation, int]:
         """Return the frames of an animation of the same rows that a captured body covers.
@@ -138,13 +153,14 @@ def read_inputs(
     _check_sync(files, sync, offset, trim)
     tables: list[str] = []
     readers: list[Format] = []
+    rates: list[Fraction] = []
     recordings: list[Recording] = []
     faces: list[FaceCapture | None] = []
     with Progress("reading", len(files)) as step:
         for path in files:
             animation = read_input(
                 path, fps=fps, format=format, capture=capture, limits=limits, tables=tables,
-                readers=readers, **options,
+                readers=readers, rates=rates, **options,
             )  # fmt: skip
             step.advance()
             if not len(animation):
@@ -154,11 +170,15 @@ def read_inputs(
             faces.append(read_face_quietly(path, fps, format, limits, capture) if again else None)
             name = STANDARD_INPUT if str(path) == "-" else str(path)
             recordings.append(Recording(name, animation, None if faces[-1] is None else faces[-1].start))
+    by_part = formats_by_part([one.animation for one in recordings], readers)
     if len(recordings) == 1:
-        return Inputs(recordings[0].animation, recordings[0].start, None, tuple(tables), tuple(readers))
+        only = recordings[0]
+        resampled = only.animation.rate != rates[0]
+        return Inputs(only.animation, only.start, None, tuple(tables), by_part, resampled)
     first, second = recordings
     if sync is None and offset is None and not any(reader.is_capture for reader in readers):
-        return Inputs(_merge(first, second), None, None, tuple(tables), tuple(readers))
+        resampled = [one.animation.rate for one in recordings] != rates
+        return Inputs(_merge(first, second), None, None, tuple(tables), by_part, resampled)
     try:
         together = join(
             first,
@@ -171,7 +191,18 @@ def read_inputs(
         )
     except OptionError as error:
         raise click.UsageError(str(error)) from error
-    return Inputs(together.animation, together.start, together, tuple(tables), tuple(readers))
+    resampled = any(rate != together.animation.rate for rate in rates)
+    return Inputs(together.animation, together.start, together, tuple(tables), by_part, resampled)
+
+
+def formats_by_part(animations: Sequence[Animation], readers: Sequence[Format]) -> dict[str, Format]:
+    """Return the format that "face" and "body" come from, as far as they exist, given each file's."""
+    return {
+        part: reader
+        for animation, reader in zip(animations, readers, strict=True)
+        for part, track in (("face", animation.face), ("body", animation.body))
+        if track is not None
+    }
 
 
 def together_lines(files: tuple[Path, ...], together: Together) -> list[str]:

@@ -34,7 +34,8 @@ def capture(tmp_path: Path) -> Path:
 
 def test_encode(run: Run, capture: Path, tmp_path: Path) -> None:
     out = tmp_path / "a.fba"
-    done = run("encode", capture, "-o", out, "--fps", "25", "--map-out", tmp_path / "a.toml")
+    everything = ("--preset", "reference")
+    done = run("encode", capture, "-o", out, "--fps", "25", "--map-out", tmp_path / "a.toml", *everything)
     assert done.code == 0, done.err
     assert "50 frames, 2.00 s at 25 frames/s" in done.out
     assert "34 markers of" in done.out
@@ -44,7 +45,7 @@ def test_encode(run: Run, capture: Path, tmp_path: Path) -> None:
     assert animation.body is not None
     text = (tmp_path / "a.toml").read_text()
     (tmp_path / "b.toml").write_text(text.replace('"LCR" = "8.4"\n', ""))
-    options = ("--map", tmp_path / "b.toml", "--no-head-path", "--gaze", "camera")
+    options = ("--map", tmp_path / "b.toml", "--no-head-path", "--gaze", "camera", *everything)
     again = run("encode", capture, "-o", out, *options)
     assert again.code == 0, again.err
     animation = fba.read(out)

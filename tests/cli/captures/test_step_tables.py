@@ -75,7 +75,7 @@ def test_which_steps_are_written(run: Run, tmp_path: Path, bvh: Path, walk: Path
         (("encode", bvh, "-o", target, "--no-mark"), "iso", False),
         (("encode", bvh, "-o", target, "--bap-steps", "iso"), "iso", True),
         (("encode", paths["bap"], "-o", target, "--clamp"), "iso", True),
-        (("encode", walk, "-o", target), "visage", True),
+        (("encode", walk, "-o", target, "--preset", "reference"), "visage", True),
         (("convert", walk, target), "visage", True),
         (("encode", paths["iso"], "-o", target), "iso", True),
         (("encode", walk, "-o", target, "--epf", epf), "visage", False),

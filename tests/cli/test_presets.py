@@ -1,0 +1,128 @@
+"""What `fba encode` and `fba convert` send unless told otherwise, and options that contradict each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation, BodyTrack, FaceTrack
+from fba.face.resolve import resolve
+
+Run = Callable[..., Any]
+SAMPLES = Path(fba.__file__).parent / "samples"
+
+
+@pytest.fixture
+def archive() -> Animation:
+    """A face and a body of which much is sent and stays 0, with values between the quantiser's steps."""
+    faps, baps = np.zeros((40, 68), dtype=np.int32), np.zeros((40, 296), dtype=np.int32)
+    faps[:, 2] = np.arange(40) * 7  # open_jaw, in steps of 4
+    faps[:, [11, 12]] = np.arange(40)[:, None] % 9  # both corners of the mouth
+    baps[:, 183] = np.arange(40) * 5
+    face_mask, body_mask = np.ones((40, 68), dtype=bool), np.ones((40, 296), dtype=bool)
+    face_mask[:, :2] = False
+    face_mask[20:, 30:40] = body_mask[:10, 100:] = False
+    return Animation(
+        25, np.arange(40), FaceTrack(faps * face_mask, face_mask), BodyTrack(baps * body_mask, body_mask)
+    )
+
+
+@pytest.mark.parametrize("command", ["encode", "convert"])
+@pytest.mark.parametrize(("part", "suffix"), [("face", "fap"), ("body", "bap")])
+def test_text_files_come_back_as_they_were(
+    run: Run, tmp_path: Path, archive: Animation, command: str, part: str, suffix: str
+) -> None:
+    given, back = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
+    parts = {"face": archive.face, "body": archive.body}
+    fba.write(given, Animation(25, archive.index, parts["face"] if part == "face" else None,
+                               parts["body"] if part == "body" else None, name="a"))  # fmt: skip
+    target = ("-o", tmp_path / "a.fba") if command == "encode" else (tmp_path / "a.fba",)
+    done = run(command, given, *target)
+    assert (done.code, done.err) == (0, "")
+    assert "rounded" not in done.out
+    assert run("decode", tmp_path / "a.fba", f"--{suffix}", back).code == 0
+    assert back.read_bytes() == given.read_bytes()
+
+
+def test_rounded_values_are_counted(run: Run, tmp_path: Path, archive: Animation) -> None:
+    """Steps of the eyes are 128: where no stream carries values as they are, that is said."""
+    assert archive.face is not None
+    values = archive.face.values.copy()
+    values[0, 22] = 2000  # yaw_l_eyeball
+    fba.write(tmp_path / "a.fap", Animation(25, archive.index, FaceTrack(values, archive.face.mask)))
+    done = run("encode", tmp_path / "a.fap", "-o", tmp_path / "a.fba")
+    wrong = (fba.read(tmp_path / "a.fba").face.values != values).sum()  # type: ignore[union-attr]
+    assert done.out.endswith(f"; {wrong} values rounded to quantiser steps\n")
+    done = run("encode", tmp_path / "a.fap", "-o", tmp_path / "a.fba", "--quant", 1)
+    assert not done.out.endswith("rounded to quantiser steps\n")
+
+
+def test_streams_leave_out_what_never_moves(run: Run, tmp_path: Path, archive: Animation) -> None:
+    fba.write(tmp_path / "a.fba", archive)
+    for arguments in (("encode", "-o"), ("convert",)):
+        assert run(arguments[0], tmp_path / "a.fba", *arguments[1:], tmp_path / "b.fba").code == 0
+        before, after = fba.read(tmp_path / "a.fba"), fba.read(tmp_path / "b.fba")
+        assert after.face is not None
+        assert after.body is not None
+        # The outer lips are sent, too: a player would copy the inner ones.
+        assert set(np.flatnonzero(after.face.mask[5])) == {2, 11, 12, 58, 59}
+        assert set(np.flatnonzero(after.body.mask[15])) == {183}
+        assert np.array_equal(after.face.values, before.face.values)  # type: ignore[union-attr]
+        assert np.array_equal(after.body.values, before.body.values)  # type: ignore[union-attr]
+    assert run("encode", tmp_path / "a.fba", "-o", tmp_path / "b.fba", "--preset", "reference").code == 0
+    assert fba.read(tmp_path / "b.fba").face.mask[5].sum() == 66  # type: ignore[union-attr]
+
+
+def test_captured_faces_send_what_a_player_does_not_derive(
+    run: Run, tmp_path: Path, archive: Animation
+) -> None:
+    assert archive.face is not None
+    fba.write(
+        tmp_path / "a.csv", Animation(25, archive.index, archive.face)
+    )  # blendshapes, alike on both sides
+    assert run("encode", tmp_path / "a.csv", "-o", tmp_path / "all.fba", "--preset", "reference").code == 0
+    everything = fba.read(tmp_path / "all.fba").face
+    assert everything is not None
+    for arguments in (("encode", "-o"), ("convert",)):
+        assert run(arguments[0], tmp_path / "a.csv", *arguments[1:], tmp_path / "b.fba").code == 0
+        face = fba.read(tmp_path / "b.fba").face
+        assert face is not None
+        assert face.mask[:, [11, 12]].sum() == len(face)
+        assert everything.mask[:, [11, 12]].all()
+        assert np.array_equal(resolve(face), resolve(everything))
+    # A FAP file beside captured motion is an archive still.
+    fba.write(tmp_path / "a.fap", Animation(25, archive.index, archive.face))
+    given = (tmp_path / "a.fap", SAMPLES / "hello.bvh", "-o", tmp_path / "c.fba")
+    assert run("encode", *given).code == 0
+    both = fba.read(tmp_path / "c.fba", bap_steps="visage").face
+    assert both is not None
+    assert both.mask[5, [11, 12]].all()
+
+
+@pytest.mark.parametrize(
+    "options", [("--preset", "exact"), ("--bap-quant", 3), ("--unsent", "keep"), ("--time-codes",)]
+)
+def test_an_epf_file_says_it_all(
+    run: Run, tmp_path: Path, archive: Animation, options: tuple[str, ...]
+) -> None:
+    fba.write(tmp_path / "a.fap", Animation(25, archive.index, archive.face))
+    (tmp_path / "a.epf").write_text("")
+    done = run("encode", tmp_path / "a.fap", "-o", tmp_path / "a.fba", "--epf", tmp_path / "a.epf", *options)
+    assert done.code == 2
+    assert f"{options[0]} and --epf contradict each other" in " ".join(done.err.split())
+
+
+def test_unknown_presets(run: Run, tmp_path: Path, archive: Animation) -> None:
+    fba.write(tmp_path / "a.fba", archive)
+    done = run("encode", tmp_path / "a.fba", "-o", tmp_path / "b.fba", "--preset", "small")
+    assert done.code == 2
+    assert "'small' is not one of 'reference', 'exact', 'compact'" in " ".join(done.err.split())
+    with pytest.raises(fba.OptionError, match="preset must be one of reference, exact, compact, not 'small'"):
+        fba.write(tmp_path / "b.fba", archive, preset="small")
+    fba.write(tmp_path / "b.fba", archive, preset="compact")
+    assert (tmp_path / "b.fba").stat().st_size < (tmp_path / "a.fba").stat().st_size
