@@ -213,6 +213,16 @@ MUTANTS = (
     ),
     Mutant("fba/codec/code_length.py", "2 * RANGE_CODE_MAX * RANGE_UNIT + 1", "RANGE_CODE_MAX", PLANS_TEST),
     Mutant("fba/codec/quantisation.py", "divisor % scale == 0 and", "", PLANS_TEST),
+    Mutant(
+        "fba/codec/quantisation.py", "np.where(intra[1:, None], 0, values[:-1])", "values[:-1]", PLANS_TEST
+    ),
+    Mutant("fba/codec/code_length.py", "IMPOSSIBLE_BITS = 1e9", "IMPOSSIBLE_BITS = 0.0", PLANS_TEST),
+    Mutant(
+        "fba/cli/coding/coded_streams.py",
+        '"compact" if inputs.has_captured_face else "exact"',
+        '"exact"',
+        "tests/cli/test_presets.py",
+    ),
     Mutant("fba/face/importers/assembly/landmarks.py", "UNLIKE = 1.3", "UNLIKE = 1.4", SURFACE_TEST),
     Mutant(
         "fba/face/importers/assembly/landmarks.py",

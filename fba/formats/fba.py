@@ -64,23 +64,19 @@ def read_fba(
 
 
 def write_fba(
-    path: Path,
-    animation: Animation,
-    *,
-    options: EncoderOptions | None = None,
-    preset: str = "reference",
-    **settings: Any,
+    path: Path, animation: Animation, *, options: EncoderOptions | None = None, **settings: Any
 ) -> None:
     """Encode an animation into an FBA file.
 
     options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Unless they say otherwise, a
-    file whose BAP steps are not the standard's is marked (see `fba.codec.write_mark`). preset: "reference"
-    sends all that the animation does; "exact" and "compact" leave out what a player shows without it (see
-    `fba.planning`). Raises OptionError if options and fields are given, or for an unknown preset, RangeError
-    for values that no stream can carry, FormatError if the file cannot be written.
+    file whose BAP steps are not the standard's is marked (see `fba.codec.write_mark`). With either, preset:
+    "reference" sends all that the animation does; "exact" and "compact" leave out what a player shows without
+    it (see `fba.planning`). Raises OptionError if options and fields are given, or for an unknown preset,
+    RangeError for values that no stream can carry, FormatError if the file cannot be written.
     """
     from fba.codec import EncoderOptions, encode
 
+    preset = settings.pop("preset", "reference")
     if settings:
         if options is not None:
             raise OptionError(f"give either options or {', '.join(settings)}, not both")
@@ -107,7 +103,7 @@ def _encoder_settings() -> tuple[str, ...]:
     """Return the names of the keywords of `write_fba`."""
     from fba.codec import EncoderOptions
 
-    return tuple(field.name for field in fields(EncoderOptions) if field.name != "preset")
+    return tuple(field.name for field in fields(EncoderOptions) if field.init)
 
 
 write_fba.extra_options = _encoder_settings  # type: ignore[attr-defined]

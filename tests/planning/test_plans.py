@@ -341,4 +341,8 @@ def test_quantisers_that_keep_archives() -> None:
     assert exact_quantisers(body([5, 1860, 3721]), options).bap_quant == 1
     assert exact_quantisers(body([1861, 5, 5]), options).bap_quant == 1  # the I plane cannot
     assert exact_quantisers(body([5, 6]), options, parts=["face"]).bap_quant == 1
+    mask = np.tile(np.arange(296) == 100, (3, 1))
+    mask[2, 200] = True  # another mask, and so another I plane
+    changed = replace(body([5, 1860, 3720]), body=BodyTrack(body([5, 1860, 3720]).body.values, mask))  # type: ignore[union-attr]
+    assert exact_quantisers(changed, options).bap_quant == 1
     assert count_rounded(body([5, 128, 6]), options) == {"body": 2}
