@@ -5,15 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from fba.study.results import Result
+from fba.study.results import EVERYTHING, Result
 
-EVERYTHING = "all"
 OWN = ""
+"""What the column `numbers` says of this codec."""
 
 
-def of_kind(results: Iterable[Result], kind: str) -> list[Result]:
-    """Return the results of all faces, or of all bodies, together."""
-    return [one for one in results if one.kind == kind and one.subject == EVERYTHING]
+def group_results(results: Iterable[Result]) -> list[list[Result]]:
+    """Return results in groups of the same data and kind, in the order in which they come."""
+    found: dict[tuple[str, str], list[Result]] = {}
+    for one in results:
+        found.setdefault((one.data, one.kind), []).append(one)
+    return list(found.values())
+
+
+def together(group: Iterable[Result]) -> list[Result]:
+    """Return the results of a group that sum up all its subjects."""
+    return [one for one in group if one.subject == EVERYTHING]
 
 
 def own_points(results: Iterable[Result]) -> list[Result]:
@@ -47,12 +55,23 @@ class Comparison(NamedTuple):
     file: Result
 
 
-def compare(results: Sequence[Result]) -> list[Comparison]:
-    """Return the points that rivals have, too, the smallest errors first. results: of one kind."""
+def compare(group: Sequence[Result]) -> list[Comparison]:
+    """Return the points of a group that rivals have, too, the smallest errors first."""
     found = []
-    for own in own_points(results):
-        rivals = rivals_of(results, own)
+    chosen = together(group)
+    for own in own_points(chosen):
+        rivals = rivals_of(chosen, own)
         live, file = smallest_live(rivals), smallest_file(rivals)
         if live is not None and file is not None:
             found.append(Comparison(own, live, file))
     return found
+
+
+def best_within(group: Sequence[Result], limit: float) -> Comparison:
+    """Return the comparison with the smallest live stream of ours whose error is at most `limit` mm.
+
+    The one with the smallest error where none is.
+    """
+    compared = compare(group)
+    good = [one for one in compared if one.own.max_mm <= limit]
+    return min(good, key=lambda one: one.own.live_rate or 0.0) if good else compared[0]

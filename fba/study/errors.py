@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Array, Float32, Float64
-from fba.body import BapSolver
+from fba.body.displacement import displacements
 from fba.face import Deformer, FaceModel
 from fba.study.subjects import FACE
 
@@ -16,42 +16,50 @@ HEAD_TURN = slice(47, 50)
 """FAPs 48 to 50: the head's rotation, 1e-5 rad."""
 BLOCK = 64
 """Frames whose vertices are in memory at once."""
-ARM = 0.03
-"""Metres from a joint to the points that show its error, as the Animation Compression Library measures."""
-THRESHOLDS = {"face": 0.5, "body": 0.1}
-"""Millimetres; 0.1 is the Animation Compression Library's."""
+ROOT = slice(180, 183)
+"""BAPs 181 to 183: the root's position in millimetres; all others are angles."""
+TURN = 2e5 * np.pi
+"""A full turn in units of 1e-5 rad, which shows the same pose."""
+THRESHOLDS = {"face": 0.5, "body": 10.0}
+"""Millimetres within which most should be: what `fba encode --tolerance` keeps to."""
 
 
 class Errors(NamedTuple):
     """Errors of one subject.
 
     millimetres: float32 (N,), of a face: of the vertex that is worst in each frame, in the head's frame; of a
-    body: of every joint in every frame. degrees: the head's largest; 0 for bodies. units: the largest of a
-    parameter, in the standard's units.
+    body: of every joint in every frame, at points 3 cm off it. degrees: the head's largest; 0 for bodies.
+    feet: the largest of soles that stand, millimetres; 0 for faces. units: the largest of a parameter, in the
+    standard's units.
     """
 
     millimetres: Float32
     degrees: float
+    feet: float
     units: float
 
 
-def measure_errors(kind: str, source: Float64, shown: Float64) -> Errors:
-    """Return the errors of FAPs (T, 68) or BAPs (T, 296) that are shown in place of a source's."""
-    units = float(np.abs(shown - source).max(initial=0.0))
+def measure_errors(kind: str, source: Float64, shown: Float64, rate: float) -> Errors:
+    """Return the errors of FAPs (T, 68) or BAPs (T, 296) that are shown in place of a source's.
+
+    rate: frames per second.
+    """
+    apart = shown - source
     if kind == FACE:
-        turns = np.abs(shown[:, HEAD_TURN] - source[:, HEAD_TURN]).max(initial=0.0)
-        return Errors(_face_errors(source, shown), float(np.degrees(1e-5 * turns)), units)
-    return Errors(_body_errors(source, shown), 0.0, units)
+        turn = float(np.degrees(1e-5 * np.abs(apart[:, HEAD_TURN]).max(initial=0.0)))
+        return Errors(_face_errors(source, shown), turn, 0.0, float(np.abs(apart).max(initial=0.0)))
+    root = apart[:, ROOT].copy()
+    apart -= TURN * np.rint(apart / TURN)
+    apart[:, ROOT] = root
+    moved = displacements(source, shown, rate)
+    joints = (1000.0 * moved.joints).astype(np.float32).reshape(-1)
+    feet = 1000.0 * float(moved.feet.max(initial=0.0))
+    return Errors(joints, 0.0, feet, float(np.abs(apart).max(initial=0.0)))
 
 
 @cache
 def _deformer() -> Deformer:
     return Deformer(FaceModel.default())
-
-
-@cache
-def _solver() -> BapSolver:
-    return BapSolver()
 
 
 def _differing(source: Array, shown: Array) -> Array:
@@ -68,17 +76,3 @@ def _face_errors(source: Float64, shown: Float64) -> Float32:
         apart = _deformer().local(source[block]) - _deformer().local(shown[block])
         result[block] = 1000.0 * np.sqrt(np.einsum("tvi,tvi->tv", apart, apart).max(axis=1))
     return result
-
-
-def _body_errors(source: Float64, shown: Float64) -> Float32:
-    """Return the displacement of the worst of three points 3 cm off each joint, along its axes: float32
-    (T x J,), millimetres."""
-    count = len(_solver().skeleton)
-    result = np.zeros((len(source), count), dtype=np.float32)
-    frames = _differing(source, shown)
-    for start in range(0, len(frames), BLOCK):
-        block = frames[start : start + BLOCK]
-        apart = (_solver().pose(source[block]) - _solver().pose(shown[block]))[:, :, :3]
-        points = apart[..., 3:] + ARM * apart[..., :3]  # columns: the points along x, y and z
-        result[block] = 1000.0 * np.linalg.norm(points, axis=2).max(axis=2)
-    return result.reshape(-1)

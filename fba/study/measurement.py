@@ -13,7 +13,7 @@ from fba.face.resolve import resolve
 from fba.study.errors import THRESHOLDS, Errors, measure_errors
 from fba.study.gltf_samples import gltf_rates
 from fba.study.points import Coded, Point, decode_subject, operating_points
-from fba.study.results import Result
+from fba.study.results import EVERYTHING, Result
 from fba.study.rivals import installed_rivals
 from fba.study.subjects import FACE, Subject
 
@@ -32,6 +32,7 @@ class _Sum:
     live_bytes: int | None = 0
     millimetres: list[Float32] = field(default_factory=list)
     degrees: float = 0.0
+    feet: float = 0.0
     units: float = 0.0
 
     def add(self, subject: Subject, packets: int, file: int | None, live: int | None, errors: Errors) -> None:
@@ -44,25 +45,29 @@ class _Sum:
         self.live_bytes = None if live is None or self.live_bytes is None else self.live_bytes + live
         self.millimetres.append(errors.millimetres)
         self.degrees = max(self.degrees, errors.degrees)
+        self.feet = max(self.feet, errors.feet)
         self.units = max(self.units, errors.units)
 
-    def result(self, name: str, kind: str, method: str, point: str, numbers: str) -> Result:
-        """Return the sum as a result."""
+    def result(self, data: str, name: str, kind: str, method: str, point: str, numbers: str) -> Result:
+        """Return the sum as a result; see `Result` for the arguments."""
         errors = np.concatenate(self.millimetres)
         return Result(
-            name, kind, method, point, numbers, self.subjects, self.frames, self.seconds, self.packets,
+            data, name, kind, method, point, numbers, self.subjects, self.frames, self.seconds, self.packets,
             self.file_bytes, self.live_bytes, float(errors.max()), float(np.percentile(errors, 99)),
-            float((errors <= THRESHOLDS[kind]).mean()), self.degrees, self.units,
+            float((errors <= THRESHOLDS[kind]).mean()), self.degrees, self.feet, self.units,
         )  # fmt: skip
 
 
 Key = tuple[str, str, str, str]
 
 
-def measure(subjects: Sequence[Subject], progress: Callable[[str], None] = lambda _: None) -> list[Result]:
+def measure(
+    data: str, subjects: Sequence[Subject], progress: Callable[[str], None] = lambda _: None
+) -> list[Result]:
     """Return results of all subjects together, and of this codec for each.
 
-    progress: called with a line of text before each subject. OptionError where nothing moves.
+    data: what they are, in words. progress: called with a line of text before each subject. OptionError where
+    nothing moves.
     """
     if not subjects:
         raise OptionError("nothing moves in these files: there is no face and no body to measure")
@@ -78,8 +83,8 @@ def measure(subjects: Sequence[Subject], progress: Callable[[str], None] = lambd
             if key[3] == "" and len(subjects) > 1:
                 alone = _Sum()
                 alone.add(subject, one.packets, one.file_bytes, one.live_bytes, one.errors)
-                single.append(alone.result(subject.name, *key))
-    return [total.result("all", *key) for key, total in sums.items()] + single
+                single.append(alone.result(data, subject.name, *key))
+    return [total.result(data, EVERYTHING, *key) for key, total in sums.items()] + single
 
 
 @dataclass
@@ -99,7 +104,7 @@ def _measure_subject(subject: Subject) -> dict[Key, _Measured]:
         coded = decode_subject(subject, point.encode(subject))
         shown = coded.shown.tobytes()
         if shown not in known:
-            known[shown] = measure_errors(subject.kind, source, coded.shown)
+            known[shown] = measure_errors(subject.kind, source, coded.shown, float(subject.animation.rate))
         errors = known[shown]
         packets = len(coded.plane_bytes)
         name = f"{point.method}, {point.setting}"

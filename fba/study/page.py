@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from importlib.resources import files
 
 from fba.study import plots, tables
-from fba.study.choices import compare, of_kind
-from fba.study.results import Result
+from fba.study.choices import best_within, compare, group_results
+from fba.study.results import EVERYTHING, Result
 from fba.study.subjects import BODY, FACE
 from fba.study.summary import LIMITS, subjects_text, summary_lines
 
-TITLES = {FACE: "Faces", BODY: "Bodies"}
-FILES = {FACE: "faces", BODY: "bodies"}
-PICTURES = tuple(f"{name}{part}.svg" for name in FILES.values() for part in ("", "-bars"))
+NAMES = {FACE: "faces", BODY: "bodies"}
 MEASURE = {
     FACE: "Errors are those of the built-in head's vertex that is worst in each frame, in the head's own "
     "frame; its rotation is measured in degrees.",
@@ -22,54 +21,59 @@ MEASURE = {
 }
 
 
-def make_pictures(results: Sequence[Result], prefix: str = "") -> dict[str, bytes]:
+def picture_names(data: str) -> list[str]:
+    """Return the names of all pictures that results of some data may have."""
+    return [f"{_slug(data)}-{name}{part}.svg" for name in NAMES.values() for part in ("", "-bars")]
+
+
+def make_pictures(results: Sequence[Result]) -> dict[str, bytes]:
     """Return the pictures of the page by file name. OptionError without matplotlib."""
     found = {}
-    for kind in _kinds(results):
-        found[f"{prefix}{FILES[kind]}.svg"] = plots.draw_rates(results, kind)
-        found[f"{prefix}{FILES[kind]}-bars.svg"] = plots.draw_bars(results, kind, LIMITS[kind])
+    for group in _groups(results):
+        rates, bars = _picture_names(group)
+        found[rates] = plots.draw_rates(group)
+        found[bars] = plots.draw_bars(group, LIMITS[group[0].kind])
     return found
 
 
 def make_page(results: Sequence[Result]) -> str:
     """Return the page for results that `make_pictures` draws beside it."""
-    lines = ["# Bit rates", "", *summary_lines(results), ""]
-    for kind in _kinds(results):
-        lines += make_section(results, kind)
+    lines = ["# Bit rates", "", "Rates are kbit/s, without packet headers.", "", *summary_lines(results), ""]
+    for group in _groups(results):
+        own = compare(group)[0].own
+        lines += [f"## {own.data}: {subjects_text(own)}", "", *make_section(group)]
     lines += ["## Published rates of others", "", "On data of their own, and not measured again here.", ""]
     return "\n".join([*lines, *tables.published_table(), "", method_text()])
 
 
-def make_section(results: Sequence[Result], kind: str, prefix: str = "") -> list[str]:
-    """Return the lines about faces or bodies. prefix: of the pictures' names."""
-    compared = compare(of_kind(results, kind))
-    points = [(one.own.method, one.own.point) for one in compared]
-    name = FILES[kind]
-    best = plots.best_within(of_kind(results, kind), LIMITS[kind]).own
+def make_section(group: Sequence[Result], folder: str = "") -> list[str]:
+    """Return the lines about the faces or the bodies of some data. folder: of the pictures, with a slash."""
+    kind, compared = group[0].kind, compare(group)
+    best = best_within(group, LIMITS[kind]).own
+    rates, bars = _picture_names(group)
     lines = [
-        f"## {TITLES[kind]}: {subjects_text(compared[0].own)}", "", f"{MEASURE[kind]} Rates are kbit/s.", "",
-        f"![Bit rate against error, {name}]({prefix}{name}.svg)", "",
-        f"![What each way takes live and as a file, {name}]({prefix}{name}-bars.svg)", "",
-        *tables.comparison_table(results, kind), "",
+        MEASURE[kind], "",
+        f"![Bit rate against error of {NAMES[kind]}]({folder}{rates})", "",
+        f"![What each way takes, live and as a file, for {NAMES[kind]}]({folder}{bars})", "",
+        *tables.comparison_table(group), "",
         "Every way to code the values of the first row:", "",
-        *tables.rivals_table(results, compared[0].own), "",
+        *tables.rivals_table(group, compared[0].own), "",
     ]  # fmt: skip
     if best != compared[0].own:
-        lines += [f"Those with errors of at most {tables.error_text(best.max_mm)} mm:", ""]
-        lines += [*tables.rivals_table(results, best), ""]
-    lines += ["All settings of FBA:", "", *tables.settings_table(results, kind), ""]
-    if per_file := files_section(results, kind, points[:1] + points[-3:-1]):
-        lines += per_file
+        lines += [
+            f"And those of *{best.method}, {best.point}*, at most {tables.error_text(best.max_mm)} mm off:"
+        ]
+        lines += ["", *tables.rivals_table(group, best), ""]
+    lines += ["All settings of FBA:", "", *tables.settings_table(group), ""]
+    if any(one.subject != EVERYTHING for one in group):
+        points = dict.fromkeys((one.method, one.point) for one in (compared[0].own, best))
+        lines += [
+            "Each file, live, with its largest error:",
+            "",
+            *tables.files_table(group, list(points)),
+            "",
+        ]
     return lines
-
-
-def files_section(results: Sequence[Result], kind: str, points: Sequence[tuple[str, str]]) -> list[str]:
-    """Return the table of single files, with a line before it; nothing where there is one file."""
-    if not any(one.kind == kind and one.subject != "all" for one in results):
-        return []
-    return [
-        "Each file, live, with its largest error:", "", *tables.files_table(results, kind, points), ""
-    ]  # fmt: skip
 
 
 def method_text() -> str:
@@ -77,5 +81,14 @@ def method_text() -> str:
     return (files("fba.study") / "method.md").read_text(encoding="utf-8")
 
 
-def _kinds(results: Sequence[Result]) -> list[str]:
-    return [kind for kind in (FACE, BODY) if compare(of_kind(results, kind))]
+def _groups(results: Sequence[Result]) -> list[list[Result]]:
+    return [group for group in group_results(results) if compare(group)]
+
+
+def _picture_names(group: Sequence[Result]) -> tuple[str, str]:
+    name = f"{_slug(group[0].data)}-{NAMES[group[0].kind]}"
+    return f"{name}.svg", f"{name}-bars.svg"
+
+
+def _slug(data: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", data.lower()).strip("-") or "data"

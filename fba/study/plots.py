@@ -6,7 +6,7 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-from fba.study.choices import Comparison, compare, of_kind, own_points, rivals_of
+from fba.study.choices import best_within, compare, own_points, rivals_of, together
 from fba.study.packages import require_package
 from fba.study.published import Published, published_rates
 from fba.study.results import Result
@@ -24,13 +24,13 @@ ANCHORS = {FACE: (1.75, 153.0), BODY: (15.6, 3.3)}
 """The published rates that are drawn."""
 
 
-def draw_rates(results: Sequence[Result], kind: str) -> bytes:
-    """Return an SVG of rate against error for faces or bodies. OptionError without matplotlib."""
+def draw_rates(group: Sequence[Result]) -> bytes:
+    """Return an SVG of rate against error for a group of results. OptionError without matplotlib."""
     pyplot = _pyplot()
-    chosen = of_kind(results, kind)
+    chosen, kind = together(group), group[0].kind
     figure, axes = pyplot.subplots(figsize=SIZE, layout="constrained")
     own = _lower_hull([one for one in own_points(chosen) if "look-ahead" not in one.method])
-    compared = compare(chosen)
+    compared = compare(group)
     _line(axes, [(one.max_mm, one.live_rate) for one in own], OURS, "FBA, live", 2.4)
     _line(axes, [(one.own.max_mm, one.live.live_rate) for one in compared], LIVE,
           "best general\ncompressor, live", 1.8)  # fmt: skip
@@ -54,13 +54,12 @@ def draw_rates(results: Sequence[Result], kind: str) -> bytes:
     return _svg(figure)
 
 
-def draw_bars(results: Sequence[Result], kind: str, limit: float) -> bytes:
+def draw_bars(group: Sequence[Result], limit: float) -> bytes:
     """Return an SVG of bars: what each way takes live and as a file, with an error of at most `limit` mm."""
     pyplot = _pyplot()
-    chosen = of_kind(results, kind)
-    best = best_within(chosen, limit)
+    best = best_within(group, limit)
     rows = [("FBA", best.own.live_rate, best.own.file_rate)]
-    rivals = rivals_of(chosen, best.own)
+    rivals = rivals_of(together(group), best.own)
     for name in ("brotli 11", "xz", "zstd 19", "deflate", "glTF, int16, meshopt, zstd 19", "int16"):
         same = [one for one in rivals if one.method.startswith(name)]
         if same:
@@ -78,16 +77,6 @@ def draw_bars(results: Sequence[Result], kind: str, limit: float) -> bytes:
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.14)
     return _svg(figure)
-
-
-def best_within(chosen: Sequence[Result], limit: float) -> Comparison:
-    """Return the comparison with the smallest live stream of ours whose error is at most `limit` mm.
-
-    The one with the smallest error where none is.
-    """
-    compared = compare(chosen)
-    good = [one for one in compared if one.own.max_mm <= limit]
-    return min(good, key=lambda one: one.own.live_rate or 0.0) if good else compared[0]
 
 
 def _lower_hull(own: Sequence[Result]) -> list[Result]:

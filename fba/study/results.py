@@ -13,18 +13,24 @@ HEADER_BYTES = 40
 """IP version 4, UDP and RTP: 20, 8 and 12 bytes in front of every packet."""
 
 
+EVERYTHING = "all"
+"""The subject of results that sum up all subjects."""
+
+
 @dataclass(frozen=True)
 class Result:
     """What all subjects of a kind take together, coded in one way.
 
-    subject: "all", or the name of the one file that it is of. kind: "face" or "body". method: who codes.
-    point: the setting, "quantiser 4"; of rivals, the one whose values they code, "FBA compact, quantiser 4".
-    numbers: which of them rivals code, "all" or "sent"; "" for this codec. subjects, frames, seconds: of the
-    sources. packets: live. file_bytes; live_bytes: without packet headers, None where there is no live form.
-    max_mm, p99_mm, under: largest error, 99th percentile, share of samples within `THRESHOLDS`. degrees: the
-    largest error of the head's rotation. units: the largest of a parameter.
+    data: what was measured, in words. subject: `EVERYTHING`, or the name of the one file that it is of.
+    kind: "face" or "body". method: who codes. point: the setting, "quantiser 4"; of rivals, the one whose
+    values they code, "FBA compact, quantiser 4". numbers: which of them rivals code, "all" or "sent"; "" for
+    this codec. subjects, frames, seconds: of the sources. packets: live. file_bytes; live_bytes: without
+    packet headers, None where there is no live form. max_mm, p99_mm, under: largest error, 99th percentile,
+    share of samples within `THRESHOLDS`. degrees: the largest error of the head's rotation. feet_mm: of soles
+    that stand. units: the largest of a parameter.
     """
 
+    data: str
     subject: str
     kind: str
     method: str
@@ -40,6 +46,7 @@ class Result:
     p99_mm: float
     under: float
     degrees: float
+    feet_mm: float
     units: float
 
     @property
@@ -58,9 +65,9 @@ class Result:
         return 8e-3 * HEADER_BYTES * self.packets / self.seconds
 
 
-_ROUNDED = {"seconds": 3, "max_mm": 4, "p99_mm": 4, "under": 6, "degrees": 4, "units": 1}
+_ROUNDED = {"seconds": 3, "max_mm": 4, "p99_mm": 4, "under": 6, "degrees": 4, "feet_mm": 3, "units": 1}
 _NAMES = tuple(field.name for field in fields(Result))
-_TEXT = ("subject", "kind", "method", "point", "numbers")
+_TEXT = ("data", "subject", "kind", "method", "point", "numbers")
 _RATES = ("file_kbit_s", "live_kbit_s")
 
 

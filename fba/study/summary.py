@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fba.study.choices import Comparison, compare, of_kind
-from fba.study.plots import best_within
+from fba.study.choices import Comparison, best_within, compare, group_results
 from fba.study.results import Result
 from fba.study.subjects import BODY, FACE
 from fba.study.tables import error_text, rate_text
 
 HEADER = ("what", "error", "FBA live", "smallest other, live", "FBA file", "smallest other, file")
-LIMITS = {FACE: 0.5, BODY: 1.0}
+LIMITS = {FACE: 0.5, BODY: 10.0}
 """Millimetres of error of the second row of a kind."""
 
 
 def summary_lines(results: Sequence[Result]) -> list[str]:
     """Return a table of the streams without loss and with a small one, of faces and bodies."""
     lines = [f"| {' | '.join(HEADER)} |", "|---|---|---|---|---|---|"]
-    for kind in (FACE, BODY):
-        chosen = of_kind(results, kind)
-        if compared := compare(chosen):
-            rows = dict.fromkeys((compared[0], best_within(chosen, LIMITS[kind])))
+    for group in group_results(results):
+        if compared := compare(group):
+            rows = dict.fromkeys((compared[0], best_within(group, LIMITS[group[0].kind])))
             lines += [f"| {' | '.join(_row(one))} |" for one in rows]
     return lines
 
@@ -36,7 +34,7 @@ def _row(one: Comparison) -> list[str]:
     own = one.own
     error = "none" if own.max_mm == 0 else f"at most {error_text(own.max_mm)} mm"
     return [
-        subjects_text(own), error, f"{rate_text(own.live_rate)} kbit/s",
+        f"{own.data}: {subjects_text(own)}", error, f"{rate_text(own.live_rate)} kbit/s",
         f"{rate_text(one.live.live_rate)} ({one.live.method})", f"{rate_text(own.file_rate)} kbit/s",
         f"{rate_text(one.file.file_rate)} ({one.file.method})",
     ]  # fmt: skip

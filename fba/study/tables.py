@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fba.study.choices import Comparison, compare, of_kind, own_points, rivals_of
+from fba.study.choices import Comparison, compare, own_points, rivals_of, together
 from fba.study.errors import THRESHOLDS
 from fba.study.measurement import ALL, SENT
 from fba.study.published import published_rates
-from fba.study.results import Result
-from fba.study.rivals import RIVALS
-from fba.study.subjects import BODY, FACE
+from fba.study.results import EVERYTHING, Result
+from fba.study.subjects import FACE
 
 ABSENT = "–"
 
@@ -38,16 +37,16 @@ def share_text(share: float) -> str:
     return f"{100 * share:.2f} %"
 
 
-def settings_table(results: Sequence[Result], kind: str) -> list[str]:
+def settings_table(group: Sequence[Result]) -> list[str]:
     """Return this codec's results at all settings."""
-    own = own_points(of_kind(results, kind))
-    head = ["head, degrees"] if kind == FACE else []
+    own, kind = own_points(together(group)), group[0].kind
+    more = "head, degrees" if kind == FACE else "standing feet, mm"
     header = ["setting", "live, kbit/s", "file, kbit/s", "max, mm", "99 % within, mm",
-              f"within {THRESHOLDS[kind]:g} mm", *head, _unit_header(kind)]  # fmt: skip
+              f"within {THRESHOLDS[kind]:g} mm", more, _unit_header(kind)]  # fmt: skip
     rows = [
         [f"{one.method}, {one.point}", rate_text(one.live_rate), rate_text(one.file_rate),
          error_text(one.max_mm), error_text(one.p99_mm), share_text(one.under),
-         *([f"{one.degrees:.2f}"] if head else []),
+         f"{one.degrees:.2f}" if kind == FACE else error_text(one.feet_mm),
          f"{one.units:,.0f}"]
         for one in own
     ]  # fmt: skip
@@ -58,10 +57,9 @@ def _unit_header(kind: str) -> str:
     return "max, units of the FAP" if kind == FACE else "max, 1e-5 rad or mm"
 
 
-def rivals_table(results: Sequence[Result], own: Result) -> list[str]:
+def rivals_table(group: Sequence[Result], own: Result) -> list[str]:
     """Return what every other way takes for the values of one of this codec's points."""
-    chosen = of_kind(results, own.kind)
-    rivals = rivals_of(chosen, own)
+    rivals = rivals_of(together(group), own)
     fewer = [SENT] if own.kind == FACE else []
     header = ["", *[f"{form}, {what}" for form in ("live", "file") for what in _number_names(fewer)]]
     first = rate_text(own.live_rate), rate_text(own.file_rate)
@@ -82,11 +80,11 @@ def _number_names(fewer: Sequence[str]) -> list[str]:
     return ["all numbers", "those that FBA sends"] if fewer else ["kbit/s"]
 
 
-def comparison_table(results: Sequence[Result], kind: str) -> list[str]:
+def comparison_table(group: Sequence[Result]) -> list[str]:
     """Return this codec and the smallest others at the same errors."""
     header = ["setting", "max, mm", "FBA live", "smallest other, live", "times", "FBA file",
               "smallest other, file", "times"]  # fmt: skip
-    return table(header, [_comparison_row(one) for one in compare(of_kind(results, kind))])
+    return table(header, [_comparison_row(one) for one in compare(group)])
 
 
 def _comparison_row(one: Comparison) -> list[str]:
@@ -118,19 +116,15 @@ def published_table() -> list[str]:
     ]
 
 
-def files_table(results: Sequence[Result], kind: str, points: Sequence[tuple[str, str]]) -> list[str]:
+def files_table(group: Sequence[Result], points: Sequence[tuple[str, str]]) -> list[str]:
     """Return the live rates and largest errors of every file, at some points of this codec."""
-    names = list(dict.fromkeys(one.subject for one in results if one.kind == kind and one.subject != "all"))
+    names = list(dict.fromkeys(one.subject for one in group if one.subject != EVERYTHING))
     header = ["file", "seconds", *[f"{method}, {point}" for method, point in points]]
     rows = []
     for name in names:
-        own = {(one.method, one.point): one for one in results if one.kind == kind and one.subject == name}
+        own = {(one.method, one.point): one for one in group if one.subject == name}
         found = [own[point] for point in points if point in own]
         if found:
             cells = [f"{rate_text(one.live_rate)} ({error_text(one.max_mm)} mm)" for one in found]
             rows.append([name, f"{found[0].seconds:.1f}", *cells])
     return table(header, rows)
-
-
-KINDS = {FACE: "faces", BODY: "bodies"}
-ORDER = [rival.name for rival in RIVALS]

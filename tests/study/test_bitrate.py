@@ -39,7 +39,7 @@ def short_face() -> Animation:
 @pytest.fixture(scope="session")
 def results(short_face: Animation) -> list[Result]:
     lines: list[str] = []
-    found = measure(split_subjects("short", short_face, "iso"), lines.append)
+    found = measure("a test", split_subjects("short", short_face, "iso"), lines.append)
     assert lines == ["1 of 1: the face of short, 0.5 s"]
     return found
 
@@ -116,10 +116,12 @@ def test_the_command_writes_page_pictures_and_numbers(
     assert code == 0
     assert out.splitlines() == summary_lines(read_results(path))
     made = {one.name: one.read_text(encoding="utf-8") for one in (tmp_path / "study").iterdir()}
-    assert set(made) == {"results.csv", "bitrate.md", "faces.svg", "faces-bars.svg"}
+    assert set(made) == {"results.csv", "bitrate.md", "a-test-faces.svg", "a-test-faces-bars.svg"}
     assert made["results.csv"] == path.read_text(encoding="utf-8")
     assert made["bitrate.md"] == make_page(read_results(path))
-    assert made["faces.svg"].encode() == make_pictures(read_results(path))["faces.svg"]  # the same every time
+    assert (
+        made["a-test-faces.svg"].encode() == make_pictures(read_results(path))["a-test-faces.svg"]
+    )  # the same every time
     code, _, err = run("bench", "bitrate", "--results", path, "-o", tmp_path / "study", "--no-clobber")
     assert code == 1
     assert "results.csv" in err
@@ -145,7 +147,7 @@ def test_what_cannot_be_measured_is_said(
     code, _, err = run("bench", "bitrate", SAMPLES / "hello.fap", "-o", tmp_path / "taken")
     assert code == 2
     with pytest.raises(OptionError, match="nothing moves"):
-        measure([])
+        measure("nothing", [])
     with pytest.raises(OptionError, match="short has no frames"):
         split_subjects("short", short_face[:0], "iso")
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fba.cli import options
+from fba.cli.clamped_values import bring_near
 from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, read_input
 from fba.cli.outputs import Output, Outputs
@@ -56,6 +57,7 @@ PAGE = "bitrate.md"
 @click.option(
     "--only", type=click.Choice(("face", "body")), help="Measure only the faces, or only the bodies."
 )
+@click.option("--title", metavar="TEXT", help="What the files are, for the tables; default: their number.")
 @options.bap_steps_option
 @options.no_clobber_option
 @options.limit_option
@@ -65,6 +67,7 @@ def command(
     summary: bool,
     tables: tuple[Path, ...],
     only: str | None,
+    title: str | None,
     bap_steps: str,
     no_clobber: bool,
     limit: Limits,
@@ -76,16 +79,22 @@ def command(
     Takes about a second for each second of animation; needs the packages of the extra `study`.
     """
     from fba.study import make_page, make_pictures, results_csv, summary_lines
-    from fba.study.page import PICTURES
+    from fba.study.page import picture_names
 
     if tables and files:
         raise click.UsageError("give files to measure or --results, not both")
+    if not title:
+        title = f"{len(files)} file{'s' * (len(files) > 1)}" if files else "samples of fba"
+    measured = _read_results(tables)
     outputs = None
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        names = [TABLE, PAGE, *PICTURES]
-        outputs = Outputs([Output("-o", folder / name) for name in names], files, no_clobber=no_clobber)
-    results = _read_results(tables) if tables else _measure(files, only, bap_steps, limit)
+        titles = dict.fromkeys(one.data for one in measured) or [title]
+        names = [TABLE, PAGE, *(name for data in titles for name in picture_names(data))]
+        outputs = Outputs(
+            [Output("-o", folder / name) for name in names], [*files, *tables], no_clobber=no_clobber
+        )
+    results = measured or _measure(title, files, only, bap_steps, limit)
     if folder is not None and outputs is not None:
         outputs.write(folder / TABLE, results_csv(results).encode())
         for name, data in make_pictures(results).items():
@@ -102,8 +111,10 @@ def _read_results(tables: Sequence[Path]) -> list[Result]:
     return [result for table in tables for result in read_results(table)]
 
 
-def _measure(files: Sequence[Path], only: str | None, bap_steps: str, limits: Limits) -> list[Result]:
-    """Return the results of files, or of the samples."""
+def _measure(
+    title: str, files: Sequence[Path], only: str | None, bap_steps: str, limits: Limits
+) -> list[Result]:
+    """Return the results of files, or of the samples. title: what they are."""
     from fba.study.measurement import measure
     from fba.study.packages import EXTRA
     from fba.study.rivals import missing_packages
@@ -117,7 +128,7 @@ def _measure(files: Sequence[Path], only: str | None, bap_steps: str, limits: Li
         with each.file(path):
             subjects += _subjects_of(path, only, bap_steps, limits)
     each.finish()
-    return measure(subjects, lambda line: click.echo(f"fba: {line}", err=True))
+    return measure(title, subjects, lambda line: click.echo(f"fba: {line}", err=True))
 
 
 def _subjects_of(path: Path, only: str | None, bap_steps: str, limits: Limits) -> list[Subject]:
@@ -127,6 +138,8 @@ def _subjects_of(path: Path, only: str | None, bap_steps: str, limits: Limits) -
     tables: list[str] = []
     animation = read_input(path, bap_steps=bap_steps, limits=limits, tables=tables)
     steps = tables[0] if tables else FINE if bap_steps == BAP_STEPS_AUTO else bap_steps
+    if not tables:
+        animation = bring_near(animation, steps, 1)
     found = split_subjects(path.name, animation, steps)
     if not found:
         click.echo(f"fba: {path}: nothing moves; left out", err=True)
