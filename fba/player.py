@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from fba_player.export.pyrender_bridge import to_pyrender
     from fba_player.export.recorder import Recorder
     from fba_player.export.render import record, render
+    from fba_player.export.side_by_side import draw_side_by_side
     from fba_player.gl.renderer import Renderer
     from fba_player.playback.live import LiveAnimation, LiveTimeline
     from fba_player.playback.timeline import Timeline
@@ -53,6 +54,7 @@ _MODULE_OF = {
     "check_display": "fba_player.window.display",
     "contact_sheet": "fba_player.export.contact_sheet",
     "default_camera": "fba_player.scene.scene",
+    "draw_side_by_side": "fba_player.export.side_by_side",
     "film_sheet": "fba_player.export.film_sheet",
     "open_audio": "fba_player.sound.player",
     "play": "fba_player.window.play",
@@ -78,6 +80,7 @@ __all__ = [
     "check_display",
     "contact_sheet",
     "default_camera",
+    "draw_side_by_side",
     "film_sheet",
     "open_audio",
     "play",

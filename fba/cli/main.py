@@ -35,6 +35,7 @@ _COMMANDS = {
     "bench": "Measure the speed of this codec on a stream, and what bit rates others need.",
     "gait": "Generate a walk by stride and character, or find the steps in one.",
     "express": "Show expressions: named ones, mixtures, points of the plane of emotions.",
+    "emote": "Play a performance in a mood: angry, surprised, sad, sleepy, happy and others.",
     "markers": "Let captured markers move any head: map them onto it, play, export.",
     "model": "Inspect face models, check them, import them, fit them to a person.",
     "demo": "Encode the sample animation, print its size, and play it.",

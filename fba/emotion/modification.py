@@ -101,6 +101,7 @@ def emote(
     times = (animation.index - animation.index[0]) / float(animation.rate)
     curves = intensity_curves(moods, times.astype(np.float64))
     shown = resolve(animation.face, model)
+    curves = curves or {next(iter(expressions())).name: np.zeros(len(animation))}  # neutral
     values = np.empty((len(animation), FAP_COUNT), dtype=np.int32)
     moved = np.zeros(FAP_COUNT, dtype=np.bool_)
     mixtures: Mixtures = {}

@@ -70,7 +70,7 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
                 assert "--no-clobber" in options, f"fba {name}"
     assert writing == {
         "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
-        "model learn-fit", "conformance", "capture", "markers", "express",
+        "conformance", "capture", "markers", "express", "model learn-fit", "emote",
     }  # fmt: skip
 
 
@@ -101,6 +101,9 @@ OVERWRITING = [
     "model learn-fit IN.fap -o OUT",
     "model learn-fit both.fba --model IN.glb -o OUT",
     "model learn-fit IN.fap -o new.glb --fit OUT",
+    "emote IN.fap -o OUT --emotion angry",
+    "emote face.fap -o OUT --keys IN.csv",
+    "emote face.fap -o OUT --emotion angry --model IN.png",
     "markers IN.png -o OUT",
     "markers both.fba IN.glb -o OUT",
     "capture livelink --play --model IN.glb -o OUT",
@@ -247,6 +250,7 @@ STANDARD = [
     "convert body.bap {} --to glb --no-mesh",
     "gait --cycles 1 -o {} --to bap",
     "express fear -o {} --to fap",
+    "emote face.fap -o {} --writing fap --emotion angry",
 ]
 
 
@@ -391,6 +395,7 @@ CLOBBERING = [
     "convert face.fap there.fba",
     "gait -o there.fba",
     "express fear -o there.fba",
+    "emote face.fap -o there.fba --emotion angry",
     "render both.fba -o there.fba --to png",
     "render --contact-sheet faps -o there.fba --to png",
     "model import face.fap -o there.glb",

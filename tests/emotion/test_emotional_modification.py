@@ -110,6 +110,12 @@ def test_without_a_mood_frames_stay() -> None:
     assert (moved[6] != shown[6]).any()
 
 
+def test_neutral_changes_nothing() -> None:
+    source = speech()
+    made = emote(source, [Mood("neutral", 100)])
+    np.testing.assert_array_equal(resolve(made.face), resolve(source.face))  # type: ignore[arg-type]
+
+
 def test_one_intensity_is_a_share_of_the_expression() -> None:
     still = performance([{31: 0}])
     for share in (25, 50, 100):

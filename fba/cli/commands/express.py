@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,18 +9,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options
-from fba.cli.command import Command, examples, usage_errors
+from fba.cli.command import Command, examples
 from fba.cli.emotions import tables
-from fba.cli.inputs import read_model
-from fba.cli.outputs import STANDARD, TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
-from fba.cli.printing import Progress, seconds_text
-from fba.errors import OptionError
+from fba.cli.emotions.pictures import PICTURES, draw, option_errors, picture_kind
+from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.printing import seconds_text
 
 if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.emotion import Blend
 
-PICTURES, FILMS = ("png", "jpg", "jpeg"), ("mp4", "gif")
 DEFAULT_RATE = Fraction(25)
 DEFAULT_SECONDS, DEFAULT_EASE = 3.0, 0.5
 """Length of an animation, and how long it takes from neutral to the expression and back."""
@@ -132,7 +128,7 @@ def command(
         return
     drawn = {"--model": model, "--size": size}
     moving = {"--seconds": seconds, "--ease": ease, "--fps": fps, "--to": to}
-    kind = "" if output is None else _picture_kind(output, to)
+    kind = "" if output is None else picture_kind(output, to)
     for option, value in {**(drawn if not kind else {}), **(moving if output is None else {})}.items():
         if value is not None:
             what = "a picture or a film" if option in drawn else "-o"
@@ -146,11 +142,11 @@ def command(
         raise click.UsageError("a picture shows the full expression; --seconds and --ease are for films")
     length = 0.0 if still else DEFAULT_SECONDS if seconds is None else seconds
     easing = min(DEFAULT_EASE, length / 2) if ease is None else ease
-    with _option_errors():
+    with option_errors():
         animation = _perform(blend, length, easing, fps, send)
     if kind:
         outputs = Outputs([Output("--output", output)], [model], no_clobber=no_clobber)
-        _draw(animation, output, outputs, kind, model, size)
+        draw(animation, output, outputs, kind, model, size)
         report = {"file": display_name(output), **tables.blend_record(blend)}
         text = f"{display_name(output)}: {blend}"
     else:
@@ -171,23 +167,6 @@ def command(
         outputs.say(text)
 
 
-def _picture_kind(output: Path, to: str | None) -> str:
-    """Return which kind of picture or film is asked for, "" for a format of animations."""
-    kind = to.lower() if to is not None else output.suffix.lower().removeprefix(".")
-    if output == STANDARD and to is None:
-        return ""
-    return kind if kind in PICTURES + FILMS else ""
-
-
-@contextmanager
-def _option_errors() -> Iterator[None]:
-    """What the library says about values that were typed is bad usage."""
-    try:
-        yield
-    except OptionError as error:
-        raise click.UsageError(str(error)) from error
-
-
 def _make_blend(
     weights: tuple[str, ...],
     point: tuple[float, float] | None,
@@ -198,7 +177,7 @@ def _make_blend(
     from fba import emotion
 
     given = {"interpolation": interpolation, "reduction": reduction, "nearness": nearness}
-    with _option_errors():
+    with option_errors():
         rules = emotion.Rules(**{name: value for name, value in given.items() if value is not None})
         if point is not None:
             return emotion.expression_at(*point, rules)
@@ -235,20 +214,3 @@ def _bits_text(animation: Animation, bits: dict[str, int | None]) -> str:
     if _sent(animation) == "expression":
         return f"FAP 2, {by_expression} as a stream; low-level FAPs by the rules (--send faps): {by_faps}"
     return f"low-level FAPs by the rules, {by_faps} as a stream; FAP 2 (--send expression): {by_expression}"
-
-
-def _draw(
-    animation: Animation,
-    output: Path,
-    outputs: Outputs,
-    kind: str,
-    model: Path | None,
-    size: tuple[int, int] | None,
-) -> None:
-    from fba_player.export.render import render
-    from fba_player.scene.scene import Scene
-
-    scene = Scene(animation, read_model(model))
-    suffix = f".{kind}"
-    with outputs.file(output, suffix) as file, Progress("rendering", None) as step, usage_errors():
-        render(scene, file, size=size, progress=step.show)

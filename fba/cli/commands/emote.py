@@ -1,0 +1,264 @@
+"""`fba emote`: a performance in a mood."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections import defaultdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from fba.cli import options
+from fba.cli.command import Command, examples, usage_errors
+from fba.cli.emotions.pictures import draw, option_errors, picture_kind
+from fba.cli.inputs import EXISTING, read_input, read_model
+from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.printing import Progress, seconds_text
+from fba.errors import FormatError
+from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.animation import Animation
+    from fba.emotion import Mood, MoodCurve
+    from fba.face.model import FaceModel
+
+DEFAULT_EASE = 0.5
+MOST_KEYS = 1_000_000
+KEY_HEADER = ("seconds", "emotion", "intensity")
+
+
+class SecondsType(click.ParamType[float]):
+    """A time: 2, 2s, 500ms."""
+
+    name = "time"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        text = str(value).strip().lower()
+        scale = 0.001 if text.endswith("ms") else 1.0
+        try:
+            seconds = float(text.removesuffix("ms").removesuffix("s")) * scale
+        except ValueError:
+            seconds = math.nan
+        if not math.isfinite(seconds):
+            self.fail(f"{value!r} is no time; write e.g. 2s or 500ms", param, ctx)
+        return seconds
+
+
+class MoodType(click.ParamType[tuple[str, float | None, float | None]]):
+    """An emotion with its intensity, and perhaps its own times: angry=70, sad=50@2s-6s."""
+
+    name = "emotion"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, float | None, float | None]:
+        if isinstance(value, tuple):
+            return value
+        text, at, span = str(value).partition("@")
+        if not at:
+            return text, None, None
+        first, dash, last = span.partition("-")
+        if not dash or not (first or last):
+            self.fail(f"{value!r}: write times as @2s-6s, @2s- or @-6s", param, ctx)
+        times = SecondsType()
+        return (
+            text,
+            times.convert(first, param, ctx) if first else None,
+            times.convert(last, param, ctx) if last else None,
+        )
+
+
+@click.command(
+    cls=Command,
+    epilog=examples(
+        "fba emote talk.fba -o angry.fba --emotion angry=70 --from 2s --to 6s --ease 0.5s",
+        "fba emote talk.fba -o moods.mp4 --emotion happy=60@0s-3s --emotion sleepy=80@3s-",
+        "fba emote talk.fap -o talk2.fap --keys moods.csv",
+        "fba emote talk.fba -o moods.mp4 --side-by-side --emotion neutral --emotion angry=80",
+    ),
+)
+@click.argument("source", metavar="IN", type=EXISTING)
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    type=OutputType(),
+    required=True,
+    help="File to write: .fba, .fap or another format of animations, .png, .jpg, .mp4, .gif. - for standard "
+    "output.",
+)
+@click.option(
+    "--emotion",
+    "moods",
+    type=MoodType(),
+    multiple=True,
+    metavar="NAME=INTENSITY[@FROM-TO]",
+    help="An expression and its intensity, 0 to 100; repeatable. `fba express --list` lists all.",
+)
+@click.option("--from", "start", type=SecondsType(), help="When it begins; default: with the performance.")
+@click.option("--to", "end", type=SecondsType(), help="When it ends; default: with the performance.")
+@click.option(
+    "--ease",
+    type=SecondsType(),
+    help=f"From none to full, and back; default: {DEFAULT_EASE:g}s. Not at either end of the performance.",
+)
+@click.option(
+    "--keys",
+    type=EXISTING,
+    metavar="FILE.csv",
+    help=f"Intensities over time: a table with the columns {', '.join(KEY_HEADER)}.",
+)
+@click.option(
+    "--side-by-side",
+    is_flag=True,
+    help="Pictures and films: draw IN once for each --emotion, beside each other; --emotion neutral draws IN "
+    "as it is.",
+)
+@click.option("--reading", metavar="FORMAT", help="Input format, if neither content nor suffix shows it.")
+@click.option(
+    "--writing", metavar="FORMAT", help="Output format, if OUT is - or its suffix does not show it."
+)
+@options.no_clobber_option
+@click.option(
+    "--model",
+    type=click.Path(exists=True, path_type=Path),
+    metavar="FILE",
+    help="The face whose visemes and expressions IN means, and that is drawn; default: the built-in head.",
+)
+@click.option(
+    "--size",
+    type=options.SizeType(),
+    metavar="WIDTHxHEIGHT",
+    help="Pictures: default 1280x720; of each side by side, 320x320.",
+)
+@options.limit_option
+def command(
+    source: Path,
+    output: Path,
+    moods: tuple[tuple[str, float | None, float | None], ...],
+    start: float | None,
+    end: float | None,
+    ease: float | None,
+    keys: Path | None,
+    side_by_side: bool,
+    reading: str | None,
+    writing: str | None,
+    no_clobber: bool,
+    model: Path | None,
+    size: tuple[int, int] | None,
+    limit: Limits,
+) -> None:
+    """Put a performance into a mood: angry, surprised, sad, sleepy, happy, or any named expression.
+
+    The mood moves the face at rest, and the performance is added, less where a feature is near its limit
+    already. Lips that touch still touch, eyes that close still close. --from, --to and --ease are for
+    emotions without times of their own.
+    """
+    from fba.emotion import emote
+
+    if not moods and keys is None:
+        raise click.UsageError("give a mood: --emotion angry=70, or --keys FILE.csv")
+    kind = picture_kind(output, writing)
+    for option, wanted in (("--size", size is not None), ("--side-by-side", side_by_side)):
+        if wanted and not kind:
+            raise click.UsageError(f"{option} goes with a picture or a film")
+    if side_by_side and (keys is not None or not moods):
+        raise click.UsageError("--side-by-side draws one performance for each --emotion; leave --keys out")
+    format = None if kind else find_writer(output, writing)
+    text = format is not None and format.name in TEXT_FORMATS
+    outputs = Outputs([Output("--output", output, text)], [source, keys, model], no_clobber=no_clobber)
+    with option_errors():
+        given: list[Mood | MoodCurve] = [*_parse_moods(moods, start, end, ease)]
+        if keys is not None:
+            given += _read_keys(keys)
+    animation = read_input(source, format=reading, limits=limit)
+    face = read_model(model)
+    if side_by_side:
+        with option_errors():
+            several = {
+                text: emote(animation, _parse_moods((mood,), start, end, ease), model=face)
+                for mood in moods
+                for text in [mood[0].replace("=", " ")]
+            }
+        _draw_side_by_side(several, output, outputs, kind, face, size)
+        outputs.say(f"{display_name(output)}: {', '.join(several)}; {seconds_text(animation.duration)}")
+        return
+    with option_errors():
+        made = emote(animation, given, model=face)
+    if format is None:
+        draw(made, output, outputs, kind, model, size)
+    else:
+        from fba.formats import write
+
+        with outputs.file(output) as file:
+            write(file, made, format=format.name)
+    names = ", ".join(dict.fromkeys(mood.name for mood in given))
+    outputs.say(f"{display_name(output)}: {names}; {len(made)} frames, {seconds_text(made.duration)}")
+
+
+def _draw_side_by_side(
+    performances: dict[str, Animation],
+    output: Path,
+    outputs: Outputs,
+    kind: str,
+    model: FaceModel | None,
+    size: tuple[int, int] | None,
+) -> None:
+    from fba_player.export.side_by_side import draw_side_by_side
+    from fba_player.scene.scene import Scene
+
+    scenes = {name: Scene(animation, model) for name, animation in performances.items()}
+    with outputs.file(output, f".{kind}") as file, Progress("rendering", None) as step, usage_errors():
+        draw_side_by_side(scenes, file, tile=size, progress=step.show)
+
+
+def _parse_moods(
+    moods: tuple[tuple[str, float | None, float | None], ...],
+    start: float | None,
+    end: float | None,
+    ease: float | None,
+) -> list[Mood]:
+    from fba.emotion import Mood, parse_weights
+
+    result = []
+    for text, own_start, own_end in moods:
+        timed = own_start is not None or own_end is not None
+        span = (own_start, own_end) if timed else (start, end)
+        for name, intensity in parse_weights(text).items():
+            result.append(Mood(name, intensity, *span, DEFAULT_EASE if ease is None else ease))
+    return result
+
+
+def _read_keys(path: Path) -> list[MoodCurve]:
+    """Read keys from a table. Raises FormatError where it is none."""
+    from fba.emotion import MoodCurve
+
+    keys: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = csv.DictReader(file)
+            missing = [name for name in KEY_HEADER if name not in (rows.fieldnames or [])]
+            if missing:
+                raise FormatError(
+                    f"{path}: the column {missing[0]!r} is missing; the first line must be "
+                    f"{','.join(KEY_HEADER)}"
+                )
+            for number, row in enumerate(rows):
+                if number >= MOST_KEYS:
+                    raise FormatError(f"{path}: more than {MOST_KEYS} keys")
+                try:
+                    key = float(row["seconds"]), float(row["intensity"])
+                except (TypeError, ValueError):
+                    raise FormatError(
+                        f"{path}:{rows.line_num}: seconds and intensity must be numbers, not "
+                        f"{row['seconds']!r} and {row['intensity']!r}"
+                    ) from None
+                keys[str(row["emotion"]).strip()].append(key)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FormatError(f"{path}: no table of keys ({error})") from error
+    if not keys:
+        raise FormatError(f"{path}: there are no keys behind the header")
+    return [MoodCurve(name, *np.array(pairs).T) for name, pairs in keys.items()]

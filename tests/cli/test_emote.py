@@ -1,0 +1,130 @@
+"""`fba emote`: moods on the command line, over time, from keys, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import fba
+import graphics
+from fba.arrays import Float32
+from fba.emotion import expression
+from fba.face import resolve
+
+Run = Callable[..., Any]
+BROW = 30
+"""Column of raise_l_i_eyebrow."""
+
+
+@pytest.fixture
+def still(tmp_path: Path) -> Path:
+    """Four seconds of a face that does nothing."""
+    mask = np.zeros((100, 68), dtype=bool)
+    mask[:, 2:] = True
+    face = fba.FaceTrack(np.zeros((100, 68), dtype=np.int32), mask)
+    path = tmp_path / "still.fap"
+    fba.write(path, fba.Animation(25, np.arange(100), face))
+    return path
+
+
+def brow(path: Path) -> Float32:
+    """Left inner brow over time, of anger's."""
+    face = fba.read(path).face
+    assert face is not None
+    shares: Float32 = resolve(face)[:, BROW] / expression("anger").faps[BROW]
+    return shares
+
+
+def test_a_mood_for_a_while(run: Run, still: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.fba"
+    done = run(
+        "emote", still, "-o", out, "--emotion", "angry=70", "--from", "1s", "--to", "3000ms", "--ease", "0.5s"
+    )
+    assert (done.code, done.err) == (0, "")
+    assert "anger; 100 frames, 4.00 s" in done.out
+    np.testing.assert_allclose(brow(out)[[0, 24, 50, 76, 99]], [0, 0, 0.7, 0, 0], atol=0.02)
+
+
+def test_moods_with_times_of_their_own(run: Run, still: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.fap"
+    moods = ["--emotion", "angry=100@-1s", "--emotion", "sad=100@3s-", "--ease", "100ms"]
+    assert run("emote", still, "-o", out, *moods).code == 0
+    sad = expression("sadness").faps[BROW] / expression("anger").faps[BROW]
+    np.testing.assert_allclose(brow(out)[[0, 10, 50, 90, 99]], [1, 1, 0, sad, sad], atol=0.02)
+
+
+def test_keys(run: Run, still: Path, tmp_path: Path) -> None:
+    keys, out = tmp_path / "keys.csv", tmp_path / "out.fap"
+    keys.write_text("seconds,emotion,intensity\n0,angry,0\n2,angry,80\n3,angry,20\n")
+    assert run("emote", still, "-o", out, "--keys", keys).code == 0
+    np.testing.assert_allclose(brow(out)[[0, 50, 75, 99]], [0, 0.8, 0.2, 0.2], atol=0.02)
+
+
+def test_side_by_side(run: Run, still: Path, tmp_path: Path) -> None:
+    if graphics.missing_opengl():
+        graphics.skip(graphics.missing_opengl())
+    out = tmp_path / "moods.png"
+    moods = [part for name in ("neutral", "angry=90", "happy=80") for part in ("--emotion", name)]
+    assert run("emote", still, "-o", out, "--side-by-side", "--size", "96x96", *moods).code == 0
+    with Image.open(out) as picture:
+        pixels = np.asarray(picture).astype(int)
+    tiles = [pixels[4:100, 4 + 100 * k : 100 + 100 * k] for k in range(3)]
+    for one, other in ((0, 1), (0, 2), (1, 2)):
+        assert np.abs(tiles[one] - tiles[other]).max() > 40
+        assert np.median(np.abs(tiles[one] - tiles[other])) == 0  # the same but for the face
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ((), "give a mood"),
+        (("--emotion", "angre=50"), "did you mean 'angry'"),
+        (("--emotion", "angry=150"), "0 to 100"),
+        (("--emotion", "angry=5@2"), "write times as @2s-6s"),
+        (("--emotion", "angry=5", "--from", "soon"), "is no time"),
+        (("--emotion", "angry=5", "--from", "3", "--to", "2"), "give an end after that"),
+        (("--emotion", "angry=5", "--emotion", "anger=9"), "at the same time"),
+        (("--emotion", "angry=5", "--size", "64x64"), "--size goes with a picture"),
+        (("--emotion", "angry=5", "--side-by-side"), "--side-by-side goes with a picture"),
+    ],
+)
+def test_mistakes(run: Run, still: Path, tmp_path: Path, given: tuple[str, ...], said: str) -> None:
+    out = tmp_path / "out.fba"
+    done = run("emote", still, "-o", out, *given)
+    assert done.code == 2
+    assert said in " ".join(done.err.split())
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("time,emotion\n1,angry\n", "the column 'seconds' is missing"),
+        ("seconds,emotion,intensity\n1,angry,much\n", "keys.csv:2: seconds and intensity must be numbers"),
+        ("seconds,emotion,intensity\n", "no keys behind the header"),
+        ("seconds,emotion,intensity\n1\n", "must be numbers"),
+        ("", "the column 'seconds' is missing"),
+        ("\0\0", "the column 'seconds' is missing"),
+    ],
+)
+def test_tables_that_are_none(run: Run, still: Path, tmp_path: Path, table: str, said: str) -> None:
+    keys, out = tmp_path / "keys.csv", tmp_path / "out.fba"
+    keys.write_text(table)
+    done = run("emote", still, "-o", out, "--keys", keys)
+    assert done.code == 1
+    assert said in " ".join(done.err.split())
+    assert not out.exists()
+
+
+def test_a_body_has_no_mood(run: Run, tmp_path: Path) -> None:
+    body = fba.BodyTrack(np.zeros((1, 296), dtype=np.int32), np.ones((1, 296), dtype=bool))
+    path = tmp_path / "body.bap"
+    fba.write(path, fba.Animation(25, np.arange(1), None, body))
+    done = run("emote", path, "-o", tmp_path / "out.fba", "--emotion", "angry=5")
+    assert done.code == 2
+    assert "no face" in done.err
