@@ -206,7 +206,7 @@ PLANS_TEST = "tests/planning/test_plans.py"
 MUTANTS = (
     Mutant("fba/planning/plan.py", "    if not any(used):", "    if True:", PLANS_TEST),
     Mutant("fba/planning/plan.py", "moves[list(related)].any()", "moves[list(related)]", PLANS_TEST),
-    Mutant("fba/planning/plan.py", "bits + INTRA_BITS, cuts)\n    face", "bits, cuts)\n    face", PLANS_TEST),
+    Mutant("fba/planning/plan.py", "bits + intra_bits, cuts)\n    face", "bits, cuts)\n    face", PLANS_TEST),
     Mutant("fba/planning/segments.py", "            earliest = last", "            pass", PLANS_TEST),
     Mutant(
         "fba/planning/derived_faps.py", "better = shown & (own < least)", "better = own < least", PLANS_TEST

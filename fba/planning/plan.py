@@ -117,18 +117,23 @@ def plan_exact(
 
 
 def plan_compact(
-    animation: Animation, options: EncoderOptions | None = None, *, keep_masks: Collection[str] = ()
+    animation: Animation,
+    options: EncoderOptions | None = None,
+    *,
+    keep_masks: Collection[str] = (),
+    intra_bits: float = INTRA_BITS,
 ) -> Plan:
     """Return a plan that keeps every value that is shown, with the quantisers in `options`.
 
     Left out is what a player fills in by the standard's rules: a FAP that equals its left/right mate or its
     counterpart on the other contour of the lips. Which ones is decided anew at every I plane. On a face
     without an interpolation table of its own, `fba.face.resolve` gives the same for the decoded stream
-    as for the animation. keep_masks: as for `plan_exact`; only "body" has an effect.
+    as for the animation. keep_masks: as for `plan_exact`; only "body" has an effect. intra_bits: what an I
+    plane counts, besides what its FAPs take: the more, the fewer segments.
     ValueError for an animation without frames.
     """
     options = options or EncoderOptions()
-    return _plan_compact(quantise(animation, options), options, keep_masks)
+    return _plan_compact(quantise(animation, options), options, keep_masks, intra_bits)
 
 
 def _plan_exact(given: Animation, options: EncoderOptions, keep_masks: Collection[str]) -> Plan:
@@ -136,7 +141,9 @@ def _plan_exact(given: Animation, options: EncoderOptions, keep_masks: Collectio
     return _plan_as_sent(_without_unmoved(given, keep_masks), coarsest_quantisers(given, options))
 
 
-def _plan_compact(given: Animation, options: EncoderOptions, keep_masks: Collection[str]) -> Plan:
+def _plan_compact(
+    given: Animation, options: EncoderOptions, keep_masks: Collection[str], intra_bits: float = INTRA_BITS
+) -> Plan:
     """Return the compact plan of a quantised animation."""
     sent = _without_unmoved(given, {"body"} & set(keep_masks))
     options = coarsest_quantisers(given, options)
@@ -149,7 +156,7 @@ def _plan_compact(given: Animation, options: EncoderOptions, keep_masks: Collect
         return _plan_as_sent(sent, options)
     choice = choose_faps(values, known, code_lengths(FaceTrack(values, known), cuts.frames, options), cuts)
     bits = choice.bits + _code_lengths(sent.body, cuts, options)
-    borders = cheapest_segments(bits + INTRA_BITS, cuts)
+    borders = cheapest_segments(bits + intra_bits, cuts)
     face = _face_to_send(sent.face, values, known, choice, borders, cuts)
     if not np.array_equal(resolve(face), resolve(sent.face)):
         return _plan_as_sent(sent, options)  # definitions of visemes or expressions depend on what is sent

@@ -133,7 +133,7 @@ class Deformer:
 
         For column vectors: `calling = matrix . local`. Errors as when called.
         """
-        values, single = _frames(faps)
+        values, single = frame_values(faps)
         matrices = self._poses(values)[:, -1]
         return matrices[0] if single else matrices
 
@@ -145,7 +145,7 @@ class Deformer:
         the head; `head_matrices . part_matrices` is that in the world. The identity for parts without
         transforms; FaceDefMesh is not included. Errors as when called.
         """
-        values, single = _frames(faps)
+        values, single = frame_values(faps)
         matrices = self._poses(values)[:, :-1]
         return matrices[0] if single else matrices
 
@@ -157,7 +157,7 @@ class Deformer:
         that kind, the rest with the head alone. Points that the face lacks stay NaN. local: without the
         head's transforms. Errors as when called.
         """
-        values, single = _frames(faps)
+        values, single = frame_values(faps)
         points: Float64 = np.empty((len(values), len(names()), 3))
         with np.errstate(all="ignore"):
             self._loops.points_of_frames(
@@ -182,7 +182,7 @@ class Deformer:
     def _run(
         self, faps: npt.ArrayLike, out: Float32 | None, normals: Float32 | None, *, with_head: bool
     ) -> Float32:
-        values, single = _frames(faps)
+        values, single = frame_values(faps)
         count = len(self.model.vertices)
         shape = (count, 3) if single else (len(values), count, 3)
         out = result_array(shape, out, normals)
@@ -206,7 +206,7 @@ class Deformer:
         return out
 
 
-def _frames(values: npt.ArrayLike) -> tuple[Float64, bool]:
+def frame_values(values: npt.ArrayLike) -> tuple[Float64, bool]:
     """FAPs as float64 (T, 68), and whether they were one frame (68,)."""
     array = np.asarray(values)
     if array.ndim not in {1, 2} or array.shape[-1] != FAP_COUNT:

@@ -1,0 +1,159 @@
+"""Loops over the vertices that two sets of FAPs put in different places, compiled (see `fba.compiled`)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fba.arrays import Bool, Float32, Float64, Int64
+from fba.compiled import compiled
+from fba.face.deform._loops import compose, transform_points
+from fba.face.deform.flat_tables import Shifts, Transforms
+
+
+class Scratch(NamedTuple):
+    """Working arrays for one frame: (V, 3) twice, poses (P + 1, 3, 4) twice, and a pose of 32 bits."""
+
+    one: Float32
+    other: Float32
+    one_poses: Float64
+    other_poses: Float64
+    pose: Float32
+
+
+def allocate_scratch(vertices: int, parts: int) -> Scratch:
+    """Return working arrays for a face of so many vertices and parts."""
+    return Scratch(
+        np.zeros((vertices, 3), dtype=np.float32),
+        np.zeros((vertices, 3), dtype=np.float32),
+        np.zeros((parts + 1, 3, 4)),
+        np.zeros((parts + 1, 3, 4)),
+        np.zeros((3, 4), dtype=np.float32),
+    )
+
+
+@compiled
+def find_interval(shifts: Shifts, track: int, value: float) -> int:
+    """Return the interval of a track that a value is in."""
+    interval, last = int(shifts.first[track]), int(shifts.first[track + 1]) - 1
+    while interval < last and value > shifts.upper[interval]:
+        interval += 1
+    return interval
+
+
+@compiled
+def _add(shifts: Shifts, interval: int, steps: float, sign: float, moved: Float32) -> None:
+    """Add `steps` steps along an interval's slopes and, unless sign is 0, sign times its bases."""
+    start, stop = int(shifts.start[interval]), int(shifts.start[interval + 1])
+    rows, slopes = shifts.rows[start:stop], shifts.slopes[start:stop]
+    amount = np.float32(steps)
+    for k in range(len(rows)):
+        i = rows[k]
+        moved[i, 0] += amount * slopes[k, 0]
+        moved[i, 1] += amount * slopes[k, 1]
+        moved[i, 2] += amount * slopes[k, 2]
+    base = int(shifts.base[interval])
+    if base < 0 or sign == 0.0:
+        return
+    bases = shifts.bases[base : base + stop - start]
+    factor = np.float32(sign)
+    for k in range(len(rows)):
+        i = rows[k]
+        moved[i, 0] += factor * bases[k, 0]
+        moved[i, 1] += factor * bases[k, 1]
+        moved[i, 2] += factor * bases[k, 2]
+
+
+@compiled
+def _add_value(shifts: Shifts, track: int, value: float, sign: float, moved: Float32) -> None:
+    """Add to vertices sign times the shifts of a track at a value."""
+    if value == 0.0:
+        return
+    interval = find_interval(shifts, track, value)
+    _add(shifts, interval, sign * (value - shifts.anchor[interval]), sign, moved)
+
+
+@compiled
+def _add_part(shifts: Shifts, part: int, one: Float64, other: Float64, apart: bool, scratch: Scratch) -> bool:
+    """Add a part's shifts by FAPs `one` (68,) less those by `other`; return whether any differs.
+
+    apart: those of each to an array of its own instead, of all FAPs.
+    """
+    differs = False
+    for track in range(len(shifts.column)):
+        if shifts.part[track] != part:
+            continue
+        first, second = one[shifts.column[track]], other[shifts.column[track]]
+        if apart:
+            _add_value(shifts, track, first, 1.0, scratch.one)
+            _add_value(shifts, track, second, 1.0, scratch.other)
+        elif first != second:
+            differs = True
+            interval = find_interval(shifts, track, first)
+            if interval == find_interval(shifts, track, second):
+                _add(shifts, interval, first - second, 0.0, scratch.one)
+            else:
+                _add_value(shifts, track, first, 1.0, scratch.one)
+                _add_value(shifts, track, second, -1.0, scratch.one)
+    return differs
+
+
+@compiled
+def measure_frames(
+    one: Float64,
+    other: Float64,
+    rest: Float32,
+    part_start: Int64,
+    shifts: Shifts,
+    transforms: Transforms,
+    scratch: Scratch,
+    largest: Float64,
+    worst: Int64,
+    unit: float,
+    counts: Int64,
+) -> None:
+    """Measure how far vertices are apart, in the head's frame, by FAPs `one` and `other` (T, 68).
+
+    largest, worst: (T,), set to the largest distance in a frame, metres, and its vertex. counts: int64 (B,),
+    raised for every vertex that moved: the number n for up to n units, the last one for all beyond.
+    """
+    poses, others = scratch.one_poses, scratch.other_poses
+    for frame in range(len(one)):
+        compose(one[frame], transforms, poses)
+        compose(other[frame], transforms, others)
+        most, place = 0.0, 0
+        for part in range(len(poses) - 1):
+            start, stop = int(part_start[part]), int(part_start[part + 1])
+            first, second = scratch.one[start:stop], scratch.other[start:stop]
+            turned = False
+            for row in range(3):
+                for column in range(4):
+                    turned = turned or poses[part, row, column] != others[part, row, column]
+            if turned:
+                first[:], second[:] = rest[start:stop], rest[start:stop]
+                _add_part(shifts, part, one[frame], other[frame], True, scratch)
+                scratch.pose[:] = others[part]
+                transform_points(scratch.pose, second, second)
+            else:
+                first[:] = 0
+                if not _add_part(shifts, part, one[frame], other[frame], False, scratch):
+                    continue
+            scratch.pose[:] = poses[part]
+            if not turned:  # a difference has no place
+                scratch.pose[:, 3] = 0
+            transform_points(scratch.pose, first, first)
+            if turned:
+                for v in range(len(first)):
+                    first[v, 0] -= second[v, 0]
+                    first[v, 1] -= second[v, 1]
+                    first[v, 2] -= second[v, 2]
+            for v in range(len(first)):
+                x, y, z = first[v, 0], first[v, 1], first[v, 2]
+                squared = x * x + y * y + z * z
+                if squared > 0:
+                    distance = np.sqrt(np.float64(squared))
+                    counts[min(int(distance / unit) + 1, len(counts) - 1)] += 1
+                    if distance > most:
+                        most, place = distance, start + v
+        largest[frame], worst[frame] = most, place
