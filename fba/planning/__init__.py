@@ -1,8 +1,20 @@
-"""Planning: what a stream need not send, and where I planes pay.
+"""Planning: what a stream need not send, where I planes pay, and how much may be lost within a tolerance.
 
-May use: the codec, and the rules by which a face fills in what was not sent.
+May use: the codec; faces and bodies, for what they show and by how much it moves.
 """
 
+from fba.planning.near_lossless import FaceErrors, NearLossless, encode_within_tolerance
 from fba.planning.plan import PRESETS, Plan, encode_planned, plan_compact, plan_exact
+from fba.planning.tolerance import Tolerance
 
-__all__ = ["PRESETS", "Plan", "encode_planned", "plan_compact", "plan_exact"]
+__all__ = [
+    "PRESETS",
+    "FaceErrors",
+    "NearLossless",
+    "Plan",
+    "Tolerance",
+    "encode_planned",
+    "encode_within_tolerance",
+    "plan_compact",
+    "plan_exact",
+]

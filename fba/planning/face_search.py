@@ -17,28 +17,30 @@ from fba.compiled import compiled
 from fba.face.deform.displacements import DisplacementMeter
 from fba.parameters import FAP_COUNT, fap_steps
 from fba.planning.mesh_error import ErrorBasis
-from fba.planning.paths import Bounds, find_path
+from fba.planning.paths import ROUNDS, Bounds, find_path
 
 MARGIN = 0.998
 """Share of the tolerance that the search fills: slopes are not quite what the mesh does."""
 SWEEPS = 3
 """Rounds over all FAPs."""
-CHECKS = 8
-"""Times that less is allowed where the mesh turns out to be beyond the tolerance."""
 ROUNDING = 1e-4
 """Share of the tolerance that rounding in 32 bits may take."""
 PLANE_BITS, SKIP_BITS = 6, 4
 """Bits of a P plane that no FAP pays for, and more where frames are left out behind it."""
-REPAIRS = 3
-"""Times that frames left out are taken back where that leaves too little."""
+AROUND = 12
+"""Frames on either side of one beyond the tolerance in which paths are searched again."""
+HOPELESS = 0.2
+"""Share of frames beyond the tolerance from which on a quantiser is given up."""
+REPAIRS = 8
+"""Times that paths are searched again around frames beyond the tolerance."""
 
 
 @dataclass(frozen=True)
 class Effort:
     """How a search goes about it.
 
-    quant: of FAPs. share: of the tolerance that each FAP may take in the first round. gap_share: of that, what
-    leaving frames out may take; 0 leaves none out but those that repeat. most: frames left out in a row.
+    quant: of FAPs. share: of the tolerance that each FAP may take at first. gap_share: of that, what leaving
+    frames out may take; 0 leaves out only those that repeat. most: frames left out in a row.
     """
 
     quant: int
@@ -75,28 +77,35 @@ class FoundFaps:
     within: bool
 
 
-def search_faps(segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, effort: Effort) -> FoundFaps:
-    """Return the cheapest FAPs found for a segment, measured on all vertices."""
+def search_faps(
+    segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, effort: Effort, below: float = np.inf
+) -> FoundFaps:
+    """Return the cheapest FAPs found for a segment, measured on all vertices.
+
+    below: bits; what takes more is given up.
+    """
     search = _Search(segment, basis, effort)
     search.sweep(first=True)
     search.drop_repeated()
     for _ in range(SWEEPS - 1):
         search.sweep()
-    for _ in range(REPAIRS):
-        if search.is_within() or not search.add_keys():
+    beyond = search.find_beyond()
+    for attempt in range(REPAIRS):
+        if not beyond.any() or beyond.mean() > HOPELESS:
             break
-        search.sweep()
-        search.sweep()
-    if not search.is_within():  # the quantiser is too coarse
-        return search.result(within=False)
-    within = search.measure(meter)
-    for _ in range(CHECKS):
-        if within:
-            break
-        search.sweep()
-        within = search.measure(meter)
+        search.repair(beyond, round_off=attempt >= REPAIRS // 2)
+        beyond = search.find_beyond()
     search.drop_repeated()
-    return search.result(within=within)
+    if beyond.any() or search.bits() >= below:  # too coarse a quantiser, or no better
+        return search.result(within=False)
+    beyond = search.measure(meter)
+    for attempt in range(REPAIRS):
+        if not beyond.any():
+            break
+        search.repair(beyond, round_off=attempt >= REPAIRS // 2)
+        beyond = search.measure(meter)
+    search.drop_repeated()
+    return search.result(within=not beyond.any())
 
 
 class _Search:
@@ -112,6 +121,7 @@ class _Search:
         self.reach = {one: effort.share / max(slopes[one].largest, 1e-12) for one in self.columns}
         self.wanted = {one: np.ascontiguousarray(segment.values[:, one]) for one in self.columns}
         self.limit = np.full(len(segment.shown), MARGIN)
+        self.measured, self.longest = segment.shown, np.zeros(len(segment.shown))
         self.frames = np.arange(len(segment.shown))
         self.keys = self.frames
         if effort.gap_share > 0 and segment.gaps.any() and self.columns:
@@ -125,8 +135,14 @@ class _Search:
             self.shown[one] = np.interp(self.frames, self.keys, self.wanted[one][self.keys])
             _add_error(self.errors, *slopes[one][:3], self.shown[one] - self.wanted[one])
 
-    def sweep(self, *, first: bool = False) -> None:
-        """Give each FAP the cheapest path within what the others leave."""
+    def sweep(self, *, first: bool = False, around: Bool | None = None) -> None:
+        """Give each FAP the cheapest path within what the others leave.
+
+        first: no FAP may take more than its share. around: bool (T,), paths change near these frames only.
+        """
+        still = np.zeros(len(self.frames), dtype=np.bool_)
+        if around is not None:
+            still = ~_widen(around, AROUND)
         for column in self.columns:
             own, step, shown = self.slopes[column], int(self.steps[column]), self.shown[column]
             room = _free_room(self.errors, *own[:3], self.limit)
@@ -136,11 +152,10 @@ class _Search:
             if first:
                 lower = np.maximum(lower, np.minimum(self.wanted[column] - self.reach[column], shown))
                 upper = np.minimum(upper, np.maximum(self.wanted[column] + self.reach[column], shown))
+            lower, upper = np.where(still, shown, lower), np.where(still, shown, upper)
             bounds = Bounds(lower, upper, self.keys, step, self.quant)
-            path = find_path(bounds, self.paths.get(column))
-            now = np.interp(self.frames, self.keys, path * step)
-            _add_error(self.errors, *own[:3], now - shown)
-            self.paths[column], self.shown[column] = path, now
+            path = find_path(bounds, self.paths.get(column), rounds=ROUNDS if around is None else 1)
+            self._show(column, path)
 
     def drop_repeated(self) -> None:
         """Leave out frames that a player shows the same without: those between two that are the same."""
@@ -153,46 +168,66 @@ class _Search:
         self.keys = self.keys[kept]
         self.paths = {column: path[kept] for column, path in self.paths.items()}
 
-    def add_keys(self) -> bool:
-        """Send frames beyond the tolerance, and those beside them; return whether any was left out."""
-        beyond = np.flatnonzero(self._longest() > 1)
-        near = np.clip(np.concatenate([beyond - 1, beyond, beyond + 1]), 0, len(self.frames) - 1)
-        keys = np.union1d(self.keys, near)
-        if len(keys) == len(self.keys):
-            return False
-        self.keys, self.paths = keys, {}
-        return True
+    def repair(self, beyond: Bool, *, round_off: bool) -> None:
+        """Search paths again around frames beyond the tolerance, bool (T,), after all frames there are sent.
 
-    def is_within(self) -> bool:
-        """Whether all rows keep within the tolerance."""
-        return bool((self._longest() <= 1).all())
+        round_off: begin with the levels nearest to the source there.
+        """
+        near = _widen(beyond, 1)
+        self.keys, before = np.union1d(self.keys, np.flatnonzero(near)), self.keys
+        if round_off:
+            for column in self.columns:
+                step, shown = int(self.steps[column]), self.shown[column]
+                levels = np.where(near, np.rint(self.wanted[column] / step), shown / step)[self.keys]
+                self._show(column, np.rint(levels).astype(np.int64))
+        elif len(self.keys) > len(before):
+            self.paths = {}
+        for _ in range(2):
+            self.sweep(around=beyond)
 
-    def measure(self, meter: DisplacementMeter) -> bool:
-        """Whether the mesh keeps within the tolerance; less is allowed from now on in frames where not."""
+    def _show(self, column: int, path: Int64) -> None:
+        """Take a path for a FAP."""
+        now = np.interp(self.frames, self.keys, path * int(self.steps[column]))
+        _add_error(self.errors, *self.slopes[column][:3], now - self.shown[column])
+        self.paths[column], self.shown[column] = path, now
+
+    def find_beyond(self) -> Bool:
+        """Return where a row is beyond the tolerance: bool (T,)."""
+        squared = np.einsum("trc,trc->tr", self.errors, self.errors)
+        beyond: Bool = squared.max(axis=1, initial=0.0) > 1
+        return beyond
+
+    def measure(self, meter: DisplacementMeter) -> Bool:
+        """Return where the mesh is beyond the tolerance, bool (T,); less is allowed there from now on."""
         new = self.segment.shown.copy()
         for column, columns in self.segment.groups.items():
             for one in columns:
                 new[:, one] += self.shown[column] - self.segment.values[:, one]
-        longest = meter.measure(self.segment.shown, new).largest / self.tolerance.face
-        beyond = longest > 1 - ROUNDING
-        self.limit[beyond] *= np.maximum(0.98 / longest[beyond], 0.5)
-        return self.is_within() and not beyond.any()
+        changed = np.flatnonzero((new != self.measured).any(axis=1))
+        own = meter.measure(self.segment.shown[changed], new[changed]).largest / self.tolerance.face
+        self.longest[changed], self.measured = own, new
+        beyond = self.longest > 1 - ROUNDING
+        self.limit[beyond] *= np.maximum(0.98 / self.longest[beyond], 0.5)
+        return beyond | self.find_beyond()
+
+    def bits(self) -> float:
+        """Return the bits of all that is sent, about."""
+        planes = PLANE_BITS * (len(self.keys) - 1) + SKIP_BITS * int((np.diff(self.keys) > 1).sum())
+        return planes + sum(level_bits(path, self.quant) for path in self.paths.values())
 
     def result(self, *, within: bool) -> FoundFaps:
         """Return what was found."""
         values = np.zeros((len(self.keys), FAP_COUNT), dtype=np.int32)
-        bits = PLANE_BITS * (len(self.keys) - 1.0)
-        bits += SKIP_BITS * int((np.diff(self.keys) > 1).sum())
         for column, path in self.paths.items():
             values[:, column] = path * self.steps[column]
-            bits += level_bits(path, self.quant)
-        return FoundFaps(self.keys, values, bits, within)
+        return FoundFaps(self.keys, values, self.bits(), within)
 
-    def _longest(self) -> Float64:
-        """Return the length of the longest row at each frame: float64 (T,)."""
-        squared = np.einsum("trc,trc->tr", self.errors, self.errors)
-        longest: Float64 = np.sqrt(squared.max(axis=1, initial=0.0)).astype(np.float64)
-        return longest
+
+def _widen(frames: Bool, by: int) -> Bool:
+    """Return bool (T,): the frames and those so near to one of them."""
+    ends = np.cumsum(np.concatenate([np.zeros(by + 1), frames, np.zeros(by)]))
+    widened: Bool = ends[2 * by + 1 :] > ends[: len(frames)]
+    return widened
 
 
 def _add_differences(errors: Float32, segment: Segment, basis: ErrorBasis) -> None:

@@ -38,8 +38,8 @@ class Slopes(NamedTuple):
     """What an error of FAPs that are shown alike moves.
 
     rows: int64 (N,), of the errors. table: float32 (K, N, 3), for a step of 1, in shares of the tolerance.
-    which: int64 (T,), the entry of the table at each frame. lowest, highest: float64 (T,), values between which
-    the slopes hold. largest: length of the longest slope.
+    which: int64 (T,), the entry of the table at each frame. lowest, highest: float64 (T,), values between
+    which the slopes hold. largest: length of the longest slope.
     """
 
     rows: Int64
@@ -71,10 +71,12 @@ class ErrorBasis:
     def slopes(self, columns: tuple[int, ...], values: Float64) -> Slopes:
         """Return slopes of FAPs that are shown alike around values (T, 68).
 
-        Where a border of a FAP's intervals is so near that the tolerance may reach beyond, the steeper of both
-        sides counts.
+        Where a border of a FAP's intervals is so near that the tolerance may reach beyond, the steeper side
+        counts.
         """
-        tracks = [track for column in columns for track in np.flatnonzero(self._shifts.column == column)]
+        tracks = [
+            track for column in columns for track in np.flatnonzero(self._shifts.column == column).tolist()
+        ]
         intervals = np.zeros((len(values), len(tracks)), dtype=np.int64)
         lowest, highest = np.full(len(values), -np.inf), np.full(len(values), np.inf)
         for place, track in enumerate(tracks):
@@ -103,7 +105,8 @@ class ErrorBasis:
         """Return the interval that each value (T,) is in."""
         own = self._range(track)
         uppers = self._shifts.upper[own.start : own.stop - 1]
-        return own.start + np.searchsorted(uppers, values, side="left").astype(np.int64)
+        result: Int64 = own.start + np.searchsorted(uppers, values, side="left").astype(np.int64)
+        return result
 
     def _find_ends(self) -> tuple[Float64, Float64]:
         """Return where the slopes of each interval cease to hold, below and above: float64 (S,), (S,).
@@ -165,8 +168,8 @@ def _turn_rows(
 ) -> dict[int, tuple[int, Float32]]:
     """Return the row, and what a step moves in it, of every FAP with transforms of a part or of the head.
 
-    Up to three FAPs of a part have an axis each: turns about crossing axes add up like that. Each angle of the
-    head has a row of its own.
+    Up to three FAPs of a part have an axis each: turns about crossing axes add up like that. Each angle of
+    the head has a row of its own.
     """
     result: dict[int, tuple[int, Float32]] = {}
     row = 0

@@ -1,4 +1,4 @@
-"""`encode_within_tolerance`: a stream whose face and body stay near those of the source, measured after decoding."""
+"""`encode_within_tolerance`: a stream that shows nearly what its source does, measured after decoding."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.codec import Encoder, EncoderOptions, EncoderStatistics, decode
+from fba.codec import EncoderOptions, EncoderStatistics, decode
 from fba.errors import FbaWarning, RangeError
 from fba.face.deform.displacements import DisplacementMeter, Displacements
 from fba.face.mates import donors
@@ -93,20 +93,17 @@ def encode_within_tolerance(
         raise ValueError("there is no frame to encode")
     model = model or FaceModel.default()
     source = _Source(animation, model, options)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
-        data, statistics = encode_planned(animation, options, preset="compact")
+    data, statistics = encode_planned(animation, options, preset="compact")
     smallest = _measured(data, statistics, source, options, compact=True)
     if animation.face is not None and _is_plain(animation.face):
-        for quant, plan in _search(source, tolerance):
-            encoder = Encoder(replace(options, fap_quant=quant))
-            chunks = [encoder.push_segment(plan.animation[frames]) for frames in plan.segments]
-            data_found = b"".join([*chunks, encoder.finish()])
-            if len(data_found) >= len(data):
-                continue
-            found = _measured(data_found, encoder.statistics, source, replace(options, fap_quant=quant))
-            if found.face is not None and found.face.is_within(tolerance):
-                data, smallest = data_found, found
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)  # given above
+            for plan in _search(source, tolerance):
+                found_data, statistics = plan.encode()
+                if len(found_data) < len(data) or not _is_within(smallest, tolerance):
+                    found = _measured(found_data, statistics, source, plan.options)
+                    if _is_within(found, tolerance):
+                        data, smallest = found_data, found
     _check(smallest, tolerance)
     return data, smallest
 
@@ -138,8 +135,8 @@ def _is_plain(face: FaceTrack) -> bool:
     return not defines.any()
 
 
-def _search(source: _Source, tolerance: Tolerance) -> Iterator[tuple[int, Plan]]:
-    """Yield quantisers of FAPs and plans that keep within the tolerance."""
+def _search(source: _Source, tolerance: Tolerance) -> Iterator[Plan]:
+    """Yield plans that keep within the tolerance, with different quantisers of FAPs."""
     plan = source.plan()
     face = source.animation.face
     assert face is not None
@@ -163,7 +160,7 @@ def _search(source: _Source, tolerance: Tolerance) -> Iterator[tuple[int, Plan]]
             found.append((frames, best))
         else:
             tried -= 1
-            yield quant, _assemble(source, plan, segments, found, quant)
+            yield _assemble(source, plan, segments, found, quant)
 
 
 def _best(
@@ -172,9 +169,9 @@ def _best(
     """Return the cheapest of several searches; None where the quantiser is too coarse."""
     best = None
     for share, gap_share, most in EFFORTS[:efforts]:
-        found = search_faps(segment, basis, meter, Effort(quant, share, gap_share, most))
-        if found.within and (best is None or found.bits < best.bits):
-            best = found
+        below = best.bits if best is not None else np.inf
+        found = search_faps(segment, basis, meter, Effort(quant, share, gap_share, most), below)
+        best = found if found.within else best
     return best
 
 
@@ -294,14 +291,20 @@ def _errors(off: Displacements, angles: Float64) -> FaceErrors:
     )
 
 
+def _is_within(result: NearLossless, tolerance: Tolerance) -> bool:
+    """Whether a stream keeps within a tolerance."""
+    return result.face is None or result.face.is_within(tolerance)
+
+
 def _check(result: NearLossless, tolerance: Tolerance) -> None:
-    """Raise RangeError for a stream that is not within the tolerance: its input was not, either."""
-    if result.face is None or result.face.is_within(tolerance):
+    """Raise RangeError for a stream that is not within the tolerance: no quantiser is fine enough."""
+    if _is_within(result, tolerance):
         return
-    face = result.face
+    assert result.face is not None
+    face, mm = result.face, 1000
     raise RangeError(
-        f"no quantiser keeps within {tolerance.face * 1000:g} mm and {tolerance.head:g} degrees: the finest one "
-        f"moves vertex {face.vertex} by {face.largest * 1000:.4f} mm and turns the head by {face.head:.4f} degrees; "
-        "allow that much, or send values unquantised (fap_quant 0)",
+        f"no quantiser keeps within {tolerance.face * mm:g} mm and {tolerance.head:g} degrees: the finest "
+        f"moves vertex {face.vertex} by {face.largest * mm:.4f} mm, and turns the head by {face.head:.4f} "
+        "degrees; allow that much, or send values unquantised, without a tolerance (fap_quant 0)",
         frame=face.frame,
     )

@@ -19,7 +19,7 @@ from fba.compiled import compiled
 
 ROUNDS = 6
 """Most searches for one path; each starts from what the one before tells of the coder."""
-WIDEST = 48
+WIDEST = 24
 """Levels that are tried at a frame; more of them lie within the bounds of parameters that move little."""
 OUTSIDE = 1e6
 """Bits that count for a frame outside its bounds, and for a change that no P plane carries."""
@@ -42,21 +42,22 @@ class Bounds(NamedTuple):
     scale: int
 
 
-def find_path(bounds: Bounds, start: Int64 | None = None) -> Int64:
+def find_path(bounds: Bounds, start: Int64 | None = None, *, rounds: int = ROUNDS) -> Int64:
     """Return the cheapest levels found at the keys: int64 (K,).
 
     Within the bounds at every frame, those between keys included, wherever `start` is, or a path that holds
     its level as long as it may; and never costlier than that. Where no level is within the bounds of a key,
     the one nearest to their middle is taken: the caller checks what must hold.
 
-    start: int64 (K,), a path to better.
+    start: int64 (K,), a path to better. rounds: most searches, with ranges as they are and with
+    narrower ones.
     """
     band = _band(bounds, start)
     candidates = [hold_level(bounds)] if start is None else [start, hold_level(bounds)]
     best = min(candidates, key=lambda path: _cost(bounds, path))
     least = _cost(bounds, best)
-    for narrower in (0, 1):
-        for _ in range(ROUNDS):
+    for narrower in (0, 1) if rounds > 1 else (0,):
+        for _ in range(rounds):
             path = _search(bounds, band, best, narrower)
             bits = _cost(bounds, path)
             if bits >= least - 1e-6:
@@ -159,6 +160,7 @@ def _shortest(
         begin, end = int(keys[key - 1]), int(keys[key])
         base, before = int(first[key]), int(first[key - 1])
         count = int(last[key]) - base + 1
+        least, cheapest = np.inf, 0
         for j in range(count):
             new_sums[j] = np.inf
         for i in range(int(last[key - 1]) - before + 1):
@@ -169,14 +171,22 @@ def _shortest(
                 held = level * (1.0 - share)
                 lowest = max(lowest, (lower[frame] - held) / share - ROUNDING)
                 highest = min(highest, (upper[frame] - held) / share + ROUNDING)
-            for j in range(count):
-                change = base + j - level + low
-                total = sums[i] + (cost[change] if 0 <= change < len(cost) else OUTSIDE)
-                if base + j < lowest or base + j > highest:
-                    total += OUTSIDE
+            j_first = max(0, level - low - base, int(np.ceil(max(lowest, -1e9))) - base)
+            j_last = min(
+                count - 1, level - low + len(cost) - 1 - base, int(np.floor(min(highest, 1e9))) - base
+            )
+            for j in range(j_first, j_last + 1):
+                total = sums[i] + cost[base + j - level + low]
                 if total < new_sums[j]:
                     new_sums[j] = total
                     choices[key, j] = i
+            least = min(least, sums[i])
+            if sums[i] == least:
+                cheapest = i
+        for j in range(count):  # what no level before leads to
+            if new_sums[j] > least + OUTSIDE:
+                new_sums[j] = least + OUTSIDE
+                choices[key, j] = cheapest
         sums, new_sums = new_sums, sums
     result = np.zeros(len(keys), dtype=np.int64)
     best = 0

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fba.arrays import Bool, Float32, Float64, Int64
+from fba.arrays import Float32, Float64, Int64
 from fba.compiled import compiled
 from fba.face.deform._loops import compose, transform_points
 from fba.face.deform.flat_tables import Shifts, Transforms

@@ -24,7 +24,7 @@ FURTHEST = 0.02
 class Displacements:
     """Distances between the vertices that two sequences of FAPs give, in the frame of the head.
 
-    largest: float64 (T,), metres, in each frame; worst: int64 (T,), the vertex with it. counts: int64 (B,), how
+    largest: float64 (T,), metres, in each frame; worst: int64 (T,), its vertex. counts: int64 (B,), how
     often any vertex was so far off, in bins of FURTHEST / BINS, vertices that did not move in the first.
     """
 
