@@ -540,6 +540,32 @@ def encode_run(
     return len(rows), OK, bit, -1, before
 
 
+@compiled
+def measure_plane(
+    data: UInt8,
+    bit: int,
+    before: int,
+    object_mask: int,
+    skip: int,
+    layout: Layout,
+    state: State,
+    levels: Int64,
+    flags: Int64,
+) -> int:
+    """Return the bit after one P plane, written to `data` at `bit` as `encode_run` does; no model learns.
+
+    levels: int64, of the differences, by layout.order. data: a copy, with room for the plane.
+    """
+    coding = coding_of(state, True)
+    symbols = np.zeros(len(levels), np.int64)
+    for position in range(len(levels)):
+        symbols[position] = levels[position] - coding.minimum[int(layout.order[position])]
+    after = _write_plane(data, bit, object_mask, skip, layout, coding, symbols, flags)
+    if before != AFTER_CODE:
+        after, before = guard_plane(data, before, bit, after)
+    return after
+
+
 STATUS_TEXT = {
     arithmetic.BAD_GUARD: "22 zero bits are followed by another 0, where a 1 must be inserted; "
     "the stream is damaged here or before",

@@ -12,9 +12,9 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from fba.animation import BodyTrack, FaceTrack
-from fba.arrays import Bool, Int32, Int64
-from fba.parameters import EXPRESSION_FIELDS, VISEME_FIELDS, bap_groups, baps, faps
+from fba.animation import Animation, BodyTrack, FaceTrack
+from fba.arrays import Bool, Float64, Int32, Int64
+from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, bap_groups, baps, faps
 
 VISEME = slice(0, 3)
 EXPRESSION = slice(3, 7)
@@ -116,4 +116,25 @@ def track_rows(face: FaceTrack | None, body: BodyTrack | None) -> Int32:
         result[:, FAPS] = face.values[:, 2:]
     if body is not None:
         result[:, BAPS] = body.values
+    return result
+
+
+def with_values(frame: Animation, row: Int32) -> Animation:
+    """Return a frame with the low-level FAPs and the BAPs of row (columns,); the rest as it is."""
+    face, body = frame.face, frame.body
+    if face is not None:
+        values = np.concatenate([np.zeros(2, np.int32), row[FAPS]])[None]
+        face = FaceTrack(values, face.mask, face.viseme, face.expression, face.interpolated)
+    if body is not None:
+        body = BodyTrack(row[BAPS][None], body.mask)
+    return Animation(frame.rate, frame.index, face, body, frame.name)
+
+
+def slot_weights(weights: Float64) -> Float64:
+    """Return a weight for each slot, float64 (372,), of those of the FAPs and BAPs, (364,).
+
+    Infinite for visemes and expressions.
+    """
+    result = np.full(SLOTS, np.inf)
+    result[FAPS], result[BAPS] = weights[2:FAP_COUNT], weights[FAP_COUNT:]
     return result

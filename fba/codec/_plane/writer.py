@@ -35,6 +35,7 @@ class PlaneWriter:
     def __init__(self, bap_table: str = "iso") -> None:
         self.models = Models(bap_table)
         self.planes = 0
+        self._taken = 0  # bytes
         self._writer = BitWriter()
         self._settings: dict[int, PartSettings] = {}
         self._layouts: dict[int, Layout] = {}
@@ -46,9 +47,15 @@ class PlaneWriter:
         if self._before >= 0 and not loops.hides_plane(writer.data, self._before, writer.bit):
             self._before = -1
         taken = writer.take_bytes(writer.bit if self._before < 0 else self._before)
+        self._taken += len(taken)
         if self._before >= 0:
             self._before -= 8 * len(taken)
         return taken
+
+    @property
+    def bits(self) -> int:
+        """Number of bits written so far."""
+        return 8 * self._taken + self._writer.bit
 
     def begin_object(self) -> None:
         """Write the start code of an object."""
@@ -60,11 +67,11 @@ class PlaneWriter:
 
     def ending(self) -> bytes:
         """Return what would end the object behind the bytes taken so far; it goes on as if not asked."""
-        writer, before = self._writer, self._before
+        writer, before, count = self._writer, self._before, self._taken
         self._writer = writer.copy()
         self.end_object()
         taken = self.take_bytes()
-        self._writer, self._before = writer, before
+        self._writer, self._before, self._taken = writer, before, count
         return taken
 
     def settings_in_force(self, part: int) -> PartSettings | None:
@@ -150,11 +157,7 @@ class PlaneWriter:
         start_code: write a plane start code before the first. Raises DoesNotFitError for the first plane that
         does not fit its ranges; those before it have been written, and nothing of that plane.
         """
-        if mask not in self._layouts:
-            face = self._settings[slots.FACE_BIT].mask if mask & slots.FACE_BIT else None
-            body = self._settings[slots.BODY_BIT].mask if mask & slots.BODY_BIT else None
-            self._layouts[mask] = Layout(*slots.coding_order(face, body))
-        layout = self._layouts[mask]
+        layout = self.layout(mask)
         models, writer = self.models, self._writer
         if start_code:
             self._write_aligned_code(syntax.PLANE_CODES[0])
@@ -178,6 +181,27 @@ class PlaneWriter:
             if status == OUT_OF_DATA:
                 need = loops.room_for(int(skips[done]), layout)
                 writer.reserve(max(need, 8 * len(writer.data)))
+
+    def layout(self, mask: int) -> Layout:
+        """Return what P planes with this fba_object_mask code, by the settings in force."""
+        if mask not in self._layouts:
+            face = self._settings[slots.FACE_BIT].mask if mask & slots.FACE_BIT else None
+            body = self._settings[slots.BODY_BIT].mask if mask & slots.BODY_BIT else None
+            self._layouts[mask] = Layout(*slots.coding_order(face, body))
+        return self._layouts[mask]
+
+    def bits_of(self, mask: int, levels: Int64, flags: Int64, skip: int) -> int:
+        """Return the bits that a P plane takes next, with what must stand before it; nothing is written.
+
+        levels: of the differences of what `layout` lists, within their ranges. flags: viseme_def, init_face,
+        expression_def.
+        """
+        layout, trial = self.layout(mask), self._writer.copy()
+        trial.reserve(loops.room_for(skip, layout))
+        end = loops.measure_plane(
+            trial.data, trial.bit, self._before, mask, skip, layout, self.models.state, levels, flags
+        )
+        return end - self._writer.bit
 
     def _write_aligned_code(self, code: int) -> None:
         """Write alignment and the start code with this last byte, so that they do not hide the last plane."""
