@@ -61,6 +61,7 @@ fba.body.builtin
 fba.body.gait
 fba.body.importers
 fba.planning
+fba.planning.rate
 fba.study
 fba.capture.markers
 fba.capture.virtual_markers

@@ -12,6 +12,8 @@ from fba.codec._encoder import (
     encode_with_statistics,
 )
 from fba.codec._options import EncoderOptions
+from fba.codec._plane.pricing import NextPlane
+from fba.codec._plane.slots import weights_of_slots
 from fba.codec._script import encode_planes
 from fba.codec._stream.damage import Damage
 from fba.codec._stream.mark import marked_table, write_mark
@@ -36,6 +38,7 @@ __all__ = [
     "EncoderStatistics",
     "FrameBuffer",
     "FrameRate",
+    "NextPlane",
     "PartInfo",
     "PartSettings",
     "PlaneInfo",
@@ -60,5 +63,6 @@ __all__ = [
     "range_limit",
     "step_scale",
     "verify_stream",
+    "weights_of_slots",
     "write_mark",
 ]

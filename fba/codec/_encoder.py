@@ -9,12 +9,12 @@ from fractions import Fraction
 import numpy as np
 
 from fba.animation import Animation, Frame
-from fba.arrays import Float64, Int32, Int64
+from fba.arrays import Int32, Int64
 from fba.codec import _headers as headers
 from fba.codec._options import EncoderOptions
 from fba.codec._plane import full_turns, quantiser, slots
 from fba.codec._plane.loops import SKIP_MAX
-from fba.codec._plane.pricing import approximate_row
+from fba.codec._plane.pricing import NextPlane
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec._ranges import CLAMP, Ranges, fitting_ranges
 from fba.codec._runs import Run, find_runs
@@ -165,22 +165,12 @@ class Encoder:
         """Number of bits of all planes encoded so far."""
         return self._writer.bits
 
-    def approximate(
-        self, frame: Animation, weights: Float64, price: float, skip: int = 0
-    ) -> tuple[Animation, int] | None:
-        """Return a frame as the next P plane brings it at a price, and the bits that this plane takes.
-
-        Of each parameter it has the level with the least weight x error^2 + price x bits, by the models as
-        they are after `settle`. weights: float64 (364,), of the FAPs and then of the BAPs; infinite for the
-        nearest level that the ranges hold. skip: frames left out after it. None where an I plane must come.
-        """
-        run = next(find_runs(frame, int(frame.index[0]) + 1 + skip, self.options.unsent))
+    def next_plane(self, frame: Animation) -> NextPlane | None:
+        """Return what the next P plane may bring for a frame, after `settle`; None where an I plane must come."""
+        run = next(find_runs(frame, int(frame.index[0]) + 1, self.options.unsent))
         if not all(self._in_force(run, part) for part in run.parts):
             return None
-        row, bits = approximate_row(
-            self._writer, sum(run.parts), run.rows[0], slots.slot_weights(weights), price, skip
-        )
-        return slots.with_values(frame, row), bits
+        return NextPlane(self._writer, frame, sum(run.parts), run.rows[0])
 
     def _push_all(self, animation: Animation) -> bytes:
         """Add consecutive frames in pieces, so that memory stays bounded; return the complete bytes."""

@@ -1,4 +1,4 @@
-"""Approximate rows: P planes with values near the wanted ones that take fewer bits."""
+"""Approximate frames: P planes with values near the wanted ones that take fewer bits."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from fba.animation import Animation
 from fba.arrays import Float64, Int32, Int64
 from fba.codec._plane import slots
 from fba.codec._plane.arithmetic import Counts
@@ -14,20 +15,42 @@ from fba.codec._plane.writer import PlaneWriter
 from fba.compiled import compiled
 
 
-def approximate_row(
-    writer: PlaneWriter, mask: int, row: Int32, weights: Float64, price: float, skip: int
-) -> tuple[Int32, int]:
-    """Return what the next P plane brings for a row (columns,) at a price, and the bits that it takes.
+class NextPlane:
+    """What the next P plane may bring for a frame, of which nothing is written yet.
 
-    Of every parameter it takes the level with the least weight x error^2 + price x bits; equal to `row` in
-    what is not coded. weights: float64 (slots,), of a slot by itself; infinite: the nearest level. mask:
-    fba_object_mask. Nothing is written.
+    It holds until the next plane is written. frame: the frame as it should be. mask: fba_object_mask.
+    row: int32 (columns,), its values.
     """
-    layout, state = writer.layout(mask), writer.models.state
-    levels = choose_levels(layout, state, row, weights, price)
-    result = row.copy()
-    result[layout.order] = writer.models.last[layout.order] + levels * writer.models.step[layout.order]
-    return result, writer.bits_of(mask, levels, row[slots.FLAGS].astype(np.int64), skip)
+
+    def __init__(self, writer: PlaneWriter, frame: Animation, mask: int, row: Int32) -> None:
+        self.frame = frame
+        self._writer = writer
+        self._mask = mask
+        self._row = row
+
+    def levels(self, weights: Float64, price: float) -> Int64:
+        """Return the differences to code, in quantiser steps: int64 (parameters coded,).
+
+        Of every parameter the level with the least weight x error^2 + price x bits, by the models as they
+        are. weights: float64 (372,), see `slots`; infinite for the nearest level that the ranges hold, at any
+        price. An infinite price: no change.
+        """
+        return choose_levels(self._layout, self._writer.models.state, self._row, weights, price)
+
+    def bits(self, levels: Int64, skip: int = 0) -> int:
+        """Return the bits of the plane with these differences. skip: frames left out after it."""
+        flags = self._row[slots.FLAGS].astype(np.int64)
+        return self._writer.bits_of(self._mask, levels, flags, skip)
+
+    def with_levels(self, levels: Int64) -> Animation:
+        """Return the frame as these differences show it."""
+        row, order, models = self._row.copy(), self._layout.order, self._writer.models
+        row[order] = models.last[order] + levels * models.step[order]
+        return slots.with_values(self.frame, row)
+
+    @property
+    def _layout(self) -> Layout:
+        return self._writer.layout(self._mask)
 
 
 @compiled
@@ -50,6 +73,8 @@ def _choose_level(coding: Coding, slot: int, value: int, weight: float, price: f
     nearest = min(max(quantise_change(value, last, step), low), high)
     if math.isinf(weight):
         return nearest
+    if math.isinf(price):
+        return 0
     best = nearest
     least = _cost(coding, slot, nearest, value, weight, price)
     if low <= 0 <= high:  # no change costs the fewest bits nearly always: it shortens the search

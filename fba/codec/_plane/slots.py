@@ -130,8 +130,8 @@ def with_values(frame: Animation, row: Int32) -> Animation:
     return Animation(frame.rate, frame.index, face, body, frame.name)
 
 
-def slot_weights(weights: Float64) -> Float64:
-    """Return a weight for each slot, float64 (372,), of those of the FAPs and BAPs, (364,).
+def weights_of_slots(weights: Float64) -> Float64:
+    """Return the weights of slots, float64 (372,), from those of the FAPs and then the BAPs, (364,).
 
     Infinite for visemes and expressions.
     """

@@ -1,0 +1,293 @@
+"""`RateEncoder`: an encoder that holds a mean rate within a bounded buffer, a frame at a time."""
+
+from __future__ import annotations
+
+import copy
+import math
+import warnings
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fba.animation import Animation, Frame
+from fba.codec import Encoder, EncoderOptions, EncoderStatistics
+from fba.errors import FbaWarning, RangeError, Remedy
+from fba.planning.rate.bucket import LeakyBucket
+from fba.planning.rate.expectations import expected_motion, quantisers_for
+from fba.planning.rate.visibility import slot_weights
+
+COARSEST = 5.0
+"""Millimetres by which a parameter may be off before it is worth bits, with a full buffer."""
+STEEPNESS = 4.0
+"""How much faster that grows as the buffer fills than in a straight line: e-fold."""
+CHANGE_BITS = 6.0
+"""Bits of a change beyond those of none, about: what makes a price of a tolerance."""
+DEARER = 4.0
+"""Factor between the prices that are tried until a plane fits."""
+CHEAPEST, DEAREST = 1e-4, 1e9
+HOLD = math.inf
+"""A price at which nothing changes."""
+FULL = 0.5
+"""Part of the buffer from which on frames are left out, where planes without a change take too much."""
+STILL_SHARE = 2.0
+"""A plane's share of the rate, in planes without a change, that frames are left out for."""
+LONGEST_GAP = 0.2
+"""Seconds between two planes, unless the buffer is full."""
+SPARE = 96
+"""Bits that always stay free: for the end of the stream, and for start codes that keep planes apart."""
+LEARNING = 16
+"""Bits by which a plane without a change may cost more after the next plane than it does now."""
+SKIP_BITS = 4
+
+
+@dataclass
+class RateStatistics(EncoderStatistics):
+    """Counts of an encoder that holds a rate.
+
+    frames: frames that came. left_out: of these, those without a plane. longest_gap: seconds between planes.
+    peak: bits in the buffer at most. over: planes that did not fit the buffer, which must be 0.
+    """
+
+    frames: int = 0
+    left_out: int = 0
+    longest_gap: float = 0.0
+    peak: float = 0.0
+    over: int = 0
+
+
+class RateEncoder:
+    """Encodes frames as they come, at a mean rate: `push` and `finish` return the bytes that are complete.
+
+    rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size at the
+    time of its frame. A plane is returned when the frame after it comes. options: as for `Encoder`; the
+    quantisers count unless choose_quantisers is set, which takes those that suit the rate and the first frame.
+
+    Each frame is approximated (`Encoder.next_plane`) at a price that grows as the buffer fills: what is
+    seen least stays behind first, by `finest` millimetres even where there is room. Frames are left out where planes without a change would take too much of
+    the rate; players move on smoothly from one plane to the next. I planes come at the beginning and when
+    something is sent that was not before; frames are left out until the buffer has room for one.
+
+    Raises RangeError where an I plane does not fit the buffer at all, and as `Encoder` does, ValueError for a
+    rate or a buffer that is not positive.
+    """
+
+    def __init__(
+        self,
+        rate: float,
+        buffer: float = 1.0,
+        options: EncoderOptions | None = None,
+        *,
+        choose_quantisers: bool = True,
+        finest: float = 0.05,
+    ) -> None:
+        self.bucket = LeakyBucket(rate, rate * buffer)
+        self.statistics = RateStatistics()
+        self._encoder = Encoder(options)
+        self._choose = choose_quantisers
+        self._finest = finest
+        self._expected: Animation | None = None
+        self._exactly = False
+        self._last: Animation | None = None  # the last frame with a plane, as it was pushed
+        self._late: Animation | None = None  # a frame after it that was left out
+        self._planes = 0  # with the last frame, which is not encoded yet
+        self._due = 0  # index from which on a frame may have a plane
+        self._origin: int | None = None
+
+    @property
+    def options(self) -> EncoderOptions:
+        """The options in force."""
+        return self._encoder.options
+
+    def expect(self, animation: Animation, *, exactly: bool = False) -> None:
+        """Begin with ranges for the least and the largest values of an animation.
+
+        exactly: its changes from frame to frame are those that will come, too; else they are estimated.
+        ValueError after the first frame.
+        """
+        if self._last is not None:
+            raise ValueError("this encoder has begun; say what to expect before the first frame")
+        self._expected, self._exactly = animation, exactly
+
+    def push(self, frame: Frame) -> bytes:
+        """Add a frame; return the bytes that are complete."""
+        return self.push_animation(Animation.from_frames([frame]))
+
+    def push_animation(self, animation: Animation) -> bytes:
+        """Add frames, one after another; return the bytes that are complete."""
+        return b"".join(self._push(animation[t : t + 1]) for t in range(len(animation)))
+
+    def finish(self) -> bytes:
+        """End the stream, with the last frame if the buffer has room for it; return the last bytes."""
+        if self._last is None:
+            raise ValueError("there is no frame to encode")
+        data = b""
+        if self._late is not None:
+            self._due = 0
+            late, self._late = self._late, None
+            data = self._push_due(late)
+        data += self._encoder.finish()
+        self._count()
+        return data
+
+    def ending(self) -> bytes:
+        """Return what would end the stream behind the bytes returned so far; see `Encoder.ending`."""
+        return self._encoder.ending()
+
+    def _push(self, frame: Animation) -> bytes:
+        if self._last is not None:
+            self._check(frame)
+        self.statistics.frames += 1
+        if self._last is not None and int(frame.index[0]) < self._due:
+            self._late = frame
+            return b""
+        return self._push_due(frame)
+
+    def _check(self, frame: Animation) -> None:
+        """Raise ValueError for a frame that cannot come after those before it."""
+        before = self._late if self._late is not None else self._last
+        assert before is not None
+        if frame.rate != before.rate:
+            raise ValueError(
+                f"the stream has {before.rate} frames/s, this frame {frame.rate}; resample it first"
+            )
+        if frame.index[0] <= before.index[0]:
+            raise ValueError(
+                f"frame index {frame.index[0]} comes after {before.index[0]}; they must increase"
+            )
+
+    def _push_due(self, frame: Animation) -> bytes:
+        """Encode a frame if the buffer has room for it."""
+        index = int(frame.index[0])
+        if self._origin is None:
+            self._origin = index
+        self.bucket.drain(float((index - self._origin) / frame.rate))
+        new = self._last is None or _sends_other(frame, self._last)
+        if new:
+            data = self._push_intra(frame)
+            if data is None:
+                self._late = frame
+                return b""
+        else:
+            data = self._push_predicted(frame)
+        if self._last is not None:
+            gap = float((index - int(self._last.index[0])) / frame.rate)
+            self.statistics.longest_gap = max(self.statistics.longest_gap, gap)
+        self._last, self._late = frame, None
+        self._planes += 1
+        self._count()
+        return data
+
+    def _count(self) -> None:
+        """Bring the statistics up to date."""
+        own, theirs = self.statistics, self._encoder.statistics
+        own.planes, own.intra_planes = theirs.planes, theirs.intra_planes
+        own.clamped_parameters = theirs.clamped_parameters
+        own.left_out = own.frames - self._planes
+        own.peak = self.bucket.peak
+
+    def _push_intra(self, frame: Animation) -> bytes | None:
+        """Encode a frame as an I plane; None where the buffer has no room for that yet."""
+        index = int(frame.index[0])
+        trial = copy.deepcopy(self._encoder)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)  # given below
+            trial.settle(index)
+            before = trial.bits
+            self._begin_segment(trial, frame)
+            trial.push_animation(frame)
+            trial.settle(index + 1)
+        bits = trial.bits - before
+        if bits + SPARE > self.bucket.size:
+            raise self._too_small(bits + SPARE)
+        if bits + SPARE > self.bucket.room:
+            return None
+        data = self._encoder.settle(index)
+        self._begin_segment(self._encoder, frame)
+        self._encoder.push_animation(frame)
+        self.bucket.add(bits)
+        after = trial.next_plane(frame)
+        assert after is not None
+        self._plan_gap(frame, after.bits(after.levels(slot_weights(), HOLD)))
+        return data
+
+    def _begin_segment(self, encoder: Encoder, frame: Animation) -> None:
+        """Set ranges and quantisers for the frames that follow."""
+        options = encoder.options
+        if self._choose:
+            options = replace(options, **quantisers_for(frame, self.bucket.rate))
+        motion = self._expected
+        if motion is None or not self._exactly:
+            motion = expected_motion(frame, motion)
+        encoder.begin_segment(motion, options)
+
+    def _push_predicted(self, frame: Animation) -> bytes:
+        """Encode a frame as a P plane, at a price at which it fits the buffer."""
+        data = self._encoder.settle(int(frame.index[0]))
+        room = self.bucket.room - SPARE - SKIP_BITS
+        plane = self._encoder.next_plane(frame)
+        assert plane is not None
+        price, weights = self._price(), slot_weights()
+        while True:
+            levels = plane.levels(weights, price)
+            bits = plane.bits(levels)
+            if bits <= room or price == HOLD:
+                break
+            price = max(price, CHEAPEST) * DEARER if price < DEAREST else HOLD
+        self.statistics.over += bits > room
+        self.bucket.add(bits)
+        self._plan_gap(frame, plane.bits(plane.levels(weights, HOLD)))
+        self._encoder.push_animation(plane.with_levels(levels))
+        return data
+
+    def _price(self) -> float:
+        """Return the square millimetres that a bit is worth, by the level of the buffer."""
+        full = min(self.bucket.level / self.bucket.size, 1.0)
+        tolerance = max(self._finest, COARSEST * math.expm1(STEEPNESS * full) / math.expm1(STEEPNESS))
+        return tolerance * tolerance / CHANGE_BITS
+
+    def _plan_gap(self, frame: Animation, still: int) -> None:
+        """Set from which frame on a plane may come. still: bits of a plane without a change."""
+        bucket, period = self.bucket, float(1 / frame.rate)
+        need = still + LEARNING + SPARE + SKIP_BITS
+        longest = max(1, math.floor(LONGEST_GAP / period + 1e-9))
+        gap = 1
+        while gap < longest and (
+            gap * period * bucket.rate < STILL_SHARE * still
+            and bucket.level_at(bucket.time + gap * period) > FULL * bucket.size
+        ):
+            gap += 1
+        over = bucket.level + SKIP_BITS + need - bucket.size  # must have drained
+        if over > 0:
+            gap = max(gap, math.ceil(over / (bucket.rate * period)))
+        if gap > 1:
+            bucket.add(SKIP_BITS)
+        self._due = int(frame.index[0]) + gap
+
+    def _too_small(self, bits: int) -> RangeError:
+        """Return the error for a buffer that no I plane fits."""
+        rate, size = self.bucket.rate, self.bucket.size
+        seconds = size / rate
+        return RangeError(
+            f"an I plane takes {bits} bits, more than the buffer of {size:.0f} bits holds "
+            f"({rate:g} bit/s for {seconds:g} s)"
+        ).with_remedies(
+            Remedy("rate", "give a rate of at least {}", str(math.ceil(bits / seconds))),
+            Remedy("buffer", "or a buffer of at least {}", f"{math.ceil(100 * bits / rate) / 100:g}"),
+        )
+
+
+def _sends_other(frame: Animation, last: Animation) -> bool:
+    """Whether a frame sends other parameters than the last one."""
+    for one, other in ((frame.face, last.face), (frame.body, last.body)):
+        if (one is None) != (other is None):
+            return True
+        if one is not None and other is not None and not np.array_equal(one.mask, other.mask):
+            return True
+    if frame.face is None or last.face is None:
+        return False
+    one, other = frame.face.interpolated, last.face.interpolated
+    return (one is None) != (other is None) or (
+        one is not None and other is not None and not np.array_equal(one, other)
+    )
+
+

@@ -1,0 +1,77 @@
+"""What is to come, of which nothing is known yet: how far and how fast parameters move, how finely to code."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Float64, Int32, Int64
+from fba.parameters import BAP_COUNT, FAP_COUNT, Bap, Fap, bap_steps, baps, fap_steps, faps
+from fba.tracks import BodyTrack, FaceTrack
+
+SLOW, FAST = 1.0, 0.06
+"""Seconds in which a parameter goes from one end to the other at the fastest; lids and eyes are the fast ones."""
+FAST_FAPS = slice(18, 26)
+UNKNOWN = 60
+"""Table steps that a parameter without limits in the standard reaches."""
+BITS_OF_FINEST = 8.0
+"""Bits for a parameter in a frame at which quantiser 1 serves; at half of them quantiser 2, and so on."""
+COARSEST_QUANTISER = 6
+"""With a coarser one, a slow turn of the head is seen in steps."""
+
+
+def expected_motion(frame: Animation, extremes: Animation | None = None) -> Animation:
+    """Return motion of what a frame sends, from the least values to the largest and back, as fast as it goes.
+
+    extremes: an animation that reaches the least and the largest values; the standard's limits count for what
+    it does not move. What goes faster than this lags behind by a frame or two.
+    """
+    rate = float(frame.rate)
+    turn = math.ceil(SLOW * rate)
+    index = np.arange(2 * (turn + 1))
+    face = body = None
+    if frame.face is not None:
+        seconds = np.full(FAP_COUNT, SLOW)
+        seconds[FAST_FAPS] = FAST
+        track = None if extremes is None else extremes.face
+        values = _there_and_back(*_ends(track, faps(), fap_steps()), seconds * rate, turn)
+        values[:, :2] = 0
+        face = FaceTrack(values, np.broadcast_to(frame.face.mask[0], values.shape))
+    if frame.body is not None:
+        track = None if extremes is None else extremes.body
+        seconds = np.full(BAP_COUNT, SLOW)
+        values = _there_and_back(*_ends(track, baps(), bap_steps("iso")), seconds * rate, turn)
+        body = BodyTrack(values, np.broadcast_to(frame.body.mask[0], values.shape))
+    return Animation(frame.rate, index, face, body)
+
+
+def quantisers_for(frame: Animation, rate: float) -> dict[str, int]:
+    """Return fap_quant and bap_quant that suit a rate, in bits a second, for what a frame sends."""
+    tracks = [track for track in (frame.face, frame.body) if track is not None]
+    count = max(1, sum(int(track.mask.sum()) for track in tracks))
+    wanted = BITS_OF_FINEST * count * float(frame.rate) / rate
+    quant = min(max(round(wanted), 1), COARSEST_QUANTISER)
+    return {"fap_quant": quant, "bap_quant": quant}
+
+
+def _ends(
+    track: FaceTrack | BodyTrack | None, table: Sequence[Fap | Bap], steps: Int64
+) -> tuple[Float64, Float64]:
+    """Return the least and the largest values: those of a track, or else of the table."""
+    limits = np.array([one.i_limits or (-UNKNOWN, UNKNOWN) for one in table]) * steps[:, None]
+    least, most = limits[:, 0].astype(np.float64), limits[:, 1].astype(np.float64)
+    if track is not None:
+        moved = np.asarray(track.values.any(axis=0))
+        least[moved] = track.values.min(axis=0)[moved]
+        most[moved] = track.values.max(axis=0)[moved]
+    return least, most
+
+
+def _there_and_back(least: Float64, most: Float64, frames: Float64, turn: int) -> Int32:
+    """Return int32 (2 (turn + 1), columns): from `least` to `most` in so many frames each, and back."""
+    share = np.minimum(np.arange(turn + 1)[:, None] / np.maximum(frames, 1.0), 1.0)
+    there = np.rint(least + (most - least) * share).astype(np.int32)
+    return np.concatenate([there, there[::-1]])

@@ -1,0 +1,234 @@
+"""Streams at a bit rate: every plane fits the buffer, and what is lost falls as the rate rises."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
+from fba.errors import RangeError
+from fba.face.resolve import resolve
+from fba.parameters import bap_steps, fap_steps
+from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate, measure_errors
+
+VISAGE = EncoderOptions(bap_steps="visage", clamp=True)
+FACE = [3, 4, 5, 6, 7, 12, 13, 14, 19, 20, 23, 24, 31, 32, 48, 49, 50]
+BODY = [8, 9, 16, 17, 28, 29, 38, 39, 48, 49, 50, 184]
+
+
+def moving_face(rng: np.random.Generator, length: int, kind: str) -> FaceTrack:
+    """Return FAPs that speak, rest, or jump."""
+    mask = np.zeros((length, 68), dtype=bool)
+    mask[:, np.array(FACE) - 1] = True
+    steps = np.asarray(fap_steps())
+    values = np.zeros((length, 68))
+    if kind != "silence":
+        strength = 8 if kind != "noise" else 60
+        speed = rng.normal(0, strength, (length, 68))
+        if kind == "bursts":
+            speed *= (np.arange(length) // 15 % 3 == 0)[:, None] * 4
+        values = 200 * np.sin(np.cumsum(speed, axis=0) / 200)
+    if kind == "jumps":
+        values = np.where((np.arange(length) // 20 % 2)[:, None], values + 900, values)
+    values = np.rint(values) * steps
+    viseme = np.zeros((length, 4), dtype=np.int16)
+    if kind == "visemes":
+        mask[:, 0] = True
+        viseme[:, 0], viseme[:, 2] = rng.integers(0, 15, length), rng.integers(0, 64, length)
+    values[~mask] = 0
+    values[:, :2] = 0
+    return FaceTrack(values.astype(np.int32), mask, viseme)
+
+
+def moving_body(rng: np.random.Generator, length: int) -> BodyTrack:
+    mask = np.zeros((length, 296), dtype=bool)
+    mask[:, np.array(BODY) - 1] = True
+    walk = np.cumsum(rng.normal(0, 4, (length, 296)), axis=0)
+    return BodyTrack((np.rint(walk) * bap_steps("visage") * mask).astype(np.int32), mask)
+
+
+def made(kind: str, length: int = 90, fps: Fraction | int = 25, seed: int = 1) -> Animation:
+    rng = np.random.default_rng(seed)
+    face = moving_face(rng, length, kind) if kind != "body" else None
+    body = moving_body(rng, length) if kind in ("body", "both") else None
+    gaps = rng.integers(1, 5, length) if kind == "gaps" else np.ones(length, dtype=np.int64)
+    return Animation(Fraction(fps), np.cumsum(gaps) - gaps[0], face, body)
+
+
+def levels(data: bytes, rate: float) -> list[float]:
+    """Return how full a buffer that drains at a rate is after each plane, by where planes lie in a stream."""
+    decoder = fba.Decoder(bap_steps="visage")
+    frames = [*decoder.push(data), *decoder.finish()]
+    result: list[float] = []
+    level, before, end = 0.0, Fraction(0), 0
+    first = frames[0].time
+    for frame in frames:
+        now = frame.time - first
+        stop = frame.plane.bit + frame.plane.bits
+        if frame is frames[-1]:
+            stop = 8 * len(data)
+        level = max(0.0, level - rate * float(now - before)) + stop - end
+        before, end = now, stop
+        result.append(level)
+    return result
+
+
+def coded(animation: Animation, rate: float, buffer: float = 1.0) -> tuple[bytes, RateEncoder]:
+    encoder = RateEncoder(rate, buffer, VISAGE)
+    return encoder.push_animation(animation) + encoder.finish(), encoder
+
+
+@pytest.mark.parametrize(
+    ("kind", "fps", "rate", "buffer"),
+    [
+        ("speech", 25, 1500, 1.0),
+        ("speech", 25, 700, 1.5),
+        ("speech", 5, 700, 1.0),
+        ("speech", 120, 1200, 0.8),
+        ("noise", 25, 900, 0.8),
+        ("noise", 60, 20_000, 0.1),
+        ("silence", 25, 700, 1.0),
+        ("bursts", 25, 1000, 1.0),
+        ("jumps", Fraction(30000, 1001), 1000, 1.0),
+        ("gaps", 25, 800, 1.0),
+        ("visemes", 25, 1500, 1.0),
+        ("body", 25, 2000, 1.0),
+        ("both", 25, 3000, 0.6),
+    ],
+)
+def test_every_plane_fits_the_buffer(kind: str, fps: Fraction | int, rate: float, buffer: float) -> None:
+    animation = made(kind, fps=fps)
+    data, encoder = coded(animation, rate, buffer)
+    assert max(levels(data, rate)) <= rate * buffer
+    assert encoder.statistics.over == 0
+    decoded = fba.decode(data, bap_steps="visage")
+    assert set((decoded.index - decoded.index[0]).tolist()) <= set((animation.index - animation.index[0]).tolist())
+    assert len(decoded) == encoder.statistics.planes
+    assert encoder.statistics.left_out == len(animation) - len(decoded)
+    if kind == "visemes":
+        assert decoded.face is not None
+        assert animation.face is not None
+        there = np.isin(animation.index - animation.index[0], decoded.index - decoded.index[0])
+        assert np.array_equal(decoded.face.viseme[:, 0], animation.face.viseme[there, 0])
+
+
+@cache
+def one_by_one() -> bytes:
+    encoder = RateEncoder(900, 1.0, VISAGE)
+    return b"".join(encoder.push(frame) for frame in made("bursts")) + encoder.finish()
+
+
+def test_frames_one_by_one_and_all_at_once_give_the_same_stream() -> None:
+    assert coded(made("bursts"), 900)[0] == one_by_one()
+
+
+def test_a_plane_comes_with_the_frame_after_it() -> None:
+    encoder = RateEncoder(9000, 1.0, VISAGE)
+    so_far = b""
+    for number, frame in enumerate(made("speech", 12)):
+        so_far += encoder.push(frame)
+        complete = so_far + encoder.ending()
+        assert len(fba.decode(complete) if complete else ()) == number
+
+
+def test_more_bits_lose_less() -> None:
+    animation = made("speech", 150)
+    losses = []
+    for rate in (900, 1500, 3000, 8000):
+        found = encode_at_rate(animation, rate, 1.0, VISAGE)
+        assert max(levels(found.data, rate)) <= rate
+        errors = measure_errors(animation, found.shown)
+        steps = {one.label: one.largest for one in errors}
+        losses.append(sum(steps.values()))
+    assert losses == sorted(losses, reverse=True)
+    assert losses[-1] == 0  # enough for all of it
+    assert losses[0] > 4 * losses[2]
+
+
+def test_what_players_derive_is_not_sent() -> None:
+    animation = made("speech")
+    assert animation.face is not None
+    values, mask = animation.face.values.copy(), animation.face.mask.copy()
+    values[:, 13 - 1] = values[:, 12 - 1]
+    values[:, 59 - 1] = values[:, 60 - 1] = values[:, 12 - 1]
+    mask[:, [59 - 1, 60 - 1]] = True
+    twins = Animation(animation.rate, animation.index, FaceTrack(values, mask))
+    found = encode_at_rate(twins, 9000, 1.0, VISAGE)
+    assert found.shown.face is not None
+    assert found.shown.face.mask[0, [11, 12, 58, 59]].sum() == 1
+    assert np.array_equal(resolve(found.shown.face), resolve(FaceTrack(values, mask)))
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_buffer_that_no_i_plane_fits_says_which_does(whole: bool) -> None:
+    animation = made("speech", 30)
+
+    def encode(rate: float, buffer: float) -> bytes:
+        if whole:
+            return encode_at_rate(animation, rate, buffer, VISAGE).data
+        return coded(animation, rate, buffer)[0]
+
+    with pytest.raises(RangeError, match="an I plane takes .* bits, more than the buffer") as caught:
+        encode(100, 1.0)
+    rate, buffer = (float(re.search(rf"{name}=([\d.]+)", str(caught.value))[1]) for name in ("rate", "buffer"))  # type: ignore[index]
+    assert encode(rate * (1 if whole else 1.05), 1.0)
+    assert encode(100, buffer * (1 if whole else 1.05))
+
+
+def test_a_still_face_takes_less_than_the_rate() -> None:
+    data, encoder = coded(made("silence", 250), 2000)
+    assert 8 * len(data) < 0.7 * 2000 * 10
+    assert encoder.statistics.left_out == 0
+
+
+@pytest.mark.parametrize("kind", ["speech", "body", "both"])
+def test_one_frame(kind: str) -> None:
+    animation = made(kind, 1)
+    data, _ = coded(animation, 3000)
+    decoded = fba.decode(data, bap_steps="visage")
+    assert len(decoded) == 1
+    assert len(encode_at_rate(animation, 3000, 1.0, VISAGE).shown) == 1
+
+
+def test_no_frames() -> None:
+    with pytest.raises(ValueError, match="no frame"):
+        RateEncoder(1500).finish()
+    with pytest.raises(ValueError, match="no frame"):
+        encode_at_rate(made("speech")[:0], 1500)
+
+
+@pytest.mark.parametrize(("rate", "size"), [(0, 1), (-5, 1), (float("nan"), 1), (1500, 0), (1500, float("inf"))])
+def test_rates_and_buffers_are_positive(rate: float, size: float) -> None:
+    with pytest.raises(ValueError, match="positive"):
+        RateEncoder(rate, size)
+
+
+def test_what_begins_later_comes_as_soon_as_there_is_room() -> None:
+    animation = made("speech", 120)
+    assert animation.face is not None
+    mask = animation.face.mask.copy()
+    mask[:40, 47:50] = False
+    later = Animation(animation.rate, animation.index, FaceTrack(np.where(mask, animation.face.values, 0), mask))
+    data, encoder = coded(later, 1000)
+    assert max(levels(data, 1000)) <= 1000
+    assert encoder.statistics.intra_planes == 2
+    decoded = fba.decode(data)
+    assert decoded.face is not None
+    assert decoded.face.mask[-1, 47:50].all()
+
+
+def test_a_leaky_bucket() -> None:
+    bucket = LeakyBucket(100, 50)
+    bucket.add(40)
+    assert bucket.room == 10
+    assert bucket.level_at(0.1) == 30
+    bucket.drain(0.3)
+    assert bucket.level == 10
+    bucket.drain(5)
+    assert bucket.level == 0
+    assert bucket.peak == 40
