@@ -166,7 +166,7 @@ class Encoder:
         return self._writer.bits
 
     def next_plane(self, frame: Animation) -> NextPlane | None:
-        """Return what the next P plane may bring for a frame, after `settle`; None where an I plane must come."""
+        """Return what the next P plane may bring for a frame, after `settle`; None for an I plane."""
         run = next(find_runs(frame, int(frame.index[0]) + 1, self.options.unsent))
         if not all(self._in_force(run, part) for part in run.parts):
             return None

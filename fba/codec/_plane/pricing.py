@@ -98,7 +98,9 @@ def _choose_level(coding: Coding, slot: int, value: int, weight: float, price: f
 def _cost(coding: Coding, slot: int, level: int, value: int, weight: float, price: float) -> float:
     """Return weight x error^2 + price x bits of a level."""
     error = float(value - int(coding.last[slot]) - level * int(coding.step[slot]))
-    return weight * error * error + price * _symbol_bits(coding.models, slot, level - int(coding.minimum[slot]))
+    return weight * error * error + price * _symbol_bits(
+        coding.models, slot, level - int(coding.minimum[slot])
+    )
 
 
 @compiled

@@ -13,7 +13,7 @@ from fba.animation import Animation, Frame
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics
 from fba.errors import FbaWarning, RangeError, Remedy
 from fba.planning.rate.bucket import LeakyBucket
-from fba.planning.rate.expectations import expected_motion, quantisers_for
+from fba.planning.rate.expectations import expected_motion, quantiser_for
 from fba.planning.rate.visibility import slot_weights
 
 COARSEST = 5.0
@@ -59,13 +59,14 @@ class RateEncoder:
     """Encodes frames as they come, at a mean rate: `push` and `finish` return the bytes that are complete.
 
     rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size at the
-    time of its frame. A plane is returned when the frame after it comes. options: as for `Encoder`; the
-    quantisers count unless choose_quantisers is set, which takes those that suit the rate and the first frame.
+    time of its frame. A plane is returned when the frame after it comes. options: as for `Encoder`; their
+    quantisers count unless choose_quantisers is set, which takes one that suits the rate and the frame.
 
-    Each frame is approximated (`Encoder.next_plane`) at a price that grows as the buffer fills: what is
-    seen least stays behind first, by `finest` millimetres even where there is room. Frames are left out where planes without a change would take too much of
-    the rate; players move on smoothly from one plane to the next. I planes come at the beginning and when
-    something is sent that was not before; frames are left out until the buffer has room for one.
+    Each frame is approximated (`Encoder.next_plane`) at a price that grows as the buffer fills: what is seen
+    least stays behind first, by `finest` millimetres even where there is room. Frames are left out where
+    planes without a change would take too much of the rate; players move on smoothly from one plane to the
+    next. I planes come at the beginning and when something is sent that was not before; frames are left out
+    until the buffer has room for one.
 
     Raises RangeError where an I plane does not fit the buffer at all, and as `Encoder` does, ValueError for a
     rate or a buffer that is not positive.
@@ -214,7 +215,8 @@ class RateEncoder:
         """Set ranges and quantisers for the frames that follow."""
         options = encoder.options
         if self._choose:
-            options = replace(options, **quantisers_for(frame, self.bucket.rate))
+            quant = quantiser_for(frame, self.bucket.rate)
+            options = replace(options, fap_quant=quant, bap_quant=quant)
         motion = self._expected
         if motion is None or not self._exactly:
             motion = expected_motion(frame, motion)
@@ -285,9 +287,7 @@ def _sends_other(frame: Animation, last: Animation) -> bool:
             return True
     if frame.face is None or last.face is None:
         return False
-    one, other = frame.face.interpolated, last.face.interpolated
-    return (one is None) != (other is None) or (
-        one is not None and other is not None and not np.array_equal(one, other)
-    )
-
-
+    wanted, before = frame.face.interpolated, last.face.interpolated
+    if wanted is None or before is None:
+        return wanted is not before
+    return not np.array_equal(wanted, before)

@@ -63,7 +63,10 @@ def _errors(wanted: Animation, shown: Animation) -> Float64:
         there, here = resolve(wanted.face), resolve(shown.face)
         result[:, :FACE_PARAMETERS] = np.abs(there - _at(here, *index))
     if wanted.body is not None and shown.body is not None:
-        there, here = (hold(track.values, track.mask, np.zeros_like(track.values[0])) for track in (wanted.body, shown.body))
+        there, here = (
+            hold(track.values, track.mask, np.zeros_like(track.values[0]))
+            for track in (wanted.body, shown.body)
+        )
         result[:, FACE_PARAMETERS:] = np.abs(there - _at(here, *index))
     return result
 

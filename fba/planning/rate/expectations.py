@@ -1,4 +1,4 @@
-"""What is to come, of which nothing is known yet: how far and how fast parameters move, how finely to code."""
+"""What is to come, of which nothing is known yet: how far and how fast parameters move."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fba.parameters import BAP_COUNT, FAP_COUNT, Bap, Fap, bap_steps, baps, fap_
 from fba.tracks import BodyTrack, FaceTrack
 
 SLOW, FAST = 1.0, 0.06
-"""Seconds in which a parameter goes from one end to the other at the fastest; lids and eyes are the fast ones."""
+"""Seconds in which a parameter goes from one end to the other at the fastest; lids and eyes are fast."""
 FAST_FAPS = slice(18, 26)
 UNKNOWN = 60
 """Table steps that a parameter without limits in the standard reaches."""
@@ -32,29 +32,28 @@ def expected_motion(frame: Animation, extremes: Animation | None = None) -> Anim
     rate = float(frame.rate)
     turn = math.ceil(SLOW * rate)
     index = np.arange(2 * (turn + 1))
-    face = body = None
+    face: FaceTrack | None = None
+    body: BodyTrack | None = None
     if frame.face is not None:
         seconds = np.full(FAP_COUNT, SLOW)
         seconds[FAST_FAPS] = FAST
-        track = None if extremes is None else extremes.face
-        values = _there_and_back(*_ends(track, faps(), fap_steps()), seconds * rate, turn)
+        ends = _ends(None if extremes is None else extremes.face, faps(), fap_steps())
+        values = _there_and_back(*ends, seconds * rate, turn)
         values[:, :2] = 0
         face = FaceTrack(values, np.broadcast_to(frame.face.mask[0], values.shape))
     if frame.body is not None:
-        track = None if extremes is None else extremes.body
-        seconds = np.full(BAP_COUNT, SLOW)
-        values = _there_and_back(*_ends(track, baps(), bap_steps("iso")), seconds * rate, turn)
+        ends = _ends(None if extremes is None else extremes.body, baps(), bap_steps("iso"))
+        values = _there_and_back(*ends, np.full(BAP_COUNT, SLOW) * rate, turn)
         body = BodyTrack(values, np.broadcast_to(frame.body.mask[0], values.shape))
     return Animation(frame.rate, index, face, body)
 
 
-def quantisers_for(frame: Animation, rate: float) -> dict[str, int]:
-    """Return fap_quant and bap_quant that suit a rate, in bits a second, for what a frame sends."""
+def quantiser_for(frame: Animation, rate: float) -> int:
+    """Return the fap_quant and bap_quant that suits a rate, in bits a second, for what a frame sends."""
     tracks = [track for track in (frame.face, frame.body) if track is not None]
     count = max(1, sum(int(track.mask.sum()) for track in tracks))
     wanted = BITS_OF_FINEST * count * float(frame.rate) / rate
-    quant = min(max(round(wanted), 1), COARSEST_QUANTISER)
-    return {"fap_quant": quant, "bap_quant": quant}
+    return min(max(round(wanted), 1), COARSEST_QUANTISER)
 
 
 def _ends(

@@ -51,8 +51,8 @@ def encode_at_rate(
     """Return the stream that loses least at a rate, in bits a second.
 
     buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size. What players derive by the
-    standard's rules is not sent, as in `plan_compact`, with one choice for all frames. Quantisers are tried on
-    the first half minute; those in `options` do not count.
+    standard's rules is not sent, as in `plan_compact`, with one choice for all frames. Quantisers are tried
+    on the first half minute; those in `options` do not count.
 
     A stream that needs less than the rate takes less. Raises RangeError for a buffer that no I plane fits,
     ValueError for an animation without frames and for a rate or a buffer that is not positive.
@@ -62,7 +62,9 @@ def encode_at_rate(
     options = options or EncoderOptions()
     sent = _to_send(quantise(animation, replace(options, fap_quant=1, bap_quant=1)), options)
     beginning = sent[: max(1, math.ceil(TRIED_SECONDS * float(animation.rate)))]
-    best = _best_setting(beginning, sent, rate, buffer, [_Setting(one, FINEST[0]) for one in QUANTISERS], options)
+    best = _best_setting(
+        beginning, sent, rate, buffer, [_Setting(one, FINEST[0]) for one in QUANTISERS], options
+    )
     finer = [_Setting(best.quantiser, finest) for finest in FINEST]
     best = _best_setting(beginning, sent, rate, buffer, finer, options)
     return _encode(sent, sent, rate, buffer, best, options)

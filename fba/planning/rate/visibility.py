@@ -65,7 +65,7 @@ def fap_millimetres() -> Float64:
 
 
 def bap_millimetres() -> Float64:
-    """Return how far one unit of each BAP moves points 3 cm off the built-in body's joints: float64 (296,)."""
+    """Return how far one unit of each BAP moves points 3 cm off the body's joints: float64 (296,)."""
     from fba.body import BapSolver
 
     steps = np.asarray(bap_steps("iso"), dtype=np.float64)
