@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fba.animation import Animation
 from fba.cli.clamped_values import clamped_values
 from fba.cli.coding.size_options import Size
+from fba.cli.coding.tolerance_options import encode_near, tolerance_lines, tolerance_values
 from fba.cli.inputs import input_file
 from fba.cli.outputs import display_name
 from fba.cli.printing import rate_text, seconds_text
@@ -18,6 +19,7 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.cli.recordings.inputs import Inputs
     from fba.codec import ClampedParameter, EncoderOptions
+    from fba.planning import NearLossless
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +27,8 @@ class CodedStream:
     """A stream, and what it took.
 
     clamped: parameters with values that no plane could carry, by label. bap_quant: the largest of any plane;
-    0 if BAPs are unquantised. rounded: values of FAP and BAP files that no stream carries as they are.
+    0 if BAPs are unquantised. rounded: values of FAP and BAP files that no stream carries as they are. near:
+    how near it is to its source, if that was asked for.
     """
 
     data: bytes
@@ -34,6 +37,7 @@ class CodedStream:
     clamped: dict[str, ClampedParameter]
     bap_quant: int
     rounded: int = 0
+    near: NearLossless | None = None
 
     @property
     def clamped_count(self) -> int:
@@ -56,7 +60,12 @@ class CodedStream:
             "rounded": self.rounded,
             "clamped": self.clamped_count,
             "clamped_parameters": clamped_values(self.clamped),
+            **({"tolerance": tolerance_values(self.near)} if self.near is not None else {}),
         }
+
+    def details(self, animation: Animation) -> list[str]:
+        """Return what else is said of the stream of this animation: how near it is to its source."""
+        return tolerance_lines(self.near, animation) if self.near is not None else []
 
     def summary(self, output: Path, animation: Animation) -> str:
         """Return the same in one line. output: its file."""
@@ -80,6 +89,12 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
     from fba.codec import count_rounded, encode_with_statistics, exact_quantisers
     from fba.planning import encode_planned
 
+    if size.tolerance is not None:
+        data, near = encode_near(animation, options, size.tolerance, size.model)
+        counts = near.statistics
+        return CodedStream(
+            data, counts.planes, counts.intra_planes, counts.clamped_parameters, options.bap_quant, near=near
+        )
     preset = size.preset or ("compact" if inputs.has_captured_face else "exact")
     kept = inputs.text_parts
     rounded: dict[str, int] = {}

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import click
 
 from fba.cli import options
+from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Decorated
 
 PRESETS = ("reference", "exact", "compact")
@@ -18,10 +20,13 @@ PRESETS = ("reference", "exact", "compact")
 class Size:
     """How small a stream is to be, and what may be lost for that, as far as options say it; else None.
 
-    preset: what is sent. fap_quant, bap_quant: how finely.
+    preset: what is sent. fap_quant, bap_quant: how finely. tolerance: metres by which vertices may move, on
+    the head of `model`.
     """
 
     preset: str | None = None
+    tolerance: float | None = None
+    model: Path | None = None
     fap_quant: int | None = None
     bap_quant: int | None = None
 
@@ -50,6 +55,19 @@ def size_options(command: Decorated) -> Decorated:
                 "for captured faces, else exact.",
             ),
             click.option(
+                "--tolerance",
+                type=LengthType(),
+                metavar="LENGTH",
+                help="Send as little as keeps every vertex of the face within this distance (0.5mm, 0.05cm, "
+                "500um), in the head's own frame, and each angle of the head within 0.1 degree.",
+            ),
+            click.option(
+                "--model",
+                type=click.Path(exists=True, path_type=Path),
+                metavar="FILE",
+                help="With --tolerance: the head whose vertices count. Default: the built-in head.",
+            ),
+            click.option(
                 "--quant",
                 "fap_quant",
                 type=click.IntRange(0, 31),
@@ -72,7 +90,7 @@ PLANES = ("intra_period", "start_codes", "time_codes", "unsent", "gender", "clam
 """Options of single planes."""
 CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "epf": (
-        ("preset", "tolerance", "bitrate", *QUANTISERS, *PLANES),
+        ("preset", "tolerance", "model", "bitrate", *QUANTISERS, *PLANES),
         "the EPF file says how planes are coded",
     ),
     "tolerance": (
@@ -95,3 +113,5 @@ def check_sizes() -> None:
         for other in others:
             if options.is_given(option) and options.is_given(other):
                 raise click.UsageError(f"{flags[other]} and {flags[option]} contradict each other: {reason}")
+    if options.is_given("model") and not options.is_given("tolerance"):
+        raise click.UsageError("--model goes with --tolerance: it says on which head that is measured")

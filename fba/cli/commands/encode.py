@@ -47,6 +47,7 @@ class _EncodeCommand(Command):
         "fba encode walk.bvh -o walk.fba",
         "fba encode face.csv -o face.fba",
         "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4 --bap-steps visage",
+        "fba encode talk.fap -o talk.fba --tolerance 0.5mm",
         "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
         "fba encode talk.fap -o again.fba --epf talk.epf",
         "fba encode walk.bvh -o walk.fba --report --limits report",
@@ -246,6 +247,7 @@ def command(
         return
     for line in (
         coded.summary(output, animation),
+        *coded.details(animation),
         *(together_lines(inputs, taken.together) if taken.together is not None else ()),
         *((voice.voice_line(spoken),) if spoken is not None else ()),
         *clamped_lines(coded.clamped),

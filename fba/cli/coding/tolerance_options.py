@@ -1,0 +1,95 @@
+"""`--tolerance`: how far what is shown may be off, and what encoding within that came to."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli.inputs import read_model
+
+if TYPE_CHECKING:
+    from fba.animation import Animation
+    from fba.codec import EncoderOptions
+    from fba.planning import NearLossless
+
+UNITS = {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "\u00b5m": 1e-6, "\u03bcm": 1e-6}
+"""Metres of the units that a length may have; the last two have the micro sign and the Greek letter."""
+
+
+class LengthType(click.ParamType[float]):
+    """A positive length with its unit, in metres: 0.5mm."""
+
+    name = "length"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        text = str(value).strip()
+        match = re.fullmatch(r"([0-9.eE+-]+)\s*([a-zA-Z\u00b5\u03bc]*)", text)
+        try:
+            number = float(match[1]) if match else math.nan
+        except ValueError:
+            number = math.nan
+        if match is None or not math.isfinite(number):
+            self.fail(f"{text!r} is not a length; write a number and its unit, as 0.5mm", param, ctx)
+        if number <= 0:
+            self.fail(f"{text} is not positive", param, ctx)
+        if not match[2]:
+            self.fail(f"{text} has no unit; write {match[1]}mm, {match[1]}cm or {match[1]}um", param, ctx)
+        if match[2] not in UNITS:
+            self.fail(f"{match[2]!r} is not a unit of a tolerance; use mm, cm or um", param, ctx)
+        return number * UNITS[match[2]]
+
+
+def encode_near(
+    animation: Animation, options: EncoderOptions, tolerance: float, model: Path | None
+) -> tuple[bytes, NearLossless]:
+    """Return the stream within a tolerance in metres. model: file of the head; None for the built-in one."""
+    from fba.planning import Tolerance, encode_within_tolerance
+
+    return encode_within_tolerance(animation, Tolerance(face=tolerance), options, read_model(model))
+
+
+def tolerance_lines(result: NearLossless, animation: Animation) -> list[str]:
+    """Return what encoding within a tolerance came to, for people."""
+    face = result.face
+    if face is None:
+        return []
+    head = f"the head's angles are within {face.head:.3f} degrees"
+    if face.largest:
+        lines = [
+            f"face: vertices move by at most {face.largest * 1000:.3f} mm (vertex {face.vertex} at "
+            f"{float(animation.times[face.frame]):.2f} s), 99 % of them by at most "
+            f"{face.percentile_99 * 1000:.3f} mm; {head}"
+        ]
+    else:
+        lines = [f"face: no vertex moves; {head}"]
+    if result.compact:
+        lines.append("nothing smaller keeps within the tolerance than what keeps all that is shown")
+    elif result.left_out:
+        lines.append(
+            f"{result.left_out} of {len(animation)} frames are not sent; players fill them in between those "
+            f"beside them; quantiser of FAPs {result.fap_quant}"
+        )
+    return lines
+
+
+def tolerance_values(result: NearLossless) -> dict[str, Any]:
+    """Return the same for programs."""
+    face = result.face
+    values: dict[str, Any] = {
+        "fap_quant": result.fap_quant,
+        "frames_left_out": result.left_out,
+        "compact": result.compact,
+    }
+    if face is not None:
+        values["face"] = {
+            "largest_mm": round(face.largest * 1000, 6),
+            "percentile_99_mm": round(face.percentile_99 * 1000, 6),
+            "frame": face.frame,
+            "vertex": face.vertex,
+            "head_degrees": round(face.head, 6),
+        }
+    return values

@@ -1,0 +1,101 @@
+"""`fba encode --tolerance`: what it prints, what it refuses, and that the file keeps what it promises."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation, FaceTrack
+from fba.face import Deformer, FaceModel
+from fba.face.resolve import resolve
+
+Run = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def talk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A FAP file: a mouth that opens, a smile, and a head that turns."""
+    time = np.arange(60) / 25
+    values = np.zeros((60, 68))
+    values[:, 2] = np.abs(200 * np.sin(7 * time))  # open_jaw
+    values[:, [11, 12, 58, 59]] = (60 * np.sin(3 * time))[:, None]
+    values[:, 48] = 9000 * np.sin(2 * time)
+    mask = np.tile(values.any(axis=0), (60, 1))
+    step = np.array([1, 1, *(one.step for one in fba.parameters.faps()[2:])])
+    faps = FaceTrack((np.rint(values / step) * step).astype(np.int32), mask)
+    path = tmp_path_factory.mktemp("talk") / "talk.fap"
+    fba.write(path, Animation(25, np.arange(60), faps))
+    return path
+
+
+def test_the_file_keeps_what_is_printed(run: Run, talk: Path, tmp_path: Path) -> None:
+    done = run("encode", talk, "-o", tmp_path / "a.fba", "--tolerance", "0.05cm", "--json")
+    assert (done.code, done.err) == (0, "")
+    near = json.loads(done.out)["tolerance"]
+    assert 0.3 < near["face"]["largest_mm"] <= 0.5
+    assert run("decode", tmp_path / "a.fba", "--fap", tmp_path / "b.fap").code == 0
+    source, decoded = fba.read(talk), fba.read(tmp_path / "b.fap")
+    assert decoded.face is not None
+    assert source.face is not None
+    assert near["frames_left_out"] == len(source) - len(decoded) > 0
+    shown = resolve(decoded.face).astype(float)
+    shown = np.stack([np.interp(source.index, decoded.index, one) for one in shown.T], axis=1)
+    deformer = Deformer(FaceModel.default())
+    moved = deformer.local(resolve(source.face)).astype(float) - deformer.local(shown)
+    assert np.linalg.norm(moved, axis=2).max() * 1000 == pytest.approx(near["face"]["largest_mm"], abs=1e-4)
+
+
+def test_what_is_printed(run: Run, talk: Path, tmp_path: Path) -> None:
+    done = run("encode", talk, "-o", tmp_path / "a.fba", "--tolerance", "500 um")
+    size, face, left_out = done.out.splitlines()
+    assert size.startswith(str(tmp_path / "a.fba"))
+    assert face.startswith("face: vertices move by at most 0.4")
+    assert "of 60 frames are not sent" in left_out
+    exact = run("encode", talk, "-o", tmp_path / "a.fba", "--tolerance", "0.000001mm").out
+    assert "face: no vertex moves; the head's angles are within" in exact
+
+
+@pytest.mark.parametrize(
+    ("given", "answer"),
+    [
+        ("0.5", "0.5 has no unit; write 0.5mm, 0.5cm or 0.5um"),
+        ("-1mm", "-1mm is not positive"),
+        ("0mm", "0mm is not positive"),
+        ("3ft", "'ft' is not a unit of a tolerance; use mm, cm or um"),
+        ("small", "'small' is not a length; write a number and its unit, as 0.5mm"),
+        ("1e999mm", "'1e999mm' is not a length"),
+    ],
+)
+def test_lengths_that_are_none(run: Run, talk: Path, tmp_path: Path, given: str, answer: str) -> None:
+    done = run("encode", talk, "-o", tmp_path / "a.fba", f"--tolerance={given}")
+    assert done.code == 2
+    assert answer in " ".join(done.err.split())
+    assert not (tmp_path / "a.fba").exists()
+
+
+@pytest.mark.parametrize(
+    "options", [("--preset", "exact"), ("--quant", 3), ("--bap-quant", 3), ("--unsent", "keep")]
+)
+def test_what_a_tolerance_decides(run: Run, talk: Path, tmp_path: Path, options: tuple[str, ...]) -> None:
+    done = run("encode", talk, "-o", tmp_path / "a.fba", "--tolerance", "1mm", *options)
+    assert done.code == 2
+    assert f"{options[0]} and --tolerance contradict each other" in " ".join(done.err.split())
+
+
+def test_a_head_of_ones_own(run: Run, talk: Path, tmp_path: Path) -> None:
+    alone = run("encode", talk, "-o", tmp_path / "a.fba", "--model", talk)
+    assert alone.code == 2
+    assert "--model goes with --tolerance" in alone.err
+    FaceModel.default().save(tmp_path / "head.glb")
+    sizes = []
+    for options in ((), ("--model", tmp_path / "head.glb")):
+        done = run("encode", talk, "-o", tmp_path / "a.fba", "--tolerance", "0.5mm", *options)
+        assert (done.code, done.err) == (0, "")
+        sizes.append((tmp_path / "a.fba").stat().st_size)
+    assert sizes[0] == pytest.approx(sizes[1], rel=0.05)
