@@ -18,6 +18,8 @@ Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 OPTIONS = {
     "fps": "fps",
     "rate": "fps",
+    "bit_rate": "bitrate",
+    "buffer": "buffer",
     "format": "format",
     "salvage": "salvage",
     "clamp": "clamp",

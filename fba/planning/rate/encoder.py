@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fba.animation import Animation, Frame
-from fba.codec import Encoder, EncoderOptions, EncoderStatistics
+from fba.codec import Encoder, EncoderOptions, EncoderStatistics, write_mark
 from fba.errors import FbaWarning, RangeError, Remedy
 from fba.planning.rate.bucket import LeakyBucket
 from fba.planning.rate.expectations import expected_motion, quantiser_for
@@ -34,7 +34,9 @@ STILL_SHARE = 2.0
 LONGEST_GAP = 0.2
 """Seconds between two planes, unless the buffer is full."""
 SPARE = 96
-"""Bits that always stay free: for the end of the stream, and for start codes that keep planes apart."""
+"""Bits that always stay free: for the end of the stream, and for start codes that keep planes apart; a mark
+behind the end takes more.
+"""
 LEARNING = 16
 """Bits by which a plane without a change may cost more after the next plane than it does now."""
 SKIP_BITS = 4
@@ -58,7 +60,7 @@ class RateStatistics(EncoderStatistics):
 class RateEncoder:
     """Encodes frames as they come, at a mean rate: `push` and `finish` return the bytes that are complete.
 
-    rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size at the
+    bit_rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size at the
     time of its frame. A plane is returned when the frame after it comes. options: as for `Encoder`; their
     quantisers count unless choose_quantisers is set, which takes one that suits the rate and the frame.
 
@@ -74,18 +76,19 @@ class RateEncoder:
 
     def __init__(
         self,
-        rate: float,
+        bit_rate: float,
         buffer: float = 1.0,
         options: EncoderOptions | None = None,
         *,
         choose_quantisers: bool = True,
         finest: float = 0.05,
     ) -> None:
-        self.bucket = LeakyBucket(rate, rate * buffer)
+        self.bucket = LeakyBucket(bit_rate, bit_rate * buffer)
         self.statistics = RateStatistics()
         self._encoder = Encoder(options)
         self._choose = choose_quantisers
         self._finest = finest
+        self._spare = SPARE + 8 * len(write_mark(self.options.bap_steps)) * self.options.mark
         self._expected: Animation | None = None
         self._exactly = False
         self._last: Animation | None = None  # the last frame with a plane, as it was pushed
@@ -198,9 +201,9 @@ class RateEncoder:
             trial.push_animation(frame)
             trial.settle(index + 1)
         bits = trial.bits - before
-        if bits + SPARE > self.bucket.size:
-            raise self._too_small(bits + SPARE)
-        if bits + SPARE > self.bucket.room:
+        if bits + self._spare > self.bucket.size:
+            raise self._too_small(bits + self._spare)
+        if bits + self._spare > self.bucket.room:
             return None
         data = self._encoder.settle(index)
         self._begin_segment(self._encoder, frame)
@@ -225,7 +228,7 @@ class RateEncoder:
     def _push_predicted(self, frame: Animation) -> bytes:
         """Encode a frame as a P plane, at a price at which it fits the buffer."""
         data = self._encoder.settle(int(frame.index[0]))
-        room = self.bucket.room - SPARE - SKIP_BITS
+        room = self.bucket.room - self._spare - SKIP_BITS
         plane = self._encoder.next_plane(frame)
         assert plane is not None
         price, weights = self._price(), slot_weights()
@@ -250,7 +253,7 @@ class RateEncoder:
     def _plan_gap(self, frame: Animation, still: int) -> None:
         """Set from which frame on a plane may come. still: bits of a plane without a change."""
         bucket, period = self.bucket, float(1 / frame.rate)
-        need = still + LEARNING + SPARE + SKIP_BITS
+        need = still + LEARNING + self._spare + SKIP_BITS
         longest = max(1, math.floor(LONGEST_GAP / period + 1e-9))
         gap = 1
         while gap < longest and (
@@ -273,7 +276,7 @@ class RateEncoder:
             f"an I plane takes {bits} bits, more than the buffer of {size:.0f} bits holds "
             f"({rate:g} bit/s for {seconds:g} s)"
         ).with_remedies(
-            Remedy("rate", "give a rate of at least {}", str(math.ceil(bits / seconds))),
+            Remedy("bit_rate", "give a rate of at least {}", str(math.ceil(bits / seconds))),
             Remedy("buffer", "or a buffer of at least {}", f"{math.ceil(100 * bits / rate) / 100:g}"),
         )
 

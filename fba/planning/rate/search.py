@@ -46,11 +46,11 @@ class RatedStream:
 
 
 def encode_at_rate(
-    animation: Animation, rate: float, buffer: float = 1.0, options: EncoderOptions | None = None
+    animation: Animation, bit_rate: float, buffer: float = 1.0, options: EncoderOptions | None = None
 ) -> RatedStream:
-    """Return the stream that loses least at a rate, in bits a second.
+    """Return the stream that loses least at a bit rate.
 
-    buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size. What players derive by the
+    bit_rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size. What players derive by the
     standard's rules is not sent, as in `plan_compact`, with one choice for all frames. Quantisers are tried
     on the first half minute; those in `options` do not count.
 
@@ -63,11 +63,11 @@ def encode_at_rate(
     sent = _to_send(quantise(animation, replace(options, fap_quant=1, bap_quant=1)), options)
     beginning = sent[: max(1, math.ceil(TRIED_SECONDS * float(animation.rate)))]
     best = _best_setting(
-        beginning, sent, rate, buffer, [_Setting(one, FINEST[0]) for one in QUANTISERS], options
+        beginning, sent, bit_rate, buffer, [_Setting(one, FINEST[0]) for one in QUANTISERS], options
     )
     finer = [_Setting(best.quantiser, finest) for finest in FINEST]
-    best = _best_setting(beginning, sent, rate, buffer, finer, options)
-    return _encode(sent, sent, rate, buffer, best, options)
+    best = _best_setting(beginning, sent, bit_rate, buffer, finer, options)
+    return _encode(sent, sent, bit_rate, buffer, best, options)
 
 
 class _Setting(NamedTuple):
