@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.cli.clamped_values import clamped_values
+from fba.cli.coding.rate_options import HeldRate, encode_held, rate_lines, rate_values
 from fba.cli.coding.size_options import Size
 from fba.cli.coding.tolerance_options import encode_near, tolerance_lines, tolerance_values
 from fba.cli.inputs import input_file
@@ -27,8 +28,8 @@ class CodedStream:
     """A stream, and what it took.
 
     clamped: parameters with values that no plane could carry, by label. bap_quant: the largest of any plane;
-    0 if BAPs are unquantised. rounded: values of FAP and BAP files that no stream carries as they are. near:
-    how near it is to its source, if that was asked for.
+    0 if BAPs are unquantised. rounded: values of FAP and BAP files that no stream carries as they are. near,
+    held: how near it is to its source, and how it held to a bit rate, if that was asked for.
     """
 
     data: bytes
@@ -38,6 +39,7 @@ class CodedStream:
     bap_quant: int
     rounded: int = 0
     near: NearLossless | None = None
+    held: HeldRate | None = None
 
     @property
     def clamped_count(self) -> int:
@@ -61,10 +63,13 @@ class CodedStream:
             "clamped": self.clamped_count,
             "clamped_parameters": clamped_values(self.clamped),
             **({"tolerance": tolerance_values(self.near)} if self.near is not None else {}),
+            **({"bitrate": rate_values(self.held)} if self.held is not None else {}),
         }
 
     def details(self, animation: Animation) -> list[str]:
         """Return what else is said of the stream of this animation: how near it is to its source."""
+        if self.held is not None:
+            return rate_lines(self.held)
         return tolerance_lines(self.near, animation) if self.near is not None else []
 
     def summary(self, output: Path, animation: Animation) -> str:
@@ -95,6 +100,10 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
         return CodedStream(
             data, counts.planes, counts.intra_planes, counts.clamped_parameters, options.bap_quant, near=near
         )
+    if size.bitrate is not None:
+        data, held = encode_held(animation, options, size.bitrate, size.buffer)
+        own = held.statistics
+        return CodedStream(data, own.planes, own.intra_planes, own.clamped_parameters, held.quant, held=held)
     preset = size.preset or ("compact" if inputs.has_captured_face else "exact")
     kept = inputs.text_parts
     rounded: dict[str, int] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -13,9 +13,11 @@ from fba.cli.command import Decorated
 from fba.cli.options import is_given
 
 if TYPE_CHECKING:
+    from fba.animation import Animation
+    from fba.codec import EncoderOptions
     from fba.planning.rate import RateStatistics, ShownErrors
 
-BITS = {"": 1.0, "bit/s": 1.0, "kbit/s": 1e3, "mbit/s": 1e6}
+BITS = {"": 1.0, "bit/s": 1.0, "kbit/s": 1e3, "Mbit/s": 1e6}
 """Bits a second of the units that a bit rate may have."""
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3}
 LARGEST = 1e9
@@ -41,13 +43,14 @@ class AmountType(click.ParamType[float]):
             number = math.nan
         if match is None or math.isnan(number):
             self.fail(f"{text!r} is no {self.name}; write e.g. {self._example}", param, ctx)
-        unit = match[2].lower()
-        if unit not in self._units:
+        if match[2] not in self._units:
             known = ", ".join(one for one in self._units if one)
             self.fail(f"{match[2]!r} is no unit of a {self.name}; they are {known}", param, ctx)
-        amount = number * self._units[unit]
+        amount = number * self._units[match[2]]
         if not 0 < amount <= LARGEST:
-            self.fail(f"{text} is out of reach: a {self.name} is positive, and at most {LARGEST:g}", param, ctx)
+            self.fail(
+                f"{text} is out of reach: a {self.name} is positive, and at most {LARGEST:g}", param, ctx
+            )
         return amount
 
 
@@ -75,23 +78,47 @@ def check_buffer() -> None:
         raise click.UsageError("--buffer goes with --bitrate: it says how closely that is held")
 
 
-def rate_lines(
-    bitrate: float, buffer: float, statistics: RateStatistics, quant: int, errors: ShownErrors | None
-) -> list[str]:
+class HeldRate(NamedTuple):
+    """What holding to a bit rate came to.
+
+    bitrate: bits a second. buffer: seconds. quant: of FAPs and BAPs. errors: None where they are not known.
+    """
+
+    bitrate: float
+    buffer: float
+    statistics: RateStatistics
+    quant: int
+    errors: ShownErrors | None = None
+
+
+def encode_held(
+    animation: Animation, options: EncoderOptions, bitrate: float, buffer: float | None
+) -> tuple[bytes, HeldRate]:
+    """Return the stream at a rate. buffer: None for the default."""
+    from fba.planning.rate import encode_at_rate, measure_errors
+
+    seconds = DEFAULT_BUFFER if buffer is None else buffer
+    found = encode_at_rate(animation, bitrate, seconds, options)
+    errors = measure_errors(animation, found.shown)
+    return found.data, HeldRate(bitrate, seconds, found.statistics, found.options.fap_quant, errors)
+
+
+def rate_lines(held: HeldRate) -> list[str]:
     """Return what holding to a rate came to, for people."""
+    counts = held.statistics
     text = (
-        f"held to {bitrate:g} bit/s: never more than {statistics.peak / bitrate:.2f} s ahead, of {buffer:g} s; "
-        f"quantiser {quant}"
+        f"held to {held.bitrate:g} bit/s: at most {counts.peak / held.bitrate:.2f} s ahead, of "
+        f"{held.buffer:g} s; quantiser {held.quant}"
     )
-    if statistics.left_out:
+    if counts.left_out:
         text += (
-            f"; {statistics.left_out} of {statistics.frames} frames are not sent, for {statistics.longest_gap:.2f} s "
-            "at most"
+            f"; {counts.left_out} of {counts.frames} frames are not sent, planes are at most "
+            f"{counts.longest_gap:.2f} s apart"
         )
-    return [text, *(error_lines(errors) if errors is not None else ())]
+    return [text, *(_error_lines(held.errors) if held.errors is not None else ())]
 
 
-def error_lines(errors: ShownErrors) -> list[str]:
+def _error_lines(errors: ShownErrors) -> list[str]:
     """Return how far what is shown is off."""
     if not errors.parameters:
         return ["nothing that is sent is off"]
@@ -99,46 +126,55 @@ def error_lines(errors: ShownErrors) -> list[str]:
     if errors.face is not None:
         lines.append(
             f"face: vertices move by at most {errors.face.largest * 1000:.2f} mm, 99 % of them by at most "
-            f"{errors.face.percentile * 1000:.2f} mm; the head's angles are within {errors.face.head:.2f} degrees"
+            f"{errors.face.percentile * 1000:.2f} mm; the head's angles are within {errors.face.head:.2f} "
+            "degrees"
         )
     if errors.body is not None:
         lines.append(
-            f"body: points 3 cm off joints move by at most {errors.body.largest * 1000:.1f} mm, 99 % of them by "
-            f"at most {errors.body.percentile * 1000:.1f} mm; feet that stand by at most "
+            f"body: points 3 cm off joints move by at most {errors.body.largest * 1000:.1f} mm, 99 % of them "
+            f"by at most {errors.body.percentile * 1000:.1f} mm; feet that stand by at most "
             f"{errors.body.feet * 1000:.1f} mm"
         )
     named = [
-        f"{one.label} {one.largest:g} (99 %: {one.percentile:g})" for one in errors.parameters[:MOST_PARAMETERS]
+        f"{one.label} {one.largest:g} (99 %: {one.percentile:g})"
+        for one in errors.parameters[:MOST_PARAMETERS]
     ]
     more = len(errors.parameters) - len(named)
-    return [*lines, f"off at most, in units: {', '.join(named)}{f', and {more} parameters less' if more else ''}"]
+    return [
+        *lines,
+        f"off at most, in units: {', '.join(named)}{f', and {more} parameters less' if more else ''}",
+    ]
 
 
-def rate_values(
-    bitrate: float, buffer: float, statistics: RateStatistics, errors: ShownErrors | None
-) -> dict[str, Any]:
+def rate_values(held: HeldRate) -> dict[str, Any]:
     """Return the same for programs."""
+    counts = held.statistics
     values: dict[str, Any] = {
-        "bits_per_second": bitrate,
-        "buffer": buffer,
-        "largest_in_buffer": round(statistics.peak / bitrate, 6),
-        "frames_left_out": statistics.left_out,
-        "longest_gap": round(statistics.longest_gap, 6),
+        "bits_per_second": held.bitrate,
+        "buffer": held.buffer,
+        "most_ahead": round(counts.peak / held.bitrate, 6),
+        "quantiser": held.quant,
+        "frames_left_out": counts.left_out,
+        "longest_gap": round(counts.longest_gap, 6),
     }
-    if errors is not None:
-        values["parameters"] = {
+    return values | (_error_values(held.errors) if held.errors is not None else {})
+
+
+def _error_values(errors: ShownErrors) -> dict[str, Any]:
+    """Return how far what is shown is off, for programs."""
+    values: dict[str, Any] = {
+        "parameters": {
             one.label: {"largest": one.largest, "percentile_99": one.percentile} for one in errors.parameters
         }
-        if errors.face is not None:
-            values["face"] = {
-                "largest_mm": round(errors.face.largest * 1000, 6),
-                "percentile_99_mm": round(errors.face.percentile * 1000, 6),
-                "head_degrees": round(errors.face.head, 6),
+    }
+    for name, found in (("face", errors.face), ("body", errors.body)):
+        if found is not None:
+            values[name] = {
+                "largest_mm": round(found.largest * 1000, 6),
+                "percentile_99_mm": round(found.percentile * 1000, 6),
             }
-        if errors.body is not None:
-            values["body"] = {
-                "largest_mm": round(errors.body.largest * 1000, 6),
-                "percentile_99_mm": round(errors.body.percentile * 1000, 6),
-                "feet_mm": round(errors.body.feet * 1000, 6),
-            }
+    if errors.face is not None:
+        values["face"]["head_degrees"] = round(errors.face.head, 6)
+    if errors.body is not None:
+        values["body"]["feet_mm"] = round(errors.body.feet * 1000, 6)
     return values

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from fba.cli import options
+from fba.cli.coding.rate_options import check_buffer, rate_options
 from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Decorated
 
@@ -21,12 +22,14 @@ class Size:
     """How small a stream is to be, and what may be lost for that, as far as options say it; else None.
 
     preset: what is sent. fap_quant, bap_quant: how finely. tolerance: metres by which vertices may move, on
-    the head of `model`.
+    the head of `model`. bitrate: bits a second; buffer: seconds that the stream may be ahead of them.
     """
 
     preset: str | None = None
     tolerance: float | None = None
     model: Path | None = None
+    bitrate: float | None = None
+    buffer: float | None = None
     fap_quant: int | None = None
     bap_quant: int | None = None
 
@@ -67,6 +70,7 @@ def size_options(command: Decorated) -> Decorated:
                 metavar="FILE",
                 help="With --tolerance: the head whose vertices count. Default: the built-in head.",
             ),
+            rate_options,
             click.option(
                 "--quant",
                 "fap_quant",
@@ -98,8 +102,8 @@ CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
         "the tolerance decides what is sent, and how finely",
     ),
     "bitrate": (
-        ("preset", *QUANTISERS, "unsent"),
-        "the bit rate decides what is sent, and how finely",
+        ("preset", *QUANTISERS, "unsent", "intra_period"),
+        "the bit rate decides what is sent, how finely, and where I planes come",
     ),
 }
 """Options that decide all that some others decide, those others, and the reason to give."""
@@ -115,3 +119,4 @@ def check_sizes() -> None:
                 raise click.UsageError(f"{flags[other]} and {flags[option]} contradict each other: {reason}")
     if options.is_given("model") and not options.is_given("tolerance"):
         raise click.UsageError("--model goes with --tolerance: it says on which head that is measured")
+    check_buffer()

@@ -48,6 +48,7 @@ class _EncodeCommand(Command):
         "fba encode face.csv -o face.fba",
         "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4 --bap-steps visage",
         "fba encode talk.fap -o talk.fba --tolerance 0.5mm",
+        "fba encode talk.fap -o talk.fba --bitrate 1.5kbit/s --buffer 0.5s",
         "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
         "fba encode talk.fap -o again.fba --epf talk.epf",
         "fba encode walk.bvh -o walk.fba --report --limits report",

@@ -60,8 +60,8 @@ class RateStatistics(EncoderStatistics):
 class RateEncoder:
     """Encodes frames as they come, at a mean rate: `push` and `finish` return the bytes that are complete.
 
-    bit_rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size at the
-    time of its frame. A plane is returned when the frame after it comes. options: as for `Encoder`; their
+    bit_rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size at
+    the time of its frame. A plane is returned when the frame after it comes. options: as for `Encoder`; their
     quantisers count unless choose_quantisers is set, which takes one that suits the rate and the frame.
 
     Each frame is approximated (`Encoder.next_plane`) at a price that grows as the buffer fills: what is seen
@@ -88,7 +88,7 @@ class RateEncoder:
         self._encoder = Encoder(options)
         self._choose = choose_quantisers
         self._finest = finest
-        self._spare = SPARE + 8 * len(write_mark(self.options.bap_steps)) * self.options.mark
+        self._spare = SPARE
         self._expected: Animation | None = None
         self._exactly = False
         self._last: Animation | None = None  # the last frame with a plane, as it was pushed
@@ -192,6 +192,8 @@ class RateEncoder:
     def _push_intra(self, frame: Animation) -> bytes | None:
         """Encode a frame as an I plane; None where the buffer has no room for that yet."""
         index = int(frame.index[0])
+        if frame.body is not None and self.options.mark:
+            self._spare = SPARE + 8 * len(write_mark(self.options.bap_steps))
         trial = copy.deepcopy(self._encoder)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FbaWarning)  # given below

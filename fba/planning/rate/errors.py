@@ -59,8 +59,8 @@ class ShownErrors:
 def measure_errors(wanted: Animation, shown: Animation) -> ShownErrors:
     """Return what is shown otherwise, at every frame of `wanted`.
 
-    Between the frames of `shown`, values go on in straight lines, as players show them. FAPs as a face without
-    an interpolation table of its own shows them.
+    Between the frames of `shown`, values go on in straight lines, as players show them. FAPs as a face
+    without an interpolation table of its own shows them.
     """
     there, here = _values(wanted), _at(_values(shown), wanted, shown)
     face = body = None
@@ -70,9 +70,7 @@ def measure_errors(wanted: Animation, shown: Animation) -> ShownErrors:
         pair = there[:, FACE_PARAMETERS:], here[:, FACE_PARAMETERS:]
         moved = displacements(*pair, float(wanted.rate))
         percentile = float(np.percentile(moved.joints, 99))
-        body = DistanceErrors(
-            float(moved.joints.max()), percentile, feet=float(moved.feet.max(initial=0.0))
-        )
+        body = DistanceErrors(float(moved.joints.max()), percentile, feet=float(moved.feet.max(initial=0.0)))
     return ShownErrors(_parameter_errors(np.abs(there - here)), face, body)
 
 

@@ -50,9 +50,9 @@ def encode_at_rate(
 ) -> RatedStream:
     """Return the stream that loses least at a bit rate.
 
-    bit_rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size. What players derive by the
-    standard's rules is not sent, as in `plan_compact`, with one choice for all frames. Quantisers are tried
-    on the first half minute; those in `options` do not count.
+    bit_rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size. What
+    players derive by the standard's rules is not sent, as in `plan_compact`, with one choice for all frames.
+    Quantisers are tried on the first half minute; those in `options` do not count.
 
     A stream that needs less than the rate takes less. Raises RangeError for a buffer that no I plane fits,
     ValueError for an animation without frames and for a rate or a buffer that is not positive.
