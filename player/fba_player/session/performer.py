@@ -116,7 +116,7 @@ class Performer:
 
     def _face_moved(self) -> bool:
         puppet = self.puppet
-        return bool(puppet.speaks or puppet.feels or puppet.fap_moved.any())
+        return bool(puppet.speaks or puppet.feels or puppet.mood.active or puppet.fap_moved.any())
 
 
 def neutral(*, body: bool = False, name: str = "puppet") -> Animation:

@@ -16,6 +16,7 @@ from fba.parameters import (
     INTENSITY_MAX,
     VISEME_SELECT_MAX,
 )
+from fba_player.session.mood import PuppetMood
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +51,11 @@ class Puppet:
 
     A FAP or BAP that was moved has that value until it is released; all others have the value that is played.
     A viseme replaces all FAPs that visemes move; an expression is added to what is played, as with init_face
-    of the standard. FAPs moved by hand replace both.
+    of the standard. A mood moves the rest shape, and all of this is added to it. FAPs moved by hand replace
+    all.
 
-    definitions: of visemes and expressions, by default the built-in ones. motion: FAPs (68,) and BAPs (296,)
-    of the last picture before they were changed; shown: the same afterwards.
+    mood: see `PuppetMood`. definitions: of visemes and expressions, by default the built-in ones. motion:
+    FAPs (68,) and BAPs (296,) of the last picture before they were changed; shown: the same afterwards.
     """
 
     def __init__(self, definitions: Definitions | None = None) -> None:
@@ -61,6 +63,7 @@ class Puppet:
         self._mouth = self._definitions.visemes.any(axis=0)
         self._fap_values = np.zeros(FAP_COUNT, np.float32)
         self._bap_values = np.zeros(BAP_COUNT)
+        self.mood = PuppetMood()
         self.fap_moved = np.zeros(FAP_COUNT, bool)
         self.bap_moved = np.zeros(BAP_COUNT, bool)
         self._viseme, self._expression = Viseme(), Expression()
@@ -76,6 +79,7 @@ class Puppet:
             np.copyto(faps, self._spoken, where=self._mouth)
         if self.feels:
             faps += self._felt
+        self.mood.apply(faps)
         np.copyto(faps, self._fap_values, where=self.fap_moved)
         np.copyto(baps, self._bap_values, where=self.bap_moved)
         self.shown = (faps.copy(), baps.copy())
@@ -83,7 +87,8 @@ class Puppet:
     @property
     def idle(self) -> bool:
         """Whether it changes nothing."""
-        return not (self.speaks or self.feels or self.fap_moved.any() or self.bap_moved.any())
+        moved = self.fap_moved.any() or self.bap_moved.any()
+        return not (self.speaks or self.feels or self.mood.active or moved)
 
     @property
     def speaks(self) -> bool:
@@ -147,7 +152,8 @@ class Puppet:
                 moved[number - 1] = False
 
     def release_all(self) -> None:
-        """Release everything, including visemes and expressions."""
+        """Release everything, including visemes, expressions and the mood."""
+        self.mood.release()
         self.fap_moved[:] = False
         self.bap_moved[:] = False
         self.viseme, self.expression = Viseme(), Expression()

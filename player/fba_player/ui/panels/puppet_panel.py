@@ -12,6 +12,7 @@ from fba_player.session.performer import Performer
 from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels._curve_data import parameter
+from fba_player.ui.panels._puppet_emotion import EmotionTab
 from fba_player.ui.panels._puppet_rows import Group, Row, groups
 from fba_player.ui.panels._puppet_speech import draw_expressions, draw_visemes
 from fba_player.ui.panels.panel import Panel, shorten, tooltip
@@ -25,7 +26,7 @@ SHORTEST = 70.0
 
 
 class PuppetPanel(Panel):
-    """Sliders for FAPs and the body, visemes, expressions, and takes."""
+    """Sliders for FAPs and the body, visemes, expressions, moods, and takes."""
 
     name, title, label = "puppet", "Puppeteer", "Puppet"
     width, height, least = 380.0, 530.0, 280.0
@@ -36,10 +37,11 @@ class PuppetPanel(Panel):
         self._zeroed = ""
         self.together = True
         """Whether left and right move together."""
+        self.emotion = EmotionTab()
         self.sliders: dict[tuple[str, int], tuple[float, float, float]] = {}
         """Sliders in view by (group, row): left, right and vertical middle in points; for tests."""
         self.buttons: dict[str, tuple[float, float]] = {}
-        """Centres of the buttons by name, in points; for tests."""
+        """Centres of buttons and tabs by name, in points; for tests."""
 
     def available(self, session: Session) -> bool:
         """Whether a single animation is shown."""
@@ -67,18 +69,22 @@ class PuppetPanel(Panel):
         imgui.end_disabled()
         self.sliders = {}
         if imgui.begin_tab_bar("parts"):
-            for title, kind in (("Face", "fap"), ("Speech, mood", ""), ("Body", "bap")):
+            for title, kind in (("Face", "fap"), ("Speech", "speech"), ("Mood", "mood"), ("Body", "bap")):
                 if kind == "bap" and not session.scene.has_body:
                     continue
-                if imgui.begin_tab_item(title)[0]:
+                opened = imgui.begin_tab_item(title)[0]
+                self._remember(title)
+                if opened:
                     imgui.push_style_var(imgui.StyleVar_.frame_padding, (8, 3))
                     imgui.push_style_var(imgui.StyleVar_.item_spacing, (8, 4))
                     imgui.begin_child("rows", (0, 0))
-                    if kind:
-                        self._groups(performer, kind)
-                    else:
+                    if kind == "speech":
                         draw_visemes(performer)
                         draw_expressions(performer)
+                    elif kind == "mood":
+                        self.emotion.draw(performer.puppet.mood)
+                    else:
+                        self._groups(performer, kind)
                     imgui.end_child()
                     imgui.pop_style_var(2)
                     imgui.end_tab_item()
@@ -128,9 +134,12 @@ class PuppetPanel(Panel):
 
     def _button(self, text: str) -> bool:
         pressed = imgui.button(text)
-        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-        self.buttons[text.rpartition("###")[2]] = ((low.x + high.x) / 2, (low.y + high.y) / 2)
+        self._remember(text.rpartition("###")[2])
         return bool(pressed)
+
+    def _remember(self, name: str) -> None:
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        self.buttons[name] = ((low.x + high.x) / 2, (low.y + high.y) / 2)
 
     def _groups(self, performer: Performer, kind: str) -> None:
         first = True
