@@ -14,7 +14,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
 from fba.face.deform.displacements import DisplacementMeter
-from fba.face.deform.flat_tables import Shifts, Transforms
+from fba.face.deform.flat_tables import KIND_ORDER, Shifts, Transforms
 from fba.face.mates import donors
 from fba.face.model import FaceModel
 from fba.parameters import FAP_COUNT
@@ -29,6 +29,8 @@ NEAR = 0.5
 """Share of the tolerance within which a border of intervals counts as near."""
 ALIKE = 0.05
 """Slopes that differ by less than this share of the steepest are the same."""
+
+TRANSLATION, ROTATION = (KIND_ORDER.index(kind) for kind in ("translation", "rotation"))
 
 _worst_vertices: WeakKeyDictionary[FaceModel, Int64] = WeakKeyDictionary()
 """Cache of the worst vertices, as long as their models live."""
@@ -50,6 +52,15 @@ class Slopes(NamedTuple):
     largest: float
 
 
+class _Turn(NamedTuple):
+    """What a step of a FAP moves in a row along an axis, in shares of the tolerance."""
+
+    column: int
+    row: int
+    axis: int
+    step: float
+
+
 class ErrorBasis:
     """Rows in which errors of FAPs add up: vertices and turns.
 
@@ -61,8 +72,8 @@ class ErrorBasis:
         self._shifts = meter.shifts
         vertices = _find_worst_vertices(meter)
         turns = _turn_rows(meter.model, meter.transforms, tolerance)
-        self.count = len(vertices) + 1 + max((row for row, _ in turns.values()), default=-1)
-        self._turns = {column: (len(vertices) + row, vector) for column, (row, vector) in turns.items()}
+        self.count = len(vertices) + 1 + max((turn.row for turn in turns), default=-1)
+        self._turns = [turn._replace(row=len(vertices) + turn.row) for turn in turns]
         self._slopes = _slopes_at(self._shifts, vertices, self.count) / np.float32(tolerance.face)
         lengths = np.linalg.norm(self._slopes, axis=2)
         self._lengths = lengths.max(axis=1, initial=0.0)
@@ -88,10 +99,9 @@ class ErrorBasis:
             highest = np.minimum(highest, self._highest[near[2]])
         distinct, which = np.unique(intervals, axis=0, return_inverse=True)
         table = self._slopes[distinct].sum(axis=1)
-        for column in columns:
-            if column in self._turns:
-                row, vector = self._turns[column]
-                table[:, row] += vector
+        for turn in self._turns:
+            if turn.column in columns:
+                table[:, turn.row, turn.axis] += turn.step
         rows = np.flatnonzero(np.abs(table).max(axis=(0, 2), initial=0.0) > 1e-9)
         table = np.ascontiguousarray(table[:, rows])
         largest = float(np.linalg.norm(table, axis=2).max(initial=0.0))
@@ -163,30 +173,27 @@ def _slopes_at(shifts: Shifts, vertices: Int64, rows: int) -> Float32:
     return result
 
 
-def _turn_rows(
-    model: FaceModel, transforms: Transforms, tolerance: Tolerance
-) -> dict[int, tuple[int, Float32]]:
-    """Return the row, and what a step moves in it, of every FAP with transforms of a part or of the head.
+def _turn_rows(model: FaceModel, transforms: Transforms, tolerance: Tolerance) -> list[_Turn]:
+    """Return what steps of FAPs with transforms of a part, or of the head, move.
 
-    Up to three FAPs of a part have an axis each: turns about crossing axes add up like that. Each angle of
-    the head has a row of its own.
+    Up to three FAPs of a part have an axis each: turns about crossing axes add up like that. Each angle, of
+    the head or of a part, has also a row of its own.
     """
-    result: dict[int, tuple[int, Float32]] = {}
+    result: list[_Turn] = []
     row = 0
     for part in range(len(transforms.start) - 1):
         first, last = int(transforms.start[part]), int(transforms.start[part + 1])
         head = part == len(transforms.start) - 2
         for place, one in enumerate(range(first, last)):
+            column, kind = int(transforms.column[one]), int(transforms.kind[one])
             amount = float(np.linalg.norm(transforms.amount[one]))
-            if head:
-                step = np.degrees(amount) / tolerance.head
-            else:
+            if not head:
                 points = model.parts[part].vertices.astype(np.float64) - transforms.centre[one]
-                reach = 1.0 if transforms.kind[one] == 0 else float(np.linalg.norm(points, axis=1).max())
-                step = amount * reach / tolerance.face
-            vector = np.zeros(3, dtype=np.float32)
-            vector[0 if head else place % 3] = step
-            result.setdefault(int(transforms.column[one]), (row, vector))
-            row += head
-        row += last > first and not head
+                reach = 1.0 if kind == TRANSLATION else float(np.linalg.norm(points, axis=1).max(initial=0.0))
+                result.append(_Turn(column, row, place % 3, amount * reach / tolerance.face))
+            if kind == ROTATION:
+                own = row + 1 + place
+                angle = tolerance.head if head else tolerance.gaze
+                result.append(_Turn(column, own, 0, float(np.degrees(amount)) / angle))
+        row += 1 + last - first
     return result

@@ -43,7 +43,7 @@ class FaceErrors:
     """How far a decoded face is from its source, at all frames of the source.
 
     largest, percentile_99: metres, of a vertex, in the frame of the head; frame, vertex: where it is
-    largest. head: degrees, the most that one of the head's three angles is off.
+    largest. head, gaze: degrees, the most that one of the head's three angles, or of an eye's, is off.
     """
 
     largest: float
@@ -51,10 +51,12 @@ class FaceErrors:
     frame: int
     vertex: int
     head: float
+    gaze: float
 
     def is_within(self, tolerance: Tolerance) -> bool:
-        """Whether both are within a tolerance."""
-        return self.largest <= tolerance.face and self.head <= tolerance.head
+        """Whether all are within a tolerance."""
+        pairs = ((self.largest, tolerance.face), (self.head, tolerance.head), (self.gaze, tolerance.gaze))
+        return all(off <= allowed for off, allowed in pairs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +80,8 @@ def encode_within_tolerance(
     tolerance: Tolerance | None = None,
     options: EncoderOptions | None = None,
     model: FaceModel | None = None,
+    *,
+    every_frame: bool = False,
 ) -> tuple[bytes, NearLossless]:
     """Return a stream that stays within a tolerance of what an animation shows, and what it came to.
 
@@ -86,13 +90,14 @@ def encode_within_tolerance(
     they are. Never larger than with the preset "compact", which is taken where nothing else is smaller.
 
     options: quantisers are ignored for FAPs. model: the head to measure on; default: the built-in one.
+    every_frame: send all frames, for players that hold a frame until the next comes.
     RangeError where not even the finest quantiser keeps within the tolerance, ValueError without frames.
     """
     tolerance, options = tolerance or Tolerance(), replace(options or EncoderOptions(), fap_quant=1)
     if not len(animation):
         raise ValueError("there is no frame to encode")
     model = model or FaceModel.default()
-    source = _Source(animation, model, options)
+    source = _Source(animation, model, options, every_frame)
     data, statistics = encode_planned(animation, options, preset="compact")
     smallest = _measured(data, statistics, source, options, compact=True)
     if animation.face is not None and _is_plain(animation.face):
@@ -111,8 +116,11 @@ def encode_within_tolerance(
 class _Source:
     """What is encoded, and the head that shows it."""
 
-    def __init__(self, animation: Animation, model: FaceModel, options: EncoderOptions) -> None:
-        self.animation, self.model, self.options = animation, model, options
+    def __init__(
+        self, animation: Animation, model: FaceModel, options: EncoderOptions, every_frame: bool
+    ) -> None:
+        self.animation, self.options = animation, options
+        self.may_skip = not every_frame and animation.body is None
         self.fit = model if model.fit is not None else None
         self.shown: Float64 = np.zeros((len(animation), 68))
         if animation.face is not None:
@@ -185,7 +193,7 @@ def _segments(source: _Source, plan: Plan) -> list[tuple[slice, Segment]]:
     index = source.animation.index
     consecutive = np.zeros(len(index), dtype=np.bool_)
     consecutive[1:-1] = (index[1:-1] - index[:-2] == 1) & (index[2:] - index[1:-1] == 1)
-    consecutive &= ~track.mask[:, :2].any(axis=1) & (source.animation.body is None)
+    consecutive &= ~track.mask[:, :2].any(axis=1) & source.may_skip
     result = []
     for whole in plan.segments:
         for start in range(whole.start, whole.stop, LONGEST):
@@ -273,22 +281,15 @@ def _measured(
         shown = resolve(decoded.face, source.fit).astype(np.float64)
         if len(sent) < len(index):
             shown = np.stack([np.interp(index, sent, column) for column in shown.T], axis=1)
-        errors = _errors(
-            source.meter.measure(source.shown, shown), source.meter.head_angles(source.shown, shown)
-        )
+        off = source.meter.measure(source.shown, shown)
+        errors = _errors(off, *source.meter.angles(source.shown, shown))
     left_out = len(source.animation) - len(decoded)
     return NearLossless(statistics, options.fap_quant, left_out, errors, compact)
 
 
-def _errors(off: Displacements, angles: Float64) -> FaceErrors:
+def _errors(off: Displacements, head: float, gaze: float) -> FaceErrors:
     frame = int(off.largest.argmax())
-    return FaceErrors(
-        float(off.largest[frame]),
-        off.percentile(99),
-        frame,
-        int(off.worst[frame]),
-        float(angles.max(initial=0.0)),
-    )
+    return FaceErrors(float(off.largest[frame]), off.percentile(99), frame, int(off.worst[frame]), head, gaze)
 
 
 def _is_within(result: NearLossless, tolerance: Tolerance) -> bool:
@@ -303,8 +304,9 @@ def _check(result: NearLossless, tolerance: Tolerance) -> None:
     assert result.face is not None
     face, mm = result.face, 1000
     raise RangeError(
-        f"no quantiser keeps within {tolerance.face * mm:g} mm and {tolerance.head:g} degrees: the finest "
-        f"moves vertex {face.vertex} by {face.largest * mm:.4f} mm, and turns the head by {face.head:.4f} "
+        f"no quantiser keeps within {tolerance.face * mm:g} mm, {tolerance.head:g} degrees of the head and "
+        f"{tolerance.gaze:g} of the eyes: the finest moves vertex {face.vertex} by "
+        f"{face.largest * mm:.4f} mm, and turns the head by {face.head:.4f} and an eye by {face.gaze:.4f} "
         "degrees; allow that much, or send values unquantised, without a tolerance (fap_quant 0)",
         frame=face.frame,
     )

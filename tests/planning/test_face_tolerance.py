@@ -30,8 +30,8 @@ def shown_at(decoded: Animation, index: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(index - index[0], sent, one) for one in shown.T], axis=1)
 
 
-def measure(source: Animation, data: bytes) -> tuple[float, float]:
-    """Return the largest distance of a vertex, in mm, and of one of the head's angles, in degrees."""
+def measure(source: Animation, data: bytes) -> tuple[float, float, float]:
+    """Return the largest distance of a vertex, in mm, and of the angles of head and eyes, in degrees."""
     assert source.face is not None
     before, after = resolve(source.face).astype(float), shown_at(fba.decode(data), source.index)
     deformer, largest = Deformer(FaceModel.default()), 0.0
@@ -39,7 +39,8 @@ def measure(source: Animation, data: bytes) -> tuple[float, float]:
         rows = slice(start, start + 50)
         moved = deformer.local(before[rows]).astype(float) - deformer.local(after[rows])
         largest = max(largest, float(np.linalg.norm(moved, axis=2).max()) * 1000)
-    return largest, float(np.degrees(np.abs(before - after)[:, 47:50].max() * 1e-5))
+    angles = np.degrees(np.abs(before - after).max(axis=0) * 1e-5)
+    return largest, float(angles[47:50].max()), float(angles[22:26].max())
 
 
 def made_face(seed: int, count: int = 120) -> FaceTrack:
@@ -76,9 +77,16 @@ def coded(talk: Animation) -> dict[float, bytes]:
 
 @pytest.mark.parametrize("mm", [0.3, 0.5, 1.0])
 def test_no_vertex_moves_further(talk: Animation, coded: dict[float, bytes], mm: float) -> None:
-    largest, angle = measure(talk, coded[mm])
+    largest, head, gaze = measure(talk, coded[mm])
     assert 0.5 * mm < largest <= mm
-    assert angle <= 0.1
+    assert head <= 0.1
+    assert 0.3 < gaze <= 1
+
+
+def test_every_frame_may_be_sent(talk: Animation) -> None:
+    data, report = encode_within_tolerance(talk, every_frame=True)
+    assert report.left_out == 0
+    assert measure(talk, data)[0] <= 0.5
 
 
 def test_streams_are_smaller_the_more_may_be_lost(talk: Animation, coded: dict[float, bytes]) -> None:
@@ -88,11 +96,11 @@ def test_streams_are_smaller_the_more_may_be_lost(talk: Animation, coded: dict[f
 
 def test_the_report_says_what_was_measured(talk: Animation) -> None:
     data, report = encode_within_tolerance(talk)
-    largest, angle = measure(talk, data)
+    largest, head, gaze = measure(talk, data)
     decoded = fba.decode(data)
     assert report.face is not None
     assert report.face.largest * 1000 == pytest.approx(largest, abs=1e-4)
-    assert report.face.head == pytest.approx(angle, abs=1e-6)
+    assert (report.face.head, report.face.gaze) == pytest.approx((head, gaze), abs=1e-6)
     assert 0 < report.face.percentile_99 < report.face.largest
     assert report.left_out == len(talk) - len(decoded) > 0
     assert report.statistics.planes == len(decoded)
@@ -152,14 +160,14 @@ def test_values_between_steps_and_a_tolerance_too_small_for_them() -> None:
     animation = Animation(25, np.arange(40), uneven)
     data, _ = encode_within_tolerance(animation)
     assert measure(animation, data)[0] <= 0.5
-    with pytest.raises(RangeError, match=r"no quantiser keeps within 0\.0001 mm .* allow that much"):
+    with pytest.raises(RangeError, match=r"no quantiser keeps within 0\.0001 mm, .* allow that much"):
         encode_within_tolerance(animation, Tolerance(face=1e-7))
 
 
 def test_a_tolerance_that_only_the_exact_values_meet(talk: Animation) -> None:
-    data, report = encode_within_tolerance(talk, Tolerance(face=1e-9, head=1e-6))
+    data, report = encode_within_tolerance(talk, Tolerance(face=1e-9, head=1e-6, gaze=1e-6))
     assert report.compact
-    assert measure(talk, data) == (0.0, 0.0)
+    assert measure(talk, data) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

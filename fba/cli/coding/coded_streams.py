@@ -95,7 +95,7 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
     from fba.planning import encode_planned
 
     if size.tolerance is not None:
-        data, near = encode_near(animation, options, size.tolerance, size.model)
+        data, near = encode_near(animation, options, size.tolerance, size.model, every_frame=size.every_frame)
         counts = near.statistics
         return CodedStream(
             data, counts.planes, counts.intra_planes, counts.clamped_parameters, options.bap_quant, near=near

@@ -44,12 +44,13 @@ class LengthType(click.ParamType[float]):
 
 
 def encode_near(
-    animation: Animation, options: EncoderOptions, tolerance: float, model: Path | None
+    animation: Animation, options: EncoderOptions, tolerance: float, model: Path | None, *, every_frame: bool
 ) -> tuple[bytes, NearLossless]:
     """Return the stream within a tolerance in metres. model: file of the head; None for the built-in one."""
     from fba.planning import Tolerance, encode_within_tolerance
 
-    return encode_within_tolerance(animation, Tolerance(face=tolerance), options, read_model(model))
+    allowed = Tolerance(face=tolerance)
+    return encode_within_tolerance(animation, allowed, options, read_model(model), every_frame=every_frame)
 
 
 def tolerance_lines(result: NearLossless, animation: Animation) -> list[str]:
@@ -57,7 +58,7 @@ def tolerance_lines(result: NearLossless, animation: Animation) -> list[str]:
     face = result.face
     if face is None:
         return []
-    head = f"the head's angles are within {face.head:.3f} degrees"
+    head = f"head within {face.head:.3f} degrees, eyes within {face.gaze:.3f}"
     if face.largest:
         lines = [
             f"face: vertices move by at most {face.largest * 1000:.3f} mm (vertex {face.vertex} at "
@@ -91,5 +92,6 @@ def tolerance_values(result: NearLossless) -> dict[str, Any]:
             "frame": face.frame,
             "vertex": face.vertex,
             "head_degrees": round(face.head, 6),
+            "gaze_degrees": round(face.gaze, 6),
         }
     return values

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from fba.arrays import Float64, Int64
 from fba.face.deform.deformer import Deformer, frame_values
-from fba.face.deform.flat_tables import Shifts, Transforms
+from fba.face.deform.flat_tables import KIND_ORDER, Shifts, Transforms
 from fba.face.model import FaceModel
 
 BLOCK = 256
@@ -98,12 +98,13 @@ class DisplacementMeter:
             self._movable = int(movable.sum())
         return self._movable
 
-    def head_angles(self, one: npt.ArrayLike, other: npt.ArrayLike) -> Float64:
-        """Return the most, in degrees, by which one of the head's angles differs: float64 (T,)."""
+    def angles(self, one: npt.ArrayLike, other: npt.ArrayLike) -> tuple[float, float]:
+        """Return the most, in degrees, by which one of the head's angles differs, and one of an eye's."""
         first, second = frame_values(one)[0], frame_values(other)[0]
-        transforms, result = self.transforms, np.zeros(len(first))
-        for one_transform in range(int(transforms.start[-2]), int(transforms.start[-1])):
-            column = int(transforms.column[one_transform])
-            step = np.degrees(np.linalg.norm(transforms.amount[one_transform]))
-            np.maximum(result, np.abs(first[:, column] - second[:, column]) * step, out=result)
-        return result
+        off = np.abs(first - second).max(axis=0, initial=0.0)
+        transforms, most = self.transforms, [0.0, 0.0]
+        for number in np.flatnonzero(transforms.kind == KIND_ORDER.index("rotation")).tolist():
+            part = int(number < transforms.start[-2])
+            step = float(np.degrees(np.linalg.norm(transforms.amount[number])))
+            most[part] = max(most[part], float(off[transforms.column[number]]) * step)
+        return most[0], most[1]
