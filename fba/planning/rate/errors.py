@@ -105,9 +105,7 @@ def _face_distances(there: Float64, here: Float64) -> DistanceErrors:
 
     meter = DisplacementMeter(FaceModel.default())
     moved = meter.measure(there, here)
-    return DistanceErrors(
-        float(moved.largest.max()), moved.percentile(99), head=float(meter.head_angles(there, here).max())
-    )
+    return DistanceErrors(float(moved.largest.max()), moved.percentile(99), head=meter.angles(there, here)[0])
 
 
 def _values(animation: Animation) -> Float64:
