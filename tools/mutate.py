@@ -202,6 +202,7 @@ PLACEMENT_TEST = "tests/player/scene/test_point_placement.py"
 VERDICT_TEST = "tests/cli/test_model.py -k verdicts"
 
 PLANS_TEST = "tests/planning/test_plans.py"
+FIT_PLANS_TEST = "tests/planning/test_fit_plans.py"
 
 MUTANTS = (
     Mutant("fba/planning/plan.py", "    if not any(used):", "    if True:", PLANS_TEST),
@@ -213,6 +214,8 @@ MUTANTS = (
     ),
     Mutant("fba/codec/code_length.py", "2 * RANGE_CODE_MAX * RANGE_UNIT + 1", "RANGE_CODE_MAX", PLANS_TEST),
     Mutant("fba/codec/quantisation.py", "divisor % scale == 0 and", "", PLANS_TEST),
+    Mutant("fba/planning/fit_faps.py", "self.given | self.needed", "self.given", FIT_PLANS_TEST),
+    Mutant("fba/planning/fit_faps.py", "(values % step != 0) | ", "", FIT_PLANS_TEST),
     Mutant(
         "fba/codec/quantisation.py", "np.where(intra[1:, None], 0, values[:-1])", "values[:-1]", PLANS_TEST
     ),

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from fba.animation import FaceTrack
-from fba.arrays import Array, Bool, Float32, Int16, Int32, Intp
+from fba.arrays import Array, Bool, Float32, Float64, Int16, Int32, Intp
 from fba.face.expressions import Definitions
-from fba.face.interpolation.evaluate import evaluate
+from fba.face.interpolation.evaluate import estimate, evaluate
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.mates import fill
 from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps
@@ -73,6 +73,32 @@ def known_faps(track: FaceTrack) -> tuple[Int32, Bool]:
     filled, known = fill(values, sent)
     known[:, :2] = False
     return filled.astype(np.int32, copy=False), known
+
+
+class FitValues(NamedTuple):
+    """What a FIT has to do with a track, before mates are copied and visemes and expressions added.
+
+    values: float64 (T, 68), of FAPs sent and computed. known: bool (T, 68), which those are. alone: float64
+    (T, 68), what the FIT would give for each FAP if that one alone were not sent. gives: bool (T, 68),
+    whether it gives anything.
+    """
+
+    values: Float64
+    known: Bool
+    alone: Float64
+    gives: Bool
+
+
+def fit_values(track: FaceTrack, table: InterpolationTable) -> FitValues:
+    """Return what a FIT gives for the FAPs of a track, and what it would give for those that are sent."""
+    state = _initial_state()
+    values, sent, interpolated = state.hold_low_level(track)
+    high_level = state.hold_high_level(track)
+    if interpolated is not None:
+        sent = sent & ~interpolated
+    filled, known, _ = evaluate(table, values, sent, *high_level)
+    filled[~known] = 0
+    return FitValues(filled, known, *estimate(table, filled, known, *high_level))
 
 
 def shown_faps(track: FaceTrack, model: FaceSettings | None = None) -> FaceTrack:

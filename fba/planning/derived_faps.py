@@ -6,6 +6,7 @@ standard suggests and `fba.face.resolve` follows (see `fba.face.mates`).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from itertools import combinations
 from typing import NamedTuple
@@ -28,6 +29,20 @@ class Choice(NamedTuple):
     bits: Float64
 
 
+@dataclass(frozen=True, eq=False)
+class FitChoice:
+    """What an interpolation table (FIT) gives from one cut to another, if only that FAP is not sent.
+
+    gives: bool (68, C, C), the value that is shown, at every frame. leaves: bool (68, C, C), nothing at any
+    frame, and it computes nothing from this one, which may copy its mate. unsendable: bool (68, C, C), those
+    that cannot be sent.
+    """
+
+    gives: Bool
+    leaves: Bool
+    unsendable: Bool
+
+
 @cache
 def related_faps() -> tuple[tuple[int, ...], ...]:
     """Return the columns of low-level FAPs in sets of 1, 2 or 4 that can be derived from one another."""
@@ -35,29 +50,39 @@ def related_faps() -> tuple[tuple[int, ...], ...]:
     return tuple(sorted(tuple(sorted(one)) for one in sets))
 
 
-def choose_faps(values: Int32, known: Bool, bits: Float64, cuts: Cuts) -> Choice:
+def choose_faps(
+    values: Int32, known: Bool, bits: Float64, cuts: Cuts, fit: FitChoice | None = None
+) -> Choice:
     """Return the FAPs to send, from one cut to another, that take the fewest bits and give all others.
 
     values: int32 (T, 68), shown. known: bool (T, 68), those to be shown, the same from one needed cut to
     the next, and either all FAPs of a related set or none. bits: float64 (68, C, C), of each FAP by itself.
+    fit: what an interpolation table gives.
     """
+    if fit is not None:
+        bits = np.where(fit.unsendable, np.inf, bits)
     sent = np.zeros(bits.shape, dtype=np.bool_)
     total = np.zeros(bits.shape[1:])
     starts = cuts.frames[:-1]
+    smallest = 1 if fit is None else 0
     for related in related_faps():
         shown = np.append(known[starts, related[0]], False)[:, None]
         if not shown.any():
             continue
         least = np.full(bits.shape[1:], np.inf)
         equal = _equal_pairs(values, related, cuts)
-        for few in (one for size in range(1, len(related) + 1) for one in combinations(related, size)):
-            own = np.where(_derive_others(related, few, equal), bits[list(few)].sum(axis=0), np.inf)
+        for few in _subsets(related, smallest):
+            own = np.where(_derive_others(related, few, equal, fit), bits[list(few)].sum(axis=0), np.inf)
             better = shown & (own < least)
             least[better] = own[better]
             for column in related:
                 sent[column][better] = column in few
         total += np.where(shown, least, 0.0)
     return Choice(sent, total)
+
+
+def _subsets(related: tuple[int, ...], smallest: int) -> list[tuple[int, ...]]:
+    return [one for size in range(smallest, len(related) + 1) for one in combinations(related, size)]
 
 
 def interpolated_faps(sent: Bool, known: Bool) -> Bool:
@@ -83,12 +108,23 @@ def _equal_pairs(values: Int32, related: tuple[int, ...], cuts: Cuts) -> dict[tu
 
 
 def _derive_others(
-    related: tuple[int, ...], sent: tuple[int, ...], equal: dict[tuple[int, int], Bool]
+    related: tuple[int, ...],
+    sent: tuple[int, ...],
+    equal: dict[tuple[int, int], Bool],
+    fit: FitChoice | None,
 ) -> Bool | np.bool_:
-    """Return bool (C, C): whether the sent FAPs give all related ones, from one cut to another."""
+    """Return bool (C, C): whether the sent FAPs and a FIT give all related ones, from one cut to another."""
     result: Bool | np.bool_ = np.True_
     for column in related:
-        if column not in sent:
-            donor = next(int(one[column]) for one in donors() if int(one[column]) in sent)
-            result = result & equal[column, donor]
+        if column in sent:
+            continue
+        copied: Bool | np.bool_ = np.False_
+        known: Bool | np.bool_ = np.False_  # whether a better donor is, so that this one is not asked
+        for donor in (int(one[column]) for one in donors()):
+            if donor == column:
+                continue
+            gives = np.bool_(donor in sent) if fit is None or donor in sent else fit.gives[donor]
+            copied = copied | (gives & ~known & equal[column, donor])
+            known = known | gives
+        result = result & (copied if fit is None else fit.gives[column] | (copied & fit.leaves[column]))
     return result

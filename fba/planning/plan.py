@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Bool, Float64, Int32
+from fba.arrays import Bool, Float64, Int32, Int64
 from fba.codec import (
     INTRA_BITS,
     Encoder,
@@ -23,9 +23,11 @@ from fba.codec import (
     quantise,
 )
 from fba.errors import FbaWarning
-from fba.face.resolve import known_faps, resolve
+from fba.face.resolve import FaceSettings, known_faps, resolve
 from fba.limits import Limits
+from fba.parameters import FAP_COUNT, fap_steps
 from fba.planning.derived_faps import Choice, choose_faps, interpolated_faps, related_faps
+from fba.planning.fit_faps import find_fit_faps, table_columns
 from fba.planning.segments import Cuts, cheapest_segments, find_cuts
 from fba.tracks import BodyTrack, FaceTrack
 
@@ -59,12 +61,13 @@ def encode_planned(
     *,
     preset: str = "exact",
     keep_masks: Collection[str] = (),
+    model: FaceSettings | None = None,
 ) -> tuple[bytes, EncoderStatistics]:
     """Return the shortest of the streams of plans and that of `fba.encode`, and what the encoder counted.
 
     preset: "exact" or "compact", the plans. Exact ones have the values of the stream of `fba.encode`. Where
     those depend on what came before, compact ones may also have the values that each frame has by itself.
-    keep_masks: see `plan_exact` and `plan_compact`. Raises as `fba.codec.encode` does, ValueError for
+    keep_masks, model: see `plan_exact` and `plan_compact`. Raises as `fba.codec.encode` does, ValueError for
     another preset.
     """
     if preset not in PRESETS:
@@ -75,10 +78,10 @@ def encode_planned(
     if preset == "exact":
         plans = [_plan_exact(given, options, keep_masks)]
     else:
-        plans = [_plan_compact(given, options, keep_masks)]
+        plans = [_plan_compact(given, options, keep_masks, model)]
         by_itself = quantise(animation, options)
         if by_itself != given:
-            plans.append(_plan_compact(by_itself, options, keep_masks))
+            plans.append(_plan_compact(by_itself, options, keep_masks, model))
     planned = [one for one in (plan.encode() for plan in plans) if not one[1].clamped]
     best, statistics = min([unplanned, *planned], key=lambda one: len(one[0]))
     statistics.clamped_parameters = unplanned[1].clamped_parameters
@@ -121,6 +124,7 @@ def plan_compact(
     options: EncoderOptions | None = None,
     *,
     keep_masks: Collection[str] = (),
+    model: FaceSettings | None = None,
     intra_bits: float = INTRA_BITS,
 ) -> Plan:
     """Return a plan that keeps every value that is shown, with the quantisers in `options`.
@@ -128,12 +132,12 @@ def plan_compact(
     Left out is what a player fills in by the standard's rules: a FAP that equals its left/right mate or its
     counterpart on the other contour of the lips. Which ones is decided anew at every I plane. On a face
     without an interpolation table of its own, `fba.face.resolve` gives the same for the decoded stream
-    as for the animation. keep_masks: as for `plan_exact`; only "body" has an effect. intra_bits: what an I
-    plane counts, besides what its FAPs take: the more, the fewer segments.
-    ValueError for an animation without frames.
+    as for the animation. keep_masks: as for `plan_exact`; only "body" has an effect. model: the face that
+    every receiver has; what its table gives exactly is left out, too. intra_bits: what an I plane counts,
+    besides what its FAPs take: the more, the fewer segments. ValueError for an animation without frames.
     """
     options = options or EncoderOptions()
-    return _plan_compact(quantise(animation, options), options, keep_masks, intra_bits)
+    return _plan_compact(quantise(animation, options), options, keep_masks, model, intra_bits)
 
 
 def _plan_exact(given: Animation, options: EncoderOptions, keep_masks: Collection[str]) -> Plan:
@@ -142,37 +146,53 @@ def _plan_exact(given: Animation, options: EncoderOptions, keep_masks: Collectio
 
 
 def _plan_compact(
-    given: Animation, options: EncoderOptions, keep_masks: Collection[str], intra_bits: float = INTRA_BITS
+    given: Animation,
+    options: EncoderOptions,
+    keep_masks: Collection[str],
+    model: FaceSettings | None,
+    intra_bits: float = INTRA_BITS,
 ) -> Plan:
     """Return the compact plan of a quantised animation."""
-    sent = _without_unmoved(given, {"body"} & set(keep_masks))
+    table = None if model is None else model.fit
+    linked = [] if table is None else table_columns(table)
+    sent = _without_unmoved(given, {"body"} & set(keep_masks), linked)
     options = coarsest_quantisers(given, options)
     if sent.face is None:
         return _plan_as_sent(sent, options)
-    values, known = known_faps(sent.face)
+    fit = None if table is None else find_fit_faps(sent.face, table, _fap_steps(options))
+    values, known = known_faps(sent.face) if fit is None else (fit.values, fit.known)
     high_level = sent.face.mask[:, :2]
     cuts = find_cuts(_changes(known) | _changes(high_level) | _changes(_mask(sent.body, len(sent))))
     if cuts is None:
         return _plan_as_sent(sent, options)
-    choice = choose_faps(values, known, code_lengths(FaceTrack(values, known), cuts.frames, options), cuts)
+    lengths = code_lengths(FaceTrack(values, known), cuts.frames, options)
+    choice = choose_faps(values, known, lengths, cuts, None if fit is None else fit.choice(cuts))
     bits = choice.bits + _code_lengths(sent.body, cuts, options)
     borders = cheapest_segments(bits + intra_bits, cuts)
     face = _face_to_send(sent.face, values, known, choice, borders, cuts)
-    if not np.array_equal(resolve(face), resolve(sent.face)):
+    if not np.array_equal(resolve(face, model), resolve(sent.face, model)):
         return _plan_as_sent(sent, options)  # definitions of visemes or expressions depend on what is sent
     return Plan(replace(sent, face=face), tuple(cuts.segment(*one) for one in borders), options)
 
 
-def _without_unmoved(animation: Animation, keep_masks: Collection[str]) -> Animation:
+def _fap_steps(options: EncoderOptions) -> Int64:
+    """Return the quantiser steps of all FAPs, int64 (68,)."""
+    return fap_steps() * options.fap_quant if options.fap_quant else np.ones(FAP_COUNT, dtype=np.int64)
+
+
+def _without_unmoved(
+    animation: Animation, keep_masks: Collection[str], linked: Collection[int] = ()
+) -> Animation:
     """Return an animation that does not send what never moves. ValueError if it has no frames.
 
-    keep_masks: parts of which all is sent.
+    keep_masks: parts of which all is sent. linked: columns of FAPs that are sent, too, since a FIT gives
+    something else for them, or others from them.
     """
     if not len(animation):
         raise ValueError("there is no frame to encode")
     face, body = animation.face, animation.body
     if face is not None and "face" not in keep_masks:
-        face = _without_unmoved_faps(face)
+        face = _without_unmoved_faps(face, linked)
     if body is not None and "body" not in keep_masks:
         body = BodyTrack(body.values, body.mask & body.values.any(axis=0))  # one never sent is 0, too
     return replace(animation, face=face, body=body)
@@ -189,7 +209,7 @@ def _plan_as_sent(sent: Animation, options: EncoderOptions) -> Plan:
     return Plan(sent, tuple(cuts.segment(*one) for one in borders), options)
 
 
-def _without_unmoved_faps(face: FaceTrack) -> FaceTrack:
+def _without_unmoved_faps(face: FaceTrack, linked: Collection[int]) -> FaceTrack:
     """Return a face that does not send what is 0 throughout, as far as a player shows the same.
 
     With a viseme or an expression in force, a FAP that is sent as 0 holds against it. And 0 must be sent
@@ -197,11 +217,11 @@ def _without_unmoved_faps(face: FaceTrack) -> FaceTrack:
     """
     mask = face.mask.copy()
     used = face.viseme.any(), face.expression.any()
-    mask[:, :2] &= used
+    mask[:, :2] &= np.array(used) | np.isin([0, 1], list(linked))
     if not any(used):
         moves = np.asarray(face.values.any(axis=0))
         for related in related_faps():
-            mask[:, related] &= moves[list(related)].any()
+            mask[:, related] &= moves[list(related)].any() or not set(linked).isdisjoint(related)
     interpolated = face.interpolated
     if interpolated is not None:  # what is left out must not end the interpolation of its group
         interpolated = interpolated_faps(mask, mask | interpolated)

@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 import fba
+import stored_models
 from fba import Animation, BodyTrack, FaceTrack
+from fba.face.interpolation.table import InterpolationTable
+from fba.face.interpolation.terms import Function, Link, Term
 from fba.face.resolve import resolve
 
 Run = Callable[..., Any]
@@ -126,3 +129,50 @@ def test_unknown_presets(run: Run, tmp_path: Path, archive: Animation) -> None:
         fba.write(tmp_path / "b.fba", archive, preset="small")
     fba.write(tmp_path / "b.fba", archive, preset="compact")
     assert (tmp_path / "b.fba").stat().st_size < (tmp_path / "a.fba").stat().st_size
+
+
+def head(folder: Path, table: InterpolationTable | None) -> Path:
+    path = folder / ("bare.glb" if table is None else "head.glb")
+    stored_models.face(fit=table).save(path)
+    return path
+
+
+def test_what_the_receivers_head_gives_is_not_sent(run: Run, tmp_path: Path) -> None:
+    """Push_b_lip is twice open_jaw, by the head's own table."""
+    function = Function([Term(2.0, {"open_jaw": 1})])
+    model = head(tmp_path, InterpolationTable([Link(["open_jaw"], {"push_b_lip": function})]))
+    values, mask = np.zeros((40, 68), dtype=np.int32), np.zeros((40, 68), dtype=bool)
+    values[:, 2], values[:, 15] = np.arange(40) * 4, np.arange(40) * 8
+    mask[:, [2, 15]] = True
+    given, stream, back = tmp_path / "a.fap", tmp_path / "a.fba", tmp_path / "b.fap"
+    fba.write(given, Animation(25, np.arange(40), FaceTrack(values, mask), name="a"))
+    assert run("encode", given, "-o", stream, "--model", model).code == 0
+    face = fba.read(stream).face
+    assert face is not None
+    assert np.flatnonzero(face.mask.any(axis=0)).tolist() == [2]
+    for outputs in (("--fap", back), ("--fap", back, "-o", tmp_path / "b.csv")):
+        done = run("decode", stream, *outputs, "--shown", "--model", model)
+        assert (done.code, done.err) == (0, "")
+        assert fba.read(back).face.values.tolist() == values.tolist()  # type: ignore[union-attr]
+    assert run("decode", stream, "--fap", back, "--shown").code == 0
+    assert not fba.read(back).face.values[:, 15].any()  # type: ignore[union-attr]
+    assert "--model says how to write --output" in run("decode", stream, "--fap", back, "--model", model).err
+    before = model.read_bytes()
+    assert run("encode", given, "-o", model, "--model", model).code == 2
+    assert model.read_bytes() == before
+
+
+def test_heads_that_give_nothing(run: Run, tmp_path: Path, archive: Animation) -> None:
+    given, out = tmp_path / "a.fba", tmp_path / "b.fba"
+    fba.write(given, archive)
+    bare = head(tmp_path, None)
+    done = run("encode", given, "-o", out, "--model", bare)
+    assert done.code == 0
+    assert "bare.glb has no interpolation table (FIT)" in done.err
+    with_model = out.read_bytes()
+    assert run("encode", given, "-o", out, "--preset", "compact").code == 0
+    assert out.read_bytes() == with_model
+    for preset in ("reference", "exact"):
+        done = run("encode", given, "-o", out, "--model", bare, "--preset", preset)
+        assert done.code == 2
+        assert f"--model and --preset {preset} contradict each other" in " ".join(done.err.split())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,14 +13,16 @@ from fba.cli.clamped_values import clamped_values
 from fba.cli.coding.rate_options import HeldRate, encode_held, rate_lines, rate_values
 from fba.cli.coding.size_options import Size
 from fba.cli.coding.tolerance_options import encode_near, tolerance_lines, tolerance_values
-from fba.cli.inputs import input_file
+from fba.cli.inputs import input_file, read_model
 from fba.cli.outputs import display_name
 from fba.cli.printing import rate_text, seconds_text
+from fba.errors import FbaWarning
 from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.cli.recordings.inputs import Inputs
     from fba.codec import ClampedParameter, EncoderOptions
+    from fba.face.model import FaceModel
     from fba.planning import NearLossless
 
 
@@ -91,9 +94,6 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
 
     options: with quantisers as `size` says. inputs: where the animation comes from.
     """
-    from fba.codec import count_rounded, encode_with_statistics, exact_quantisers
-    from fba.planning import encode_planned
-
     if size.tolerance is not None:
         data, near = encode_near(animation, options, size.tolerance, size.model, every_frame=size.every_frame)
         counts = near.statistics
@@ -104,7 +104,18 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
         data, held = encode_held(animation, options, size.bitrate, size.buffer)
         own = held.statistics
         return CodedStream(data, own.planes, own.intra_planes, own.clamped_parameters, held.quant, held=held)
-    preset = size.preset or ("compact" if inputs.has_captured_face else "exact")
+    return _encode_as_preset(animation, options, size, inputs)
+
+
+def _encode_as_preset(
+    animation: Animation, options: EncoderOptions, size: Size, inputs: Inputs
+) -> CodedStream:
+    """Return the stream of an animation as a preset has it: `--preset`, or what fits where it comes from."""
+    from fba.codec import count_rounded, encode_with_statistics, exact_quantisers
+    from fba.planning import encode_planned
+
+    model = _read_model_with_fit(size.model)
+    preset = size.preset or ("compact" if inputs.has_captured_face or size.model is not None else "exact")
     kept = inputs.text_parts
     rounded: dict[str, int] = {}
     if preset == "exact":
@@ -115,7 +126,7 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
     if preset == "reference":
         data, statistics = encode_with_statistics(animation, options)
     else:
-        data, statistics = encode_planned(animation, options, preset=preset, keep_masks=kept)
+        data, statistics = encode_planned(animation, options, preset=preset, keep_masks=kept, model=model)
     return CodedStream(
         data,
         statistics.planes,
@@ -124,6 +135,19 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
         options.bap_quant,
         sum(rounded.values()),
     )
+
+
+def _read_model_with_fit(path: Path | None) -> FaceModel | None:
+    """Return the face of `--model`; None without one. Warns (FbaWarning) of one without a FIT."""
+    model = read_model(path)
+    if model is not None and model.fit is None:
+        warnings.warn(
+            f"{path} has no interpolation table (FIT), which would give FAPs that are not sent; the stream "
+            "is that without this model",
+            FbaWarning,
+            stacklevel=2,
+        )
+    return model
 
 
 def encode_as_epf(

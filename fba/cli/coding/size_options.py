@@ -21,15 +21,15 @@ PRESETS = ("reference", "exact", "compact")
 class Size:
     """How small a stream is to be, and what may be lost for that, as far as options say it; else None.
 
-    preset: what is sent. fap_quant, bap_quant: how finely. tolerance: metres by which vertices may move, on
-    the head of `model`; every_frame: whether no frame is left out for that. bitrate: bits a second; buffer:
-    seconds that the stream may be ahead of them.
+    preset: what is sent. model: the face that all receivers have. fap_quant, bap_quant: how finely.
+    tolerance: metres by which vertices may move; every_frame: whether no frame is left out for that. bitrate:
+    bits a second; buffer: seconds that the stream may be ahead of them.
     """
 
     preset: str | None = None
+    model: Path | None = None
     tolerance: float | None = None
     every_frame: bool = False
-    model: Path | None = None
     bitrate: float | None = None
     buffer: float | None = None
     fap_quant: int | None = None
@@ -60,6 +60,13 @@ def size_options(command: Decorated) -> Decorated:
                 "for captured faces, else exact.",
             ),
             click.option(
+                "--model",
+                type=click.Path(exists=True, path_type=Path),
+                metavar="FILE",
+                help="The face that all receivers have: with --preset compact, what its interpolation table "
+                "(FIT) gives is not sent; with --tolerance, its vertices count. Default: the built-in head.",
+            ),
+            click.option(
                 "--tolerance",
                 type=LengthType(),
                 metavar="LENGTH",
@@ -71,12 +78,6 @@ def size_options(command: Decorated) -> Decorated:
                 "--every-frame",
                 is_flag=True,
                 help="With --tolerance: send all frames, for players that hold a frame until the next comes.",
-            ),
-            click.option(
-                "--model",
-                type=click.Path(exists=True, path_type=Path),
-                metavar="FILE",
-                help="With --tolerance: the head whose vertices count. Default: the built-in head.",
             ),
             rate_options,
             click.option(
@@ -102,7 +103,7 @@ PLANES = ("intra_period", "start_codes", "time_codes", "unsent", "gender", "clam
 """Options of single planes."""
 CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "epf": (
-        ("preset", "tolerance", "every_frame", "model", "bitrate", *QUANTISERS, *PLANES),
+        ("preset", "model", "tolerance", "every_frame", "bitrate", *QUANTISERS, *PLANES),
         "the EPF file says how planes are coded",
     ),
     "tolerance": (
@@ -110,7 +111,7 @@ CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
         "the tolerance decides what is sent, and how finely",
     ),
     "bitrate": (
-        ("preset", *QUANTISERS, "unsent", "intra_period"),
+        ("preset", "model", *QUANTISERS, "unsent", "intra_period"),
         "the bit rate decides what is sent, how finely, and where I planes come",
     ),
 }
@@ -125,7 +126,12 @@ def check_sizes() -> None:
         for other in others:
             if options.is_given(option) and options.is_given(other):
                 raise click.UsageError(f"{flags[other]} and {flags[option]} contradict each other: {reason}")
-    for option in ("model", "every_frame"):
-        if options.is_given(option) and not options.is_given("tolerance"):
-            raise click.UsageError(f"{flags[option]} goes with --tolerance")
+    if options.is_given("every_frame") and not options.is_given("tolerance"):
+        raise click.UsageError("--every-frame goes with --tolerance")
     check_buffer()
+    preset = context.params.get("preset")
+    if options.is_given("model") and preset in ("reference", "exact"):
+        raise click.UsageError(
+            f"--model and --preset {preset} contradict each other: only --preset compact leaves out what "
+            "that face gives"
+        )

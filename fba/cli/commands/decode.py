@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,7 +12,7 @@ import click
 from fba.animation import Animation
 from fba.cli import options, step_tables, writer_options
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import EXISTING, input_file
+from fba.cli.inputs import EXISTING, input_file, read_model
 from fba.cli.outputs import (
     STANDARD,
     TEXT_FORMATS,
@@ -27,6 +28,7 @@ from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO
 
 if TYPE_CHECKING:
+    from fba.animation import FaceTrack
     from fba.codec import PlaneSettings
     from fba.formats.registry import Format
 
@@ -77,7 +79,8 @@ _FOLDER_OR_FILE = OutputType(folders=True)
 @click.option(
     "--shown",
     is_flag=True,
-    help="Write what a face shows, as low-level FAPs: also those that a player derives from others.",
+    help="Write what a face shows, as low-level FAPs: also those that a player derives from others, or that "
+    "the face of --model gives.",
 )
 @options.no_clobber_option
 @writer_options.writer_options
@@ -105,6 +108,9 @@ def command(
 
     One of the files can be -, standard output.
     """
+    face = given["model"] if shown else None
+    if face is not None and (output is None or not _takes_model(output, to)):
+        given = given | {"model": None}  # it is for --shown alone
     targets = _targets({"--fap": fap, "--bap": bap, "--epf": epf}, output, to, given)
     several = len(inputs) > 1
     for target in targets:
@@ -114,13 +120,14 @@ def command(
             )
     outputs = Outputs(
         [target.output(path) for target in targets for path in inputs],
-        [*inputs, given["model"], given["body"]],
+        [*inputs, face, given["model"], given["body"]],
         no_clobber=no_clobber,
     )
     written_as = targets[-1].writing
     settings: dict[str, Any] = {}
     if output is not None and written_as is not None:
         settings = writer_options.settings(output, written_as, given)
+    shows = _shows(face) if shown else None
     reports = []
     each = EachFile(inputs)
     with Progress("decoding", len(inputs)) as step:
@@ -134,7 +141,7 @@ def command(
                         settings,
                         bap_steps=bap_steps,
                         salvage=salvage,
-                        shown=shown,
+                        shows=shows,
                         limits=limit,
                     )
                 )
@@ -199,6 +206,21 @@ def _targets(
     return targets
 
 
+def _takes_model(output: Path, to: str | None) -> bool:
+    """Whether the writer of an output takes a face. As `find_writer`, raises for one that there is not."""
+    if to is None and output.is_dir():
+        return False  # an error, which is said later
+    return "model" in find_writer(output, to).write_options
+
+
+def _shows(model: Path | None) -> Callable[[FaceTrack], FaceTrack]:
+    """Return the function from what a stream sends to what a face shows, by default the built-in one."""
+    from fba.face.resolve import shown_faps
+
+    face = read_model(model)
+    return lambda track: shown_faps(track, face)
+
+
 def _name(source: Path) -> str:
     """Return the name of the content of a stream."""
     return "stdin" if source == STANDARD else source.stem
@@ -212,10 +234,13 @@ def _decode(
     *,
     bap_steps: str,
     salvage: bool,
-    shown: bool,
+    shows: Callable[[FaceTrack], FaceTrack] | None,
     limits: Limits,
 ) -> dict[str, Any]:
-    """Decode a stream to its files; return a report. settings: for the writer of `--output`."""
+    """Decode a stream to its files; return a report.
+
+    settings: for the writer of `--output`. shows: what a face shows, to write that.
+    """
     from fba.formats import write
     from fba.formats.epf.epf import write_epf
 
@@ -228,10 +253,8 @@ def _decode(
     )
     if bap_steps != BAP_STEPS_AUTO:
         step_tables.warn_of_doubt(path, animation, table)
-    if shown and animation.face is not None:
-        from fba.face.resolve import shown_faps
-
-        animation = replace(animation, face=shown_faps(animation.face))
+    if shows is not None and animation.face is not None:
+        animation = replace(animation, face=shows(animation.face))
     parts = {"face": "FAPs", "body": "BAPs"}
     for target in targets:
         held = parts if target.writing is None else target.writing.carries

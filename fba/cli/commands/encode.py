@@ -166,7 +166,7 @@ def command(
     written = [Output("--output", output), *([Output("--report", page)] if page is not None else [])]
     saved = [] if map_out is None else [Output("--map-out", map_out, True)]
     sounds = voice.check_audio(audio, audio_offset, output)
-    read = [*inputs, epf, audio, *(each for each in maps if isinstance(each, Path))]
+    read = [*inputs, epf, audio, size.model, *(each for each in maps if isinstance(each, Path))]
     outputs = Outputs([*written, *saved, *sounds], read, no_clobber=no_clobber)
     captures = [path for path in inputs if has_skeleton(path, format)]
     marked = [path for path in inputs if has_markers(path, format)]
