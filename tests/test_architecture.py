@@ -52,7 +52,6 @@ fba.face.importers.points
 fba.face.importers.makehuman
 fba.face.importers
 fba.face.calibration
-fba.emotion
 fba.body.skeleton
 fba.body.solve
 fba.body.skin
@@ -74,6 +73,7 @@ fba.capture.action_units
 fba.capture.points
 fba.capture
 fba.capture.live
+fba.emotion
 fba.formats
 fba.formats.text
 fba.formats.epf

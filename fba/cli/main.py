@@ -36,6 +36,7 @@ _COMMANDS = {
     "gait": "Generate a walk by stride and character, or find the steps in one.",
     "express": "Show expressions: named ones, mixtures, points of the plane of emotions.",
     "emote": "Play a performance in a mood: angry, surprised, sad, sleepy, happy and others.",
+    "emotion": "Read the expressions of a face from any file with FAPs.",
     "markers": "Let captured markers move any head: map them onto it, play, export.",
     "model": "Inspect face models, check them, import them, fit them to a person.",
     "demo": "Encode the sample animation, print its size, and play it.",

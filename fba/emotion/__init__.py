@@ -12,6 +12,8 @@ from fba.emotion.moods import Mood, MoodCurve
 from fba.emotion.performance import perform
 from fba.emotion.plane import expression_at, known_points
 from fba.emotion.profiles import Measurement, Movement, measured_faps, measurements, vocabulary
+from fba.emotion.reading import Readings, read_expressions
+from fba.emotion.recogniser import Nearest, Reading, Recogniser
 from fba.emotion.rules import Rules
 
 __all__ = [
@@ -24,6 +26,10 @@ __all__ = [
     "Mood",
     "MoodCurve",
     "Movement",
+    "Nearest",
+    "Reading",
+    "Readings",
+    "Recogniser",
     "Rules",
     "combine",
     "emote",
@@ -36,5 +42,6 @@ __all__ = [
     "modify",
     "parse_weights",
     "perform",
+    "read_expressions",
     "vocabulary",
 ]

@@ -11,9 +11,8 @@ import numpy as np
 from fba.arrays import Float32, Int16
 from fba.emotion.expression import NEUTRAL_POINT, Expression
 from fba.emotion.expressions import expression
-from fba.emotion.mixing import mix
+from fba.emotion.mixing import mix, point_of
 from fba.emotion.rules import Rules
-from fba.emotion.whissel import family_point
 from fba.errors import OptionError
 from fba.parameters import INTENSITY_MAX
 
@@ -119,19 +118,13 @@ def _check_intensity(name: str, intensity: float) -> None:
 
 
 def _point(parts: tuple[tuple[Expression, float], ...]) -> tuple[float, float]:
-    placed = [(_place(one), intensity / FULL) for one, intensity in parts]
+    placed = [(point_of(one), intensity / FULL) for one, intensity in parts]
     total = max(sum(weight for _, weight in placed), 1.0)
     offset = [
         sum(weight * (point[axis] - NEUTRAL_POINT[axis]) for point, weight in placed) / total
         for axis in (0, 1)
     ]
     return NEUTRAL_POINT[0] + offset[0], NEUTRAL_POINT[1] + offset[1]
-
-
-def _place(one: Expression) -> tuple[float, float]:
-    if one.point is not None:
-        return one.point
-    return family_point(one.family) if one.family else NEUTRAL_POINT
 
 
 def _word(name: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fba.arrays import Float32, Float64
-from fba.emotion.expression import Expression
+from fba.emotion.expression import NEUTRAL_POINT, Expression
 from fba.emotion.rules import Part, Rules, limited, mix_families, mix_within_family, part
 from fba.emotion.whissel import family_point
 from fba.face.expressions import Definitions
@@ -38,6 +38,13 @@ def activation_of(expression: Expression) -> float | None:
     if expression.activation is not None:
         return expression.activation
     return family_point(expression.family)[0] if expression.family else None
+
+
+def point_of(expression: Expression) -> tuple[float, float]:
+    """Return activation and evaluation of an expression, else of its family, else of neutral."""
+    if expression.point is not None:
+        return expression.point
+    return family_point(expression.family) if expression.family else NEUTRAL_POINT
 
 
 def _centre(expression: Expression) -> Float64:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from fba.cli.printing import print_json
+from fba.parameters import FAP_COUNT, faps
 
 if TYPE_CHECKING:
-    from fba.emotion import Blend
+    from fba.emotion import Blend, Reading, Readings
 
 
 def print_expressions(as_json: bool) -> None:
@@ -43,8 +45,6 @@ def print_expressions(as_json: bool) -> None:
 
 def print_blend(blend: Blend, as_json: bool) -> None:
     """Print the parts of a mixture, its point, and the FAPs that it moves."""
-    from fba.parameters import faps
-
     if as_json:
         print_json(blend_record(blend))
         return
@@ -56,8 +56,6 @@ def print_blend(blend: Blend, as_json: bool) -> None:
 
 def blend_record(blend: Blend) -> dict[str, Any]:
     """Return a mixture for programs: names, intensities, point, FAPs by name."""
-    from fba.parameters import faps
-
     named = zip(faps(), blend.faps.tolist(), strict=True)
     return {
         "expressions": {one.name: round(intensity, 3) for one, intensity in blend.parts},
@@ -65,3 +63,49 @@ def blend_record(blend: Blend) -> dict[str, Any]:
         "evaluation": round(blend.evaluation, 3),
         "faps": {one.name: round(value) for one, value in named if round(value)},
     }
+
+
+def reading_record(time: float, reading: Reading) -> dict[str, Any]:
+    """Return the reading of a frame for programs."""
+    point = {"activation": reading.activation, "evaluation": reading.evaluation}
+    return {
+        "time": round(time, 4),
+        "label": reading.label,
+        "probability": round(reading.probability, 4),
+        "intensity": round(reading.intensity, 1),
+        **{name: None if value is None else round(value, 3) for name, value in point.items()},
+        "nearest": [
+            {
+                "name": near.name,
+                "intensity": round(near.intensity, 1),
+                "probability": round(near.probability, 4),
+            }
+            for near in reading.nearest
+        ],
+    }
+
+
+def summary_text(readings: Readings) -> str:
+    """Return "joy 62 % (mean 54), neutral 38 %": shares of frames, with mean intensities."""
+    parts = []
+    for row in readings.summary()["shares"]:
+        mean = f" (mean {row['intensity']:.0f})" if row["intensity"] else ""
+        parts.append(f"{row['label']} {100 * row['share']:.0f} %{mean}")
+    return ", ".join(parts)
+
+
+def reading_lines(readings: Readings, *, every: bool) -> Iterator[str]:
+    """Yield a table of every frame, or of those at which the label changes."""
+    yield f"{'time':>8}  {'shown':11}  {'int.':>4}  {'act.':>4}  {'eval.':>5}  nearest expressions"
+    before = ""
+    for time, one in zip(readings.times.tolist(), readings.readings, strict=True):
+        if every or one.label != before:
+            point = ["-" if value is None else f"{value:.1f}" for value in (one.activation, one.evaluation)]
+            intensity = f"{one.intensity:.0f}" if one.intensity else "-"
+            nearest = ", ".join(f"{near.name} {near.intensity:.0f}" for near in one.nearest)
+            line = f"{time:7.2f}s  {one.label:11}  {intensity:>4}  {point[0]:>4}  {point[1]:>5}  {nearest}"
+            yield line.rstrip()
+        before = one.label
+    if readings.unsent:
+        count = len(readings.unsent)
+        yield f"FAPs that are never sent, or always 0, and say nothing: {count} of {FAP_COUNT - 2}"

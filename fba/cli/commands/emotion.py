@@ -1,0 +1,124 @@
+"""`fba emotion`: which expressions a face shows, frame by frame."""
+
+from __future__ import annotations
+
+import csv
+import io
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fba.cli import options
+from fba.cli.command import Command, examples
+from fba.cli.emotions import tables
+from fba.cli.inputs import EXISTING, read_input, read_model
+from fba.cli.outputs import Output, Outputs, OutputType, display_name
+from fba.cli.printing import print_json
+from fba.errors import FormatError
+from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.emotion import Readings
+
+BASELINES = ("none", "start", "median")
+
+
+@click.command(
+    cls=Command,
+    epilog=examples(
+        "fba emotion talk.fba",
+        "fba emotion talk.fba --frames",
+        "fba emotion talk.fba -o talk.csv",
+        "fba emotion face.csv --baseline median --json",
+    ),
+)
+@click.argument("file", type=EXISTING)
+@click.option("--frames", is_flag=True, help="Print a row a frame, not only the summary and the changes.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT.csv",
+    type=OutputType(),
+    help="Write a row a frame as CSV. - for standard output.",
+)
+@options.no_clobber_option
+@click.option(
+    "--baseline",
+    type=click.Choice(BASELINES),
+    default=BASELINES[0],
+    show_default=True,
+    help="The face at rest, for captures whose zero is not: start: the first half second; median: of each "
+    "FAP, where a face is mostly at rest.",
+)
+@click.option(
+    "--model",
+    type=click.Path(exists=True, path_type=Path),
+    metavar="FILE",
+    help="The face whose visemes and expressions a stream shows; default: the built-in head.",
+)
+@options.fps_option("Frame rate of a file that has none.")
+@options.from_option
+@options.salvage_option
+@options.json_option
+@options.limit_option
+def command(
+    file: Path,
+    frames: bool,
+    output: Path | None,
+    no_clobber: bool,
+    baseline: str,
+    model: Path | None,
+    fps: Fraction | None,
+    format: str | None,
+    salvage: bool,
+    as_json: bool,
+    limit: Limits,
+) -> None:
+    """Read the expressions of a face: families, named expressions, intensities, activation, evaluation.
+
+    FILE: any file with a face, streams as well as captures. "neutral": nothing is shown, or too little to
+    count. "unknown": something is shown that is like no expression. FAPs that a file never sends say nothing.
+    """
+    if output is not None and (frames or as_json):
+        raise click.UsageError("-o writes a table; --frames and --json print one: give one of them")
+    outputs = None
+    if output is not None:
+        outputs = Outputs([Output("--output", output, text=True)], [file, model], no_clobber=no_clobber)
+    animation = read_input(file, header_fps=fps, format=format, salvage=salvage, limits=limit)
+    if animation.face is None:
+        raise FormatError("has no face: it sends no FAPs, from which expressions are read", path=file)
+    from fba.emotion import read_expressions
+
+    readings = read_expressions(animation, read_model(model), baseline=baseline)
+    if outputs is not None and output is not None:
+        outputs.write(output, _csv(readings).encode())
+        outputs.say(f"{display_name(output)}: {len(readings)} frames; {tables.summary_text(readings)}")
+    elif as_json:
+        print_json({**readings.summary(), "unsent": readings.unsent, "frames": list(_rows(readings))})
+    else:
+        click.echo(f"{file}: {len(readings)} frames; {tables.summary_text(readings)}")
+        for line in tables.reading_lines(readings, every=frames):
+            click.echo(line)
+
+
+def _rows(readings: Readings) -> list[dict[str, object]]:
+    return [
+        tables.reading_record(time, one)
+        for time, one in zip(readings.times.tolist(), readings.readings, strict=True)
+    ]
+
+
+def _csv(readings: Readings) -> str:
+    """Return the table: time, label, its probability and intensity, activation, evaluation, nearest."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["time", "label", "probability", "intensity", "activation", "evaluation", "nearest"])
+    for time, one in zip(readings.times.tolist(), readings.readings, strict=True):
+        nearest = " ".join(f"{near.name.replace(' ', '_')}={near.intensity:.0f}" for near in one.nearest)
+        point = ["" if value is None else f"{value:.2f}" for value in (one.activation, one.evaluation)]
+        writer.writerow(
+            [f"{time:.4f}", one.label, f"{one.probability:.3f}", f"{one.intensity:.1f}", *point, nearest]
+        )
+    return text.getvalue()
