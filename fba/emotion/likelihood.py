@@ -25,7 +25,7 @@ from fba.emotion.features import features, known_features, measure
 from fba.emotion.profiles import measured_faps, measurements
 from fba.face.expressions import Definitions
 from fba.face.resolve import resolve
-from fba.parameters import FAP_COUNT
+from fba.parameters import FAP_COUNT, fap_numbers
 
 INTENSITIES = (0.3, 0.42, 0.56, 0.7, 0.85, 1.0, 1.25)
 """Intensities at which each expression is tried."""
@@ -39,14 +39,19 @@ OWN = 0.08
 """The same, as a share of each feature's spread: nobody moves only what an expression lists."""
 SPEECH = 1.0
 """Amplitude of speech, in visemes."""
+OPEN_MOUTH = 500.0
+"""By how much a jaw, and the lower lip with it, open for no reason, standard deviation, in MNS."""
 REST_SCALES = (0.4, 0.8, 1.5)
 """A face that shows nothing is nearer to its neutral position in one recording than in another: it is a
 mixture of Gaussians with the noise of `features.csv` times these."""
 SHOWING_NOISE = 0.4
 """What an expression adds to, times that noise."""
+VISIBLE = 2.0
+"""How many standard deviations of a face at rest an expression must move what is known, to be read at all."""
+HIDDEN_PRIOR = 1e-12
 UNKNOWN_SPREAD = 1.4
 """Width of "unknown", in spreads of the features."""
-NEUTRAL_PRIOR, UNKNOWN_PRIOR, MADE_UP_PRIOR = 0.25, 0.02, 0.03
+NEUTRAL_PRIOR, UNKNOWN_PRIOR, MADE_UP_PRIOR = 0.2, 0.02, 0.03
 """Shares before anything is seen: neutral, unknown, and expressions of no family; the six share the rest."""
 LEADING, MEASURED, CAPTURED = 0.2, 0.2, 0.35
 """Shares in a family of its own expression, its measured profile, its prototypes; variants share the rest."""
@@ -189,11 +194,13 @@ def _model(packed: bytes) -> Model:
     table = features()
     noise, spread = table.noise[used], table.spread[used]
     spoken = measure(Definitions.default().visemes[1:].astype(np.float64), known)[:, used]
-    speech = SPEECH**2 * spoken.T @ spoken / len(spoken)
+    opened = measure(_open_mouth(), known)[None, used]
+    speech = SPEECH**2 * spoken.T @ spoken / len(spoken) + opened.T @ opened
     means = [np.zeros(len(noise))] * len(REST_SCALES)
     covariances = [speech + np.diag((scale * noise) ** 2) for scale in REST_SCALES]
     priors = [NEUTRAL_PRIOR * (1 - FAINT_PRIOR) / len(REST_SCALES)] * len(REST_SCALES)
     showing = [_show(one, known, used) for one in candidates()]
+    visible = _visible([target for target, _ in showing], speech + np.diag(noise**2))
     resting = speech + np.diag((SHOWING_NOISE * noise) ** 2)
     total = sum(one.prior for one in candidates())
     for intensity in FAINT:
@@ -204,16 +211,30 @@ def _model(packed: bytes) -> Model:
     means.append(np.zeros(len(noise)))
     covariances.append(speech + np.diag((UNKNOWN_SPREAD * spread) ** 2))
     priors.append(UNKNOWN_PRIOR)
-    for one, (target, varied) in zip(candidates(), showing, strict=True):
+    for one, (target, varied), seen in zip(candidates(), showing, visible, strict=True):
         for intensity in INTENSITIES:
             means.append(intensity * target)
             covariances.append(resting + intensity**2 * varied)
-            priors.append(one.prior / len(INTENSITIES))
+            priors.append(one.prior / len(INTENSITIES) * (1.0 if seen else HIDDEN_PRIOR))
     inverse = np.linalg.inv(np.array(covariances))
     linear = np.einsum("mij,mj->mi", inverse, np.array(means))
     constants = 0.5 * np.linalg.slogdet(inverse)[1] - 0.5 * (linear * means).sum(axis=1) + np.log(priors)
     quadratic = -0.5 * inverse.reshape(len(inverse), -1)
     return Model(known, used, np.ascontiguousarray(quadratic.T), np.ascontiguousarray(linear.T), constants)
+
+
+def _visible(targets: list[Float64], rest: Float64) -> list[bool]:
+    """Return which expressions move features of known FAPs further than a face at rest does."""
+    inverse = np.linalg.inv(rest)
+    return [bool(target @ inverse @ target >= VISIBLE**2) for target in targets]
+
+
+@cache
+def _open_mouth() -> Float64:
+    faps = np.zeros(FAP_COUNT)
+    faps[fap_numbers()["open_jaw"] - 1] = OPEN_MOUTH
+    faps[[n - 1 for name, n in fap_numbers().items() if name.startswith("raise_b_")]] = -OPEN_MOUTH
+    return faps
 
 
 def _show(one: Candidate, known: Bool, used: Bool) -> tuple[Float64, Float64]:

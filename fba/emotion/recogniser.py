@@ -99,6 +99,12 @@ class Recogniser:
         self._state: Float64 | None = None  # of each label
         self._within: Float64 | None = None  # of each name and intensity, within its label
 
+    def prepare(self) -> None:
+        """Compute what frames are compared with, so that not even the first waits for it."""
+        for known in (self._known, self._known & ~_lids()):
+            model(known)
+        _states()
+
     def push(self, faps: npt.ArrayLike) -> Reading:
         """Return what the next frame shows. faps: (68,), as `fba.face.resolve` gives them.
 

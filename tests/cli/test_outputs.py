@@ -251,6 +251,7 @@ STANDARD = [
     "gait --cycles 1 -o {} --to bap",
     "express fear -o {} --to fap",
     "emote face.fap -o {} --writing fap --emotion angry",
+    "emotion face.fap -o {}",
 ]
 
 

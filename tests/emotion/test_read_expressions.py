@@ -1,0 +1,243 @@
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fba import Animation, FaceTrack, emotion
+from fba.capture import ActionUnitMotion, from_action_units
+from fba.emotion import Reading, Recogniser
+from fba.errors import OptionError
+from fba.face import resolve
+from fba.parameters import fap_numbers
+
+UNITS = {
+    "joy": (6, 12, 25),
+    "sadness": (1, 4, 15, 17),
+    "anger": (4, 5, 7, 23),
+    "fear": (1, 2, 4, 5, 20, 25),
+    "disgust": (9, 10, 17),
+    "surprise": (1, 2, 5, 26),
+}
+"""Action units of the six, as EMFACS has them."""
+
+
+def read_one(faps: np.ndarray, known: np.ndarray | None = None) -> Reading:
+    return Recogniser(25, known=known).push(faps)
+
+
+def columns(*beginnings: str) -> np.ndarray:
+    mask = np.zeros(68, dtype=bool)
+    mask[[n - 1 for name, n in fap_numbers().items() if name.startswith(beginnings)]] = True
+    return mask
+
+
+@cache
+def sampled(family: str, count: int = 60) -> np.ndarray:
+    """Profiles within one deviation of Table 8-4, at intensities of 40 to 100."""
+    rng = np.random.default_rng(8)
+    features = [one.feature for one in emotion.measurements(family)]
+    return np.array(
+        [
+            emotion.measured_faps(family, dict(zip(features, rng.uniform(-1, 1, len(features)), strict=True)))
+            * rng.uniform(0.4, 1)
+            for _ in range(count)
+        ]
+    )
+
+
+def test_measured_profiles_are_read_as_their_family() -> None:
+    right = {
+        family: np.mean([read_one(faps).label == family for faps in sampled(family)])
+        for family in emotion.FAMILIES
+    }
+    assert np.mean(list(right.values())) >= 0.95, right
+    assert min(right.values()) >= 0.85, right
+
+
+def test_shown_expressions_are_read_as_their_family() -> None:
+    for one in emotion.expressions():
+        if one.family and not one.recipe:
+            labels = {read_one(share * one.faps).label for share in (0.5, 0.75, 1.0)}
+            assert labels == {one.family}, (one, labels)
+
+
+@pytest.mark.parametrize("family", emotion.FAMILIES)
+def test_action_units_are_read_as_their_family(family: str) -> None:
+    """Faces of trackers, which move other FAPs than the expressions of the built-in head."""
+    units = tuple(range(1, 27))
+    rng = np.random.default_rng(3)
+    rows = np.zeros((40, len(units)))
+    rows[:, [unit - 1 for unit in UNITS[family]]] = rng.uniform(0.4, 0.9, (40, len(UNITS[family])))
+    face = from_action_units(ActionUnitMotion(units, rows, np.arange(40) / 25, 25)).face  # type: ignore[arg-type]
+    assert face is not None
+    labels = Counter(read_one(faps).label for faps in resolve(face))
+    assert labels[family] >= 34, labels
+
+
+@pytest.mark.parametrize("name", ["joy", "fear", "rage", "contempt", "terror", "crying", "laugh", "surprise"])
+def test_the_nearest_expression_has_its_name_and_intensity(name: str) -> None:
+    one = emotion.expression(name)
+    reading = read_one(0.8 * one.faps)
+    assert reading.nearest[0].name == name
+    assert 60 <= reading.nearest[0].intensity <= 100
+
+
+def test_activation_and_evaluation_lie_between_neutral_and_the_expression() -> None:
+    full = read_one(emotion.expression("surprise").faps)
+    assert full.activation == pytest.approx(6.5, abs=0.6)
+    assert full.evaluation == pytest.approx(5.2, abs=0.3)
+    half = read_one(0.5 * emotion.expression("surprise").faps)
+    assert half.activation is not None
+    assert full.activation is not None
+    assert 4.5 < half.activation < full.activation - 0.5
+
+
+def test_a_face_at_rest_is_neutral_and_nonsense_is_unknown() -> None:
+    assert read_one(np.zeros(68)).label == "neutral"
+    nonsense = np.zeros(68)
+    nonsense[columns("raise_l_m_eyebrow", "raise_r_m_eyebrow")] = -300
+    nonsense[columns("raise_l_i_eyebrow", "raise_r_i_eyebrow")] = 400
+    nonsense[columns("stretch_l_corner", "stretch_r_corner")] = -300
+    nonsense[columns("raise_l_corner", "raise_r_corner")] = 500
+    reading = read_one(nonsense)
+    assert reading.label == "unknown"
+    assert (reading.nearest, reading.activation, reading.evaluation) == ((), None, None)
+
+
+def speech() -> Animation:
+    """Every viseme in turn, half a second each, with the change in between."""
+    viseme = np.zeros((14 * 12, 4), dtype=np.int16)
+    for number in range(14):
+        rows = slice(12 * number, 12 * number + 12)
+        viseme[rows, 0], viseme[rows, 1] = number + 1, (number + 1) % 14 + 1
+        viseme[rows, 2] = np.linspace(63, 0, 12)
+    mask = np.zeros((len(viseme), 68), dtype=bool)
+    mask[:, 0] = True
+    return Animation(
+        25, np.arange(len(viseme)), FaceTrack(np.zeros((len(viseme), 68), np.int32), mask, viseme)
+    )
+
+
+def test_speech_is_neutral() -> None:
+    labels = Counter(one.label for one in emotion.read_expressions(speech()).readings)
+    assert labels["neutral"] >= 0.95 * labels.total(), labels
+    assert not labels["surprise"]
+
+
+@pytest.mark.parametrize("opening", [200, 500, 900])
+def test_an_open_mouth_alone_is_no_surprise(opening: int) -> None:
+    faps = np.zeros(68)
+    faps[fap_numbers()["open_jaw"] - 1] = opening
+    faps[columns("raise_b_midlip", "raise_b_lip")] = -0.9 * opening
+    assert read_one(faps).label in ("neutral", "unknown")
+
+
+def test_fap_2_and_mates_are_read() -> None:
+    values, mask = np.zeros((20, 68), np.int32), np.zeros((20, 68), bool)
+    expression = np.zeros((20, 6), np.int16)
+    expression[:, :2] = 4, 50
+    mask[:, 1] = True
+    readings = emotion.read_expressions(
+        Animation(25, np.arange(20), FaceTrack(values, mask, None, expression))
+    )  # type: ignore[arg-type]
+    assert readings.summary()["main"] == "fear"
+    left = [n - 1 for name, n in fap_numbers().items() if "_l_" in name and "eye" in name]
+    mask = np.zeros((20, 68), bool)
+    mask[:, left] = True
+    values = np.broadcast_to(np.rint(emotion.expression("surprise").faps), (20, 68)).astype(np.int32)
+    values = np.where(mask, values, 0)
+    assert (
+        emotion.read_expressions(Animation(25, np.arange(20), FaceTrack(values, mask))).summary()["main"]
+        == "surprise"
+    )
+
+
+def test_faps_that_are_never_sent_say_nothing() -> None:
+    """A tracker that sees neither cheeks, lids nor the nose."""
+    known = columns("raise_", "stretch_", "lower_", "open_", "squeeze_")
+    for family in ("joy", "anger", "surprise"):
+        faps = np.where(known, emotion.expression(family).faps, 0)
+        assert read_one(faps, known).label == family
+
+
+def talking(rng: np.random.Generator, frames: int) -> Iterator[np.ndarray]:
+    """A face that is half angry, at the edge of what counts, with jitter."""
+    for _ in range(frames):
+        yield 0.3 * emotion.expression("anger").faps + rng.normal(0, 25, 68)
+
+
+def test_labels_do_not_flicker() -> None:
+    frames = list(talking(np.random.default_rng(5), 250))
+    recogniser = Recogniser(25)
+    steady = [recogniser.push(faps).label for faps in frames]
+    single = [read_one(faps).label for faps in frames]
+
+    def changes(labels: list[str]) -> int:
+        return sum(a != b for a, b in pairwise(labels))
+
+    assert changes(single) >= 20
+    assert changes(steady) <= changes(single) / 5
+
+
+def test_a_change_is_seen_within_half_a_second() -> None:
+    recogniser = Recogniser(50)
+    for _ in range(50):
+        assert recogniser.push(np.zeros(68)).label == "neutral"
+    labels = [recogniser.push(emotion.expression("joy").faps).label for _ in range(25)]
+    assert labels[-1] == "joy"
+
+
+def test_blinks_are_not_read() -> None:
+    lids = columns("close_")
+    recogniser = Recogniser(25)
+    for frame in range(100):
+        faps = np.zeros(68)
+        faps[lids] = 900 if frame % 25 in (10, 11, 12, 13) else 0
+        assert recogniser.push(faps).label == "neutral", frame
+
+
+def test_pushing_frames_one_by_one_or_together_is_the_same() -> None:
+    frames = np.array(list(talking(np.random.default_rng(1), 30)))
+    frames[10:14, columns("close_")] = 900
+    one, other = Recogniser(25), Recogniser(25)
+    assert [reading.label for reading in one.push_frames(frames)] == [other.push(row).label for row in frames]
+
+
+def test_a_baseline_is_subtracted() -> None:
+    values = np.zeros((60, 68), np.int32)
+    values[:, columns("raise_l_i", "raise_r_i", "raise_l_m", "raise_r_m")] = -150
+    values[:, columns("squeeze")] = 60
+    mask = np.ones((60, 68), bool)
+    mask[:, :2] = False
+    animation = Animation(25, np.arange(60), FaceTrack(values, mask))
+    assert emotion.read_expressions(animation).summary()["main"] == "anger"
+    for baseline in ("start", "median"):
+        assert emotion.read_expressions(animation, baseline=baseline).summary()["main"] is None
+
+
+def test_frames_that_are_not_finite_keep_the_reading() -> None:
+    recogniser = Recogniser(25)
+    assert recogniser.push(np.full(68, np.nan)).label == "unknown"
+    assert recogniser.push(emotion.expression("joy").faps).label == "joy"
+    assert recogniser.push(np.full(68, np.inf)).label == "joy"
+
+
+def test_bad_arguments() -> None:
+    with pytest.raises(OptionError, match="must have shape"):
+        Recogniser(25).push(np.zeros(67))
+    with pytest.raises(OptionError, match="rate must be a positive"):
+        Recogniser(0)
+    animation = Animation(25, np.arange(1), FaceTrack.empty(1))
+    with pytest.raises(OptionError, match="baseline must be one of none, start, median"):
+        emotion.read_expressions(animation, baseline="mean")
+
+
+def test_a_track_that_sends_nothing_is_neutral_with_nothing_known() -> None:
+    readings = emotion.read_expressions(Animation(25, np.arange(3), FaceTrack.empty(3)))
+    assert len(readings.unsent) == 66
+    assert readings.summary()["main"] is None
