@@ -110,6 +110,7 @@ fba.cli
 fba.cli.recordings
 fba.cli.emotions
 fba.cli.coding
+fba.cli.subcommands
 fba.cli.commands
 fba.__main__
 """

@@ -11,9 +11,9 @@ import click
 
 from fba.cli import options, step_tables
 from fba.cli.command import EachFile, Group, examples
-from fba.cli.commands import bench_bitrate
 from fba.cli.inputs import EXISTING, input_file
 from fba.cli.printing import print_json
+from fba.cli.subcommands import bench_bitrate
 from fba.limits import Limits
 
 SPEED = "speed"

@@ -13,9 +13,9 @@ import click
 
 from fba.cli import options
 from fba.cli.command import Group, examples
-from fba.cli.commands import model_learn_fit
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, colour_grade, print_json
+from fba.cli.subcommands import model_learn_fit
 from fba.errors import FbaWarning
 
 if TYPE_CHECKING:

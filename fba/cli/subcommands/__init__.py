@@ -1,0 +1,1 @@
+"""Commands below a command, such as `fba bench bitrate`; the commands themselves import them."""
