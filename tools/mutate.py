@@ -203,8 +203,26 @@ VERDICT_TEST = "tests/cli/test_model.py -k verdicts"
 
 PLANS_TEST = "tests/planning/test_plans.py"
 FIT_PLANS_TEST = "tests/planning/test_fit_plans.py"
+FIT_TEST = "tests/face/learning/test_learn_fit.py"
+FIT_STREAMS_TEST = "tests/planning/test_fit_streams.py"
+REGRESSION = "fba/face/learning/_regression.py"
 
 MUTANTS = (
+    Mutant(REGRESSION, "RIDGE = 1e-3", "RIDGE = 1e-1", FIT_TEST),
+    Mutant(REGRESSION, "if most - len(chosen) <= len(lacking):", "if False:", FIT_TEST),
+    Mutant(REGRESSION, "= 1.0", "= 0.999", FIT_TEST),
+    Mutant(REGRESSION, ".astype(np.float32)", "", FIT_TEST),
+    Mutant("fba/face/learning/learn.py", "if i not in fold)", "if True)", FIT_TEST),
+    Mutant("fba/face/learning/learn.py", "if poses <= count:", "if poses < count:", FIT_TEST),
+    Mutant("fba/face/learning/reduction.py", "[moves[columns] for columns in donors()]", "[moves]", FIT_TEST),
+    Mutant(
+        "fba/face/learning/reduction.py",
+        "mask[:, _copies(values, mask, linked)] = False",
+        "pass",
+        FIT_STREAMS_TEST,
+    ),
+    Mutant("fba/planning/fit_streams.py", "(linked, ~linked):", "(linked | ~linked,):", FIT_STREAMS_TEST),
+    Mutant("fba/planning/fit_streams.py", 'keep_masks=("face",)', "keep_masks=()", FIT_STREAMS_TEST),
     Mutant("fba/planning/plan.py", "    if not any(used):", "    if True:", PLANS_TEST),
     Mutant("fba/planning/plan.py", "moves[list(related)].any()", "moves[list(related)]", PLANS_TEST),
     Mutant("fba/planning/plan.py", "bits + intra_bits, cuts)\n    face", "bits, cuts)\n    face", PLANS_TEST),

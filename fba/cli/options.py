@@ -68,21 +68,6 @@ class MomentType(click.ParamType[float]):
         return seconds
 
 
-class MillimetresType(click.ParamType[float]):
-    """A positive length in millimetres: 0.5mm, or 0.5."""
-
-    name = "length"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        try:
-            length = float(str(value).removesuffix("mm"))
-        except ValueError:
-            length = math.nan
-        if not (length > 0 and math.isfinite(length)):
-            self.fail(f"{value!r} is not a length above 0; write e.g. 0.5mm", param, ctx)
-        return length
-
-
 class LimitType(click.ParamType[tuple[str, int]]):
     """A limit and its value: frames=10000000."""
 

@@ -82,8 +82,8 @@ def test_figures_for_programs(run: Run, here: Path) -> None:
     ("options", "status", "message"),
     [
         (["--faps", "3", "--tolerance", "1mm"], 2, "--faps and --tolerance contradict each other"),
-        (["--tolerance", "-1mm"], 2, "'-1mm' is not a length above 0"),
-        (["--tolerance", "nan"], 2, "'nan' is not a length above 0"),
+        (["--tolerance", "-1mm"], 2, "-1mm is not positive"),
+        (["--tolerance", "nan"], 2, "'nan' is not a length"),
         (["--faps", "60"], 1, "different poses"),
         (["walk.bap"], 1, "walk.bap: there is no face in it"),
         (["still.fap"], 1, "nothing to learn from"),
@@ -105,3 +105,31 @@ def test_a_model_is_named_as_one(run: Run, here: Path) -> None:
     code, _, err = run("model", "learn-fit", "monday.fap", "-o", "ada.json")
     assert code == 2
     assert "name it ada.glb" in err
+
+
+def test_a_stream_leaves_to_the_head_what_it_computes(run: Run, here: Path) -> None:
+    run(
+        "model", "learn-fit", "monday.fap", "tuesday.fap", "--faps", 3, "--model", "head.glb", "-o", "ada.glb"
+    )
+    code, out, err = run("encode", "monday.fap", "-o", "small.fba", "--fit", "ada.glb", "--json")
+    assert (code, err) == (0, "")
+    said = json.loads(out)["fit"]
+    assert len(said["sent"]) == 3
+    assert said["added"] == []
+    assert said["millimetres"]["largest"] <= 0.01  # the small head shows the jaw alone
+    run("encode", "monday.fap", "-o", "all.fba", "--preset", "compact")
+    assert Path("small.fba").stat().st_size < Path("all.fba").stat().st_size
+    shown = resolve(fba.read("small.fba").face, FaceModel.load("ada.glb"))
+    assert shown[:, LIP] == pytest.approx(fba.read("monday.fap").face.values[:, LIP], abs=1)
+    assert "3 FAPs sent; the head computes the others" in run(
+        "encode", "monday.fap", "-o", "small.fba", "--fit", "ada.glb"
+    )[1]  # fmt: skip
+
+
+def test_a_stream_for_a_head_without_a_table_is_refused(run: Run, here: Path) -> None:
+    code, _, err = run("encode", "monday.fap", "-o", "small.fba", "--fit", "head.glb")
+    assert code == 1
+    assert "has no interpolation table (FIT)" in " ".join(err.split())
+    code, _, err = run("encode", "monday.fap", "-o", "small.fba", "--fit", "head.glb", "--preset", "compact")
+    assert code == 2
+    assert "the table of the head decides what is sent" in " ".join(err.split())

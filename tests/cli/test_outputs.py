@@ -78,6 +78,7 @@ OVERWRITING = [
     "encode IN.fap -o OUT",
     "encode face.fap IN.bap -o OUT",
     "encode face.fap --epf IN.epf -o OUT",
+    "encode face.fap --fit IN.glb -o OUT",
     "decode IN.fba --fap OUT",
     "decode IN.fba --bap OUT",
     "decode IN.fba --epf OUT",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.cli.clamped_values import clamped_values
+from fba.cli.coding.fit_options import encode_for_head, fit_lines, fit_values
 from fba.cli.coding.rate_options import HeldRate, encode_held, rate_lines, rate_values
 from fba.cli.coding.size_options import Size
 from fba.cli.coding.tolerance_options import encode_near, tolerance_lines, tolerance_values
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from fba.codec import ClampedParameter, EncoderOptions
     from fba.face.model import FaceModel
     from fba.planning import NearLossless
+    from fba.planning.fit_streams import FitStream
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,7 @@ class CodedStream:
     rounded: int = 0
     near: NearLossless | None = None
     held: HeldRate | None = None
+    fit: FitStream | None = None
 
     @property
     def clamped_count(self) -> int:
@@ -67,12 +70,15 @@ class CodedStream:
             "clamped_parameters": clamped_values(self.clamped),
             **({"tolerance": tolerance_values(self.near)} if self.near is not None else {}),
             **({"bitrate": rate_values(self.held)} if self.held is not None else {}),
+            **({} if self.fit is None else {"fit": fit_values(self.fit)}),
         }
 
     def details(self, animation: Animation) -> list[str]:
         """Return what else is said of the stream of this animation: how near it is to its source."""
         if self.held is not None:
             return rate_lines(self.held)
+        if self.fit is not None:
+            return fit_lines(self.fit)
         return tolerance_lines(self.near, animation) if self.near is not None else []
 
     def summary(self, output: Path, animation: Animation) -> str:
@@ -94,6 +100,17 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
 
     options: with quantisers as `size` says. inputs: where the animation comes from.
     """
+    if size.fit is not None:
+        made = encode_for_head(animation, options, size.fit)
+        counts = made.statistics
+        return CodedStream(
+            made.data,
+            counts.planes,
+            counts.intra_planes,
+            counts.clamped_parameters,
+            options.bap_quant,
+            fit=made,
+        )
     if size.tolerance is not None:
         data, near = encode_near(animation, options, size.tolerance, size.model, every_frame=size.every_frame)
         counts = near.statistics

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from fba.cli import options
+from fba.cli.coding.fit_options import fit_option
 from fba.cli.coding.rate_options import check_buffer, rate_options
 from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Decorated
@@ -21,12 +22,14 @@ PRESETS = ("reference", "exact", "compact")
 class Size:
     """How small a stream is to be, and what may be lost for that, as far as options say it; else None.
 
-    preset: what is sent. model: the face that all receivers have. fap_quant, bap_quant: how finely.
+    preset: what is sent. model: the face that all receivers have; fit: one that computes FAPs to within 3 mm.
+    fap_quant, bap_quant: how finely.
     tolerance: metres by which vertices may move; every_frame: whether no frame is left out for that. bitrate:
     bits a second; buffer: seconds that the stream may be ahead of them.
     """
 
     preset: str | None = None
+    fit: Path | None = None
     model: Path | None = None
     tolerance: float | None = None
     every_frame: bool = False
@@ -80,6 +83,7 @@ def size_options(command: Decorated) -> Decorated:
                 help="With --tolerance: send all frames, for players that hold a frame until the next comes.",
             ),
             rate_options,
+            fit_option,
             click.option(
                 "--quant",
                 "fap_quant",
@@ -103,17 +107,18 @@ PLANES = ("intra_period", "start_codes", "time_codes", "unsent", "gender", "clam
 """Options of single planes."""
 CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "epf": (
-        ("preset", "model", "tolerance", "every_frame", "bitrate", *QUANTISERS, *PLANES),
+        ("preset", "fit", "model", "tolerance", "every_frame", "bitrate", *QUANTISERS, *PLANES),
         "the EPF file says how planes are coded",
     ),
     "tolerance": (
-        ("preset", "bitrate", *QUANTISERS, "unsent"),
+        ("preset", "fit", "bitrate", *QUANTISERS, "unsent"),
         "the tolerance decides what is sent, and how finely",
     ),
     "bitrate": (
-        ("preset", "model", *QUANTISERS, "unsent", "intra_period"),
+        ("preset", "fit", "model", *QUANTISERS, "unsent", "intra_period"),
         "the bit rate decides what is sent, how finely, and where I planes come",
     ),
+    "fit": (("preset", "model", "unsent"), "the table of the head decides what is sent"),
 }
 """Options that decide all that some others decide, those others, and the reason to give."""
 

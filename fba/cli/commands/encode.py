@@ -53,6 +53,7 @@ class _EncodeCommand(Command):
         "fba encode talk.fap -o again.fba --epf talk.epf",
         "fba encode walk.bvh -o walk.fba --report --limits report",
         "fba encode face.c3d -o face.fba --fps 25 --map-out markers.toml",
+        "fba encode talk.fap -o talk.fba --fit ada.glb    # fba model learn-fit makes that head",
         "fba encode face.csv body.bvh -o both.fba --offset 2.4 --audio speech.wav",
     ),
 )
@@ -166,7 +167,7 @@ def command(
     written = [Output("--output", output), *([Output("--report", page)] if page is not None else [])]
     saved = [] if map_out is None else [Output("--map-out", map_out, True)]
     sounds = voice.check_audio(audio, audio_offset, output)
-    read = [*inputs, epf, audio, size.model, *(each for each in maps if isinstance(each, Path))]
+    read = [*inputs, epf, audio, size.model, size.fit, *(each for each in maps if isinstance(each, Path))]
     outputs = Outputs([*written, *saved, *sounds], read, no_clobber=no_clobber)
     captures = [path for path in inputs if has_skeleton(path, format)]
     marked = [path for path in inputs if has_markers(path, format)]

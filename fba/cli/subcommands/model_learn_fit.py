@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options
+from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Command, examples
 from fba.cli.inputs import EXISTING, read_input
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     help="FAPs to send, those of the head's rotation among them. Default: 10.",
 )  # fmt: skip
 @click.option(
-    "--tolerance", type=options.MillimetresType(), metavar="1mm",
+    "--tolerance", type=LengthType(), metavar="1mm",
     help="Send as many FAPs as it takes to keep every vertex this near in 99 % of the frames held out.",
 )  # fmt: skip
 @click.option(
@@ -99,7 +100,7 @@ def command(
             step.advance()
     tracks = [_face(animation, path) for animation, path in zip(animations, streams, strict=True)]
     with Progress("learning", None):
-        learnt = learn_fit(tracks, head, count=count or FAPS, tolerance=tolerance)
+        learnt = learn_fit(tracks, head, count=count or FAPS, tolerance=tolerance and 1000 * tolerance)
     with outputs.file(output) as file:
         replace(head, fit=learnt.table).save(file)
     if fit is not None:
@@ -130,7 +131,7 @@ def _lines(learnt: LearntFit) -> list[str]:
     lines = [
         f"{len(learnt.sent)} FAPs to send: {', '.join(f'{n} {names[n - 1]}' for n in learnt.sent)}",
         f"{len(learnt.computed)} FAPs computed; errors on {held}:",
-        f"worst vertex of each frame {_millimetres(error)}",
+        f"worst vertex of each frame {error.millimetres.text()}",
         f"{100 * error.explained:.1f} % of the motion of these FAPs explained",
     ]
     for one in error.faps:
@@ -140,14 +141,6 @@ def _lines(learnt: LearntFit) -> list[str]:
             f"{spread.largest:7.1f} steps, at most {one.millimetres:.2f} mm"
         )
     return lines
-
-
-def _millimetres(error: Any) -> str:
-    spread = error.millimetres
-    return (
-        f"{spread.mean:.2f} mm off on average, {spread.percentile_99:.2f} mm in the worst 1 %, "
-        f"{spread.largest:.2f} mm at most"
-    )
 
 
 def _values(learnt: LearntFit) -> dict[str, Any]:

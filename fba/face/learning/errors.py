@@ -21,6 +21,18 @@ class Spread:
     percentile_99: float
     largest: float
 
+    @classmethod
+    def measure(cls, values: Float64) -> Spread:
+        """Return the spread of values (N,), N at least 1."""
+        return cls(float(values.mean()), float(np.quantile(values, 0.99)), float(values.max()))
+
+    def text(self) -> str:
+        """Return it in words, of millimetres."""
+        return (
+            f"{self.mean:.2f} mm off on average, {self.percentile_99:.2f} mm in the worst 1 %, "
+            f"{self.largest:.2f} mm at most"
+        )
+
 
 @dataclass(frozen=True)
 class FapError:
@@ -76,12 +88,8 @@ class ErrorSum:
         for column in columns:
             own = differences[~np.isnan(differences[:, column]), column]
             if len(own):
-                steps = _spread(own / fap_steps()[column])
+                steps = Spread.measure(own / fap_steps()[column])
                 listed.append(FapError(column + 1, steps, float(own.max() * reach[column])))
         missed, moved = self._squares
         explained = 1.0 - missed / moved if moved else 1.0
-        return FitError(_spread(np.concatenate(self._distances)), float(explained), tuple(listed))
-
-
-def _spread(values: Float64) -> Spread:
-    return Spread(float(values.mean()), float(np.quantile(values, 0.99)), float(values.max()))
+        return FitError(Spread.measure(np.concatenate(self._distances)), float(explained), tuple(listed))

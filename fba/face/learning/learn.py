@@ -14,9 +14,9 @@ from fba.face.deform.deformer import Deformer
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.learning._moments import HEAD, add_up, measure
 from fba.face.learning._regression import choose_order, fewest, fit_coefficients, make_table
-from fba.face.learning._sensitivity import displacements
 from fba.face.learning.errors import ErrorSum, FitError
 from fba.face.learning.reduction import linked_columns, send_sources
+from fba.face.learning.sensitivity import displacements
 from fba.face.model import FaceModel
 from fba.face.resolve import known_faps, resolve
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_steps, faps

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fba.arrays import Bool
+from fba.arrays import Bool, Int32
 from fba.face.interpolation.table import InterpolationTable, sources_of
 from fba.face.mates import donors
 from fba.face.resolve import known_faps
@@ -16,9 +16,9 @@ def send_sources(track: FaceTrack, table: InterpolationTable) -> FaceTrack:
     """Return a track that does not send the FAPs that a face with this table computes.
 
     Sent are the FAPs that the table starts from, as 0 where nothing determines them (the table needs them
-    all), and the FAPs to which no link leads, if they move or a mate that does would be copied. What is
-    computed may differ from what the track had. A track that redefines visemes or expressions, which
-    depends on what is sent, stays as it is, and so do visemes and expressions.
+    all), and the FAPs to which no link leads, if they move or a mate that does would be copied; but not if
+    they equal the mate that a face copies. What is computed may differ from what the track had. A track that
+    redefines visemes or expressions, which depends on what is sent, stays as it is.
     """
     if track.viseme[:, 3].any() or track.expression[:, 5].any():
         return track
@@ -27,9 +27,34 @@ def send_sources(track: FaceTrack, table: InterpolationTable) -> FaceTrack:
     moves = np.asarray(values.any(axis=0)) | linked
     needed = moves | np.logical_or.reduce([moves[columns] for columns in donors()])
     mask = known & needed & ~linked
+    mask[:, _copies(values, mask, linked)] = False
     mask[:, source_columns(table)] = True
     mask[:, :2] = track.mask[:, :2]
     return FaceTrack(values, mask, track.viseme, track.expression)
+
+
+def _copies(values: Int32, mask: Bool, linked: Bool) -> list[int]:
+    """Return columns of the mask that a face copies, as they are, from what is sent or computed.
+
+    values: int32 (T, 68). mask: bool (T, 68). linked: bool (68,).
+    """
+    kept: Bool = np.asarray(mask.all(axis=0)) | linked
+    copies: list[int] = []
+    for column in range(FAP_COUNT - 1, 1, -1):  # outer lips before inner ones
+        if linked[column] or not kept[column]:
+            continue
+        kept[column] = False
+        if all(_equals_its_donor(values, each, kept) for each in (*copies, column)):
+            copies.append(column)
+        else:
+            kept[column] = True
+    return copies
+
+
+def _equals_its_donor(values: Int32, column: int, kept: Bool) -> bool:
+    """Whether the first mate of a column that is kept has the same values."""
+    donor = next((int(one[column]) for one in donors() if kept[one[column]]), None)
+    return donor is not None and bool((values[:, donor] == values[:, column]).all())
 
 
 def linked_columns(table: InterpolationTable) -> Bool:

@@ -1,0 +1,49 @@
+"""`--fit`: streams for a head that computes most FAPs by its interpolation table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.animation import Animation
+
+if TYPE_CHECKING:
+    from fba.codec import EncoderOptions
+    from fba.planning.fit_streams import FitStream
+
+fit_option = click.option(
+    "--fit",
+    metavar="HEAD.glb",
+    type=click.Path(exists=True, path_type=Path),
+    help="Leave to this head the FAPs that it computes to within 3 mm by its interpolation table, which "
+    "`fba model learn-fit` makes. The stream must be played with --model HEAD.glb.",
+)
+
+
+def encode_for_head(animation: Animation, options: EncoderOptions, head: Path) -> FitStream:
+    """Return the stream for the head in a file."""
+    from fba.face.importers import import_model
+    from fba.planning.fit_streams import encode_with_fit
+
+    return encode_with_fit(animation, import_model(head), options)
+
+
+def fit_values(made: FitStream) -> dict[str, Any]:
+    """Return what is sent and how far the head is off, for programs; lengths in mm."""
+    off = made.errors
+    return {
+        "sent": list(made.sent),
+        "added": list(made.added),
+        "millimetres": {"mean": off.mean, "percentile_99": off.percentile_99, "largest": off.largest},
+    }
+
+
+def fit_lines(made: FitStream) -> list[str]:
+    """Return the same for people."""
+    added = f", {len(made.added)} of them as the head would miss them" if made.added else ""
+    return [
+        f"face: {len(made.sent)} FAPs sent{added}; the head computes the others",
+        f"face: worst vertex of each frame {made.errors.text()}",
+    ]
