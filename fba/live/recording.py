@@ -11,6 +11,7 @@ from fba.atomic import PathLike, check_target, write_error
 from fba.capture.live import widest_faces
 from fba.codec import Encoder, EncoderOptions
 from fba.codec.settings import FrameRate
+from fba.planning.rate import RateEncoder
 
 RATES = Fraction(1), Fraction(240)
 """Smallest and largest frame rate of a live stream."""
@@ -87,14 +88,26 @@ class StreamRecorder:
 
     targets: where it goes. frames, size: written so far. rate: frames per second; 0 before the first.
     options: by default those of captures: values that no plane carries are brought as near as can be, and a
-    body's steps are the finer ones, named behind the end.
+    body's steps are the finer ones, named behind the end. bit_rate: bits a second that are held, as far as
+    `buffer` seconds of them; None for all that is sent. See `fba.planning.rate.RateEncoder`.
     """
 
-    def __init__(self, targets: Sequence[Target], options: EncoderOptions | None = None) -> None:
+    def __init__(
+        self,
+        targets: Sequence[Target],
+        options: EncoderOptions | None = None,
+        *,
+        bit_rate: float | None = None,
+        buffer: float = 1.0,
+    ) -> None:
         self.options = options or EncoderOptions(clamp=True, bap_steps="visage", mark=True)
         self.frames = self.size = 0
         self.rate = Fraction(0)
-        self.encoder = Encoder(self.options)
+        self.encoder: Encoder | RateEncoder
+        if bit_rate is None:
+            self.encoder = Encoder(self.options)
+        else:
+            self.encoder = RateEncoder(bit_rate, buffer, self.options)
         self.encoder.expect(widest_faces())
         self.targets = tuple(targets)
 
@@ -130,8 +143,11 @@ def _write_all(file: BinaryIO, data: bytes) -> None:
         view = view[file.write(view) :]
 
 
-def warm_up(*, bodies: bool = False) -> None:
-    """Compile what encodes faces, and bodies, before datagrams come, which would be lost meanwhile."""
+def warm_up(*, bodies: bool = False, rated: bool = False) -> None:
+    """Compile what encodes faces, and bodies, before datagrams come, which would be lost meanwhile.
+
+    rated: at a bit rate.
+    """
     import numpy as np
 
     from fba.body import BapSolver
@@ -146,7 +162,7 @@ def warm_up(*, bodies: bool = False) -> None:
     if bodies:
         solver = BapSolver()
         solver.solve(solver.pose(turns))
-    recorder = StreamRecorder([])
+    recorder = StreamRecorder([], bit_rate=1e6 if rated else None)
     for frame in range(3):
         part = slice(frame, frame + 1)
         shown = None if body is None else body[part]

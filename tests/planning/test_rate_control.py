@@ -231,6 +231,23 @@ def test_what_begins_later_comes_as_soon_as_there_is_room() -> None:
     assert decoded.face.mask[-1, 47:50].all()
 
 
+def test_what_begins_later_and_never_fits_is_not_sent() -> None:
+    animation = made("speech", 60)
+    assert animation.face is not None
+    mask = animation.face.mask.copy()
+    mask[:20, 10:] = False
+    later = Animation(
+        animation.rate, animation.index, FaceTrack(np.where(mask, animation.face.values, 0), mask)
+    )
+    data, encoder = coded(later, 600)
+    assert max(levels(data, 600)) <= 600
+    assert encoder.statistics.not_sent
+    decoded = fba.decode(data)
+    assert decoded.face is not None
+    assert np.array_equal(decoded.face.mask, np.broadcast_to(mask[0], decoded.face.mask.shape))
+    assert decoded.face.values[-1, 2:10].any()
+
+
 def test_a_leaky_bucket() -> None:
     bucket = LeakyBucket(100, 50)
     bucket.add(40)

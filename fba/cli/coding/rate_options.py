@@ -14,8 +14,8 @@ from fba.cli.options import is_given
 
 if TYPE_CHECKING:
     from fba.animation import Animation
-    from fba.codec import EncoderOptions
-    from fba.planning.rate import RateStatistics, ShownErrors
+    from fba.codec import Encoder, EncoderOptions
+    from fba.planning.rate import RateEncoder, RateStatistics, ShownErrors
 
 BITS = {"": 1.0, "bit/s": 1.0, "kbit/s": 1e3, "Mbit/s": 1e6}
 """Bits a second of the units that a bit rate may have."""
@@ -103,6 +103,16 @@ def encode_held(
     return found.data, HeldRate(bitrate, seconds, found.statistics, found.options.fap_quant, errors)
 
 
+def held_by(encoder: Encoder | RateEncoder) -> HeldRate | None:
+    """Return what a live encoder held to; None for one without a rate. Its errors are not known."""
+    from fba.planning.rate import RateEncoder
+
+    if not isinstance(encoder, RateEncoder):
+        return None
+    bucket = encoder.bucket
+    return HeldRate(bucket.rate, bucket.size / bucket.rate, encoder.statistics, encoder.options.fap_quant)
+
+
 def rate_lines(held: HeldRate) -> list[str]:
     """Return what holding to a rate came to, for people."""
     counts = held.statistics
@@ -115,6 +125,8 @@ def rate_lines(held: HeldRate) -> list[str]:
             f"; {counts.left_out} of {counts.frames} frames are not sent, planes are at most "
             f"{counts.longest_gap:.2f} s apart"
         )
+    if counts.not_sent:
+        text += "; what was sent later did not fit, and is not sent: a larger --buffer would hold it"
     return [text, *(_error_lines(held.errors) if held.errors is not None else ())]
 
 

@@ -15,6 +15,7 @@ import click
 
 from fba.cli import options
 from fba.cli.clamped_values import clamped_lines
+from fba.cli.coding import rate_options
 from fba.cli.command import Command, examples
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import rate_text, seconds_text
@@ -33,6 +34,7 @@ LONGEST_NEUTRAL = 60.0
     epilog=examples(
         "fba capture livelink -o face.fba",
         "fba capture livelink --play --subject Anna",
+        "fba capture livelink -o face.fba --bitrate 1500",
         "fba capture ifacialmocap --ask 192.168.0.20 -o face.fba --seconds 60",
         "fba capture vtube --ask 192.168.0.20 --play",
         "fba capture vmc -o person.fba",
@@ -84,6 +86,7 @@ LONGEST_NEUTRAL = 60.0
 )
 @click.option("--swap", is_flag=True, help="MouthLeft and MouthRight, JawLeft and JawRight change places.")
 @options.fap_quant_option
+@rate_options.rate_options
 @click.option(
     "--model",
     type=click.Path(exists=True, path_type=Path),
@@ -105,6 +108,8 @@ def command(
     neutral: float | None,
     swap: bool,
     fap_quant: int,
+    bitrate: float | None,
+    buffer: float | None,
     model: Path | None,
     as_json: bool,
 ) -> None:
@@ -118,6 +123,9 @@ def command(
         raise click.UsageError("give -o OUT.fba to record, --play to see it, or both")
     if model is not None and not play:
         raise click.UsageError("--model goes with --play")
+    rate_options.check_buffer()
+    if bitrate is not None and options.is_given("fap_quant"):
+        raise click.UsageError("--quant and --bitrate contradict each other: the bit rate decides how finely")
     written = [] if output is None else [Output("-o", output)]
     outputs = Outputs(written, [] if model is None else [model], no_clobber=no_clobber)
     if play:
@@ -131,11 +139,12 @@ def command(
     found = find_kind(kind)
     if ask is not None and not found.asked_port:
         raise click.UsageError(f"--ask: {found.description} sends by itself; enter our address in the app")
-    warm_up(bodies=found.bodies)
+    warm_up(bodies=found.bodies, rated=bitrate is not None)
     targets, stream = _targets(output, play=play)
     recorder = StreamRecorder(
-        targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage", mark=True)
-    )
+        targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage", mark=True),
+        bit_rate=bitrate, buffer=rate_options.DEFAULT_BUFFER if buffer is None else buffer,
+    )  # fmt: skip
     capture = Capture(
         found, recorder.push, sender=sender, rate=fps, swap=swap, neutral=neutral,
         say=lambda text: click.echo(f"fba: {text}", err=True),
@@ -246,13 +255,17 @@ def _report(
 ) -> None:  # fmt: skip
     """Print what was received and written."""
     clamped = recorder.encoder.statistics.clamped_parameters
+    held = rate_options.held_by(recorder.encoder)
     rate = recorder.rate
     seconds = Fraction(summary.frames) / rate
     if as_json:
         written = {"output": None if output is None else str(output), "size": recorder.size}
         outputs.print_json(
-            {**written, "rate": str(rate), "kbit_per_second": _kbit(recorder, seconds), **summary.values()}
-        )
+            {
+                **written, "rate": str(rate), "kbit_per_second": _kbit(recorder, seconds), **summary.values(),
+                **({} if held is None else {"bitrate": rate_options.rate_values(held)}),
+            }
+        )  # fmt: skip
         return
     for line in summary.lines():
         outputs.say(f"fba: {line}")
@@ -263,7 +276,7 @@ def _report(
             f"{display_name(output)}: {summary.frames} frames, {seconds_text(seconds)} at "
             f"{rate_text(rate)} frames/s, {recorder.size} bytes, {_kbit(recorder, seconds):.2f} kbit/s"
         )
-    for line in clamped_lines(clamped):
+    for line in (*(rate_options.rate_lines(held) if held is not None else ()), *clamped_lines(clamped)):
         outputs.say(line)
 
 

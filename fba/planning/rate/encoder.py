@@ -15,6 +15,7 @@ from fba.errors import FbaWarning, RangeError, Remedy
 from fba.planning.rate.bucket import LeakyBucket
 from fba.planning.rate.expectations import expected_motion, quantiser_for
 from fba.planning.rate.visibility import slot_weights
+from fba.tracks import BodyTrack, FaceTrack
 
 COARSEST = 5.0
 """Millimetres by which a parameter may be off before it is worth bits, with a full buffer."""
@@ -47,7 +48,8 @@ class RateStatistics(EncoderStatistics):
     """Counts of an encoder that holds a rate.
 
     frames: frames that came. left_out: of these, those without a plane. longest_gap: seconds between planes.
-    peak: bits in the buffer at most. over: planes that did not fit the buffer, which must be 0.
+    peak: bits in the buffer at most. over: planes that did not fit the buffer, which must be 0. not_sent:
+    whether parameters that came later are not sent, since no I plane with them fits the buffer.
     """
 
     frames: int = 0
@@ -55,6 +57,7 @@ class RateStatistics(EncoderStatistics):
     longest_gap: float = 0.0
     peak: float = 0.0
     over: int = 0
+    not_sent: bool = False
 
 
 class RateEncoder:
@@ -70,8 +73,8 @@ class RateEncoder:
     next. I planes come at the beginning and when something is sent that was not before; frames are left out
     until the buffer has room for one.
 
-    Raises RangeError where an I plane does not fit the buffer at all, and as `Encoder` does, ValueError for a
-    rate or a buffer that is not positive.
+    Raises RangeError where the first I plane does not fit the buffer at all, and as `Encoder` does,
+    ValueError for a rate or a buffer that is not positive.
     """
 
     def __init__(
@@ -93,6 +96,7 @@ class RateEncoder:
         self._exactly = False
         self._last: Animation | None = None  # the last frame with a plane, as it was pushed
         self._late: Animation | None = None  # a frame after it that was left out
+        self._refused: Animation | None = None  # a frame whose I plane no buffer would hold
         self._planes = 0  # with the last frame, which is not encoded yet
         self._due = 0  # index from which on a frame may have a plane
         self._origin: int | None = None
@@ -165,8 +169,9 @@ class RateEncoder:
         if self._origin is None:
             self._origin = index
         self.bucket.drain(float((index - self._origin) / frame.rate))
-        new = self._last is None or _sends_other(frame, self._last)
-        if new:
+        if self._last is not None and self._refused is not None and not _sends_other(frame, self._refused):
+            frame = _sending_as(frame, self._last)
+        if self._last is None or _sends_other(frame, self._last):
             data = self._push_intra(frame)
             if data is None:
                 self._late = frame
@@ -176,6 +181,8 @@ class RateEncoder:
         if self._last is not None:
             gap = float((index - int(self._last.index[0])) / frame.rate)
             self.statistics.longest_gap = max(self.statistics.longest_gap, gap)
+        if self._last is not None and self._refused is frame:
+            frame = _sending_as(frame, self._last)
         self._last, self._late = frame, None
         self._planes += 1
         self._count()
@@ -204,7 +211,11 @@ class RateEncoder:
             trial.settle(index + 1)
         bits = trial.bits - before
         if bits + self._spare > self.bucket.size:
-            raise self._too_small(bits + self._spare)
+            if self._last is None:
+                raise self._too_small(bits + self._spare)
+            self._refused = frame
+            self.statistics.not_sent = True
+            return self._push_predicted(_sending_as(frame, self._last))
         if bits + self._spare > self.bucket.room:
             return None
         data = self._encoder.settle(index)
@@ -281,6 +292,26 @@ class RateEncoder:
             Remedy("bit_rate", "give a rate of at least {}", str(math.ceil(bits / seconds))),
             Remedy("buffer", "or a buffer of at least {}", f"{math.ceil(100 * bits / rate) / 100:g}"),
         )
+
+
+def _sending_as(frame: Animation, last: Animation) -> Animation:
+    """Return a frame that sends the parameters that the last one sent; what it lacks keeps its value."""
+    face, body = last.face, last.body
+    if face is not None and frame.face is not None:
+        new = frame.face
+        values = np.where(face.mask, np.where(new.mask, new.values, face.values), 0)
+        viseme, expression = (
+            theirs if new.mask[0, column] else own
+            for column, (own, theirs) in enumerate(
+                ((face.viseme, new.viseme), (face.expression, new.expression))
+            )
+        )
+        face = FaceTrack(values, face.mask, viseme, expression, face.interpolated)
+    if body is not None and frame.body is not None:
+        other = frame.body
+        values = np.where(body.mask, np.where(other.mask, other.values, body.values), 0)
+        body = BodyTrack(values, body.mask)
+    return replace(frame, face=face, body=body)
 
 
 def _sends_other(frame: Animation, last: Animation) -> bool:

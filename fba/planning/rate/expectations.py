@@ -13,8 +13,10 @@ from fba.parameters import BAP_COUNT, FAP_COUNT, Bap, Fap, bap_steps, baps, fap_
 from fba.tracks import BodyTrack, FaceTrack
 
 SLOW, FAST = 1.0, 0.06
-"""Seconds in which a parameter goes from one end to the other at the fastest; lids and eyes are fast."""
-FAST_FAPS = slice(18, 26)
+"""Seconds in which a parameter goes from one end to the other at the fastest; lids, eyes and tongue are fast."""
+FAST_FAPS = [*range(18, 26), *range(42, 47)]
+GAP = 0.05
+"""Seconds between two planes that are reckoned with; frames may come faster."""
 UNKNOWN = 60
 """Table steps that a parameter without limits in the standard reaches."""
 BITS_OF_FINEST = 8.0
@@ -29,7 +31,7 @@ def expected_motion(frame: Animation, extremes: Animation | None = None) -> Anim
     extremes: an animation that reaches the least and the largest values; the standard's limits count for what
     it does not move. What goes faster than this lags behind by a frame or two.
     """
-    rate = float(frame.rate)
+    rate = min(float(frame.rate), 1 / GAP)
     turn = math.ceil(SLOW * rate)
     index = np.arange(2 * (turn + 1))
     face: FaceTrack | None = None

@@ -12,12 +12,14 @@ import pytest
 
 import fba
 from fba.capture import from_blendshapes
+from fba.capture.live import widest_faces
 from fba.errors import FbaError
 from fba.formats.face_tables import ifacialmocap
 from fba.formats.face_tables import livelink_udp as recorded
 from fba.live import Capture, Summary, find_kind
 from fba.live.recording import StreamPipe, StreamRecorder, stream_rate
 from fba.live.sending import send
+from fba.planning.rate import RateEncoder
 from fba_conformance.captures.face_files import (
     STEP,
     UDP_ORDER,
@@ -90,6 +92,23 @@ def test_the_recorded_capture_is_read_back_as_from_its_file(shared: Path, tmp_pa
     check_same(fba.decode(target.getvalue()), fba.decode(fba.encode(from_file(tmp_path, data))))
     with pytest.raises(ValueError, match="has begun"):
         recorder.encoder.expect(from_file(tmp_path, data))
+
+
+def test_a_capture_at_a_bit_rate_gives_the_stream_of_its_file(shared: Path, tmp_path: Path) -> None:
+    data = (shared / "data/capture/livelink_capture.udp").read_bytes()
+    target = io.BytesIO()
+    recorder = StreamRecorder([StreamPipe(target)], bit_rate=3000, buffer=0.8)
+    capture = Capture(find_kind("livelink"), recorder.push)
+    for now, host, one in at_rate(divided(data)):
+        capture.receive(one, host, now)
+    capture.finish()
+    recorder.finish()
+    stream, animation = target.getvalue(), from_file(tmp_path, data)
+    encoder = RateEncoder(3000, 0.8, recorder.options)
+    encoder.expect(widest_faces())
+    assert encoder.push_animation(animation) + encoder.finish() == stream
+    assert 8 * len(stream) <= 3000 * (float(animation.duration) + 0.8)
+    assert 0.5 * len(animation) < len(fba.decode(stream, bap_steps="visage")) < len(animation)
 
 
 def test_out_of_order_doubled_lost_and_without_a_face(tmp_path: Path) -> None:

@@ -69,6 +69,24 @@ def test_a_face_is_recorded_and_what_was_left_out_is_said(run: Callable[..., Any
     assert values["sender"] == "'iPhone' (127.0.0.1)"
 
 
+def test_a_capture_at_a_bit_rate(run: Callable[..., Any], tmp_path: Path) -> None:
+    path, port = tmp_path / "a.fba", free_port()
+    with telephone(port, junk=b""):
+        said = run("capture", "livelink", "--port", port, "-o", path, "--seconds", 0.4, "--bitrate", "4kbit/s",
+                   "--buffer", "500ms", "--json")  # fmt: skip
+    assert said.code == 0
+    values = json.loads(said.out)
+    held = values["bitrate"]
+    assert (held["bits_per_second"], held["buffer"]) == (4000, 0.5)
+    assert held["frames_left_out"] == values["frames"] - len(fba.read(path))
+    assert 8 * path.stat().st_size <= 4000 * (values["frames"] / 60 + 0.5)
+    said = run("capture", "livelink", "-o", path, "--bitrate", 1500, "--quant", 3)
+    assert said.code == 2
+    assert "--quant and --bitrate contradict each other" in said.err
+    said = run("capture", "livelink", "-o", path, "--buffer", "2s")
+    assert "--buffer goes with --bitrate" in said.err
+
+
 def test_interruptions_end_it_with_the_file_complete(run: Callable[..., Any], tmp_path: Path) -> None:
     path, port = tmp_path / "a.fba", free_port()
     before = signal.getsignal(signal.SIGINT)
