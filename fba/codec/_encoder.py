@@ -170,7 +170,10 @@ class Encoder:
         run = next(find_runs(frame, int(frame.index[0]) + 1, self.options.unsent))
         if not all(self._in_force(run, part) for part in run.parts):
             return None
-        return NextPlane(self._writer, frame, sum(run.parts), run.rows[0])
+        row = run.rows[0]
+        if self.options.clamp and slots.BODY_BIT in run.parts:
+            row = full_turns.nearest_turn(row, self._writer.models.last)
+        return NextPlane(self._writer, frame, sum(run.parts), row)
 
     def _push_all(self, animation: Animation) -> bytes:
         """Add consecutive frames in pieces, so that memory stays bounded; return the complete bytes."""

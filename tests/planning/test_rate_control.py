@@ -215,6 +215,21 @@ def test_rates_and_buffers_are_positive(rate: float, size: float) -> None:
         RateEncoder(rate, size)
 
 
+def test_an_angle_that_goes_on_past_half_a_turn_takes_the_short_way() -> None:
+    animation = made("body", 60)
+    assert animation.body is not None
+    values = animation.body.values.copy()
+    values[:, 183] = np.rint(np.linspace(250_000, 400_000, 60))
+    values[values[:, 183] > 314_159, 183] -= 628_319
+    turning = Animation(animation.rate, animation.index, None, BodyTrack(values, animation.body.mask))
+    data, _ = coded(turning, 20_000)
+    decoded = fba.decode(data, bap_steps="visage")
+    assert decoded.body is not None
+    shown = np.interp(animation.index, decoded.index, decoded.body.values[:, 183])
+    off = (shown - values[:, 183] + 314_159) % 628_319 - 314_159
+    assert np.abs(off).max() < 2000
+
+
 def test_what_begins_later_comes_as_soon_as_there_is_room() -> None:
     animation = made("speech", 120)
     assert animation.face is not None

@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from fba.arrays import Bool, Int32
+from fba.arrays import Bool, Int32, Int64
 from fba.codec._plane import slots
 from fba.parameters import baps
 
@@ -39,6 +39,15 @@ def follow(column: Int32, last: int) -> bool:
     turned = angles + turns * FULL_TURN
     column[:] = np.where(np.abs(turned) <= _LARGEST, turned, angles)
     return bool(column[0] != angles[0])
+
+
+def nearest_turn(row: Int32, last: Int64) -> Int32:
+    """Return a row (columns,) with its angles turned fully so that they are near those of `last` (slots,)."""
+    angles = np.flatnonzero(angle_slots()[: len(row)])
+    result = row.astype(np.int64)
+    turns = np.rint((result[angles] - last[angles]) / FULL_TURN).astype(np.int64)
+    result[angles] -= turns * FULL_TURN
+    return np.where(np.abs(result) <= _LARGEST, result, row).astype(np.int32)
 
 
 def within_half_turn(row: Int32, misfits: Bool) -> Int32:

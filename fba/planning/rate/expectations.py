@@ -13,8 +13,11 @@ from fba.parameters import BAP_COUNT, FAP_COUNT, Bap, Fap, bap_steps, baps, fap_
 from fba.tracks import BodyTrack, FaceTrack
 
 SLOW, FAST = 1.0, 0.06
-"""Seconds in which a parameter goes from one end to the other at the fastest; lids, eyes and tongue are fast."""
+"""Seconds from one end of a parameter to the other at the fastest; lids, eyes and tongue are fast."""
 FAST_FAPS = [*range(18, 26), *range(42, 47)]
+LIMB_SECONDS = 0.3
+"""The same for the angles of a body; those of a shoulder may all jump at once, and the pose hardly moves."""
+SHOULDERS = slice(31, 37)
 GAP = 0.05
 """Seconds between two planes that are reckoned with; frames may come faster."""
 UNKNOWN = 60
@@ -45,7 +48,9 @@ def expected_motion(frame: Animation, extremes: Animation | None = None) -> Anim
         face = FaceTrack(values, np.broadcast_to(frame.face.mask[0], values.shape))
     if frame.body is not None:
         ends = _ends(None if extremes is None else extremes.body, baps(), bap_steps("iso"))
-        values = _there_and_back(*ends, np.full(BAP_COUNT, SLOW) * rate, turn)
+        seconds = np.full(BAP_COUNT, LIMB_SECONDS)
+        seconds[SHOULDERS] = FAST
+        values = _there_and_back(*ends, seconds * rate, turn)
         body = BodyTrack(values, np.broadcast_to(frame.body.mask[0], values.shape))
     return Animation(frame.rate, index, face, body)
 

@@ -18,6 +18,7 @@ from fba.planning.derived_faps import choose_faps, interpolated_faps
 from fba.planning.plan import plan_compact
 from fba.planning.rate.encoder import RateEncoder, RateStatistics
 from fba.planning.rate.errors import mean_distance
+from fba.planning.rate.expectations import GAP
 from fba.planning.segments import Cuts
 from fba.tracks import BodyTrack, FaceTrack, hold
 
@@ -62,19 +63,22 @@ def encode_at_rate(
     options = options or EncoderOptions()
     sent = _to_send(quantise(animation, replace(options, fap_quant=1, bap_quant=1)), options)
     beginning = sent[: max(1, math.ceil(TRIED_SECONDS * float(animation.rate)))]
-    best = _best_setting(
-        beginning, sent, bit_rate, buffer, [_Setting(one, FINEST[0]) for one in QUANTISERS], options
-    )
-    finer = [_Setting(best.quantiser, finest) for finest in FINEST]
+    stride = max(1, int(GAP * float(sent.rate)))
+    coarse = [_Setting(one, FINEST[0], stride) for one in QUANTISERS]
+    best = _best_setting(beginning, sent, bit_rate, buffer, coarse, options)
+    finer = [_Setting(best.quantiser, finest, stride) for finest in FINEST]
+    if stride > 1:
+        finer += [_Setting(one.quantiser, one.finest, 1) for one in finer]
     best = _best_setting(beginning, sent, bit_rate, buffer, finer, options)
     return _encode(sent, sent, bit_rate, buffer, best, options)
 
 
 class _Setting(NamedTuple):
-    """A quantiser of FAPs and BAPs, and `finest` of a `RateEncoder`."""
+    """A quantiser of FAPs and BAPs, `finest` of a `RateEncoder`, and frames whose change a plane carries."""
 
     quantiser: int
     finest: float
+    stride: int
 
 
 def _best_setting(
@@ -106,11 +110,24 @@ def _encode(
     """Return the stream of an animation with a setting. expected: holds all values and changes."""
     options = replace(options, fap_quant=setting.quantiser, bap_quant=setting.quantiser)
     encoder = RateEncoder(rate, buffer, options, choose_quantisers=False, finest=setting.finest)
-    encoder.expect(expected, exactly=True)
+    encoder.expect(_changes_over(expected, setting.stride), exactly=True)
     data = encoder.push_animation(animation) + encoder.finish()
     shown = decode(data, bap_steps=options.bap_steps, limits=_NO_LIMITS)
     seconds = float((animation.index[-1] - animation.index[0] + 1) / animation.rate)
     return RatedStream(data, shown, options, encoder.statistics, 8 * len(data) / seconds)
+
+
+def _changes_over(animation: Animation, stride: int) -> Animation:
+    """Return an animation, and behind it every so many of its frames, backwards, with larger changes."""
+    order = np.arange(len(animation))
+    if stride > 1:
+        order = np.concatenate([order, order[::-1][::stride]])
+    face, body = animation.face, animation.body
+    if face is not None:
+        face = FaceTrack(face.values[order], face.mask[order], face.viseme[order], face.expression[order])
+    if body is not None:
+        body = BodyTrack(body.values[order], body.mask[order])
+    return Animation(animation.rate, np.arange(len(order)), face, body)
 
 
 def _to_send(animation: Animation, options: EncoderOptions) -> Animation:

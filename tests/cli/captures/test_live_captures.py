@@ -72,8 +72,8 @@ def test_a_face_is_recorded_and_what_was_left_out_is_said(run: Callable[..., Any
 def test_a_capture_at_a_bit_rate(run: Callable[..., Any], tmp_path: Path) -> None:
     path, port = tmp_path / "a.fba", free_port()
     with telephone(port, junk=b""):
-        said = run("capture", "livelink", "--port", port, "-o", path, "--seconds", 0.4, "--bitrate", "4kbit/s",
-                   "--buffer", "500ms", "--json")  # fmt: skip
+        rate = ("--bitrate", "4kbit/s", "--buffer", "500ms")
+        said = run("capture", "livelink", "--port", port, "-o", path, "--seconds", 0.4, *rate, "--json")
     assert said.code == 0
     values = json.loads(said.out)
     held = values["bitrate"]
