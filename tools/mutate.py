@@ -206,6 +206,9 @@ FIT_PLANS_TEST = "tests/planning/test_fit_plans.py"
 FIT_TEST = "tests/face/learning/test_learn_fit.py"
 FIT_STREAMS_TEST = "tests/planning/test_fit_streams.py"
 REGRESSION = "fba/face/learning/_regression.py"
+PATHS, PATHS_TEST = "fba/planning/paths.py", "tests/planning/test_paths.py"
+FACE_SEARCH, MESH_ERROR = "fba/planning/face_search.py", "fba/planning/mesh_error.py"
+FACE_TOLERANCE_TEST = "tests/planning/test_face_tolerance.py"
 
 MUTANTS = (
     Mutant(REGRESSION, "RIDGE = 1e-3", "RIDGE = 1e-1", FIT_TEST),
@@ -224,6 +227,32 @@ MUTANTS = (
     Mutant("fba/planning/fit_streams.py", "(linked, ~linked):", "(linked | ~linked,):", FIT_STREAMS_TEST),
     Mutant("fba/planning/fit_streams.py", 'keep_masks=("face",)', "keep_masks=()", FIT_STREAMS_TEST),
     Mutant("fba/planning/plan.py", "    if not any(used):", "    if True:", PLANS_TEST),
+    Mutant(PATHS, "total = sums[i] + cost[base + j - level + low]", "total = sums[i]", PATHS_TEST),
+    Mutant(PATHS, "highest = min(highest, (upper", "highest = max(highest, (upper", PATHS_TEST),
+    Mutant(PATHS, "np.rint((lower + upper) / 2)", "np.rint(lower)", PATHS_TEST),
+    Mutant(FACE_SEARCH, "self.limit[beyond] *=", "self.limit[beyond] +=", FACE_TOLERANCE_TEST),
+    Mutant(FACE_SEARCH, "same[:-1] & same[1:] &", "same[1:] &", FACE_TOLERANCE_TEST),
+    Mutant(FACE_SEARCH, "low, high = 0.0, 0.0", "pass", FACE_TOLERANCE_TEST),
+    Mutant(MESH_ERROR, "tolerance.head if head else tolerance.gaze", "tolerance.head", FACE_TOLERANCE_TEST),
+    Mutant(MESH_ERROR, "np.maximum(lowest, self._lowest[near[0]])", "lowest", FACE_TOLERANCE_TEST),
+    Mutant(
+        "fba/planning/near_lossless.py",
+        "moving[list(related)] = moving[list(related)].any()",
+        "pass",
+        FACE_TOLERANCE_TEST,
+    ),
+    Mutant(
+        "fba/planning/near_lossless.py",
+        "    if track.mask[:, :2].any():",
+        "    if False:",
+        FACE_TOLERANCE_TEST,
+    ),
+    Mutant(
+        "fba/face/deform/_displacement_loops.py",
+        "                scratch.pose[:, 3] = 0",
+        "                pass",
+        FACE_TOLERANCE_TEST,
+    ),
     Mutant("fba/planning/plan.py", "moves[list(related)].any()", "moves[list(related)]", PLANS_TEST),
     Mutant("fba/planning/plan.py", "bits + intra_bits, cuts)\n    face", "bits, cuts)\n    face", PLANS_TEST),
     Mutant("fba/planning/segments.py", "            earliest = last", "            pass", PLANS_TEST),

@@ -18,6 +18,7 @@ from fba.face.deform.displacements import DisplacementMeter
 from fba.face.resolve import resolve
 from fba.parameters import faps
 from fba.planning import Tolerance, encode_planned, encode_within_tolerance
+from fba.planning.mesh_error import ErrorBasis
 
 STEPS = np.array([1, 1, *(one.step for one in faps()[2:])])
 
@@ -126,6 +127,26 @@ def test_visemes_and_expressions_are_kept_and_no_frame_of_them_left_out() -> Non
     assert measure(spoken, data)[0] <= 0.5
 
 
+def test_a_fap_at_0_holds_against_its_mate_and_against_a_viseme() -> None:
+    values = np.zeros((40, 68), dtype=np.int32)
+    values[:, 31 - 1] = np.rint(60 * np.sin(np.arange(40) / 5)) * 2  # raise_l_i_eyebrow
+    brows = Animation(
+        25, np.arange(40), FaceTrack(values, np.tile(np.isin(np.arange(68), [30, 31]), (40, 1)))
+    )
+    data, report = encode_within_tolerance(brows)
+    assert not report.compact
+    assert measure(brows, data)[0] <= 0.5
+    mask = np.tile(np.isin(np.arange(68), [0, 2, 30]), (40, 1))
+    viseme = np.tile(np.array([10, 0, 63, 0], dtype=np.int16), (40, 1))
+    shut = Animation(25, np.arange(40), FaceTrack(values, mask, viseme))
+    data, report = encode_within_tolerance(shut)
+    decoded = fba.decode(data).face
+    assert not report.compact
+    assert decoded is not None
+    assert decoded.mask[:, 2].all()
+    assert measure(shut, data)[0] <= 0.5
+
+
 def test_definitions_of_visemes_are_left_as_they_are() -> None:
     face = made_face(3, 40)
     mask, viseme = face.mask.copy(), face.viseme.copy()
@@ -195,6 +216,16 @@ def test_wrong_tolerances() -> None:
     for wrong in ({"face": 0.0}, {"head": -1.0}, {"joint": float("nan")}, {"foot": float("inf")}):
         with pytest.raises(ValueError, match=f"a tolerance is a positive number; {next(iter(wrong))} is"):
             Tolerance(**wrong)
+
+
+def test_slopes_hold_up_to_where_a_closed_jaw_would_open() -> None:
+    basis = ErrorBasis(DisplacementMeter(FaceModel.default()), Tolerance())
+    shown = np.zeros((2, 68))
+    shown[:, 2] = -50, 300  # open_jaw: below 0 it moves nothing
+    slopes = basis.slopes((2,), shown)
+    assert slopes.highest[0] <= 0 <= slopes.lowest[1]
+    lengths = np.linalg.norm(slopes.table[slopes.which], axis=2).max(axis=1)
+    assert lengths[0] == 0 < lengths[1] == slopes.largest
 
 
 def test_displacements_are_those_of_the_deformer() -> None:

@@ -40,6 +40,7 @@ def hold_until_forced(bounds: Bounds) -> np.ndarray:
 
 @pytest.mark.parametrize("gaps", [False, True])
 def test_paths_stay_within_their_bounds_and_are_no_costlier_than_a_dead_zone(gaps: bool) -> None:
+    before = after = 0.0
     for seed in range(60):
         bounds, start = made_bounds(seed, gaps=gaps)
         path = find_path(bounds, start)
@@ -48,11 +49,13 @@ def test_paths_stay_within_their_bounds_and_are_no_costlier_than_a_dead_zone(gap
         assert (shown >= bounds.lower - slack).all()
         assert (shown <= bounds.upper + slack).all()
         assert level_bits(path, bounds.scale) <= level_bits(start, bounds.scale)
+        before, after = before + level_bits(start, bounds.scale), after + level_bits(path, bounds.scale)
         if not gaps:
             alone = find_path(bounds)
             assert (alone * bounds.step >= bounds.lower - slack).all()
             assert (alone * bounds.step <= bounds.upper + slack).all()
             assert level_bits(alone, bounds.scale) <= level_bits(hold_until_forced(bounds), bounds.scale)
+    assert after < 0.97 * before
 
 
 def test_paths_are_cheaper_than_a_dead_zone_on_the_whole() -> None:
@@ -89,6 +92,7 @@ def test_one_frame_and_bounds_without_a_level() -> None:
     assert find_path(one).tolist() == [2]
     between = Bounds(np.array([1.0, 4.0]), np.array([2.0, 4.9]), np.array([0, 1]), 3, 1)
     assert find_path(between).tolist() == [0, 1]  # 0.5 and 1.48 steps: the nearest
+    assert find_path(Bounds(np.array([1.2]), np.array([2.9]), np.array([0]), 3, 1)).tolist() == [1]
 
 
 def test_bits_of_levels_are_those_of_the_coder() -> None:
