@@ -13,6 +13,7 @@ from fba.errors import FbaError
 from fba_player.playback.live import LiveAnimation
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
+from fba_player.session.emotion_trace import Stretch, read_stretches
 from fba_player.session.timeline_trace import trace_of_motion, trace_of_planes
 
 if TYPE_CHECKING:
@@ -55,6 +56,8 @@ class Source:
         self._trace_info: StreamInfo | None = None
         self._trace: Trace | None = None
         self._thread: threading.Thread | None = None
+        self.expressions: tuple[Stretch, ...] = ()
+        """What the face shows when; empty until `probe` is done, and for live streams."""
 
     @property
     def name(self) -> str:
@@ -135,3 +138,5 @@ class Source:
         if trace is None and isinstance(animation, Animation):
             trace = trace_of_motion(animation)
         self._trace = trace
+        if isinstance(self._scene, Scene) and isinstance(animation, Animation):
+            self.expressions = read_stretches(animation, self._scene.model)

@@ -8,6 +8,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from fba_player.playback.timeline import clock_text
+from fba_player.session.emotion_trace import stretch_at
 from fba_player.session.session import Session
 from fba_player.session.timeline_trace import trace_picture
 from fba_player.ui import theme
@@ -24,6 +25,8 @@ MARGIN = 18.0
 TOP = 24.0
 TRACK = 40.0
 BUTTONS = TOP + TRACK + 13.0
+STRIP = (4.0, 9.0)
+"""Upper and lower edge of the strip of expressions, in points below the timeline."""
 GRIP = 7.0
 """Distance in points within which the mouse grabs a mark."""
 APART = 86.0
@@ -89,6 +92,7 @@ class Bar:
         self._draw_trace(session, ruler, top)
         at = ruler.x(transport.time)
         to.add_rect_filled((ruler.left, top), (at, bottom), theme.packed(theme.ACCENT, 0.16), rounding=4.0)
+        self._draw_expressions(session, to, ruler, bottom)
         self._scale(to, ruler, y, bottom)
         self._marks(session, to, ruler, top, bottom)
         colour = theme.packed(theme.TEXT)
@@ -143,6 +147,21 @@ class Bar:
         to = imgui.get_window_draw_list()
         to.add_image(image, (ruler.left, top + 4), (ruler.right, top + TRACK))
 
+    def _draw_expressions(self, session: Session, to: imgui.ImDrawList, ruler: Ruler, bottom: float) -> None:
+        """Draw the expressions that the face shows, the stronger the less transparent."""
+        for one in session.source.expressions:
+            colour = theme.FEELINGS.get(one.label)
+            if colour is None or not one.shows:
+                continue
+            left, right = ruler.x(one.start), min(ruler.x(one.end), ruler.right)
+            alpha = 0.35 + 0.65 * one.intensity / 100
+            to.add_rect_filled(
+                (left, bottom + STRIP[0]),
+                (max(right, left + 1), bottom + STRIP[1]),
+                theme.packed(colour, alpha),
+                rounding=2.0,
+            )
+
     def _scale(self, to: imgui.ImDrawList, ruler: Ruler, y: float, bottom: float) -> None:
         if self._ticks[0] != ruler:
             self._ticks = (ruler, *_ticks(ruler))
@@ -190,6 +209,9 @@ class Bar:
         if info.plane_bits is not None and info.plane_intra is not None and frame < len(info.plane_bits):
             kind = "I" if info.plane_intra[frame] else "P"
             text += f"   {kind} plane, {int(info.plane_bits[frame])} bits"
+        expression = stretch_at(session.source.expressions, time)
+        if expression is not None:
+            text += f"   {expression}"
         size = imgui.calc_text_size(text)
         left = min(max(x - size.x / 2, ruler.left), max(ruler.right - size.x, ruler.left))
         over = imgui.get_foreground_draw_list()

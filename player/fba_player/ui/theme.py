@@ -22,6 +22,12 @@ GROUND: Colour = (0.086, 0.092, 0.102, 0.93)
 RAISED: Colour = (0.155, 0.165, 0.182, 1.0)
 HOVERED: Colour = (0.215, 0.23, 0.255, 1.0)
 LINE: Colour = (1.0, 1.0, 1.0, 0.075)
+FEELINGS: dict[str, Colour] = {
+    "joy": (0.98, 0.80, 0.25, 1.0), "sadness": (0.35, 0.55, 0.92, 1.0), "anger": (0.92, 0.32, 0.28, 1.0),
+    "fear": (0.66, 0.46, 0.90, 1.0), "disgust": (0.45, 0.75, 0.38, 1.0), "surprise": (0.98, 0.58, 0.24, 1.0),
+    "sleepiness": (0.55, 0.62, 0.70, 1.0),
+}  # fmt: skip
+"""Colours of the expressions that a face may be read to show: the families, and those without one."""
 
 
 def packed(colour: Colour, alpha: float = 1.0) -> int:
