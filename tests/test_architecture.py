@@ -85,6 +85,11 @@ fba.formats.gltf
 fba.formats.face_tables
 fba.live.protocols
 fba.live
+fba.persona.points
+fba.persona.recognition
+fba.persona.training
+fba.persona
+fba.persona.evaluation
 fba_conformance
 fba_conformance.fuzz
 fba_conformance.suite.definitions

@@ -1,0 +1,293 @@
+"""`fba persona`: learn how an actor moves the face, and play another person's performance in that way."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli import options
+from fba.cli.command import Group, examples
+from fba.cli.inputs import EXISTING, input_file
+from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.printing import print_json, print_table
+from fba.limits import Limits
+
+if TYPE_CHECKING:
+    from fba.persona import Persona, TrackedFace
+
+MEANS = ("curves", "linear", "masks", "nearest")
+REPORTS = (".html",)
+
+
+class SpanType(click.ParamType[tuple[float, float]]):
+    """A part of a recording, FROM-TO in seconds."""
+
+    name = "seconds"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        first, _, last = str(value).partition("-")
+        try:
+            span = float(first), float(last)
+        except ValueError:
+            self.fail(f"{value!r} is no span of seconds; expected for example 0.5-1.5", param, ctx)
+        if not 0 <= span[0] < span[1] < float("inf"):
+            self.fail(f"{value!r}: expected FROM-TO, and TO after FROM", param, ctx)
+        return span
+
+
+_neutral_option = click.option(
+    "--neutral",
+    type=SpanType(),
+    metavar="FROM-TO",
+    help="Seconds of each recording in which the face rests; default: the first second.",
+)
+_fps_option = options.fps_option("Frame rate of recordings that do not say theirs.")
+
+
+@click.group(
+    "persona",
+    cls=Group,
+    epilog=examples(
+        "fba persona learn scene1.csv scene2.csv -o actor.persona --report actor.html",
+        "fba persona info actor.persona",
+        "fba persona play user.csv --persona actor.persona -o out.fba",
+        "fba persona evaluate",
+    ),
+)
+def command() -> None:
+    """Learn how an actor moves the face, and play another person's performance in that way."""
+
+
+@command.command(
+    "learn",
+    epilog=examples("fba persona learn scene1.csv scene2.csv -o actor.persona --report actor.html"),
+)
+@click.argument("actors", metavar="ACTOR...", nargs=-1, required=True, type=EXISTING)
+@click.option(
+    "-o", "--output", metavar="OUT.persona", required=True, type=OutputType(), help="Persona to write."
+)
+@click.option("--name", default="", metavar="NAME", help="Name of the actor; default: that of the file.")
+@_neutral_option
+@click.option(
+    "--warm-up",
+    type=click.IntRange(0),
+    default=0,
+    metavar="N",
+    help="Leave out the first N frames of each recording, in which the tracker looks for the face.",
+)
+@click.option(
+    "--report",
+    metavar="FILE.html",
+    type=OutputType(),
+    help="Also write a page with masks, classes and plots.",
+)
+@_fps_option
+@options.face_option
+@options.no_clobber_option
+@options.json_option
+@options.limit_option
+def learn_command(
+    actors: tuple[Path, ...],
+    output: Path,
+    name: str,
+    neutral: tuple[float, float] | None,
+    warm_up: int,
+    report: Path | None,
+    fps: Fraction | None,
+    face: str | None,
+    no_clobber: bool,
+    as_json: bool,
+    limit: Limits,
+) -> None:
+    """Learn how an actor moves the face, from points that a tracker found in films.
+
+    The face rests at the start of each film for a second, or where --neutral says, and looks into the camera:
+    frames in which the head is turned by more than 30 degrees are left out.
+    """
+    if report is not None and report.suffix.lower() not in REPORTS:
+        raise click.UsageError(f"--report writes {', '.join(REPORTS)} files, not {report.name}")
+    written = [Output("--output", output)]
+    if report is not None:
+        written.append(Output("--report", report, text=True))
+    outputs = Outputs(written, actors, no_clobber=no_clobber)
+    from fba.persona.learning import learn
+    from fba.persona.storage import save_persona
+
+    faces = [_read(path, fps, face, limit) for path in actors]
+    persona = learn(faces, name or actors[0].stem, neutral=[neutral] * len(faces), warm_up=warm_up)
+    with outputs.file(output) as file:
+        save_persona(persona, file)
+    if report is not None:
+        from fba.persona.report import make_report
+
+        outputs.write(report, make_report(persona, faces, neutral=neutral, warm_up=warm_up).encode())
+    if as_json:
+        outputs.print_json(_describe(persona))
+        return
+    outputs.say(f"{display_name(output)}: {persona.kept} of {persona.frames} frames")
+    for line in _lines(persona):
+        outputs.say(line)
+
+
+@command.command("info", epilog=examples("fba persona info actor.persona"))
+@click.argument("file", metavar="FILE.persona", type=EXISTING)
+@options.json_option
+@options.limit_option
+def info_command(file: Path, as_json: bool, limit: Limits) -> None:
+    """Show what a Persona holds: frames, classes, masks, and the classes that are missing."""
+    persona = _load(file, limit)
+    if as_json:
+        print_json(_describe(persona))
+        return
+    click.echo(f"{persona.name}: {persona.kept} of {persona.frames} frames")
+    for line in _lines(persona):
+        click.echo(line)
+    for part, style in persona.parts.items():
+        counts = ", ".join(f"{name} {count}" for name, count in sorted(style.count().items()))
+        click.echo(f"masks of {part}: {counts}")
+
+
+@command.command(
+    "play",
+    epilog=examples(
+        "fba persona play user.csv --persona actor.persona -o out.fba",
+        "fba persona play user.csv --persona actor.persona --user user.persona -o out.fba",
+        "fba persona play user.csv -o own.fba      # the user's own way, to compare",
+    ),
+)
+@click.argument("file", metavar="USER", type=EXISTING)
+@click.option("--persona", "persona_file", type=EXISTING, metavar="FILE.persona", help="The actor's way.")
+@click.option("--user", "user_file", type=EXISTING, metavar="FILE.persona", help="The user's own Persona.")
+@click.option(
+    "-o", "--output", metavar="OUT", required=True, type=OutputType(),
+    help="File to write; its suffix says in which format. - for standard output.",
+)  # fmt: skip
+@options.to_option
+@options.choice_option(
+    "--means", "How a face becomes the actor's: maps, or masks as in the source (docs/persona.md).", *MEANS
+)
+@_neutral_option
+@click.option("--no-head", is_flag=True, help="Leave out how the user's head turns.")
+@_fps_option
+@options.face_option
+@options.no_clobber_option
+@options.limit_option
+def play_command(
+    file: Path,
+    persona_file: Path | None,
+    user_file: Path | None,
+    output: Path,
+    to: str | None,
+    means: str,
+    neutral: tuple[float, float] | None,
+    no_head: bool,
+    fps: Fraction | None,
+    face: str | None,
+    no_clobber: bool,
+    limit: Limits,
+) -> None:
+    """Play a user's performance in an actor's way: tracked points to FAPs, which move any face.
+
+    Without --persona, the FAPs are those of the user's own way.
+    """
+    if persona_file is None and user_file is not None:
+        raise click.UsageError("--user goes with --persona")
+    writing = find_writer(output, to)
+    inputs = (file, persona_file, user_file)
+    outputs = Outputs(
+        [Output("--output", output, writing.name in TEXT_FORMATS)], inputs, no_clobber=no_clobber
+    )
+    from fba.formats import write
+    from fba.persona.performance import play
+
+    persona = None if persona_file is None else _load(persona_file, limit)
+    user = None if user_file is None else _load(user_file, limit)
+    recording = _read(file, fps, face, limit)
+    animation = play(recording, persona, means=means, neutral=neutral, user=user, head=not no_head)
+    extra: dict[str, Any] = {"clamp": True} if writing.name == "fba" else {}
+    with outputs.file(output) as target:
+        write(target, animation, format=writing.name, **extra)
+    whose = "the user's own way" if persona is None else f"the way of {persona.name}"
+    outputs.say(f"{display_name(output)}: {len(animation)} frames in {whose}")
+
+
+@command.command("evaluate", epilog=examples("fba persona evaluate --users 1"))
+@click.option(
+    "--users", type=click.IntRange(1, 20), default=2, show_default=True, help="Users for each actor."
+)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of actors and users.")
+@options.json_option
+def evaluate_command(users: int, seed: int, as_json: bool) -> None:
+    """Measure how near a Persona brings users to actors whose styles are known.
+
+    Actors and users are made up. The distance of masks falls where a Persona is used; a row for each content.
+    """
+    from fba.persona.evaluation import WAYS, evaluate, mean_reduction
+
+    found = evaluate(users=users, seed=seed)
+    if as_json:
+        print_json(found.to_dict())
+        return
+    columns = ("without", *WAYS)
+    rows = [
+        [row.content, f"{row.own:.2f}", *(f"{row.played[way]:.2f}" for way in WAYS)] for row in found.faces
+    ]
+    for name, some in (("falls by", found.faces), ("motion alone", found.motion)):
+        rows.append([name, "", *(f"{100 * mean_reduction(some, way):.1f} %" for way in WAYS)])
+    agreement = (f"{100 * found.agreement[way]:.1f} %" if way in found.agreement else "" for way in WAYS)
+    rows.append(["class kept", "", *agreement])
+    print_table(columns, rows)
+    click.echo(f"masks of two consecutive frames of an actor: {found.consecutive:.2f} mm")
+
+
+def _read(path: Path, fps: Fraction | None, face: str | None, limits: Limits) -> TrackedFace:
+    from fba.persona.recordings import read_recording
+
+    with input_file(path) as file:
+        return read_recording(file, fps=fps, face=face, limits=limits)
+
+
+def _load(path: Path, limits: Limits) -> Persona:
+    from fba.persona.storage import load_persona
+
+    with input_file(path) as file:
+        return load_persona(file, limits=limits)
+
+
+def _describe(persona: Persona) -> dict[str, Any]:
+    """Return what a Persona holds, for programs."""
+    missing = _missing(persona)
+    return {
+        "name": persona.name,
+        "frames": persona.frames,
+        "kept": persona.kept,
+        "turned": persona.turned,
+        "untracked": persona.untracked,
+        "bytes": persona.size,
+        "parts": {
+            part: {"masks": dict(sorted(style.count().items())), "missing": missing[part]}
+            for part, style in persona.parts.items()
+        },
+    }
+
+
+def _missing(persona: Persona) -> dict[str, list[str]]:
+    from fba.persona.recognition import Recogniser
+
+    known = Recogniser.default().components
+    return persona.missing({part: component.classes for part, component in known.items()})
+
+
+def _lines(persona: Persona) -> list[str]:
+    """Return a line for each part: classes, masks, and what is missing."""
+    lines = []
+    for part, missing in _missing(persona).items():
+        counts = persona.parts[part].count()
+        line = f"{part}: {len(counts)} classes, {counts.total()} masks"
+        lines.append(line + (f"; missing: {', '.join(missing)}" if missing else ""))
+    return lines

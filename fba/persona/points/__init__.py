@@ -1,0 +1,21 @@
+"""What a tracker sees of a face, and the control mask of 86 vertices that is made of it.
+
+May use: the face, and what `fba.capture.points` says of trackers.
+"""
+
+from fba.persona.points.adaptation import from_point_motion
+from fba.persona.points.distances import hausdorff_distance, mask_distance
+from fba.persona.points.procrustes import Similarity, fit_similarity
+from fba.persona.points.registration import Registered, register
+from fba.persona.points.tracked import TrackedFace
+
+__all__ = [
+    "Registered",
+    "Similarity",
+    "TrackedFace",
+    "fit_similarity",
+    "from_point_motion",
+    "hausdorff_distance",
+    "mask_distance",
+    "register",
+]

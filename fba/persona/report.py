@@ -1,0 +1,148 @@
+"""A page about a Persona: classes and masks, variance of components, frames among the examples."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+
+import numpy as np
+
+from fba.arrays import Float64
+from fba.persona.observation import Neutral, Observation, observe
+from fba.persona.persona import Persona
+from fba.persona.points import TrackedFace
+from fba.persona.points.layout import PARTS, standard_mask, triangles
+from fba.persona.recognition import Recogniser
+
+MASK, PLOT = (150, 170), (360, 260)
+"""Width and height of pictures, pixels."""
+SHOWN = 4
+"""Masks of a class that are drawn."""
+DOTS = 400
+"""Most frames or examples in a plot."""
+COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
+STYLE = (
+    "body{font:15px sans-serif;max-width:75em;margin:2em auto;padding:0 1em;color:#222}"
+    "figure{display:inline-block;margin:4px;text-align:center;font-size:12px}"
+    "table{border-collapse:collapse}td,th{padding:2px 10px;text-align:right;border-bottom:1px solid #ddd}"
+    "td:first-child,th:first-child{text-align:left}svg{background:#fafafa}"
+)
+
+
+def make_report(
+    persona: Persona,
+    faces: Sequence[TrackedFace],
+    *,
+    neutral: Neutral = None,
+    warm_up: int = 0,
+    recogniser: Recogniser | None = None,
+) -> str:
+    """Return a page (HTML) about a Persona that was learnt from these recordings; options as for `learn`."""
+    known = Recogniser.default() if recogniser is None else recogniser
+    seen = [observe(face, known, neutral, warm_up=warm_up) for face in faces]
+    name = html.escape(persona.name or "actor")
+    body = [f"<h1>Persona of {name}</h1>", _counts(persona), "<h2>Classes and masks</h2>"]
+    for part in PARTS:
+        body += _part_masks(persona, part, known)
+    body += ["<h2>Components</h2>", _variance(known), "<h2>Frames among the examples</h2>"]
+    body.append(
+        "<p>Grey: examples by which expressions are recognised. Coloured: the actor's frames by "
+        "their class, the commonest ones; the line joins them in time.</p>"
+    )
+    for part in PARTS:
+        body += [_scatter(part, seen, known, axes) for axes in ((0, 1), (1, 2))]
+    page = "\n".join(body)
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Persona of {name}</title>'
+        f"<style>{STYLE}</style></head>\n<body>\n{page}\n</body></html>\n"
+    )
+
+
+def _counts(persona: Persona) -> str:
+    return (
+        f"<p>{persona.kept} of {persona.frames} frames are used; {persona.untracked} have no face; in "
+        f"{persona.turned} the head is turned by more than 30 degrees. Masks take {persona.size} bytes.</p>"
+    )
+
+
+def _part_masks(persona: Persona, part: str, known: Recogniser) -> list[str]:
+    style = persona.parts[part]
+    missing = persona.missing({part: known.components[part].classes for part in PARTS})[part]
+    result = [f"<h3>{part.replace('_', ' ')}: {len(style.rows)} classes, {len(style.labels)} masks</h3>"]
+    if missing:
+        result.append(f"<p>Missing: {html.escape(', '.join(missing))}</p>")
+    for name, rows in sorted(style.rows.items(), key=lambda one: -len(one[1])):
+        sizes = np.linalg.norm(style.moved[rows], axis=(1, 2))
+        chosen = rows[np.argsort(sizes)[np.linspace(0, len(rows) - 1, min(SHOWN, len(rows))).astype(int)]]
+        pictures = "".join(draw_mask(persona.mask(part, int(row)), persona.neutral_mask) for row in chosen)
+        frames = ", ".join(f"{style.source[row]}:{style.frame[row]}" for row in chosen)
+        result.append(
+            f"<figure>{pictures}<figcaption>{html.escape(name)}: {len(rows)} masks, of frames "
+            f"{frames}</figcaption></figure>"
+        )
+    return result
+
+
+def draw_mask(mask: Float64, behind: Float64 | None = None) -> str:
+    """Return a picture (SVG) of a mask (86, 3), black, before another, grey."""
+    size = np.ptp(standard_mask()[:, :2], axis=0)
+    middle = standard_mask()[:, :2].min(axis=0) + size / 2
+    scale = min(MASK[0] / size[0], MASK[1] / size[1]) * 0.92
+
+    def path(points: Float64) -> str:
+        at = (points[:, :2] - middle) * (scale, -scale) + np.array(MASK) / 2
+        corners = np.round(at[triangles()], 1).tolist()
+        return "".join(f"M{a[0]} {a[1]}L{b[0]} {b[1]}L{c[0]} {c[1]}Z" for a, b, c in corners)
+
+    lines = (
+        "" if behind is None else f'<path d="{path(behind)}" fill="none" stroke="#ccc" stroke-width=".5"/>'
+    )
+    lines += f'<path d="{path(mask)}" fill="none" stroke="#222" stroke-width=".7"/>'
+    return f'<svg width="{MASK[0]}" height="{MASK[1]}">{lines}</svg>'
+
+
+def _variance(known: Recogniser) -> str:
+    rows = [
+        f"<tr><td>{part.replace('_', ' ')}</td>"
+        + "".join(f"<td>{100 * share:.1f} %</td>" for share in np.cumsum(component.variance)[:5])
+        + f"<td>{len(component.axes)}</td><td>{100 * component.kept_variance:.1f} %</td>"
+        + f"<td>{100 * component.share:.1f} %</td></tr>"
+        for part, component in known.components.items()
+    ]
+    head = "".join(f"<th>{number}</th>" for number in range(1, 6))
+    return (
+        f"<table><tr><th>variance of the first</th>{head}<th>kept</th><th>with</th><th>recognised</th></tr>"
+        f"{''.join(rows)}</table>"
+    )
+
+
+def _scatter(part: str, seen: Sequence[Observation], known: Recogniser, axes: tuple[int, int]) -> str:
+    """Return a plot (SVG) of two components of a part: examples, frames by class, and their way."""
+    examples = known.scores[part][:, axes]
+    frames = np.concatenate([one.scores[part] for one in seen])[:, axes]
+    names = [name for one in seen for name in one.labels[part].names(known.components[part].classes)]
+    low = np.minimum(np.percentile(examples, 0.5, axis=0), np.percentile(frames, 0.5, axis=0))
+    high = np.maximum(np.percentile(examples, 99.5, axis=0), np.percentile(frames, 99.5, axis=0))
+    scale = (np.array(PLOT) - 20) / np.maximum(high - low, 1e-9)
+
+    def place(points: Float64) -> list[list[float]]:
+        at = np.clip((points - low) * scale + 10, 0, PLOT)
+        return np.round(np.stack([at[:, 0], PLOT[1] - at[:, 1]], axis=1), 1).tolist()  # type: ignore[no-any-return]
+
+    dots = [f'<circle cx="{x}" cy="{y}" r="1.2" fill="#ccc"/>' for x, y in place(_thin(examples))]
+    way = " ".join(f"{x},{y}" for x, y in place(_thin(frames)))
+    dots.append(f'<polyline points="{way}" fill="none" stroke="#888" stroke-width=".3"/>')
+    common = sorted(set(names) - {""}, key=names.count, reverse=True)[: len(COLOURS)]
+    legend = []
+    for colour, name in zip(COLOURS, common, strict=False):
+        own = frames[[n for n, one in enumerate(names) if one == name]]
+        dots += [f'<circle cx="{x}" cy="{y}" r="2" fill="{colour}"/>' for x, y in place(_thin(own))]
+        legend.append(f'<span style="color:{colour}">{html.escape(name)}</span>')
+    caption = f"{part.replace('_', ' ')}, components {axes[0] + 1} and {axes[1] + 1}: {' '.join(legend)}"
+    picture = f'<svg width="{PLOT[0]}" height="{PLOT[1]}">{"".join(dots)}</svg>'
+    return f"<figure>{picture}<figcaption>{caption}</figcaption></figure>"
+
+
+def _thin(points: Float64) -> Float64:
+    """Return at most `DOTS` of some points, evenly chosen."""
+    return points[:: max(1, -(-len(points) // DOTS))]

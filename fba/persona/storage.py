@@ -1,0 +1,90 @@
+"""Reads and writes Personas: `.persona` files, described in docs/persona.md."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fba.arrays import Array
+from fba.atomic import atomic
+from fba.errors import FormatError, ModelError
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.persona.curves import RANKS, Curves
+from fba.persona.persona import PartStyle, Persona
+from fba.persona.points.layout import PARTS, TRACKED, part_vertices
+from fba.persona.recognition import Recogniser
+from fba.persona.recognition.archive import Fields, pack_archive, read_archive
+from fba.source import Path
+
+KIND, VERSION = "persona", 1
+COUNTS = ("frames", "kept", "turned", "untracked")
+LARGEST = 500.0
+"""Millimetres: vertices of faces move less."""
+MOST_FRAMES = 1 << 40
+
+
+def save_persona(persona: Persona, path: Path, recogniser: Recogniser | None = None) -> None:
+    """Write a Persona, atomically. recogniser: what it was learnt with; None for the default."""
+    known = Recogniser.default() if recogniser is None else recogniser
+    header: dict[str, Any] = {"name": persona.name, **{name: getattr(persona, name) for name in COUNTS}}
+    arrays: dict[str, Array] = {"neutral": persona.neutral.astype(np.float32)}
+    for part, style in persona.parts.items():
+        header[f"{part}.labels"] = list(style.labels)
+        header[f"{part}.classes"] = list(known.components[part].classes)
+        arrays |= {
+            f"{part}.moved": style.moved.astype(np.float32),
+            f"{part}.source": style.source.astype(np.int32),
+            f"{part}.frame": style.frame.astype(np.int32),
+            f"{part}.curves": style.curves.moved.astype(np.float32),
+            f"{part}.known": style.curves.known.astype(np.uint8),
+        }
+    with atomic(path) as file:
+        file.write(pack_archive(KIND, VERSION, header, arrays))
+
+
+def load_persona(
+    path: Path, recogniser: Recogniser | None = None, *, limits: Limits = DEFAULT_LIMITS
+) -> Persona:
+    """Return a Persona from a file. recogniser: what is used with it; None for the default.
+
+    Raises FormatError for damage, or a Persona that was learnt with other classes; UnsupportedError for
+    another version; LimitError.
+    """
+    known = Recogniser.default() if recogniser is None else recogniser
+    header, arrays = read_archive(path, KIND, VERSION, limits)
+    fields = Fields(path, header, arrays)
+    parts = {part: _read_part(fields, path, part, known) for part in PARTS}
+    counts = [fields.number(name) for name in COUNTS]
+    if any(count < 0 or count > MOST_FRAMES or count != int(count) for count in counts):
+        raise FormatError(f"{', '.join(COUNTS)} must be whole numbers, not {counts}", path=path)
+    neutral = fields.array("neutral", TRACKED, 2)
+    persona = Persona(fields.text("name"), neutral, parts, *map(int, counts))
+    try:
+        persona.fapu  # noqa: B018 - raises ModelError for a neutral face that is none
+    except ModelError as error:
+        raise FormatError(error.finding, path=path) from error
+    return persona
+
+
+def _read_part(fields: Fields, path: Path, part: str, known: Recogniser) -> PartStyle:
+    """Return the style of a part. Raises FormatError."""
+    classes = known.components[part].classes
+    if fields.texts(f"{part}.classes") != classes:
+        raise FormatError(
+            f"{part}: it was learnt with other classes than are recognised here; learn it again", path=path
+        )
+    labels = fields.texts(f"{part}.labels")
+    odd = [label for label in labels if not set(label.split("/")) <= set(classes)]
+    if odd:
+        raise FormatError(f"{part}: there is no class {odd[0]!r}"[:200], path=path)
+    vertices = len(part_vertices(part))
+    moved = fields.array(f"{part}.moved", len(labels), vertices, 3)
+    curves = fields.array(f"{part}.curves", len(classes), len(RANKS), 2 * vertices)
+    if max(float(np.abs(array).max(initial=0.0)) for array in (moved, curves)) > LARGEST:
+        raise FormatError(f"{part}: vertices move by more than {LARGEST:g} mm", path=path)
+    source, frame = (
+        fields.indices(f"{part}.{name}", MOST_FRAMES, len(labels)) for name in ("source", "frame")
+    )
+    shown = fields.array(f"{part}.known", len(classes)) > 0
+    return PartStyle(labels, moved, source, frame, Curves(curves, shown))
