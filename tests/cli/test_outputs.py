@@ -70,11 +70,8 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
                 assert "--no-clobber" in options, f"fba {name}"
     assert writing == {
         "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
-<<<<<<< HEAD
         "conformance", "capture", "markers", "express", "model learn-fit", "emote", "emotion",
-=======
-        "conformance", "capture", "markers", "persona learn", "persona play",
->>>>>>> 2fa7112 (fba persona: an actor's way to move the face, learnt from tracked points, and played by another person)
+        "persona learn", "persona play",
     }  # fmt: skip
 
 
