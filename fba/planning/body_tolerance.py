@@ -1,0 +1,231 @@
+"""A body within a tolerance: the BAPs to send, their quantiser, and what a decoder makes of the stream."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Bool, Float64, Int32
+from fba.body import Skeleton
+from fba.body.displacement import displacements
+from fba.codec import EncoderOptions, EncoderStatistics, decode, encode_with_statistics, step_scale
+from fba.codec.settings import QUANT_MAX
+from fba.errors import RangeError
+from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_steps, baps
+from fba.planning.body_rows import BodyTarget
+from fba.planning.body_search import HOPELESS, BodyEffort, FoundBaps, search_baps
+from fba.planning.joint_reduction import reduce_joints
+from fba.planning.plan import encode_planned
+from fba.planning.tolerance import Tolerance
+from fba.tracks import BodyTrack, hold
+
+FULL_TURN = 628319
+"""2 pi in 1e-5 rad, as the codec turns angles."""
+ARM = 0.9
+"""Metres from the hips to the fingers of arms that hang: how far half a step of an angle moves something."""
+REDUCED = (0.5, 0.6)
+"""Shares of the tolerance that joints which are no longer turned may take."""
+EFFORTS = ((0.7, 0.5), (0.5, 0.5), (0.7, 0.3))
+"""Share of a BAP and share of gaps, see `BodyEffort`, of the searches that are tried for each of those."""
+FRAMES_SEARCHED = 2400
+"""Frames, times searches: longer streams are searched less often."""
+
+
+@dataclass(frozen=True)
+class BodyErrors:
+    """How far a decoded body is from its source, at all frames of the source.
+
+    largest, percentile_99: metres, of a point 3 cm off a joint, in the world; joint, frame: where it is
+    largest. share: of all joints in all frames, within the tolerance. foot: metres, of a sole that stands.
+    """
+
+    largest: float
+    percentile_99: float
+    share: float
+    joint: str
+    frame: int
+    foot: float
+
+    def is_within(self, tolerance: Tolerance) -> bool:
+        """Whether joints and feet are within a tolerance."""
+        return self.largest <= tolerance.joint and self.foot <= tolerance.foot
+
+
+@dataclass(frozen=True, eq=False)
+class CodedBody:
+    """What encoding a body within a tolerance came to.
+
+    statistics: of the encoder. bap_quant: quantiser of BAPs. left_out: frames that are not sent. errors: of
+    the decoded stream.
+    """
+
+    statistics: EncoderStatistics
+    bap_quant: int
+    left_out: int
+    errors: BodyErrors
+
+
+def encode_body_within_tolerance(
+    animation: Animation, tolerance: Tolerance | None = None, options: EncoderOptions | None = None
+) -> tuple[bytes, CodedBody]:
+    """Return a stream whose body stays within a tolerance of an animation's, and what it came to.
+
+    Errors are measured where the source has frames, on the decoded stream: a frame that was left out is
+    interpolated, as `fba.player` does it. options: the quantiser of BAPs is ignored; angles beyond half a
+    turn are sent as they go on.
+
+    ValueError for an animation with a face, without a body or without frames, RangeError where not even the
+    finest quantiser keeps within the tolerance.
+    """
+    tolerance, options = tolerance or Tolerance(), replace(options or EncoderOptions(), clamp=True)
+    if animation.face is not None or animation.body is None:
+        raise ValueError("an animation with a body and no face is needed")
+    if not len(animation):
+        raise ValueError("there is no frame to encode")
+    smallest: tuple[bytes, CodedBody] | None = None
+    nearest: BodyErrors | None = None
+    for sent, chosen in body_candidates(animation, tolerance, options):
+        data, statistics = encode_with_statistics(sent, chosen)
+        planned = encode_planned(sent, chosen)
+        if len(planned[0]) < len(data):
+            data, statistics = planned
+        if smallest is not None and len(data) >= len(smallest[0]):
+            continue
+        errors = body_errors(animation, decode(data, bap_steps=options.bap_steps), tolerance)
+        if errors.is_within(tolerance):
+            left_out = len(animation) - len(sent)
+            smallest = data, CodedBody(statistics, chosen.bap_quant, left_out, errors)
+        elif nearest is None or errors.largest < nearest.largest:
+            nearest = errors
+    if smallest is None:
+        assert nearest is not None
+        raise _beyond(nearest, tolerance)
+    return smallest
+
+
+def body_candidates(
+    animation: Animation, tolerance: Tolerance, options: EncoderOptions, *, gaps: bool = True
+) -> Iterator[tuple[Animation, EncoderOptions]]:
+    """Yield animations to send that may keep a body within a tolerance, and the quantisers for them.
+
+    The last ones are the source's own values, with finer and finer quantisers. gaps: whether frames may be
+    left out.
+    """
+    assert animation.body is not None
+    count = len(animation)
+    values = held_angles(animation.body)
+    inner = np.zeros(count, dtype=np.bool_)
+    if gaps:
+        inner[1:-1] = np.diff(animation.index, n=2) == 0
+        inner[1:-1] &= np.diff(animation.index)[:-1] == 1
+    if values[:, :BAP_STANDARD_COUNT].any() and not values[:, BAP_STANDARD_COUNT:].any():
+        yield from _searched(animation, values, inner, tolerance, options)
+    for quant in range(QUANT_MAX, 0, -1):
+        chosen = replace(options, bap_quant=quant)
+        steps = bap_steps(options.bap_steps) * step_scale(chosen, body=True)
+        rounded = np.rint(values / steps) * steps
+        keys = np.arange(count)
+        sent = _to_send(animation, FoundBaps(keys, rounded.astype(np.int32), 0.0, 0.0))
+        off = displacements(values, rounded, float(animation.rate))
+        if quant == 1 or (off.joints.max() <= tolerance.joint and off.feet.max() <= tolerance.foot):
+            yield sent, chosen
+            return
+
+
+def _searched(
+    animation: Animation, values: Float64, gaps: Bool, tolerance: Tolerance, options: EncoderOptions
+) -> Iterator[tuple[Animation, EncoderOptions]]:
+    """Yield what searches find within the tolerance."""
+    target = BodyTarget(values, float(animation.rate), tolerance)
+    searches = max(FRAMES_SEARCHED // len(animation), 1)
+    bases = [_unwrapped(reduce_joints(target, share)) for share in REDUCED[:searches]]
+    efforts = [(*effort, base) for effort in EFFORTS for base in bases][:searches]
+    for quant in _quantisers(values, tolerance, options):
+        chosen = replace(options, bap_quant=quant)
+        scale = step_scale(chosen, body=True)
+        steps = bap_steps(options.bap_steps) * scale
+        within = False
+        for share, gap_share, base in efforts:
+            found = search_baps(target, base, gaps, BodyEffort(steps, scale, share, gap_share))
+            if found.longest <= 1:
+                within = True
+                yield _to_send(animation, found), chosen
+            elif found.longest > HOPELESS:
+                break
+        if within:  # finer ones take more
+            return
+
+
+def _quantisers(values: Float64, tolerance: Tolerance, options: EncoderOptions) -> list[int]:
+    """Return quantisers, coarsest first, of which half a step moves nothing beyond the tolerance."""
+    steps = bap_steps(options.bap_steps)
+    moving = np.flatnonzero(values[:, :BAP_STANDARD_COUNT].any(axis=0))
+    reach = [steps[one] * (ARM * 1e-5 if is_angle(one) else 1e-3) / 2 for one in moving.tolist()]
+    fitting = [
+        quant
+        for quant in range(QUANT_MAX, 0, -1)
+        if max(reach) * step_scale(replace(options, bap_quant=quant), body=True) <= tolerance.joint
+    ]
+    return fitting or [1]
+
+
+def body_errors(source: Animation, decoded: Animation, tolerance: Tolerance) -> BodyErrors:
+    """Return how far a decoded body is from its source, where the source has frames."""
+    assert source.body is not None
+    values = held_angles(source.body)
+    shown = np.zeros((len(source), BAP_COUNT))
+    if decoded.body is not None:
+        sent = held_angles(decoded.body)
+        frames, keys = source.index - source.index[0], decoded.index - decoded.index[0]
+        for column in np.flatnonzero(sent.any(axis=0)).tolist():
+            shown[:, column] = np.interp(frames, keys, sent[:, column])
+    off = displacements(values, shown, float(source.rate))
+    frame, joint = np.unravel_index(int(off.joints.argmax()), off.joints.shape)
+    return BodyErrors(
+        float(off.joints[frame, joint]),
+        float(np.percentile(off.joints, 99)),
+        off.share_within(tolerance.joint),
+        Skeleton.default().names[joint],
+        int(frame),
+        float(off.feet.max()),
+    )
+
+
+def held_angles(body: BodyTrack) -> Float64:
+    """Return the BAPs in force at every frame, float64 (T, 296); angles go on without full turns."""
+    values: Int32 = hold(body.values, body.mask, np.zeros(BAP_COUNT, dtype=np.int32))
+    return _unwrapped(values.astype(np.float64))
+
+
+def is_angle(column: int) -> bool:
+    """Whether the BAP of a column is an angle."""
+    return baps()[column].unit == "1e-5 rad"
+
+
+def _unwrapped(values: Float64) -> Float64:
+    """Return values (T, 296) whose angles take the short way from frame to frame."""
+    angles = [column for column in np.flatnonzero(values.any(axis=0)).tolist() if is_angle(column)]
+    result = values.copy()
+    turns = np.cumsum(-np.rint(np.diff(values[:, angles], axis=0) / FULL_TURN), axis=0)
+    result[1:, angles] += turns * FULL_TURN
+    return result
+
+
+def _to_send(animation: Animation, found: FoundBaps) -> Animation:
+    """Return the frames that are sent, with the BAPs that were found and are not 0 throughout."""
+    mask = np.broadcast_to(found.values.any(axis=0), found.values.shape)
+    return Animation(
+        animation.rate, animation.index[found.keys], None, BodyTrack(found.values, mask), animation.name
+    )
+
+
+def _beyond(nearest: BodyErrors, tolerance: Tolerance) -> RangeError:
+    return RangeError(
+        f"no quantiser keeps the body within {tolerance.joint * 1000:g} mm, and feet that stand within "
+        f"{tolerance.foot * 1000:g} mm: with the finest, a point 3 cm off {nearest.joint} is "
+        f"{nearest.largest * 1000:.2f} mm off, and a foot {nearest.foot * 1000:.2f} mm; allow that much",
+        frame=nearest.frame,
+    )
