@@ -60,6 +60,9 @@ SESSION = "player/fba_player/session/session.py"
 TAKES = "player/fba_player/session/takes.py"
 SOLES = "fba/capture/limbs/soles.py"
 STANCE = "fba/body/stance.py"
+BODY_ROWS = "fba/planning/body_rows.py"
+BODY_SEARCH = "fba/planning/body_search.py"
+BODY_TOLERANCE = "fba/planning/body_tolerance.py"
 TOES = "fba/capture/limbs/toes.py"
 RENDER = "player/fba_player/export/render.py"
 GLTF_READER = "fba/formats/gltf/reader.py"
@@ -209,6 +212,8 @@ REGRESSION = "fba/face/learning/_regression.py"
 PATHS, PATHS_TEST = "fba/planning/paths.py", "tests/planning/test_paths.py"
 FACE_SEARCH, MESH_ERROR = "fba/planning/face_search.py", "fba/planning/mesh_error.py"
 FACE_TOLERANCE_TEST = "tests/planning/test_face_tolerance.py"
+BODY_TOLERANCE_TEST = "tests/planning/test_body_tolerance.py"
+DISPLACEMENT_TEST = "tests/body/test_displacement.py"
 
 MUTANTS = (
     Mutant(REGRESSION, "RIDGE = 1e-3", "RIDGE = 1e-1", FIT_TEST),
@@ -256,6 +261,29 @@ MUTANTS = (
     Mutant("fba/planning/plan.py", "moves[list(related)].any()", "moves[list(related)]", PLANS_TEST),
     Mutant("fba/planning/plan.py", "bits + intra_bits, cuts)\n    face", "bits, cuts)\n    face", PLANS_TEST),
     Mutant("fba/planning/segments.py", "            earliest = last", "            pass", PLANS_TEST),
+    Mutant(
+        BODY_SEARCH, "np.maximum(target.longest(base, rows), effort.gap_share)", "5.0", BODY_TOLERANCE_TEST
+    ),
+    Mutant(BODY_SEARCH, "            if best.longest <= 1 or", "            if True or", BODY_TOLERANCE_TEST),
+    Mutant(BODY_ROWS, "tolerances[block, 1:][stands.T] = ", "tolerances[:0, :1] = ", BODY_TOLERANCE_TEST),
+    Mutant(BODY_ROWS, "        if low > high:", "        if False:", BODY_TOLERANCE_TEST),
+    Mutant(
+        "fba/planning/joint_reduction.py",
+        "if off[joint] <= share",
+        "if off[joint] <= 9 * share",
+        BODY_TOLERANCE_TEST,
+    ),
+    Mutant(
+        BODY_TOLERANCE, "if quant == 1 or (within and kept):", "if quant == 1 or within:", BODY_TOLERANCE_TEST
+    ),
+    Mutant(
+        BODY_TOLERANCE,
+        "            if errors.is_within(tolerance):",
+        "            if True:",
+        BODY_TOLERANCE_TEST,
+    ),
+    Mutant("fba/body/displacement.py", "REACH = 0.03", "REACH = 0.02", DISPLACEMENT_TEST),
+    Mutant("fba/body/displacement.py", "np.where(stands.T, soles, 0.0)", "soles", DISPLACEMENT_TEST),
     Mutant(
         "fba/planning/derived_faps.py", "better = shown & (own < least)", "better = own < least", PLANS_TEST
     ),

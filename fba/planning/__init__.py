@@ -3,16 +3,19 @@
 May use: the codec; faces and bodies, for what they show and by how much it moves.
 """
 
+from fba.planning.body_tolerance import BodyErrors, body_errors
 from fba.planning.near_lossless import FaceErrors, NearLossless, encode_within_tolerance
 from fba.planning.plan import PRESETS, Plan, encode_planned, plan_compact, plan_exact
 from fba.planning.tolerance import Tolerance
 
 __all__ = [
     "PRESETS",
+    "BodyErrors",
     "FaceErrors",
     "NearLossless",
     "Plan",
     "Tolerance",
+    "body_errors",
     "encode_planned",
     "encode_within_tolerance",
     "plan_compact",

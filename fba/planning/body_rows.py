@@ -82,7 +82,7 @@ class BodyTarget:
 
     def weights(self, rows: BodyRows) -> Float32:
         """Return by what errors at the points are multiplied to be shares of the tolerance: (T, R)."""
-        return (1 / self.tolerances)[:, rows.soles + 1]
+        return np.reciprocal(self.tolerances)[:, rows.soles + 1]
 
     def longest(self, shown: Float64, rows: BodyRows, frames: slice = slice(None)) -> Float64:
         """Return the largest error of BAPs (F, 296) at some frames, in shares of the tolerance: (F,)."""

@@ -37,14 +37,14 @@ class BodyEffort:
     """How a search goes about it.
 
     steps: int64 (296,), of the quantiser. scale: table steps in each. share: of the tolerance that each BAP
-    may take in the first round. gap_share: of the tolerance, what leaving frames out may take. most: frames
-    left out in a row.
+    may take in the first round. gap_share: of the tolerance, what may be taken up before, by frames that are
+    left out; 0 leaves none out. most: frames left out in a row.
     """
 
     steps: Int64
     scale: int
     share: float = 0.7
-    gap_share: float = 0.3
+    gap_share: float = 0.7
     most: int = 16
 
 
@@ -83,12 +83,12 @@ def search_baps(target: BodyTarget, base: Float64, gaps: Bool, effort: BodyEffor
 
 
 def choose_keys(target: BodyTarget, base: Float64, gaps: Bool, effort: BodyEffort) -> Int64:
-    """Return frames between which BAPs that are interpolated keep within a share of the tolerance: (K,)."""
+    """Return frames, (K,), between which BAPs that are interpolated keep within a share of the tolerance."""
     count = len(base)
     if effort.gap_share <= 0 or not gaps.any():
         return np.arange(count)
     rows = all_rows(target.solver.skeleton)
-    allowed = target.longest(base, rows) + effort.gap_share
+    allowed = np.maximum(target.longest(base, rows), effort.gap_share)
     keys, frame = [0], 0
     while frame < count - 1:
         following, end = frame + 1, frame + 2

@@ -26,11 +26,15 @@ FULL_TURN = 628319
 """2 pi in 1e-5 rad, as the codec turns angles."""
 ARM = 0.9
 """Metres from the hips to the fingers of arms that hang: how far half a step of an angle moves something."""
-REDUCED = (0.5, 0.6)
+REDUCED = (0.5, 0.3)
 """Shares of the tolerance that joints which are no longer turned may take."""
-EFFORTS = ((0.7, 0.5), (0.5, 0.5), (0.7, 0.3))
+EFFORTS = ((0.5, 0.8), (0.7, 0.7), (0.5, 0.6))
 """Share of a BAP and share of gaps, see `BodyEffort`, of the searches that are tried for each of those."""
-FRAMES_SEARCHED = 2400
+GIVEN_UP = 2
+"""Searches far beyond the tolerance after which a quantiser is too coarse."""
+STANDING = 0.9
+"""Share of the tolerance of feet that half a step of the root may take: legs must make up for it."""
+FRAMES_SEARCHED = 1600
 """Frames, times searches: longer streams are searched less often."""
 
 
@@ -69,13 +73,17 @@ class CodedBody:
 
 
 def encode_body_within_tolerance(
-    animation: Animation, tolerance: Tolerance | None = None, options: EncoderOptions | None = None
+    animation: Animation,
+    tolerance: Tolerance | None = None,
+    options: EncoderOptions | None = None,
+    *,
+    every_frame: bool = False,
 ) -> tuple[bytes, CodedBody]:
     """Return a stream whose body stays within a tolerance of an animation's, and what it came to.
 
     Errors are measured where the source has frames, on the decoded stream: a frame that was left out is
     interpolated, as `fba.player` does it. options: the quantiser of BAPs is ignored; angles beyond half a
-    turn are sent as they go on.
+    turn are sent as they go on. every_frame: leave no frame out.
 
     ValueError for an animation with a face, without a body or without frames, RangeError where not even the
     finest quantiser keeps within the tolerance.
@@ -87,23 +95,38 @@ def encode_body_within_tolerance(
         raise ValueError("there is no frame to encode")
     smallest: tuple[bytes, CodedBody] | None = None
     nearest: BodyErrors | None = None
-    for sent, chosen in body_candidates(animation, tolerance, options):
-        data, statistics = encode_with_statistics(sent, chosen)
-        planned = encode_planned(sent, chosen)
-        if len(planned[0]) < len(data):
-            data, statistics = planned
-        if smallest is not None and len(data) >= len(smallest[0]):
-            continue
-        errors = body_errors(animation, decode(data, bap_steps=options.bap_steps), tolerance)
-        if errors.is_within(tolerance):
-            left_out = len(animation) - len(sent)
-            smallest = data, CodedBody(statistics, chosen.bap_quant, left_out, errors)
-        elif nearest is None or errors.largest < nearest.largest:
-            nearest = errors
+    for sent, chosen in body_candidates(animation, tolerance, options, gaps=not every_frame):
+        streams = [encode_with_statistics(sent, chosen), encode_planned(sent, chosen)]
+        for data, statistics in sorted(streams, key=lambda one: len(one[0])):
+            if smallest is not None and len(data) >= len(smallest[0]):
+                break
+            errors = body_errors(animation, decode(data, bap_steps=options.bap_steps), tolerance)
+            if errors.is_within(tolerance):
+                left_out = len(animation) - len(sent)
+                smallest = data, CodedBody(statistics, chosen.bap_quant, left_out, errors)
+                break
+            if nearest is None or errors.largest < nearest.largest:
+                nearest = errors
     if smallest is None:
         assert nearest is not None
-        raise _beyond(nearest, tolerance)
+        raise beyond_body(nearest, tolerance)
     return smallest
+
+
+def fit_bodies(
+    animation: Animation, tolerance: Tolerance, options: EncoderOptions
+) -> list[tuple[BodyTrack, int]]:
+    """Return bodies within a tolerance of an animation's, and their quantisers, the cheapest first.
+
+    For streams with a face, too: all frames are sent.
+    """
+    own = Animation(animation.rate, animation.index, None, animation.body)
+    fitted = []
+    for sent, chosen in body_candidates(own, tolerance, replace(options, clamp=True), gaps=False):
+        assert sent.body is not None
+        size = len(encode_with_statistics(sent, chosen)[0])
+        fitted.append((size, sent.body, chosen.bap_quant))
+    return [(body, quant) for _, body, quant in sorted(fitted, key=lambda one: one[0])]
 
 
 def body_candidates(
@@ -126,11 +149,13 @@ def body_candidates(
     for quant in range(QUANT_MAX, 0, -1):
         chosen = replace(options, bap_quant=quant)
         steps = bap_steps(options.bap_steps) * step_scale(chosen, body=True)
-        rounded = np.rint(values / steps) * steps
+        rounded: Float64 = np.rint(values / steps) * steps
         keys = np.arange(count)
         sent = _to_send(animation, FoundBaps(keys, rounded.astype(np.int32), 0.0, 0.0))
         off = displacements(values, rounded, float(animation.rate))
-        if quant == 1 or (off.joints.max() <= tolerance.joint and off.feet.max() <= tolerance.foot):
+        kept = np.array_equal(rounded[:, BAP_STANDARD_COUNT:], values[:, BAP_STANDARD_COUNT:])
+        within = off.joints.max() <= tolerance.joint and off.feet.max() <= tolerance.foot
+        if quant == 1 or (within and kept):
             yield sent, chosen
             return
 
@@ -138,32 +163,35 @@ def body_candidates(
 def _searched(
     animation: Animation, values: Float64, gaps: Bool, tolerance: Tolerance, options: EncoderOptions
 ) -> Iterator[tuple[Animation, EncoderOptions]]:
-    """Yield what searches find within the tolerance."""
+    """Yield what searches find within the tolerance; with the finest quantiser, also the first beyond it."""
     target = BodyTarget(values, float(animation.rate), tolerance)
     searches = max(FRAMES_SEARCHED // len(animation), 1)
     bases = [_unwrapped(reduce_joints(target, share)) for share in REDUCED[:searches]]
-    efforts = [(*effort, base) for effort in EFFORTS for base in bases][:searches]
-    for quant in _quantisers(values, tolerance, options):
+    efforts = [(*effort, base) for effort in EFFORTS for base in bases][: max(searches, 2)]
+    for quant in _quantisers(target, tolerance, options):
         chosen = replace(options, bap_quant=quant)
         scale = step_scale(chosen, body=True)
         steps = bap_steps(options.bap_steps) * scale
-        within = False
+        within, hopeless = False, 0
         for share, gap_share, base in efforts:
             found = search_baps(target, base, gaps, BodyEffort(steps, scale, share, gap_share))
-            if found.longest <= 1:
-                within = True
+            if found.longest <= 1 or (quant == 1 and not hopeless):
+                within |= found.longest <= 1
                 yield _to_send(animation, found), chosen
-            elif found.longest > HOPELESS:
+            hopeless += found.longest > 1 and (quant == 1 or found.longest > HOPELESS)
+            if (within and searches == 1) or hopeless == GIVEN_UP:
                 break
         if within:  # finer ones take more
             return
 
 
-def _quantisers(values: Float64, tolerance: Tolerance, options: EncoderOptions) -> list[int]:
+def _quantisers(target: BodyTarget, tolerance: Tolerance, options: EncoderOptions) -> list[int]:
     """Return quantisers, coarsest first, of which half a step moves nothing beyond the tolerance."""
     steps = bap_steps(options.bap_steps)
-    moving = np.flatnonzero(values[:, :BAP_STANDARD_COUNT].any(axis=0))
-    reach = [steps[one] * (ARM * 1e-5 if is_angle(one) else 1e-3) / 2 for one in moving.tolist()]
+    moving = np.flatnonzero(target.values[:, :BAP_STANDARD_COUNT].any(axis=0)).tolist()
+    stands = bool((target.tolerances[:, 1:] < tolerance.joint).any())
+    way = tolerance.joint / (STANDING * tolerance.foot) if stands else 1.0  # feet have only this to go
+    reach = [steps[one] * (ARM * 1e-5 if is_angle(one) else max(way, 1.0) * 1e-3) / 2 for one in moving]
     fitting = [
         quant
         for quant in range(QUANT_MAX, 0, -1)
@@ -222,7 +250,8 @@ def _to_send(animation: Animation, found: FoundBaps) -> Animation:
     )
 
 
-def _beyond(nearest: BodyErrors, tolerance: Tolerance) -> RangeError:
+def beyond_body(nearest: BodyErrors, tolerance: Tolerance) -> RangeError:
+    """Return the error for a body beyond a tolerance. nearest: what the best stream came to."""
     return RangeError(
         f"no quantiser keeps the body within {tolerance.joint * 1000:g} mm, and feet that stand within "
         f"{tolerance.foot * 1000:g} mm: with the finest, a point 3 cm off {nearest.joint} is "

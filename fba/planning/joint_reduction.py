@@ -20,7 +20,7 @@ def reduce_joints(target: BodyTarget, share: float) -> Float64:
     solver = target.solver
     rows = all_rows(solver.skeleton)
     rules = solver.convention
-    moved = target.values.any(axis=0)
+    moved = np.asarray(target.values.any(axis=0))
     used = [
         joint
         for joint, columns in zip(rules.joints, rules.bap, strict=True)

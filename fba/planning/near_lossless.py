@@ -17,6 +17,13 @@ from fba.face.mates import donors
 from fba.face.model import FaceModel
 from fba.face.resolve import known_faps, resolve
 from fba.parameters import fap_steps
+from fba.planning.body_tolerance import (
+    BodyErrors,
+    beyond_body,
+    body_errors,
+    encode_body_within_tolerance,
+    fit_bodies,
+)
 from fba.planning.derived_faps import interpolated_faps, related_faps
 from fba.planning.face_search import Effort, FoundFaps, Segment, search_faps
 from fba.planning.mesh_error import ErrorBasis
@@ -63,9 +70,9 @@ class FaceErrors:
 class NearLossless:
     """What encoding within a tolerance came to.
 
-    statistics: of the encoder. fap_quant: quantiser of FAPs. left_out: frames that are not sent. face: errors
-    of the face, None where there is none. compact: whether nothing was smaller than what keeps all that is
-    shown.
+    statistics: of the encoder. fap_quant, bap_quant: quantisers. left_out: frames that are not sent. face,
+    body: errors, None for a part that there is not, or that does not move. compact: whether nothing was
+    smaller than what keeps all that is shown.
     """
 
     statistics: EncoderStatistics
@@ -73,6 +80,8 @@ class NearLossless:
     left_out: int
     face: FaceErrors | None
     compact: bool
+    bap_quant: int = 1
+    body: BodyErrors | None = None
 
 
 def encode_within_tolerance(
@@ -89,14 +98,45 @@ def encode_within_tolerance(
     interpolated linearly, as `fba.player` and `Animation.resample` do. Visemes and expressions are kept as
     they are. Never larger than with the preset "compact", which is taken where nothing else is smaller.
 
-    options: quantisers are ignored for FAPs. model: the head to measure on; default: the built-in one.
-    every_frame: send all frames, for players that hold a frame until the next comes.
-    RangeError where not even the finest quantiser keeps within the tolerance, ValueError without frames.
+    A body that moves is kept within the tolerance of joints and feet; where there is a face, too, all frames
+    are sent.
+
+    options: quantisers are ignored. model: the head to measure on; default: the built-in one. every_frame:
+    send all frames, for players that hold a frame until the next comes. RangeError where not even the finest
+    quantiser keeps within the tolerance, ValueError without frames.
     """
     tolerance, options = tolerance or Tolerance(), replace(options or EncoderOptions(), fap_quant=1)
     if not len(animation):
         raise ValueError("there is no frame to encode")
     model = model or FaceModel.default()
+    if animation.body is None or not animation.body.values.any():
+        return _encode_face(animation, tolerance, options, model, every_frame)
+    if animation.face is None:
+        data, coded = encode_body_within_tolerance(animation, tolerance, options, every_frame=every_frame)
+        return data, NearLossless(
+            coded.statistics, 1, coded.left_out, None, False, coded.bap_quant, coded.errors
+        )
+    nearest: BodyErrors | None = None
+    for body, quant in fit_bodies(animation, tolerance, options):
+        chosen = replace(options, bap_quant=quant, clamp=True)
+        data, near = _encode_face(replace(animation, body=body), tolerance, chosen, model, every_frame)
+        errors = body_errors(animation, decode(data, bap_steps=options.bap_steps), tolerance)
+        if errors.is_within(tolerance):
+            return data, replace(near, bap_quant=quant, body=errors)
+        if nearest is None or errors.largest < nearest.largest:
+            nearest = errors
+    assert nearest is not None
+    raise beyond_body(nearest, tolerance)
+
+
+def _encode_face(
+    animation: Animation,
+    tolerance: Tolerance,
+    options: EncoderOptions,
+    model: FaceModel,
+    every_frame: bool,
+) -> tuple[bytes, NearLossless]:
+    """Return a stream whose face stays within a tolerance, and what it came to; a body is sent as it is."""
     source = _Source(animation, model, options, every_frame)
     data, statistics = encode_planned(animation, options, preset="compact")
     smallest = _measured(data, statistics, source, options, compact=True)

@@ -102,3 +102,44 @@ def test_a_head_of_ones_own(run: Run, talk: Path, tmp_path: Path) -> None:
         assert (done.code, done.err) == (0, "")
         sizes.append((tmp_path / "a.fba").stat().st_size)
     assert sizes[0] == pytest.approx(sizes[1], rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def gesture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A BAP file: a left arm that is raised and bent."""
+    values = np.zeros((30, 296), dtype=np.int32)
+    values[:, 31] = np.rint(40_000 * np.sin(np.arange(30) / 7))  # l_shoulder_flexion
+    values[:, 37] = np.rint(-30_000 * np.sin(np.arange(30) / 9))  # l_elbow_flexion
+    mask = np.tile(values.any(axis=0), (30, 1))
+    path = tmp_path_factory.mktemp("gesture") / "gesture.bap"
+    fba.write(path, Animation(25, np.arange(30), None, fba.BodyTrack(values, mask)))
+    return path
+
+
+def test_a_body_stays_within_its_own_tolerance(run: Run, gesture: Path, tmp_path: Path) -> None:
+    sizes = []
+    for given in (("--tolerance", "0.5mm"), ("--body-tolerance", "3mm")):
+        done = run("encode", gesture, "-o", tmp_path / "a.fba", "--bap-steps", "visage", *given, "--json")
+        assert (done.code, done.err) == (0, "")
+        found = json.loads(done.out)
+        limit = 10.0 if given[0] == "--tolerance" else 3.0
+        assert 0.5 * limit < found["tolerance"]["body"]["largest_mm"] <= limit
+        assert found["tolerance"]["body"]["foot_mm"] == 0.0
+        assert found["tolerance"]["body"]["share_within"] == 1.0
+        assert "face" not in found["tolerance"]
+        sizes.append(found["size"])
+    assert sizes[0] < sizes[1]
+
+
+def test_what_is_printed_of_a_body(run: Run, gesture: Path, tmp_path: Path) -> None:
+    given = ("-o", tmp_path / "a.fba", "--bap-steps", "visage", "--body-tolerance")
+    body, left_out = run("encode", gesture, *given, "1cm").out.splitlines()[1:3]
+    assert body.startswith("body: points 3 cm from joints move by at most ")
+    assert "feet that stand by at most 0.00 mm" in body
+    assert "of 30 frames are not sent" in left_out
+    assert "quantiser of BAPs" in left_out
+    done = run("encode", gesture, *given, "0.01mm")
+    assert done.code == 1
+    assert "no quantiser keeps the body within 0.01 mm" in done.err
+    done = run("encode", gesture, *given, "1cm", "--bap-quant", "2")
+    assert "--bap-quant and --body-tolerance contradict each other" in " ".join(done.err.split())

@@ -111,11 +111,13 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
             options.bap_quant,
             fit=made,
         )
-    if size.tolerance is not None:
-        data, near = encode_near(animation, options, size.tolerance, size.model, every_frame=size.every_frame)
+    if size.tolerance is not None or size.body_tolerance is not None:
+        data, near = encode_near(
+            animation, options, size.tolerance, size.body_tolerance, size.model, every_frame=size.every_frame
+        )
         counts = near.statistics
         return CodedStream(
-            data, counts.planes, counts.intra_planes, counts.clamped_parameters, options.bap_quant, near=near
+            data, counts.planes, counts.intra_planes, counts.clamped_parameters, near.bap_quant, near=near
         )
     if size.bitrate is not None:
         data, held = encode_held(animation, options, size.bitrate, size.buffer)

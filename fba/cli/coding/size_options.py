@@ -23,13 +23,14 @@ class Size:
     """How small a stream is to be, and what may be lost for that, as far as options say it; else None.
 
     preset: what is sent. model: the face that all receivers have; fit: one that computes FAPs to within 3 mm.
-    fap_quant, bap_quant: how finely.
-    tolerance: metres by which vertices may move; every_frame: whether no frame is left out for that. bitrate:
+    fap_quant, bap_quant: how finely. tolerance: metres by which vertices may move; body_tolerance: by which
+    points beside joints may; every_frame: whether no frame is left out for that. bitrate:
     bits a second; buffer: seconds that the stream may be ahead of them.
     """
 
     preset: str | None = None
     fit: Path | None = None
+    body_tolerance: float | None = None
     model: Path | None = None
     tolerance: float | None = None
     every_frame: bool = False
@@ -78,6 +79,13 @@ def size_options(command: Decorated) -> Decorated:
                 "within 1 degree.",
             ),
             click.option(
+                "--body-tolerance",
+                type=LengthType(),
+                metavar="LENGTH",
+                help="The same for bodies: points 3 cm from every joint stay within this distance, and feet "
+                "that stand within half of it. Default, with --tolerance: 1cm.",
+            ),
+            click.option(
                 "--every-frame",
                 is_flag=True,
                 help="With --tolerance: send all frames, for players that hold a frame until the next comes.",
@@ -107,10 +115,24 @@ PLANES = ("intra_period", "start_codes", "time_codes", "unsent", "gender", "clam
 """Options of single planes."""
 CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "epf": (
-        ("preset", "fit", "model", "tolerance", "every_frame", "bitrate", *QUANTISERS, *PLANES),
+        (
+            "preset",
+            "fit",
+            "model",
+            "tolerance",
+            "body_tolerance",
+            "every_frame",
+            "bitrate",
+            *QUANTISERS,
+            *PLANES,
+        ),
         "the EPF file says how planes are coded",
     ),
     "tolerance": (
+        ("preset", "fit", "bitrate", *QUANTISERS, "unsent"),
+        "the tolerance decides what is sent, and how finely",
+    ),
+    "body_tolerance": (
         ("preset", "fit", "bitrate", *QUANTISERS, "unsent"),
         "the tolerance decides what is sent, and how finely",
     ),
@@ -131,7 +153,8 @@ def check_sizes() -> None:
         for other in others:
             if options.is_given(option) and options.is_given(other):
                 raise click.UsageError(f"{flags[other]} and {flags[option]} contradict each other: {reason}")
-    if options.is_given("every_frame") and not options.is_given("tolerance"):
+    tolerances = options.is_given("tolerance") or options.is_given("body_tolerance")
+    if options.is_given("every_frame") and not tolerances:
         raise click.UsageError("--every-frame goes with --tolerance")
     check_buffer()
     preset = context.params.get("preset")

@@ -14,7 +14,7 @@ from fba.cli.inputs import read_model
 if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.codec import EncoderOptions
-    from fba.planning import NearLossless
+    from fba.planning import FaceErrors, NearLossless
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "\u00b5m": 1e-6, "\u03bcm": 1e-6}
 """Metres of the units that a length may have; the last two have the micro sign and the Greek letter."""
@@ -44,20 +44,50 @@ class LengthType(click.ParamType[float]):
 
 
 def encode_near(
-    animation: Animation, options: EncoderOptions, tolerance: float, model: Path | None, *, every_frame: bool
+    animation: Animation,
+    options: EncoderOptions,
+    face: float | None,
+    body: float | None,
+    model: Path | None,
+    *,
+    every_frame: bool,
 ) -> tuple[bytes, NearLossless]:
-    """Return the stream within a tolerance in metres. model: file of the head; None for the built-in one."""
+    """Return the stream within tolerances in metres, by default those of `fba.planning.Tolerance`.
+
+    body: of points beside joints; half of it holds for feet that stand. model: file of the head; None for the
+    built-in one.
+    """
     from fba.planning import Tolerance, encode_within_tolerance
 
-    allowed = Tolerance(face=tolerance)
+    given = {} if face is None else {"face": face}
+    if body is not None:
+        given |= {"joint": body, "foot": body / 2}
+    allowed = Tolerance(**given)
     return encode_within_tolerance(animation, allowed, options, read_model(model), every_frame=every_frame)
 
 
 def tolerance_lines(result: NearLossless, animation: Animation) -> list[str]:
     """Return what encoding within a tolerance came to, for people."""
-    face = result.face
-    if face is None:
-        return []
+    lines = [] if result.face is None else _face_lines(result, result.face, animation)
+    body = result.body
+    if body is not None:
+        lines.append(
+            f"body: points 3 cm from joints move by at most {body.largest * 1000:.2f} mm ({body.joint} at "
+            f"{float(animation.times[body.frame]):.2f} s), 99 % of them by at most "
+            f"{body.percentile_99 * 1000:.2f} mm; feet that stand by at most {body.foot * 1000:.2f} mm"
+        )
+    if result.left_out:
+        used = f"quantiser of FAPs {result.fap_quant}" if result.face is not None else ""
+        used = used or f"quantiser of BAPs {result.bap_quant}"
+        lines.append(
+            f"{result.left_out} of {len(animation)} frames are not sent; players fill them in between those "
+            f"beside them; {used}"
+        )
+    return lines
+
+
+def _face_lines(result: NearLossless, face: FaceErrors, animation: Animation) -> list[str]:
+    """Return how near the face is."""
     head = f"head within {face.head:.3f} degrees, eyes within {face.gaze:.3f}"
     if face.largest:
         lines = [
@@ -69,11 +99,6 @@ def tolerance_lines(result: NearLossless, animation: Animation) -> list[str]:
         lines = [f"face: no vertex moves; {head}"]
     if result.compact:
         lines.append("nothing smaller keeps within the tolerance than what keeps all that is shown")
-    elif result.left_out:
-        lines.append(
-            f"{result.left_out} of {len(animation)} frames are not sent; players fill them in between those "
-            f"beside them; quantiser of FAPs {result.fap_quant}"
-        )
     return lines
 
 
@@ -93,5 +118,16 @@ def tolerance_values(result: NearLossless) -> dict[str, Any]:
             "vertex": face.vertex,
             "head_degrees": round(face.head, 6),
             "gaze_degrees": round(face.gaze, 6),
+        }
+    if result.body is not None:
+        body = result.body
+        values["body"] = {
+            "largest_mm": round(body.largest * 1000, 6),
+            "percentile_99_mm": round(body.percentile_99 * 1000, 6),
+            "share_within": body.share,
+            "joint": body.joint,
+            "frame": body.frame,
+            "foot_mm": round(body.foot * 1000, 6),
+            "bap_quant": result.bap_quant,
         }
     return values
