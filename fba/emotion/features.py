@@ -22,7 +22,8 @@ class Features:
 
     names: of each. weights: float64 (F, 68), of the FAPs. folded: bool (F,), whether the sign of a feature is
     dropped, as for differences between left and right. noise: float64 (F,), how much a face moves without
-    expressing anything, speech apart. spread: float64 (F,), how much it moves altogether.
+    expressing anything, speech apart. spread: float64 (F,), how much it moves altogether. speech: float64
+    (F,), how much it moves in speech, beyond what visemes explain.
     """
 
     names: tuple[str, ...]
@@ -30,6 +31,7 @@ class Features:
     folded: Bool
     noise: Float64
     spread: Float64
+    speech: Float64
 
 
 @cache
@@ -50,6 +52,7 @@ def features() -> Features:
         folded,
         np.array([float(row["noise"]) for row in rows]),
         np.array([float(row["spread"]) for row in rows]),
+        np.array([float(row["speech"]) for row in rows]),
     )
 
 

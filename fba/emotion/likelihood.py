@@ -46,8 +46,8 @@ REST_SCALES = (0.4, 0.8, 1.5)
 mixture of Gaussians with the noise of `features.csv` times these."""
 SHOWING_NOISE = 0.4
 """What an expression adds to, times that noise."""
-VISIBLE = 2.0
-"""How many standard deviations of a face at rest an expression must move what is known, to be read at all."""
+VISIBLE = 0.2
+"""Share of what tells an expression from a face at rest that must be known for it to be read at all."""
 HIDDEN_PRIOR = 1e-12
 UNKNOWN_SPREAD = 1.4
 """Width of "unknown", in spreads of the features."""
@@ -193,14 +193,13 @@ def _model(packed: bytes) -> Model:
     used = known_features(known)
     table = features()
     noise, spread = table.noise[used], table.spread[used]
-    spoken = measure(Definitions.default().visemes[1:].astype(np.float64), known)[:, used]
-    opened = measure(_open_mouth(), known)[None, used]
-    speech = SPEECH**2 * spoken.T @ spoken / len(spoken) + opened.T @ opened
+    speech = _speech(known, used)
     means = [np.zeros(len(noise))] * len(REST_SCALES)
     covariances = [speech + np.diag((scale * noise) ** 2) for scale in REST_SCALES]
     priors = [NEUTRAL_PRIOR * (1 - FAINT_PRIOR) / len(REST_SCALES)] * len(REST_SCALES)
     showing = [_show(one, known, used) for one in candidates()]
-    visible = _visible([target for target, _ in showing], speech + np.diag(noise**2))
+    every = np.ones(FAP_COUNT, dtype=bool)
+    visible = [_distance(one, known) >= VISIBLE * _distance(one, every) for one in candidates()]
     resting = speech + np.diag((SHOWING_NOISE * noise) ** 2)
     total = sum(one.prior for one in candidates())
     for intensity in FAINT:
@@ -223,10 +222,20 @@ def _model(packed: bytes) -> Model:
     return Model(known, used, np.ascontiguousarray(quadratic.T), np.ascontiguousarray(linear.T), constants)
 
 
-def _visible(targets: list[Float64], rest: Float64) -> list[bool]:
-    """Return which expressions move features of known FAPs further than a face at rest does."""
-    inverse = np.linalg.inv(rest)
-    return [bool(target @ inverse @ target >= VISIBLE**2) for target in targets]
+def _speech(known: Bool, used: Bool) -> Float64:
+    """Return the covariance of the features of a mouth that speaks, or is open for no reason."""
+    spoken = measure(Definitions.default().visemes[1:].astype(np.float64), known)[:, used]
+    opened = measure(_open_mouth(), known)[None, used]
+    rest: Float64 = np.diag(features().speech[used] ** 2)
+    return SPEECH**2 * spoken.T @ spoken / len(spoken) + opened.T @ opened + rest
+
+
+def _distance(one: Candidate, known: Bool) -> float:
+    """Return how far a candidate is from a face at rest in the features of known FAPs: squared deviations."""
+    used = known_features(known)
+    target = measure(one.faps, known)[used]
+    covariance = _speech(known, used) + np.diag(features().noise[used] ** 2)
+    return float(target @ np.linalg.solve(covariance, target)) if used.any() else 0.0
 
 
 @cache

@@ -1,0 +1,82 @@
+"""Makes the pictures of docs/emotion.md: `python docs/make_emotion_picture.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from fba import Animation, FaceTrack, emotion
+from fba.arrays import Float32
+from fba_player.export.contact_sheet import FAINT, PAPER, SPACE, TEXT, close_up
+from fba_player.export.image_files import write_picture
+from fba_player.export.offscreen import Offscreen
+from fba_player.scene.scene import Scene
+from fba_player.view.camera import Camera
+from fba_player.view.font import label_font
+
+IMAGES = Path(__file__).with_name("images")
+YAW = 10.0
+"""Degrees: a head turned a little shows brows and cheeks better, and what is one-sided."""
+COLUMNS, TILE = 7, 240
+MIXTURES = (
+    "fear=60 joy=30",
+    "anger=70 sadness=60",
+    "surprise=80 anger=60",
+    "disgust=80 joy=50",
+    "fear=60 terror=60",
+)
+
+
+def sheet(tiles: Sequence[tuple[str, str, Float32]], columns: int, size: int = TILE) -> Image.Image:
+    """Faces with a name and a note below each."""
+    rows = -(-len(tiles) // columns)
+    letters = 15
+    height = size + 2 * letters + 14
+    page = Image.new("RGB", (columns * (size + SPACE) + SPACE, rows * (height + SPACE) + SPACE), PAPER)
+    draw = ImageDraw.Draw(page)
+    font, small = label_font(letters), label_font(letters * 0.85)
+    scene = Scene(Animation(25, np.arange(1), FaceTrack.empty(1)))
+    with Offscreen(scene, (size, size), samples=4) as view:
+        view.camera = Camera(yaw=YAW).fit(close_up("face", scene), 1.0)
+        for number, (name, note, faps) in enumerate(tiles):
+            x = SPACE + number % columns * (size + SPACE)
+            y = SPACE + number // columns * (height + SPACE)
+            page.paste(Image.fromarray(view.still(faps)[..., :3]), (x, y))
+            draw.text((x + 3, y + size + 2), name, font=font, fill=TEXT)
+            draw.text((x + 3, y + size + letters + 7), note, font=small, fill=FAINT)
+    return page
+
+
+def named() -> Image.Image:
+    tiles = []
+    for one in emotion.expressions():
+        known = "" if one.point is None else f"{one.point[0]:g}, {one.point[1]:g}"
+        tiles.append((one.name, "  ".join(filter(None, (one.family, known))), one.faps))
+    return sheet(tiles, COLUMNS)
+
+
+def measured() -> Image.Image:
+    shown = [(family, "shown: FAP 2", emotion.expression(family).faps) for family in emotion.FAMILIES]
+    profiles = [(family, "measured: Table 8-4", emotion.measured_faps(family)) for family in emotion.FAMILIES]
+    return sheet([*shown, *profiles], len(emotion.FAMILIES))
+
+
+def mixtures() -> Image.Image:
+    tiles = [(text, "", emotion.combine(emotion.parse_weights(text)).faps) for text in MIXTURES]
+    point = emotion.expression_at(5.0, 4.4)
+    tiles.append(("--at 5.0,4.4", str(point).replace("_", " "), point.faps))
+    return sheet(tiles, len(tiles))
+
+
+def main() -> None:
+    IMAGES.mkdir(exist_ok=True)
+    write_picture(IMAGES / "emotion-named.jpg", np.asarray(named()))
+    write_picture(IMAGES / "emotion-measured.jpg", np.asarray(measured()))
+    write_picture(IMAGES / "emotion-mixtures.jpg", np.asarray(mixtures()))
+
+
+if __name__ == "__main__":
+    main()
