@@ -23,7 +23,7 @@ from fba.emotion.rules import Rules, limited
 from fba.errors import OptionError
 from fba.face.expressions import Definitions
 from fba.face.mates import fill
-from fba.face.resolve import FaceSettings, known_faps, resolve
+from fba.face.resolve import FaceSettings, resolve
 from fba.parameters import FAP_COUNT, fap_numbers
 from fba.tracks import FaceTrack
 
@@ -225,11 +225,9 @@ def _mixture(weights: dict[str, float], rules: Rules | None, mixtures: Mixtures)
 
 
 def _face(face: FaceTrack, values: Int32, moved: Bool) -> FaceTrack:
-    """A track that sends what the source determines and what moods move, and keeps the rest from copying."""
-    _, known = known_faps(face)
-    shown = (values != 0).any(axis=0)
-    sent = known | moved | shown
-    sent[:, :2] = False
-    copies = fill(values[:1], sent.any(axis=0)[None])[1][0]
+    """A track that sends, in every frame, what the source sends, what moods move, and what copies it."""
+    sent = face.mask.any(axis=0) | moved | (values != 0).any(axis=0)
+    sent[:2] = False
+    copies = fill(values[0], sent)[1]
     copies[:2] = False
-    return FaceTrack(values, sent | copies)
+    return FaceTrack(values, np.broadcast_to(copies, values.shape))
