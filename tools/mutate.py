@@ -188,6 +188,8 @@ SLIDE_TEST = "tests/formats/test_step_choice.py -k 'slide or sways'"
 ORIGIN_TEST = "tests/formats/test_step_choice.py -k origin"
 TRANSPARENCY_TEST = "tests/player/gl/test_transparency.py"
 WRINKLES_TEST = "tests/player/figure/test_wrinkles.py"
+EMOTE_TEST = "tests/emotion/test_emotional_modification.py"
+STRIP_TEST = "tests/player/session/test_emotion_trace.py"
 HEAD_TURN_TEST = "tests/formats/test_step_choice.py -k head"
 MEASURED_TEST = "tests/body/gait/test_measured.py"
 STRIPS_TEST = "tests/mesh/test_ply.py -k strips"
@@ -757,6 +759,17 @@ MUTANTS = (
     Mutant(SLIDING, "_to_and_fro(root[run]) - quantum", "_to_and_fro(root[run])", SLIDE_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 0.9", JUMP_TEST),
     Mutant(PLAUSIBILITY, "JUMP = 1.0", "JUMP = 1.1", JUMP_TEST),
+    Mutant(
+        "fba/emotion/modification.py", "0.0) * (1 - spoken)\n    parted", "0.0) * 0.0\n    parted", EMOTE_TEST
+    ),
+    Mutant("fba/emotion/modification.py", "offsets[:, JAW] *= spoken", "pass", EMOTE_TEST),
+    Mutant("fba/emotion/modification.py", "LIDS_APART = 1024.0", "LIDS_APART = 1100.0", EMOTE_TEST),
+    Mutant("fba/emotion/modification.py", "reach: float = 1.2", "reach: float = 3.0", EMOTE_TEST),
+    Mutant("fba/emotion/modification.py", "np.where(same, shown * room, shown)", "shown", EMOTE_TEST),
+    Mutant("fba/emotion/moods.py", "end - begin > one.ease + other.ease", "False", EMOTE_TEST),
+    Mutant(
+        "player/fba_player/session/emotion_trace.py", "begin + start, begin + end", "start, end", STRIP_TEST
+    ),
     Mutant("player/fba_player/figure/wrinkles.py", "BEGINNING = 0.5", "BEGINNING = 0.4", WRINKLES_TEST),
     Mutant("player/fba_player/figure/wrinkles.py", "BEGINNING = 0.5", "BEGINNING = 0.7", WRINKLES_TEST),
     Mutant("player/fba_player/figure/wrinkles.py", "DEEPEST = 0.75", "DEEPEST = 1.5", WRINKLES_TEST),

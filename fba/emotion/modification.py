@@ -128,8 +128,6 @@ def modify(shown: Float64, offsets: Float64, damping: Damping | None = None) -> 
         _keep_contact(offsets, result, lips, before, spoken)
     for lids in LIDS:
         _keep_lids(shown, offsets, result, lids)
-    quiet = ~offsets.any(axis=1)
-    result[quiet] = shown[quiet]
     return np.where(_beyond(shown), shown, limited(result))
 
 
