@@ -289,7 +289,13 @@ MUTANTS = (
     Mutant(
         "fba/planning/derived_faps.py", "better = shown & (own < least)", "better = own < least", PLANS_TEST
     ),
-    Mutant("fba/codec/code_length.py", "2 * RANGE_CODE_MAX * RANGE_UNIT + 1", "RANGE_CODE_MAX", PLANS_TEST),
+    Mutant(
+        "fba/codec/code_length.py",
+        "2 * RANGE_CODE_MAX * RANGE_UNIT + 1",
+        "RANGE_CODE_MAX",
+        "tests/codec/test_code_lengths.py",
+    ),
+    Mutant("fba/codec/_encoder.py", "codes[:2] = own.codes[:2]", "codes[:0] = own.codes[:0]", PLANS_TEST),
     Mutant("fba/codec/quantisation.py", "divisor % scale == 0 and", "", PLANS_TEST),
     Mutant("fba/planning/fit_faps.py", "self.given | self.needed", "self.given", FIT_PLANS_TEST),
     Mutant("fba/planning/fit_faps.py", "(values % step != 0) | ", "", FIT_PLANS_TEST),

@@ -140,6 +140,9 @@ class Encoder:
         """
         first = self.push_animation(animation[:1])
         self._ranges = fitting_ranges(animation, self.options)
+        if self.options.intra_period is None:  # only the first frame is an I plane
+            for part, own in fitting_ranges(animation[:1], self.options).items():
+                self._ranges[part].codes[:2] = own.codes[:2]
         self._resumable = set()  # as after a start code: the next plane is an I plane
         return first + self._push_all(animation[1:])
 
