@@ -64,6 +64,11 @@ ILLUSTRATIONS = {
         "./dev fuzz --target bvh fuzz-findings/bvh-seed7-1234",
     ): "a file found there",
     ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
+    (
+        "docs/emotion.md",
+        "fba emote hello.fap -o moods.mp4 --side-by-side --emotion neutral --emotion angry=90 "
+        "--emotion surprised=80 --emotion sad=90 --emotion sleepy=90 --emotion happy=80",
+    ): "draws for half a minute; tests/cli has pictures of the same",
     ("docs/face-models.md", "npm install gltf-validator"): "needs node.js and a network",
     ("docs/import-faces.md", "$ fba model points scan.obj -o scan.points.csv"): WINDOW,
     ("docs/measure.md", "./dev bench --summary > results.md"): "takes ten minutes",
