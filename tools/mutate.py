@@ -238,8 +238,6 @@ MUTANTS = (
     Mutant(PATHS, "highest = min(highest, (upper", "highest = max(highest, (upper", PATHS_TEST),
     Mutant(PATHS, "np.rint((lower + upper) / 2)", "np.rint(lower)", PATHS_TEST),
     Mutant(FACE_SEARCH, "self.limit[beyond] *=", "self.limit[beyond] +=", FACE_TOLERANCE_TEST),
-    Mutant(FACE_SEARCH, "same[:-1] & same[1:] &", "same[1:] &", FACE_TOLERANCE_TEST),
-    Mutant(FACE_SEARCH, "low, high = 0.0, 0.0", "pass", FACE_TOLERANCE_TEST),
     Mutant(MESH_ERROR, "tolerance.head if head else tolerance.gaze", "tolerance.head", FACE_TOLERANCE_TEST),
     Mutant(MESH_ERROR, "np.maximum(lowest, self._lowest[near[0]])", "lowest", FACE_TOLERANCE_TEST),
     Mutant(
