@@ -21,6 +21,8 @@ from fba.planning.paths import ROUNDS, Bounds, find_path
 
 MARGIN = 0.998
 """Share of the tolerance that the search fills: slopes are not quite what the mesh does."""
+JERK = 1.0
+"""Share of the tolerance by which a FAP's change from frame to frame may differ from the source's unseen."""
 SWEEPS = 3
 """Rounds over all FAPs."""
 ROUNDING = 1e-4
@@ -153,7 +155,8 @@ class _Search:
                 lower = np.maximum(lower, np.minimum(self.wanted[column] - self.reach[column], shown))
                 upper = np.minimum(upper, np.maximum(self.wanted[column] + self.reach[column], shown))
             lower, upper = np.where(still, shown, lower), np.where(still, shown, upper)
-            bounds = Bounds(lower, upper, self.keys, step, self.quant)
+            calm = JERK / max(own.largest, 1e-12)
+            bounds = Bounds(lower, upper, self.keys, step, self.quant, self.wanted[column], calm)
             path = find_path(bounds, self.paths.get(column), rounds=ROUNDS if around is None else 1)
             self._show(column, path)
 

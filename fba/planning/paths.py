@@ -23,6 +23,8 @@ WIDEST = 24
 """Levels that are tried at a frame; more of them lie within the bounds of parameters that move little."""
 OUTSIDE = 1e6
 """Bits that count for a frame outside its bounds, and for a change that no P plane carries."""
+JERK_BITS = 12.0
+"""Bits that count for a change by which a viewer would see a jerk."""
 ROUNDING = 1e-6
 """Share of a step by which a level may lie outside."""
 
@@ -32,7 +34,8 @@ class Bounds(NamedTuple):
 
     lower, upper: float64 (T,), values. keys: int64 (K,), ascending, the frames that are sent, with the first
     and the last. step: of the quantiser, in the parameter's unit. scale: table steps in it, which divide the
-    limits of ranges (`fba.codec.step_scale`).
+    limits of ranges (`fba.codec.step_scale`). source: float64 (T,), values that the path stands for; jump: by
+    how much a change from one key to the next may differ from theirs without being seen as a jerk.
     """
 
     lower: Float64
@@ -40,6 +43,8 @@ class Bounds(NamedTuple):
     keys: Int64
     step: int
     scale: int
+    source: Float64 | None = None
+    jump: float = np.inf
 
 
 def find_path(bounds: Bounds, start: Int64 | None = None, *, rounds: int = ROUNDS) -> Int64:
@@ -95,7 +100,20 @@ def _cost(bounds: Bounds, path: Int64) -> float:
     shown = np.interp(np.arange(len(bounds.lower)), bounds.keys, path) * bounds.step
     slack = bounds.step * ROUNDING
     outside = int(((shown < bounds.lower - slack) | (shown > bounds.upper + slack)).sum())
-    return level_bits(path, bounds.scale) + OUTSIDE * outside
+    lowest, highest = _calm_changes(bounds)
+    changes = np.diff(path)
+    jerks = int(((changes < lowest) | (changes > highest)).sum())
+    return level_bits(path, bounds.scale) + OUTSIDE * outside + JERK_BITS * jerks
+
+
+def _calm_changes(bounds: Bounds) -> tuple[Float64, Float64]:
+    """Return the least and the largest change to each key but the first that is no jerk: float64 (K - 1,)."""
+    if bounds.source is None:
+        none = np.full(len(bounds.keys) - 1, np.inf)
+        return -none, none
+    moved = np.diff(bounds.source[bounds.keys]) / bounds.step
+    room = max(bounds.jump / bounds.step, 1.0)
+    return np.minimum(moved - room, -ROUNDING), np.maximum(moved + room, ROUNDING)
 
 
 def _search(bounds: Bounds, band: tuple[Int64, Int64], before: Int64, narrower: int) -> Int64:
@@ -114,8 +132,16 @@ def _search(bounds: Bounds, band: tuple[Int64, Int64], before: Int64, narrower: 
     cost = np.log2((len(changes) + high + low + 1) / (counts + 1.0))
     first, last = band
     choices = np.zeros((len(first), int((last - first).max()) + 1), dtype=np.int32)
+    lowest, highest = _calm_changes(bounds)
     return _shortest(
-        bounds.lower / bounds.step, bounds.upper / bounds.step, bounds.keys, first, last, cost, low, choices
+        bounds.lower / bounds.step,
+        bounds.upper / bounds.step,
+        bounds.keys,
+        (first, last),
+        (lowest, highest),
+        cost,
+        low,
+        choices,
     )
 
 
@@ -143,17 +169,19 @@ def _shortest(
     lower: Float64,
     upper: Float64,
     keys: Int64,
-    first: Int64,
-    last: Int64,
+    band: tuple[Int64, Int64],
+    calm: tuple[Float64, Float64],
     cost: Float64,
     low: int,
     choices: Int32,
 ) -> Int64:
-    """Return the levels (K,) from first (K,) to last (K,) whose changes cost least together.
+    """Return the levels (K,) whose changes cost least together.
 
-    lower, upper: (T,), in levels, for the frames between keys, where values are interpolated. cost: of
-    changes from -low on. choices: int32 (K, most levels), working array.
+    lower, upper: (T,), in levels, for the frames between keys, where values are interpolated. band: lowest
+    and highest levels (K,). calm: least and largest changes (K - 1,) that are no jerk. cost: of changes from
+    -low on. choices: int32 (K, most levels), working array.
     """
+    first, last = band
     width = choices.shape[1]
     sums, new_sums = np.zeros(width), np.zeros(width)
     for key in range(1, len(keys)):
@@ -176,7 +204,10 @@ def _shortest(
                 count - 1, level - low + len(cost) - 1 - base, int(np.floor(min(highest, 1e9))) - base
             )
             for j in range(j_first, j_last + 1):
-                total = sums[i] + cost[base + j - level + low]
+                change = base + j - level
+                total = sums[i] + cost[change + low]
+                if change < calm[0][key - 1] or change > calm[1][key - 1]:
+                    total += JERK_BITS
                 if total < new_sums[j]:
                     new_sums[j] = total
                     choices[key, j] = i

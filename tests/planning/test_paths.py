@@ -70,6 +70,22 @@ def test_paths_are_cheaper_than_a_dead_zone_on_the_whole() -> None:
     assert found < 0.9 * held
 
 
+def test_paths_follow_their_source_without_jerks() -> None:
+    """A change that goes two steps further than the source is one."""
+    jerks = []
+    for jump in (np.inf, 1.0):
+        count = 0
+        for seed in range(30):
+            motion = np.cumsum(np.random.default_rng(seed).normal(0, 0.4, 120))
+            keys = np.arange(0, 120, 2)
+            keys[-1] = 119
+            bounds = Bounds(motion - 2.5, motion + 2.5, keys, 1, 3, motion, jump)
+            changes, moved = np.diff(find_path(bounds)), np.diff(motion[keys])
+            count += int((np.abs(changes) > np.abs(moved) + 1).sum())
+        jerks.append(count)
+    assert jerks[1] < 0.2 * jerks[0]
+
+
 def test_short_paths_are_nearly_the_cheapest_of_all() -> None:
     for seed in range(30):
         rng = np.random.default_rng(seed)
