@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fba.errors import FormatError
+from fba.errors import FbaError, FormatError
 from fba.limits import Limits
 from fba.source import Path, read_whole
 
@@ -38,7 +38,7 @@ def read_arrays(path: Path, limits: Limits, *, single: str, objects: bool = Fals
                     limits.check_bytes(member.file_size, f"{path}: {member.filename}", source=len(data))
                     arrays[member.filename[:-4]] = _read_array(archive.read(member), path, limits, objects)
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, OSError, ValueError) as error:
-        if isinstance(error, FormatError):
+        if isinstance(error, FbaError):
             raise
         raise FormatError(f"is no archive of arrays that can be read: {error}", path=path) from error
     except Exception as error:  # zlib.error and the like have no common class

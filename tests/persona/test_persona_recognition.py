@@ -62,15 +62,15 @@ def test_slopes_of_the_error_are_right() -> None:
 
 def test_a_network_learns_what_no_line_parts() -> None:
     random = np.random.default_rng(2)
-    inputs = random.uniform(-1, 1, size=(400, 2))
+    inputs = random.uniform(-1, 1, size=(200, 2))
     inside = (inputs[:, 0] * inputs[:, 1] > 0)[:, None]
     targets = np.concatenate([inside, ~inside], axis=1)
     found, again = (
-        train(inputs[:300], targets[:300], inputs[300:], targets[300:], units=12, enough=0.9)
+        train(inputs[:150], targets[:150], inputs[150:], targets[150:], units=12, enough=0.85)
         for _ in range(2)
     )
     np.testing.assert_array_equal(found.network.output, again.network.output)
-    assert found.share > 0.9
+    assert found.share > 0.85
     assert found.network.hidden.shape == (2, 12)
 
 

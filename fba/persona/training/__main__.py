@@ -7,6 +7,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from fba.persona.training.bosphorus import read_database
 from fba.persona.training.examples import make_examples
 from fba.persona.training.training import train_recogniser
 
@@ -23,11 +24,15 @@ def main() -> None:
     parser.add_argument("--people", type=int, default=PEOPLE, help="faces that are made up")
     parser.add_argument("--each", type=int, default=EACH, help="examples of each class of each of them")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--bosphorus", type=Path, metavar="FOLDER", help="train with scans in Bosphorus's layout"
+    )
     given = parser.parse_args()
     about = f"{given.people} faces, {given.each} examples of each of 35 classes, seed {given.seed}"
-    recogniser = train_recogniser(
-        make_examples(given.people, given.each, given.seed), seed=given.seed, about=about
-    )
+    examples = make_examples(given.people, given.each, given.seed)
+    if given.bosphorus is not None:
+        examples, about = read_database(given.bosphorus), f"scans of {given.bosphorus.name}"
+    recogniser = train_recogniser(examples, seed=given.seed, about=about)
     recogniser.save(given.output)
     lines = []
     for part, component in recogniser.components.items():

@@ -89,4 +89,6 @@ def _fit_jaw(examples: Examples) -> Float64:
         rows = np.flatnonzero(examples.person == person)
         fapu = measure_fapu(examples.neutral[rows[0]])
         values[rows] = mask_faps(moved[rows], fapu, np.zeros(len(JAW_FAPS)))[:, [fap - 1 for fap in JAW_FAPS]]
+    if not examples.jaw.any():  # scans do not tell it: as of faces that are made up
+        return Recogniser.default().jaw
     return np.asarray(np.linalg.lstsq(values, examples.jaw, rcond=None)[0])

@@ -6,7 +6,9 @@ that a reader might search again and again, or unpack: tokens, names, nodes, bra
 
 from __future__ import annotations
 
+import io
 import struct
+import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -422,6 +424,7 @@ def hostile_files() -> dict[str, HostileFile]:
         **_meshes(),
         **_points(),
         **_sounds(),
+        **_personas(),
     }
 
 
@@ -699,3 +702,21 @@ def _sounds() -> dict[str, HostileFile]:
         "wav of one sample a second": HostileFile(read_sound, "a.wav", wav(rate=1)),
         "wav of 64 channels": HostileFile(read_sound, "a.wav", wav(channels=64)),
     }
+
+
+def _personas() -> dict[str, HostileFile]:
+    from fba.persona import load_persona
+
+    return {"persona members": HostileFile(load_persona, "a.persona", persona_members)}
+
+
+def persona_members(size: int) -> bytes:
+    """A Persona of many small arrays, none of which it needs."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("header.json", '{"kind": "persona", "version": 1}')
+        for number in range(size // 300):
+            member = io.BytesIO()
+            np.save(member, np.zeros(4))
+            archive.writestr(f"a{number}.npy", member.getvalue())
+    return file.getvalue()

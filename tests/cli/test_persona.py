@@ -1,0 +1,202 @@
+"""`fba persona`: learn, info, play and evaluate; files that are none, of other versions, or damaged."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba.errors import FormatError, LimitError, UnsupportedError
+from fba.face import FaceModel
+from fba.persona import load_persona, read_recording, write_recording
+from fba.persona.evaluation.actors import Style, act
+from fba_conformance.captures import point_files
+from fba_conformance.captures.tracked_actor import film
+
+Run = Callable[..., tuple[int, str, str]]
+SCRIPT = [("E_HAPPY", 0.6), ("E_HAPPY", 0.9), ("LFAU_27", 0.8), ("UFAU_43", 1.0)]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """actor.npz and user.npz."""
+    here = tmp_path_factory.mktemp("persona")
+    write_recording(act(SCRIPT, Style(lopsided=0.5), seed=7).face, here / "actor.npz")
+    write_recording(act(SCRIPT[1:3], seed=8).face, here / "user.npz")
+    return here
+
+
+@pytest.fixture
+def persona(folder: Path, run: Run) -> Path:
+    path = folder / "actor.persona"
+    if not path.exists():
+        assert run("persona", "learn", folder / "actor.npz", "-o", path)[0] == 0
+    return path
+
+
+def test_learn_says_what_is_missing_and_writes_a_report(folder: Path, run: Run, tmp_path: Path) -> None:
+    out, page = tmp_path / "a.persona", tmp_path / "a.html"
+    code, said, err = run(
+        "persona", "learn", folder / "actor.npz", "-o", out, "--report", page, "--name", "Ann"
+    )
+    assert (code, err) == (0, "")
+    frames = len(read_recording(folder / "actor.npz"))
+    assert said.splitlines()[0] == f"{out}: {frames} of {frames} frames"
+    assert "mouth: " in said
+    assert "missing: " in said
+    assert "LFAU_22" in said
+    assert "<svg" in page.read_text()
+    assert load_persona(out).name == "Ann"
+
+
+def test_info_lists_masks(persona: Path, run: Run) -> None:
+    code, said, _ = run("persona", "info", persona)
+    assert code == 0
+    assert "masks of mouth: " in said
+    report = json.loads(run("persona", "info", persona, "--json")[1])
+    assert report["name"] == "actor"
+    assert report["parts"]["mouth"]["masks"]["E_HAPPY"] >= 1
+    assert "LFAU_22" in report["parts"]["mouth"]["missing"]
+    assert report["bytes"] < 100_000
+
+
+def test_play_writes_faps_in_the_actors_way(folder: Path, persona: Path, run: Run, tmp_path: Path) -> None:
+    for name, options in (("own.fap", []), ("acted.fap", ["--persona", persona])):
+        code, said, err = run("persona", "play", folder / "user.npz", *options, "-o", tmp_path / name)
+        assert (code, err) == (0, "")
+        assert f"{name}: " in said
+    own, acted = (fba.read(tmp_path / name).face for name in ("own.fap", "acted.fap"))
+    assert own is not None
+    assert acted is not None
+    smile = slice(45, 60)
+    uneven = [float((one.values[smile, 11] - one.values[smile, 12]).mean()) for one in (own, acted)]
+    assert uneven[1] > uneven[0] + 50
+    code, _, err = run("persona", "play", folder / "user.npz", "-o", tmp_path / "a.fba", "--user", persona)
+    assert code == 2
+    assert "--user goes with --persona" in err
+
+
+def test_points_of_other_trackers_are_read(persona: Path, run: Run, tmp_path: Path) -> None:
+    motion = film(FaceModel.default(), 68, frames=60, flat=True, turn=0.3).motion
+    (tmp_path / "user.csv").write_bytes(point_files.wide(motion))
+    code, _, err = run(
+        "persona", "play", tmp_path / "user.csv", "--persona", persona, "-o", tmp_path / "a.fap"
+    )
+    assert (code, err) == (0, "")
+    assert len(fba.read(tmp_path / "a.fap")) == 60
+
+
+def test_what_is_no_recording(persona: Path, run: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.fap").write_text("2.1 a 25 1\n" + "0 " * 67 + "0\n0\n")
+    code, _, err = run("persona", "learn", tmp_path / "a.fap", "-o", tmp_path / "a.persona")
+    assert code == 1
+    assert "is no file of tracked points" in err
+    np.savez(tmp_path / "short.npz", points=np.zeros((9, 64, 2)), angles=np.zeros((4, 3)))
+    with pytest.raises(FormatError, match=r"9 frames of points, but angles \(4, 3\)"):
+        read_recording(tmp_path / "short.npz")
+    np.savez(tmp_path / "rate.npz", points=np.zeros((9, 64, 2)), fps=np.array([25.0, 30.0]))
+    with pytest.raises(FormatError, match="fps must be one number"):
+        read_recording(tmp_path / "rate.npz")
+    code, _, err = run("persona", "learn", persona, "-o", tmp_path / "b.persona")
+    assert code == 1
+
+
+def test_a_user_who_looks_away(folder: Path, persona: Path, run: Run, tmp_path: Path) -> None:
+    face = read_recording(folder / "user.npz")
+    np.savez(tmp_path / "away.npz", points=face.points, angles=face.angles + np.array([0, 0.8, 0]), fps=30.0)
+    code, _, err = run(
+        "persona", "play", tmp_path / "away.npz", "--persona", persona, "-o", tmp_path / "a.fba"
+    )
+    assert code == 1
+    assert "with a head turned by more than 30 degrees" in err
+    assert not (tmp_path / "a.fba").exists()
+
+
+def repacked(path: Path, target: Path, **changed: object) -> Path:
+    """Write a Persona with another header, or other arrays; None leaves one out."""
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "header.json":
+                header = json.loads(data) | {key: one for key, one in changed.items() if key[0] != "_"}
+                data = json.dumps(header).encode()
+            array = changed.get("_" + name.removesuffix(".npy"), ...)
+            if array is None:
+                continue
+            if array is not ...:
+                file = io.BytesIO()
+                np.save(file, np.asarray(array), allow_pickle=True)
+                data = file.getvalue()
+            new.writestr(name, data)
+    return target
+
+
+@pytest.mark.parametrize(
+    ("changed", "error", "said"),
+    [
+        ({"kind": "other"}, FormatError, "is no persona file"),
+        ({"version": 2}, UnsupportedError, "version 2; this is 1: make it again"),
+        ({"version": "1"}, UnsupportedError, "version '1'"),
+        ({"name": 7}, FormatError, "name must be a text"),
+        ({"frames": -1}, FormatError, "whole numbers"),
+        ({"frames": 1e300}, FormatError, "whole numbers"),
+        ({"mouth.labels": ["E_HAPPY"]}, FormatError, "mouth.moved has shape"),
+        ({"mouth.classes": ["a"]}, FormatError, "other classes"),
+        ({"_mouth.moved": None}, FormatError, "lacks the array mouth.moved"),
+        ({"_neutral": np.full((64, 2), np.nan)}, FormatError, "not finite"),
+        ({"_neutral": np.zeros((64, 2))}, FormatError, "the neutral face is none"),
+        ({"_neutral": np.array([{}])}, FormatError, "Python objects"),
+        ({"_mouth.known": np.zeros(3)}, FormatError, "mouth.known has shape"),
+        ({"_left_eye.curves": np.full((4, 5, 18), 1e6)}, FormatError, "more than 500 mm"),
+    ],
+)
+def test_hostile_personas(
+    persona: Path, tmp_path: Path, changed: dict[str, object], error: type[Exception], said: str
+) -> None:
+    with pytest.raises(error, match=said):
+        load_persona(repacked(persona, tmp_path / "a.persona", **changed))
+
+
+def test_damaged_personas(persona: Path, run: Run, tmp_path: Path) -> None:
+    data, path = persona.read_bytes(), tmp_path / "a.persona"
+    for part in (data[: len(data) // 2], data[:3000] + b"?" * 500 + data[3500:], b"PK\x03\x04", b"text"):
+        path.write_bytes(part)
+        with pytest.raises(FormatError, match=r"a\.persona: "):
+            load_persona(path)
+    code, _, err = run("persona", "info", path)
+    assert (code, err) == (1, f"fba: error: {path}: is no persona file\n")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("header.json", json.dumps({"kind": "persona", "version": 1}))
+        archive.writestr("neutral.npy", b"0" * 300_000_000)
+    with pytest.raises(LimitError, match=r"a\.persona: neutral\.npy"):
+        load_persona(path)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("header.json", b" " * 3_000_000)
+    with pytest.raises(FormatError, match="header of 3000000 bytes"):
+        load_persona(path)
+
+
+def test_evaluate_prints_a_table(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    from fba.persona import evaluation
+
+    def few(**options: object) -> evaluation.Evaluation:
+        assert options == {"users": 1, "seed": 4}
+        row = evaluation.Row("E_HAPPY", 4.0, dict.fromkeys(evaluation.WAYS, 2.0))
+        means = dict.fromkeys(("curves", "linear", "masks", "nearest"), 0.95)
+        return evaluation.Evaluation((row,), (row,), means, {}, 0.7, 30, 10)
+
+    monkeypatch.setattr(evaluation, "evaluate", few)
+    code, said, err = run("persona", "evaluate", "--users", 1, "--seed", 4)
+    assert (code, err) == (0, "")
+    for text in ("E_HAPPY", "4.00", "2.00", "50.0 %", "95.0 %", "0.70 mm"):
+        assert text in said
+    assert (
+        json.loads(run("persona", "evaluate", "--users", 1, "--seed", 4, "--json")[1])["reduction"]["masks"]
+        == 0.5
+    )
