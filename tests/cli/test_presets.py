@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -176,3 +177,23 @@ def test_heads_that_give_nothing(run: Run, tmp_path: Path, archive: Animation) -
         done = run("encode", given, "-o", out, "--model", bare, "--preset", preset)
         assert done.code == 2
         assert f"--model and --preset {preset} contradict each other" in " ".join(done.err.split())
+
+
+@pytest.mark.parametrize("suffix", ["fap", "bap"])
+def test_no_frames_and_one(run: Run, tmp_path: Path, archive: Animation, suffix: str) -> None:
+    one = replace(archive[:1], **{"body" if suffix == "fap" else "face": None})
+    given, out = tmp_path / f"a.{suffix}", tmp_path / "a.fba"
+    fba.write(given, one)
+    lines = given.read_text().splitlines(keepends=True)
+    empty = tmp_path / f"empty.{suffix}"
+    empty.write_text(lines[0].replace(" 1\n", " 0\n"))
+    for preset in ("reference", "exact", "compact"):
+        done = run("encode", given, "-o", out, "--preset", preset)
+        assert (done.code, done.err) == (0, "")
+        assert len(fba.read(out)) == 1
+        done = run("encode", empty, "-o", out, "--preset", preset)
+        assert done.code == 1
+        assert f"{empty}: the file holds no frames" in done.err
+    done = run("convert", empty, out)
+    assert done.code == 1
+    assert f"{empty}: the file holds no frames" in done.err

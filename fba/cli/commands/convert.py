@@ -22,6 +22,7 @@ from fba.cli.outputs import (
     find_writer,
 )
 from fba.cli.recordings.inputs import Inputs, formats_by_part
+from fba.errors import FormatError
 from fba.limits import Limits
 from fba.source import naming_file
 
@@ -103,6 +104,8 @@ def command(
     )  # fmt: skip
     marked = mark is not False
     if writing.name == "fba":
+        if not len(animation):
+            raise FormatError("the file holds no frames; a stream needs one", path=source)
         parts = formats_by_part([animation], readers)
         taken = Inputs(animation, None, None, tuple(tables), parts, animation.rate != rates[0])
         made = taken.is_captured
