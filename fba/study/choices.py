@@ -31,14 +31,20 @@ def own_points(results: Iterable[Result]) -> list[Result]:
 
 def smallest_live(results: Iterable[Result]) -> Result | None:
     """Return the result that takes least live; None without any."""
-    found = [one for one in results if one.live_bytes is not None]
+    found = [one for one in results if one.live_rate is not None]
     return min(found, key=lambda one: one.live_rate or 0.0, default=None)
 
 
 def smallest_file(results: Iterable[Result]) -> Result | None:
     """Return the result that takes least as a file; None without any."""
-    found = [one for one in results if one.file_bytes is not None]
+    found = [one for one in results if one.file_rate is not None]
     return min(found, key=lambda one: one.file_rate or 0.0, default=None)
+
+
+def smallest_rates(results: Sequence[Result]) -> tuple[float | None, float | None]:
+    """Return the smallest rates live and as a file; None without any."""
+    live, file = smallest_live(results), smallest_file(results)
+    return None if live is None else live.live_rate, None if file is None else file.file_rate
 
 
 def rivals_of(results: Iterable[Result], own: Result) -> list[Result]:

@@ -4,51 +4,67 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
-from fba.study.choices import best_within, compare, own_points, rivals_of, together
+import numpy as np
+
+from fba.study.choices import best_within, compare, own_points, rivals_of, smallest_rates, together
 from fba.study.packages import require_package
+from fba.study.points import UNPLANNED
 from fba.study.published import Published, published_rates
 from fba.study.results import Result
 from fba.study.subjects import BODY, FACE
 
 OURS, LIVE, FILE, QUIET = "#b3401f", "#1f5fb3", "#5b7f3a", "#777777"
-SIZE = (7.6, 4.4)
-EXACT = {FACE: 0.1, BODY: 0.02}
-"""Millimetres up to which the axis of errors is linear, so that it has room for 0."""
+LIGHT = {OURS: "#dfa791", LIVE: "#a9c1e0"}
+SIZE = (7.6, 4.6)
+LINEAR = 0.1
+"""Millimetres up to which the axis of errors is linear where it has room for 0."""
 ERROR = {
-    FACE: "largest error, mm: the worst vertex of the worst frame, in the head's frame",
-    BODY: "largest error, mm: the worst point 3 cm off a joint",
+    FACE: "largest error, mm: the worst vertex in the worst frame, in the head's own frame",
+    BODY: "largest error, mm: the worst point 3 cm off a joint, in the worst frame",
 }
-ANCHORS = {FACE: (1.75, 153.0), BODY: (15.6, 3.3)}
-"""The published rates that are drawn."""
+TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+MOST = {FACE: 3.0, BODY: 60.0}
+"""Millimetres up to which errors are drawn."""
+CLOSEST = 0.055
+"""Distance of labels, in heights of the plot."""
+BARS = ("brotli 11", "xz", "zstd 19", "deflate", "glTF, int16, meshopt, zstd 19", "int16")
+"""What is drawn as bars, by the beginning of its name."""
+
+
+class _Label(NamedTuple):
+    x: float
+    y: float
+    text: str
+    colour: str
 
 
 def draw_rates(group: Sequence[Result]) -> bytes:
     """Return an SVG of rate against error for a group of results. OptionError without matplotlib."""
-    pyplot = _pyplot()
     chosen, kind = together(group), group[0].kind
-    figure, axes = pyplot.subplots(figsize=SIZE, layout="constrained")
-    own = _lower_hull([one for one in own_points(chosen) if "look-ahead" not in one.method])
-    compared = compare(group)
-    _line(axes, [(one.max_mm, one.live_rate) for one in own], OURS, "FBA, live", 2.4)
-    _line(axes, [(one.own.max_mm, one.live.live_rate) for one in compared], LIVE,
-          "best general\ncompressor, live", 1.8)  # fmt: skip
-    _line(axes, [(one.own.max_mm, one.file.file_rate) for one in compared], FILE,
-          "best general compressor,\nwhole file first", 1.4, "--")  # fmt: skip
-    for one in published_rates():
-        if one.kind == kind and one.low in ANCHORS[kind]:
-            _anchor(axes, one)
-    axes.set_xscale("symlog", linthresh=EXACT[kind], linscale=0.4)
-    axes.set_yscale("log")
-    ticks = [
-        tick for tick in (0, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if tick == 0 or tick >= EXACT[kind]
-    ]
-    largest = max(one.max_mm for one in chosen)
-    ticks = [tick for tick in ticks if tick <= 1.2 * largest]
-    axes.set_xticks(ticks, ["0: exact", *(f"{tick:g}" for tick in ticks[1:])])
-    axes.set_xlim(-0.2 * EXACT[kind], 3.2 * largest)
-    _rate_ticks(axes)
+    figure, axes = _pyplot().subplots(figsize=SIZE, layout="constrained")
+    own = [one for one in own_points(chosen) if one.max_mm <= MOST[kind]]
+    planned = [one for one in own if one.method != UNPLANNED]
+    compared = [one for one in compare(group) if one.own.max_mm <= MOST[kind]]
+    labels = [
+        _line(axes, [(one.max_mm, one.live_rate) for one in _best(planned)], OURS, "FBA, live", "-", 2.6),
+        _line(axes, [(one.own.max_mm, one.live.live_rate) for one in compared], LIVE,
+              "best of deflate, brotli,\nzstd: live", "-", 1.8),
+        _line(axes, [(one.own.max_mm, one.file.file_rate) for one in compared], FILE,
+              "best of deflate, brotli,\nzstd, xz: a file", "--", 1.4),
+    ]  # fmt: skip
+    for one in (one for one in own if one.method == UNPLANNED):
+        axes.plot(one.max_mm, one.live_rate, "o", markerfacecolor="white", color=OURS, markersize=5)
+        axes.annotate("FBA, live, with nothing known before", (one.max_mm, one.live_rate), xytext=(8, 0),
+                      textcoords="offset points", va="center", color=OURS, fontsize=8.5)  # fmt: skip
+    rates = [one.live_rate for one in own] + [one.live.live_rate for one in compared]
+    rates += [one.file.file_rate for one in compared]
+    _scale(axes, kind, [one.max_mm for one in own], [rate for rate in rates if rate])
+    for published in published_rates():
+        if published.kind == kind and published.short:
+            _anchor(axes, published)
+    _write_labels(axes, labels)
     axes.set_xlabel(ERROR[kind])
     axes.set_ylabel("kbit/s, without packet headers")
     return _svg(figure)
@@ -56,30 +72,26 @@ def draw_rates(group: Sequence[Result]) -> bytes:
 
 def draw_bars(group: Sequence[Result], limit: float) -> bytes:
     """Return an SVG of bars: what each way takes live and as a file, with an error of at most `limit` mm."""
-    pyplot = _pyplot()
-    best = best_within(group, limit)
-    rows = [("FBA", best.own.live_rate, best.own.file_rate)]
-    rivals = rivals_of(together(group), best.own)
-    for name in ("brotli 11", "xz", "zstd 19", "deflate", "glTF, int16, meshopt, zstd 19", "int16"):
-        same = [one for one in rivals if one.method.startswith(name)]
-        if same:
-            live = min((one.live_rate for one in same if one.live_rate is not None), default=None)
-            rows.append((name, live, min(one.file_rate for one in same if one.file_rate is not None)))
-    figure, axes = pyplot.subplots(figsize=(SIZE[0], 0.5 * len(rows) + 1.3), layout="constrained")
+    own = best_within(group, limit).own
+    rows: list[tuple[str, float | None, float | None]] = [("FBA", own.live_rate, own.file_rate)]
+    rivals = rivals_of(together(group), own)
+    named = {name: [one for one in rivals if one.method.startswith(name)] for name in BARS}
+    rows += [(name, *smallest_rates(same)) for name, same in named.items() if same]
+    figure, axes = _pyplot().subplots(figsize=(SIZE[0], 0.46 * len(rows) + 1.5), layout="constrained")
     for number, (name, live, file) in enumerate(rows):
-        ours = name == "FBA"
-        _bar(axes, number - 0.19, live, OURS if ours else LIVE, "live" if number == 0 else "")
-        _bar(axes, number + 0.19, file, "#d99c84" if ours else "#a9c1e0", "as a file" if number == 0 else "")
-    axes.set_yticks(range(len(rows)), [row[0] for row in rows])
+        colour = OURS if name == "FBA" else LIVE
+        _bar(axes, number - 0.19, live, colour, "live" if number == 0 else "")
+        _bar(axes, number + 0.19, file, LIGHT[colour], "as a file" if number == 0 else "")
+    axes.set_yticks(range(len(rows)), [row[0].replace(", meshopt", ",\nmeshopt") for row in rows])
     axes.invert_yaxis()
-    axes.set_xlabel(f"kbit/s, at most {best.own.max_mm:.2g} mm off; packet headers not counted: "
-                    f"{best.own.header_rate:.1f} kbit/s more for each of them, live")  # fmt: skip
+    error = f"at most {own.max_mm:.2g} mm off" if own.max_mm else "without loss"
+    axes.set_xlabel(f"kbit/s, {error}; live, packet headers add {own.header_rate:.0f} kbit/s to each")
     axes.spines[["top", "right"]].set_visible(False)
-    axes.margins(x=0.14)
+    axes.margins(x=0.16)
     return _svg(figure)
 
 
-def _lower_hull(own: Sequence[Result]) -> list[Result]:
+def _best(own: Sequence[Result]) -> list[Result]:
     """Return the points that no other beats in both error and live rate, the smallest errors first."""
     kept: list[Result] = []
     for one in sorted(own, key=lambda one: (one.max_mm, one.live_rate)):
@@ -89,51 +101,77 @@ def _lower_hull(own: Sequence[Result]) -> list[Result]:
 
 
 def _line(
-    axes: Any, points: Sequence[tuple[float, float | None]], colour: str, label: str, width: float,
-    style: str = "-",
-) -> None:  # fmt: skip
-    x, y = [point[0] for point in points], [point[1] for point in points]
+    axes: Any, points: Sequence[tuple[float, float | None]], colour: str, label: str, style: str, width: float
+) -> _Label:
+    x, y = [point[0] for point in points], [point[1] or 0.0 for point in points]
     axes.plot(x, y, style, color=colour, linewidth=width, marker="o", markersize=3.5)
-    axes.annotate(label, (x[-1], y[-1]), xytext=(7, 0), textcoords="offset points", color=colour,
-                  va="center", fontsize=9, fontweight="bold" if colour == OURS else "normal")  # fmt: skip
+    return _Label(x[-1], y[-1], label, colour)
 
 
-def _anchor(axes: Any, one: Published) -> None:
-    if one.low == one.high:
-        axes.axhline(one.low, color=QUIET, linewidth=0.9, linestyle=":")
+def _scale(axes: Any, kind: str, errors: list[float], rates: list[float]) -> None:
+    """Set the scales: logarithmic, from 0 on where there is an error of 0; room for labels at the right."""
+    errors = errors + [
+        one.max_mm for one in published_rates() if one.kind == kind and one.short and one.max_mm
+    ]
+    largest, exact = max(*errors, 2 * LINEAR), min(errors) == 0
+    if exact:
+        axes.set_xscale("symlog", linthresh=LINEAR, linscale=0.45)
+        axes.set_xlim(-0.25 * LINEAR, 5 * largest)
     else:
-        axes.axhspan(one.low, one.high, color=QUIET, alpha=0.13, linewidth=0)
-    rate = f"{one.low:g}" if one.low == one.high else f"{one.low:g} to {one.high:g}"
-    axes.annotate(
-        f"published: {one.what}, {rate}",
-        (0.995, one.high),
-        xycoords=("axes fraction", "data"),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha="right",
-        va="bottom",
-        color=QUIET,
-        fontsize=8,
-    )
-
-
-def _bar(axes: Any, place: float, value: float | None, colour: str, label: str) -> None:
-    if value is None:
-        axes.annotate("none: needs all frames first", (0, place), xytext=(3, 0), textcoords="offset points",
-                      va="center", color=QUIET, fontsize=8)  # fmt: skip
-        return
-    axes.barh(place, value, height=0.36, color=colour)
-    text = f"{value:.2f}" + (f"  {label}" if label else "")
-    axes.annotate(text, (value, place), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8.5)
-
-
-def _rate_ticks(axes: Any) -> None:
-    low, high = axes.get_ylim()
-    ticks = [tick for tick in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500) if low <= tick <= high]
+        axes.set_xscale("log")
+        axes.set_xlim(0.7 * min(errors), 5.5 * largest)
+    low = LINEAR if exact else min(errors)
+    shown = [tick for tick in TICKS if low <= tick <= 1.2 * largest]
+    axes.set_xticks([0.0] * exact + shown, ["0: exact"] * exact + [f"{tick:g}" for tick in shown])
+    axes.set_yscale("log")
+    axes.set_ylim(0.7 * min(rates), 1.7 * max(rates))
+    ticks = [tick for tick in TICKS if 0.7 * min(rates) <= tick <= 1.7 * max(rates)]
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _anchor(axes: Any, one: Published) -> None:
+    """Draw a published rate: a point where its error is known, else a line or a band."""
+    text = f"{one.short}: {one.low:g}" + (f" to {one.high:g}" if one.high > one.low else "")
+    style = {"color": QUIET, "fontsize": 8}
+    if one.low > axes.get_ylim()[1]:
+        axes.annotate(f"published: {text} \N{UPWARDS ARROW}", (0.99, 0.99), xycoords="axes fraction",
+                      ha="right", va="top", **style)  # fmt: skip
+    elif one.max_mm:
+        axes.plot(one.max_mm, one.low, "D", color=QUIET, markersize=5)
+        axes.annotate(f"published: {text},\nof other data", (one.max_mm, one.low), xytext=(0, -8), va="top",
+                      textcoords="offset points", **style)  # fmt: skip
+    else:
+        axes.axhspan(one.low, one.high, color=QUIET, alpha=0.12, linewidth=0)
+        axes.annotate(f"published, {text}", (0.01, 1.03 * one.low), xycoords=("axes fraction", "data"),
+                      va="bottom", **style)  # fmt: skip
+
+
+def _write_labels(axes: Any, labels: Sequence[_Label]) -> None:
+    """Write labels at the ends of lines, moved up or down so that none covers another."""
+    low, high = np.log(axes.get_ylim())
+    order = sorted(labels, key=lambda one: one.y)
+    places = [(np.log(one.y) - low) / (high - low) for one in order]
+    needed = [CLOSEST * (1 + ("\n" in one.text)) for one in order]
+    for number in range(1, len(order)):
+        apart = (needed[number - 1] + needed[number]) / 2
+        places[number] = max(places[number], places[number - 1] + apart)
+    for one, place in zip(order, places, strict=True):
+        axes.annotate(one.text, (one.x, np.exp(low + place * (high - low))), xytext=(8, 0), color=one.colour,
+                      textcoords="offset points", va="center", fontsize=9,
+                      fontweight="bold" if one.colour == OURS else "normal")  # fmt: skip
+
+
+def _bar(axes: Any, place: float, value: float | None, colour: str, label: str) -> None:
+    if value is None:
+        axes.annotate("not live: needs all frames first", (0, place), xytext=(3, 0), color=QUIET, fontsize=8,
+                      textcoords="offset points", va="center")  # fmt: skip
+        return
+    axes.barh(place, value, height=0.36, color=colour)
+    text = f"{value:.2f}" + (f"  {label}" if label else "")
+    axes.annotate(text, (value, place), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8.5)
 
 
 def _pyplot() -> Any:

@@ -15,6 +15,8 @@ from fba.planning import encode_planned
 from fba.study.subjects import FACE, Subject
 
 QUANTISERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 31)
+UNPLANNED = "FBA without look-ahead"
+"""The method that knows nothing before a frame comes."""
 WITH_RIVALS = (1, 2, 4, 6, 12, 24)
 """Quantisers at which rivals code the same numbers."""
 
@@ -112,7 +114,7 @@ def operating_points(kind: str) -> tuple[Point, ...]:
     found = [
         Point("FBA exact", "quantiser 1", _preset("exact", 1)),
         Point("FBA reference", "quantiser 1", _reference(1)),
-        Point("FBA without look-ahead", "quantiser 1", _live(1)),
+        Point(UNPLANNED, "quantiser 1", _live(1)),
     ]
     name, preset = ("FBA compact", "compact") if kind == FACE else ("FBA exact", "exact")
     for quant in QUANTISERS:

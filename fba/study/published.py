@@ -11,13 +11,17 @@ from typing import NamedTuple
 class Published(NamedTuple):
     """A published rate.
 
-    what: codec or protocol. kind: "face" or "body". low, high: kilobits a second. conditions, error: words.
+    what: codec or protocol; short: its name in plots, "" where it is not drawn. kind: "face" or "body". low,
+    high: kilobits a second, without packet headers. max_mm: largest error, None where unknown. conditions,
+    error: in words.
     """
 
     what: str
+    short: str
     kind: str
     low: float
     high: float
+    max_mm: float | None
     conditions: str
     error: str
 
@@ -28,7 +32,14 @@ def published_rates() -> tuple[Published, ...]:
     text = (files("fba.study") / "published.csv").read_text(encoding="utf-8")
     return tuple(
         Published(
-            row["what"], row["kind"], float(row["low"]), float(row["high"]), row["conditions"], row["error"]
+            row["what"],
+            row["short"],
+            row["kind"],
+            float(row["low"]),
+            float(row["high"]),
+            float(row["max_mm"]) if row["max_mm"] else None,
+            row["conditions"],
+            row["error"],
         )
         for row in csv.DictReader(text.splitlines())
     )
