@@ -1,6 +1,6 @@
-"""Makes docs/bitrate.md and its pictures from bench/results: `python docs/make_bitrate_page.py`; needs matplotlib.
+"""Makes docs/bitrate.md and its pictures from bench/results: `python docs/make_bitrate_page.py`.
 
-The results are measured by `fba bench bitrate`; nothing on the page is written by hand that could be measured.
+Needs matplotlib. `fba bench bitrate` measured the results; the words are in bench/results/page.md.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 from fba.study import Result, make_pictures, read_results, summary_lines
 from fba.study.choices import OWN, best_within, compare, group_results, rivals_of, smallest_live, together
 from fba.study.page import make_section, method_text
-from fba.study.points import UNPLANNED
+from fba.study.points import KNOWN, UNPLANNED
 from fba.study.summary import LIMITS, subjects_text
 from fba.study.tables import comparison_table, error_text, published_table, rate_text, settings_table
 
@@ -21,65 +21,7 @@ IMAGES = ROOT / "docs" / "images"
 RECORDINGS = ("recordings-faces.csv", "recordings-bodies.csv")
 SAMPLES = "samples.csv"
 
-INTRODUCTION = """\
-# How small? The study of bit rates
-
-What faces and bodies take as FBA, how far off that is, and what other ways need for the same values:
-
-{summary}
-
-*Live* means that every frame leaves at once; *other* ways are general-purpose compressors, which get the very values that a
-decoder of the FBA stream returns. Rates are without packet headers.
-
-- **Streams**: FBA is the smallest. {faces} take {exact} kbit/s with everything that is shown kept exactly, {near} with no vertex
-  of the face more than {near_error} mm off. The best of the others, deflate that is flushed after every frame, takes
-  {deflate} and {near_deflate}, if it leaves out the same FAPs as FBA and without loss {deflate_all} if it does not. Live Link Face
-  sends 153.
-- **Files**: FBA is not the smallest. Brotli over whole columns takes {brotli} kbit/s for the same, because it finds whatever
-  repeats anywhere. To store recordings, use that, or an FBA file for what reads FBA.
-- **Packets**: 40 bytes of RTP, UDP and IP headers are 8 kbit/s at 25 packets a second, more than any of these streams. Below
-  2 kbit/s, it pays to put several frames into a packet before anything else.
-"""
-
-DATA = """\
-The recordings are {faces} of streams of real applications that move low-level FAPs (speech and gestures of the head, 25 frames a
-second), and {bodies}: one stream, and BVH files of ten makers, as `fba encode` converts them. They may not be passed on, so
-only their figures are here (`bench/results`). [The samples](#the-samples) can be measured by anyone.
-"""
-
-LOSSES = """\
-## Where FBA loses
-
-- **Files.** Column by column, brotli, xz and zstd are smaller than FBA at every error, for faces and for bodies: they look at all
-  frames before they write the first, and find columns that equal others and motions that repeat. FBA's arithmetic coder learns
-  as it goes.
-- **Live, with nothing known before.** An encoder that knows neither the ranges of what comes nor which FAPs will stay equal takes
-  {unplanned} kbit/s for the faces and {unplanned_body} for the bodies, more than deflate ({deflate_all} and
-  {deflate_body}), which adapts its alphabet to what comes. FBA's figures above are of streams whose recording is known: a
-  performance that is streamed, not one that is captured at that moment.
-- **Bodies within a tenth of a millimetre.** The finest quantiser leaves {body_error} mm at the worst joint of the worst
-  frame, {body_99} mm in 99 % of samples. The Animation Compression Library's 0.1 mm are out of FBA's reach; its 15.6 kbit/s are of
-  other data, files, and that much more accurate.
-- **Short streams.** An adaptive model starts without knowledge, and each I plane starts it again: a few seconds cost up to twice
-  the rate of a long stream (the tables of single files below show it).
-"""
-
-AGAIN = """\
-## Measure it again
-
-The extra `study` brings what FBA is compared with; rows of packages that are missing are left out.
-
-```console
-pip install '.[study]'
-fba bench bitrate -o study
-fba bench bitrate talk.fba walk.bvh --title "my recordings" -o mine --summary
-fba bench bitrate --results study/results.csv --results mine/results.csv --summary
-```
-
-The first measures the samples that come with `fba`, the second your own files: streams, captures, whatever `fba` reads. Both write
-`results.csv`, plots, and a page of tables; the last prints the table at the top of this page from numbers measured before. Each
-second of animation takes about a second. This page is made from `bench/results` by `python docs/make_bitrate_page.py`.
-"""
+TEMPLATE = RESULTS / "page.md"
 
 
 def main() -> None:
@@ -94,14 +36,15 @@ def make_page() -> str:
     """Return the page of the results in bench/results."""
     faces, bodies = (read_results(RESULTS / name) for name in RECORDINGS)
     samples = read_results(RESULTS / SAMPLES)
-    values = {"summary": "\n".join(summary_lines([*faces, *bodies, *samples])), **_figures(faces, bodies)}
-    parts = [INTRODUCTION.format(**values), DATA.format(**values)]
-    for title, group in (("## Faces", faces), ("## Bodies", bodies)):
-        parts.append("\n".join([title, "", *make_section(group, "images/")]))
-    parts.append(LOSSES.format(**values))
-    parts.append("\n".join(["## The samples", "", *_samples(samples)]))
-    parts.append("\n".join(["## Published rates of others", "", "On data of their own.", "", *published_table(), ""]))
-    return "\n".join([*parts, AGAIN, method_text()])
+    return TEMPLATE.read_text(encoding="utf-8").format(
+        summary="\n".join(summary_lines([*faces, *bodies, *samples])),
+        faces_section="\n".join(make_section(faces, "images/")),
+        bodies_section="\n".join(make_section(bodies, "images/")),
+        samples_section="\n".join(_samples(samples)),
+        published="\n".join(published_table()),
+        method=method_text(),
+        **_figures(faces, bodies),
+    )
 
 
 def _figures(faces: list[Result], bodies: list[Result]) -> dict[str, str]:
@@ -119,8 +62,11 @@ def _figures(faces: list[Result], bodies: list[Result]) -> dict[str, str]:
         "deflate_all": rate_text(_live_of_all(faces, exact.own)),
         "deflate_body": rate_text(_live_of_all(bodies, body.own)),
         "brotli": rate_text(exact.file.file_rate),
-        "unplanned": rate_text(_unplanned(faces)),
-        "unplanned_body": rate_text(_unplanned(bodies)),
+        "near_brotli": rate_text(near.file.file_rate),
+        "unplanned": rate_text(_live_rate(faces, UNPLANNED)),
+        "unplanned_body": rate_text(_live_rate(bodies, UNPLANNED)),
+        "known": rate_text(_live_rate(faces, KNOWN)),
+        "known_body": rate_text(_live_rate(bodies, KNOWN)),
         "body_error": error_text(body.own.max_mm),
         "body_99": error_text(body.own.p99_mm),
     }
@@ -132,17 +78,13 @@ def _live_of_all(group: list[Result], own: Result) -> float | None:
     return None if found is None else found.live_rate
 
 
-def _unplanned(group: list[Result]) -> float | None:
-    """Return the live rate of FBA with nothing known before."""
-    return next(one.live_rate for one in together(group) if one.method == UNPLANNED and one.numbers == OWN)
+def _live_rate(group: list[Result], method: str) -> float | None:
+    """Return the live rate of one of FBA's methods."""
+    return next(one.live_rate for one in together(group) if one.method == method and one.numbers == OWN)
 
 
 def _samples(samples: list[Result]) -> list[str]:
-    lines = [
-        "`hello.fap`, `talk.c3d` and `hello.bvh` come with `fba`; scripts made them. They move more smoothly and more of the",
-        "face than recordings do, without equal halves of a face, so there is less to leave out.",
-        "",
-    ]
+    lines = []
     for group in group_results(samples):
         lines += [f"### {subjects_text(compare(group)[0].own)}", "", *comparison_table(group), ""]
         lines += ["All settings of FBA:", "", *settings_table(group), ""]

@@ -53,6 +53,7 @@ ILLUSTRATIONS = {
     ("README.md", ". .venv/bin/activate"): "chooses an environment",
     ("README.md", "pip install ."): "makes an environment; .ci/run installs the wheel and runs the demo",
     ("CONTRIBUTING.md", "./dev setup"): CHECKOUT,
+    ("docs/bitrate.md", "pip install '.[study]'"): "installs packages, and measures for a minute",
     ("docs/capture-live.md", "fba capture livelink --play -o face.fba"): WINDOW,
     ("docs/capture-live.md", "fba capture livelink -o face.fba"): SENT,
     ("docs/capture-live.md", "fba capture livelink -o - | fba play -"): WINDOW,

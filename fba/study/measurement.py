@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
-from fba.errors import OptionError
+from fba.errors import OptionError, RangeError
 from fba.face.resolve import resolve
 from fba.study.errors import THRESHOLDS, Errors, measure_errors
 from fba.study.gltf_samples import gltf_rates
@@ -84,7 +85,12 @@ def measure(
                 alone = _Sum()
                 alone.add(subject, one.packets, one.file_bytes, one.live_bytes, one.errors)
                 single.append(alone.result(data, subject.name, *key))
-    return [total.result(data, EVERYTHING, *key) for key, total in sums.items()] + single
+    counts = Counter(subject.kind for subject in subjects)
+    whole = {key: total for key, total in sums.items() if total.subjects == counts[key[0]]}
+    for key in sums.keys() - whole.keys():
+        if not key[3]:
+            progress(f"{key[1]}, {key[2]}: not for every {key[0]}, so it is left out of the sum of all")
+    return [total.result(data, EVERYTHING, *key) for key, total in whole.items()] + single
 
 
 @dataclass
@@ -101,7 +107,10 @@ def _measure_subject(subject: Subject) -> dict[Key, _Measured]:
     found: dict[Key, _Measured] = {}
     known: dict[bytes, Errors] = {}
     for point in operating_points(subject.kind):
-        coded = decode_subject(subject, point.encode(subject))
+        try:
+            coded = decode_subject(subject, point.encode(subject))
+        except RangeError:  # no quantiser keeps within the tolerance
+            continue
         shown = coded.shown.tobytes()
         if shown not in known:
             known[shown] = measure_errors(subject.kind, source, coded.shown, float(subject.animation.rate))

@@ -48,7 +48,7 @@ def draw_rates(group: Sequence[Result]) -> bytes:
     planned = [one for one in own if one.method != UNPLANNED]
     compared = [one for one in compare(group) if one.own.max_mm <= MOST[kind]]
     labels = [
-        _line(axes, [(one.max_mm, one.live_rate) for one in _best(planned)], OURS, "FBA, live", "-", 2.6),
+        _line(axes, [(one.max_mm, one.live_rate) for one in planned], OURS, "FBA, live", "-", 2.6),
         _line(axes, [(one.own.max_mm, one.live.live_rate) for one in compared], LIVE,
               "best of deflate, brotli,\nzstd: live", "-", 1.8),
         _line(axes, [(one.own.max_mm, one.file.file_rate) for one in compared], FILE,
@@ -91,19 +91,15 @@ def draw_bars(group: Sequence[Result], limit: float) -> bytes:
     return _svg(figure)
 
 
-def _best(own: Sequence[Result]) -> list[Result]:
-    """Return the points that no other beats in both error and live rate, the smallest errors first."""
-    kept: list[Result] = []
-    for one in sorted(own, key=lambda one: (one.max_mm, one.live_rate)):
-        if not kept or (one.live_rate or 0.0) < (kept[-1].live_rate or 0.0):
-            kept.append(one)
-    return kept
-
-
 def _line(
     axes: Any, points: Sequence[tuple[float, float | None]], colour: str, label: str, style: str, width: float
 ) -> _Label:
-    x, y = [point[0] for point in points], [point[1] or 0.0 for point in points]
+    """Draw the points that no other beats in both error and rate."""
+    kept: list[tuple[float, float]] = []
+    for error, rate in sorted((error, rate) for error, rate in points if rate is not None):
+        if not kept or rate < kept[-1][1]:
+            kept.append((error, rate))
+    x, y = zip(*kept, strict=True)
     axes.plot(x, y, style, color=colour, linewidth=width, marker="o", markersize=3.5)
     return _Label(x[-1], y[-1], label, colour)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,13 +12,19 @@ import numpy as np
 from fba.arrays import Float64, Int64
 from fba.codec import Encoder, EncoderOptions, decode, encode_with_statistics, probe_stream
 from fba.face.resolve import known_faps, resolve
-from fba.planning import encode_planned
-from fba.study.subjects import FACE, Subject
+from fba.planning import Tolerance, encode_planned, encode_within_tolerance, plan_compact
+from fba.study.subjects import BODY, FACE, Subject
 
 QUANTISERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 31)
-UNPLANNED = "FBA without look-ahead"
-"""The method that knows nothing before a frame comes."""
-WITH_RIVALS = (1, 2, 4, 6, 12, 24)
+UNPLANNED = "FBA, nothing known"
+"""A live encoder that knows nothing before a frame comes."""
+KNOWN = "FBA, ranges known"
+"""A live encoder that knows how far values go, and which FAPs are equal."""
+NO_SPARE_INTRA = 1e9
+"""Bits that an I plane counts where only needed ones shall come."""
+TOLERANCES = (0.2, 0.5, 1.0, 2.0)
+"""Millimetres by which vertices of the face may be off."""
+WITH_RIVALS = {FACE: (1, 2, 6), BODY: (1, 2, 4, 6, 12)}
 """Quantisers at which rivals code the same numbers."""
 
 
@@ -81,43 +88,53 @@ def options_for(subject: Subject, quant: int) -> EncoderOptions:
     return EncoderOptions(fap_quant=quant, bap_quant=quant, bap_steps=subject.bap_steps, clamp=True)
 
 
-def encode_as_reference(subject: Subject, quant: int) -> bytes:
-    """Return the stream of a plain encoder, with ranges that fit."""
-    return encode_with_statistics(subject.animation, options_for(subject, quant))[0]
-
-
 def encode_with_preset(subject: Subject, preset: str, quant: int) -> bytes:
-    """Return the stream of a preset."""
+    """Return the stream of a preset, planned with the whole recording known."""
     return encode_planned(subject.animation, options_for(subject, quant), preset=preset)[0]
 
 
-def encode_live(subject: Subject, quant: int) -> bytes:
+def encode_with_known_ranges(subject: Subject) -> bytes:
+    """Return the stream of a live encoder that knows how far values go, and which FAPs players derive.
+
+    It has one I plane where what is sent stays the same.
+    """
+    options = options_for(subject, 1)
+    if subject.kind == FACE:
+        return plan_compact(subject.animation, options, intra_bits=NO_SPARE_INTRA).encode()[0]
+    return encode_with_statistics(subject.animation, options)[0]
+
+
+def encode_live(subject: Subject) -> bytes:
     """Return the stream of an encoder that gets one frame at a time and knows nothing of the next."""
-    encoder = Encoder(options_for(subject, quant))
+    encoder = Encoder(options_for(subject, 1))
     return b"".join(encoder.push(frame) for frame in subject.animation) + encoder.finish()
 
 
-def _live(quant: int) -> Callable[[Subject], bytes]:
-    return lambda subject: encode_live(subject, quant)
-
-
-def _reference(quant: int) -> Callable[[Subject], bytes]:
-    return lambda subject: encode_as_reference(subject, quant)
-
-
-def _preset(preset: str, quant: int) -> Callable[[Subject], bytes]:
-    return lambda subject: encode_with_preset(subject, preset, quant)
+def encode_near(subject: Subject, millimetres: float) -> bytes:
+    """Return a stream that keeps every vertex within a distance. RangeError where none does."""
+    return encode_within_tolerance(
+        subject.animation, Tolerance(face=1e-3 * millimetres), options_for(subject, 1)
+    )[0]
 
 
 def operating_points(kind: str) -> tuple[Point, ...]:
-    """Return all settings for a face or a body. The first is the one without loss."""
-    found = [
-        Point("FBA exact", "quantiser 1", _preset("exact", 1)),
-        Point("FBA reference", "quantiser 1", _reference(1)),
-        Point(UNPLANNED, "quantiser 1", _live(1)),
-    ]
+    """Return all settings for a face or a body, those without loss first."""
     name, preset = ("FBA compact", "compact") if kind == FACE else ("FBA exact", "exact")
-    for quant in QUANTISERS:
-        point = Point(name, f"quantiser {quant}", _preset(preset, quant), quant in WITH_RIVALS)
-        found = [one for one in found if one[:2] != point[:2]] + [point]
+    found = [
+        Point(
+            name,
+            f"quantiser {quant}",
+            partial(encode_with_preset, preset=preset, quant=quant),
+            quant in WITH_RIVALS[kind],
+        )
+        for quant in QUANTISERS
+    ]
+    found.append(Point(KNOWN, "quantiser 1", encode_with_known_ranges))
+    found.append(Point(UNPLANNED, "quantiser 1", encode_live))
+    if kind == FACE:
+        found.append(Point("FBA exact", "quantiser 1", partial(encode_with_preset, preset="exact", quant=1)))
+        found += [
+            Point("FBA tolerance", f"{limit:g} mm", partial(encode_near, millimetres=limit), True)
+            for limit in TOLERANCES
+        ]
     return tuple(found)

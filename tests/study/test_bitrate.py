@@ -25,7 +25,7 @@ from fba.study import (
     split_subjects,
     summary_lines,
 )
-from fba.study.points import operating_points
+from fba.study.points import UNPLANNED, operating_points
 
 SAMPLES = files("fba") / "samples"
 
@@ -62,22 +62,23 @@ def test_every_setting_has_a_row_and_the_others_have_one_for_its_values(results:
     for numbers in ("all", "sent"):
         deflate = [one for one in results if (one.method, one.numbers) == ("deflate, rows", numbers)]
         assert {one.point for one in deflate} == with_rivals
-    assert {one.packets for one in results} == {12}
+    assert {one.packets for one in results if "tolerance" not in one.method + one.point} == {12}
     assert {one.seconds for one in results} == {0.48}
 
 
 def test_rates_are_of_whole_streams_and_of_whole_packets(
     short_face: Animation, results: list[Result]
 ) -> None:
-    data = fba.encode(short_face, fba.EncoderOptions(clamp=True))
-    (reference,) = [one for one in results if one.method == "FBA reference"]
-    assert reference.file_bytes == len(data)
-    assert reference.file_rate == pytest.approx(len(data) * 8 / 480)
-    assert reference.live_bytes is not None
+    encoder = fba.Encoder()
+    data = encoder.push_animation(short_face) + encoder.finish()
+    (live,) = [one for one in results if one.method == UNPLANNED]
+    assert live.file_bytes == len(data)
+    assert live.file_rate == pytest.approx(len(data) * 8 / 480)
+    assert live.live_bytes is not None
     bits = fba.probe(data).plane_bits
     assert bits is not None
-    assert 0 <= 8 * reference.live_bytes - bits.sum() < 8 * 12
-    assert reference.header_rate == pytest.approx(8.0)  # 40 bytes, 25 times a second
+    assert 0 <= 8 * live.live_bytes - bits.sum() < 8 * 12
+    assert live.header_rate == pytest.approx(8.0)  # 40 bytes, 25 times a second
 
 
 def test_a_coarser_quantiser_is_smaller_and_further_off(results: list[Result]) -> None:
