@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import warnings
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from multiprocessing import get_context
 
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
-from fba.errors import OptionError, RangeError
+from fba.errors import FbaWarning, OptionError, RangeError
 from fba.face.resolve import resolve
 from fba.study.errors import THRESHOLDS, Errors, measure_errors
 from fba.study.gltf_samples import gltf_rates
@@ -67,18 +71,18 @@ def measure(
 ) -> list[Result]:
     """Return results of all subjects together, and of this codec for each.
 
-    data: what they are, in words. progress: called with a line of text before each subject. OptionError where
+    data: what they are, in words. progress: called with a line of text after each subject. OptionError where
     nothing moves.
     """
     if not subjects:
         raise OptionError("nothing moves in these files: there is no face and no body to measure")
     sums: dict[Key, _Sum] = {}
     single: list[Result] = []
-    for number, subject in enumerate(subjects, 1):
+    for number, (subject, found) in enumerate(zip(subjects, _measure_all(subjects), strict=True), 1):
         progress(
             f"{number} of {len(subjects)}: the {subject.kind} of {subject.name}, {subject.seconds:.1f} s"
         )
-        for key, one in _measure_subject(subject).items():
+        for key, one in found.items():
             total = sums.setdefault(key, _Sum())
             total.add(subject, one.packets, one.file_bytes, one.live_bytes, one.errors)
             if key[3] == "" and len(subjects) > 1:
@@ -101,8 +105,24 @@ class _Measured:
     errors: Errors
 
 
+def _measure_all(subjects: Sequence[Subject]) -> Iterator[dict[Key, _Measured]]:
+    """Yield what each subject comes to, in their order; several are measured side by side."""
+    workers = min(os.cpu_count() or 1, len(subjects))
+    if workers == 1:
+        yield from map(_measure_subject, subjects)
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(_measure_subject, subjects)
+
+
 def _measure_subject(subject: Subject) -> dict[Key, _Measured]:
     """Return bytes and errors by kind, method, point, and which numbers are coded ("" for this codec)."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)  # values near the ends of ranges, at many settings
+        return _measure_points(subject)
+
+
+def _measure_points(subject: Subject) -> dict[Key, _Measured]:
     source = _source_values(subject)
     found: dict[Key, _Measured] = {}
     known: dict[bytes, Errors] = {}

@@ -20,6 +20,10 @@ from fba.study.packages import find_package, find_zstd
 FLUSH_END = b"\x00\x00\xff\xff"
 """What ends every flushed block of deflate; WebSockets leave it out (RFC 7692), and so do we."""
 
+MOST_HISTORY = 1 << 20
+"""Bytes that xz and a flushed zstd look back at most, more than any animation here has: larger tables of theirs
+take time to make."""
+
 Flush = Callable[[bytes], bytes]
 
 
@@ -108,7 +112,8 @@ def _zstd(data: bytes) -> bytes:
 def _zstd_live(numbers: Int64) -> Int64:
     zstd = find_zstd()
     assert zstd is not None
-    compressor = zstd.ZstdCompressor(level=19).compressobj()
+    settings = zstd.ZstdCompressionParameters.from_level(19, source_size=MOST_HISTORY)
+    compressor = zstd.ZstdCompressor(compression_params=settings).compressobj()
     return _sizes(lambda p: compressor.compress(p) + compressor.flush(zstd.COMPRESSOBJ_FLUSH_BLOCK), numbers)
 
 
@@ -128,7 +133,8 @@ def _brotli_live(numbers: Int64) -> Int64:
 
 def _xz(data: bytes) -> bytes:
     """Return LZMA2 without the container's checks, which are 32 bytes and more."""
-    return lzma.compress(data, lzma.FORMAT_RAW, filters=[{"id": lzma.FILTER_LZMA2, "preset": 9}])
+    lzma2 = {"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "dict_size": MOST_HISTORY}
+    return lzma.compress(data, lzma.FORMAT_RAW, filters=[lzma2])
 
 
 def _file(compress: Callable[[bytes], bytes], order: Callable[[Int64], bytes]) -> Callable[[Int64], int]:

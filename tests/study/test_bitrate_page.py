@@ -35,7 +35,9 @@ def test_the_page_is_made_of_the_results() -> None:
 def test_the_readme_shows_the_summary_as_it_is_printed(results: dict[str, list[Result]]) -> None:
     lines = summary_lines([one for name in TABLES for one in results[name]])
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert "\n".join(lines) + "\n" in readme, "run: fba bench bitrate --summary --results ..., as README.md says"
+    assert "\n".join(lines) + "\n" in readme, (
+        "run: fba bench bitrate --summary --results ..., as README.md says"
+    )
     assert len(lines) > 6
 
 
