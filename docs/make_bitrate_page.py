@@ -80,7 +80,8 @@ def _live_of_all(group: list[Result], own: Result) -> float | None:
 
 def _live_rate(group: list[Result], method: str) -> float | None:
     """Return the live rate of one of FBA's methods."""
-    return next(one.live_rate for one in together(group) if one.method == method and one.numbers == OWN)
+    own = [one for one in together(group) if one.numbers == OWN]
+    return next(one.live_rate for one in own if (one.method, one.point) == (method, "quantiser 1"))
 
 
 def _samples(samples: list[Result]) -> list[str]:

@@ -54,8 +54,10 @@ def draw_rates(group: Sequence[Result]) -> bytes:
         _line(axes, [(one.own.max_mm, one.file.file_rate) for one in compared], FILE,
               "best of deflate, brotli,\nzstd, xz: a file", "--", 1.4),
     ]  # fmt: skip
-    for one in (one for one in own if one.method == UNPLANNED):
+    unplanned = [one for one in own if one.method == UNPLANNED]
+    for one in unplanned:
         axes.plot(one.max_mm, one.live_rate, "o", markerfacecolor="white", color=OURS, markersize=5)
+    for one in unplanned[:1]:
         axes.annotate("FBA, live, with nothing known before", (one.max_mm, one.live_rate), xytext=(8, 0),
                       textcoords="offset points", va="center", color=OURS, fontsize=8.5)  # fmt: skip
     rates = [one.live_rate for one in own] + [one.live.live_rate for one in compared]

@@ -13,6 +13,7 @@ from fba.arrays import Float64, Int64
 from fba.codec import Encoder, EncoderOptions, decode, encode_with_statistics, probe_stream
 from fba.face.resolve import known_faps, resolve
 from fba.planning import Tolerance, encode_planned, encode_within_tolerance, plan_compact
+from fba.planning.rate import RateEncoder
 from fba.study.subjects import BODY, FACE, Subject
 
 QUANTISERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 31)
@@ -20,6 +21,8 @@ UNPLANNED = "FBA, nothing known"
 """A live encoder that knows nothing before a frame comes."""
 KNOWN = "FBA, ranges known"
 """A live encoder that knows how far values go, and which FAPs are equal."""
+RATES = {FACE: (2.0, 3.0, 4.0), BODY: (6.0, 12.0, 24.0)}
+"""Mean rates, kbit/s, that a live encoder holds."""
 NO_SPARE_INTRA = 1e9
 """Bits that an I plane counts where only needed ones shall come."""
 TOLERANCES = (0.2, 0.5, 1.0, 2.0)
@@ -117,6 +120,15 @@ def encode_near(subject: Subject, millimetres: float) -> bytes:
     )[0]
 
 
+def encode_live_at_rate(subject: Subject, rate: float) -> bytes:
+    """Return the stream of a live encoder that holds a mean rate, in kbit/s, and knows nothing before.
+
+    RangeError where its buffer of a second is too small for an I plane.
+    """
+    encoder = RateEncoder(1e3 * rate, options=options_for(subject, 1))
+    return b"".join(encoder.push(frame) for frame in subject.animation) + encoder.finish()
+
+
 def operating_points(kind: str) -> tuple[Point, ...]:
     """Return all settings for a face or a body, those without loss first."""
     name, preset = ("FBA compact", "compact") if kind == FACE else ("FBA exact", "exact")
@@ -131,6 +143,9 @@ def operating_points(kind: str) -> tuple[Point, ...]:
     ]
     found.append(Point(KNOWN, "quantiser 1", encode_with_known_ranges))
     found.append(Point(UNPLANNED, "quantiser 1", encode_live))
+    found += [
+        Point(UNPLANNED, f"{rate:g} kbit/s", partial(encode_live_at_rate, rate=rate)) for rate in RATES[kind]
+    ]
     if kind == FACE:
         found.append(Point("FBA exact", "quantiser 1", partial(encode_with_preset, preset="exact", quant=1)))
         found += [

@@ -21,8 +21,7 @@ FLUSH_END = b"\x00\x00\xff\xff"
 """What ends every flushed block of deflate; WebSockets leave it out (RFC 7692), and so do we."""
 
 MOST_HISTORY = 1 << 20
-"""Bytes that xz and a flushed zstd look back at most, more than any animation here has: larger tables of theirs
-take time to make."""
+"""Bytes that xz and a flushed zstd look back at most, more than an animation has: larger tables take time."""
 
 Flush = Callable[[bytes], bytes]
 
