@@ -51,6 +51,14 @@ def _figures(faces: list[Result], bodies: list[Result]) -> dict[str, str]:
     """Return the numbers in the text, by name."""
     exact, near = compare(faces)[0], best_within(faces, LIMITS["face"])
     body = compare(bodies)[0]
+    rounded = max(
+        (
+            one.own
+            for one in compare(faces)
+            if "quantiser" in one.own.point and one.own.max_mm <= LIMITS["face"]
+        ),
+        key=lambda own: own.max_mm,
+    )
     return {
         "faces": subjects_text(exact.own),
         "bodies": subjects_text(body.own),
@@ -61,6 +69,8 @@ def _figures(faces: list[Result], bodies: list[Result]) -> dict[str, str]:
         "near_deflate": rate_text(near.live.live_rate),
         "deflate_all": rate_text(_live_of_all(faces, exact.own)),
         "deflate_body": rate_text(_live_of_all(bodies, body.own)),
+        "rounded": rate_text(_live_of_all(faces, rounded)),
+        "rounded_error": error_text(rounded.max_mm),
         "brotli": rate_text(exact.file.file_rate),
         "near_brotli": rate_text(near.file.file_rate),
         "unplanned": rate_text(_live_rate(faces, UNPLANNED)),

@@ -18,11 +18,9 @@ from fba.face.resolve import resolve
 from fba.study.errors import THRESHOLDS, Errors, measure_errors
 from fba.study.gltf_samples import gltf_rates
 from fba.study.points import Coded, Point, decode_subject, operating_points
-from fba.study.results import EVERYTHING, Result
+from fba.study.results import ALL, EVERYTHING, SENT, Result
 from fba.study.rivals import installed_rivals
 from fba.study.subjects import FACE, Subject
-
-ALL, SENT = "all", "sent"
 
 
 @dataclass

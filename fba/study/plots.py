@@ -12,11 +12,11 @@ from fba.study.choices import best_within, compare, own_points, rivals_of, small
 from fba.study.packages import require_package
 from fba.study.points import UNPLANNED
 from fba.study.published import Published, published_rates
-from fba.study.results import Result
+from fba.study.results import ALL, Result
 from fba.study.subjects import BODY, FACE
 
 OURS, LIVE, FILE, QUIET = "#b3401f", "#1f5fb3", "#5b7f3a", "#777777"
-LIGHT = {OURS: "#dfa791", LIVE: "#a9c1e0"}
+LIGHT = {OURS: "#dfa791", LIVE: "#8fb0dc"}
 SIZE = (7.6, 4.6)
 LINEAR = 0.1
 """Millimetres up to which the axis of errors is linear where it has room for 0."""
@@ -47,10 +47,12 @@ def draw_rates(group: Sequence[Result]) -> bytes:
     own = [one for one in own_points(chosen) if one.max_mm <= MOST[kind]]
     planned = [one for one in own if one.method != UNPLANNED]
     compared = [one for one in compare(group) if one.own.max_mm <= MOST[kind]]
+    rounded = [(one.max_mm, smallest_rates(_plain_rivals(chosen, one))[0]) for one in own]
     labels = [
         _line(axes, [(one.max_mm, one.live_rate) for one in planned], OURS, "FBA, live", "-", 2.6),
-        _line(axes, [(one.own.max_mm, one.live.live_rate) for one in compared], LIVE,
-              "best of deflate, brotli,\nzstd: live", "-", 1.8),
+        _line(axes, rounded, LIVE, "best of deflate, brotli,\nzstd: live", "-", 1.8),
+        _line(axes, [(one.own.max_mm, one.live.live_rate) for one in compared], LIGHT[LIVE],
+              "the same, with what\nFBA chose to send", "-", 1.4),
         _line(axes, [(one.own.max_mm, one.file.file_rate) for one in compared], FILE,
               "best of deflate, brotli,\nzstd, xz: a file", "--", 1.4),
     ]  # fmt: skip
@@ -61,7 +63,7 @@ def draw_rates(group: Sequence[Result]) -> bytes:
         axes.annotate("FBA, live, with nothing known before", (one.max_mm, one.live_rate), xytext=(8, 0),
                       textcoords="offset points", va="center", color=OURS, fontsize=8.5)  # fmt: skip
     rates = [one.live_rate for one in own] + [one.live.live_rate for one in compared]
-    rates += [one.file.file_rate for one in compared]
+    rates += [one.file.file_rate for one in compared] + [rate for _, rate in rounded]
     _scale(axes, kind, [one.max_mm for one in own], [rate for rate in rates if rate])
     for published in published_rates():
         if published.kind == kind and published.short:
@@ -91,6 +93,13 @@ def draw_bars(group: Sequence[Result], limit: float) -> bytes:
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.16)
     return _svg(figure)
+
+
+def _plain_rivals(chosen: Sequence[Result], own: Result) -> list[Result]:
+    """Return rivals that send all numbers, rounded as by the quantiser of one of this codec's points."""
+    if "quantiser" not in own.point:
+        return []
+    return [one for one in rivals_of(chosen, own) if one.numbers == ALL]
 
 
 def _line(

@@ -27,7 +27,7 @@ NO_SPARE_INTRA = 1e9
 """Bits that an I plane counts where only needed ones shall come."""
 TOLERANCES = (0.2, 0.5, 1.0, 2.0)
 """Millimetres by which vertices of the face may be off."""
-WITH_RIVALS = {FACE: (1, 2, 6), BODY: (1, 2, 4, 6, 12)}
+WITH_RIVALS = {FACE: (1, 2, 6, 12, 24), BODY: (1, 2, 4, 6, 12)}
 """Quantisers at which rivals code the same numbers."""
 
 

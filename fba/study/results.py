@@ -13,6 +13,8 @@ HEADER_BYTES = 40
 """IP version 4, UDP and RTP: 20, 8 and 12 bytes in front of every packet."""
 
 
+ALL, SENT = "all", "sent"
+"""Which numbers rivals code."""
 EVERYTHING = "all"
 """The subject of results that sum up all subjects."""
 

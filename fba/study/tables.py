@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 from fba.study.choices import Comparison, compare, own_points, rivals_of, together
 from fba.study.errors import THRESHOLDS
-from fba.study.measurement import ALL, SENT
 from fba.study.published import published_rates
-from fba.study.results import EVERYTHING, Result
+from fba.study.results import ALL, EVERYTHING, SENT, Result
 from fba.study.subjects import FACE
 
 ABSENT = "–"
