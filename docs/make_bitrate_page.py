@@ -60,8 +60,10 @@ def _figures(faces: list[Result], bodies: list[Result]) -> dict[str, str]:
         key=lambda own: own.max_mm,
     )
     return {
-        "faces": subjects_text(exact.own),
-        "bodies": subjects_text(body.own),
+        "face_count": str(exact.own.subjects),
+        "face_seconds": f"{exact.own.seconds:.0f}",
+        "body_count": str(body.own.subjects),
+        "body_seconds": f"{body.own.seconds:.0f}",
         "exact": rate_text(exact.own.live_rate),
         "near": rate_text(near.own.live_rate),
         "near_error": error_text(near.own.max_mm),

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing import get_context
 
 import numpy as np
@@ -55,28 +56,33 @@ class _Sum:
         """Return the sum as a result; see `Result` for the arguments."""
         errors = np.concatenate(self.millimetres)
         return Result(
-            data, name, kind, method, point, numbers, self.subjects, self.frames, self.seconds, self.packets,
+            data, name, kind, method, point, numbers, self.subjects, self.frames,
+            round(self.seconds, 3), self.packets,
             self.file_bytes, self.live_bytes, float(errors.max()), float(np.percentile(errors, 99)),
             float((errors <= THRESHOLDS[kind]).mean()), self.degrees, self.feet, self.units,
         )  # fmt: skip
 
 
 Key = tuple[str, str, str, str]
+Points = Callable[[str], Sequence[Point]]
 
 
 def measure(
-    data: str, subjects: Sequence[Subject], progress: Callable[[str], None] = lambda _: None
+    data: str,
+    subjects: Sequence[Subject],
+    progress: Callable[[str], None] = lambda _: None,
+    points: Points = operating_points,
 ) -> list[Result]:
     """Return results of all subjects together, and of this codec for each.
 
-    data: what they are, in words. progress: called with a line of text after each subject. OptionError where
-    nothing moves.
+    data: what they are, in words. progress: called with a line of text after each subject. points: the
+    settings of a kind, a function of a module. OptionError where nothing moves.
     """
     if not subjects:
         raise OptionError("nothing moves in these files: there is no face and no body to measure")
     sums: dict[Key, _Sum] = {}
     single: list[Result] = []
-    for number, (subject, found) in enumerate(zip(subjects, _measure_all(subjects), strict=True), 1):
+    for number, (subject, found) in enumerate(zip(subjects, _measure_all(subjects, points), strict=True), 1):
         progress(
             f"{number} of {len(subjects)}: the {subject.kind} of {subject.name}, {subject.seconds:.1f} s"
         )
@@ -89,9 +95,10 @@ def measure(
                 single.append(alone.result(data, subject.name, *key))
     counts = Counter(subject.kind for subject in subjects)
     whole = {key: total for key, total in sums.items() if total.subjects == counts[key[0]]}
-    for key in sums.keys() - whole.keys():
-        if not key[3]:
-            progress(f"{key[1]}, {key[2]}: not for every {key[0]}, so it is left out of the sum of all")
+    for kind in counts:
+        for point in points(kind):
+            if (kind, point.method, point.setting, "") not in whole:
+                progress(f"{point.method}, {point.setting}: not possible for every {kind}, so it is left out")
     return [total.result(data, EVERYTHING, *key) for key, total in whole.items()] + single
 
 
@@ -103,28 +110,28 @@ class _Measured:
     errors: Errors
 
 
-def _measure_all(subjects: Sequence[Subject]) -> Iterator[dict[Key, _Measured]]:
+def _measure_all(subjects: Sequence[Subject], points: Points) -> Iterator[dict[Key, _Measured]]:
     """Yield what each subject comes to, in their order; several are measured side by side."""
     workers = min(os.cpu_count() or 1, len(subjects))
     if workers == 1:
-        yield from map(_measure_subject, subjects)
+        yield from (_measure_subject(one, points) for one in subjects)
         return
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(_measure_subject, subjects)
+        yield from pool.map(partial(_measure_subject, points=points), subjects)
 
 
-def _measure_subject(subject: Subject) -> dict[Key, _Measured]:
+def _measure_subject(subject: Subject, points: Points) -> dict[Key, _Measured]:
     """Return bytes and errors by kind, method, point, and which numbers are coded ("" for this codec)."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)  # values near the ends of ranges, at many settings
-        return _measure_points(subject)
+        return _measure_points(subject, points(subject.kind))
 
 
-def _measure_points(subject: Subject) -> dict[Key, _Measured]:
+def _measure_points(subject: Subject, points: Sequence[Point]) -> dict[Key, _Measured]:
     source = _source_values(subject)
     found: dict[Key, _Measured] = {}
     known: dict[bytes, Errors] = {}
-    for point in operating_points(subject.kind):
+    for point in points:
         try:
             coded = decode_subject(subject, point.encode(subject))
         except RangeError:  # no quantiser keeps within the tolerance

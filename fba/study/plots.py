@@ -51,11 +51,13 @@ def draw_rates(group: Sequence[Result]) -> bytes:
     labels = [
         _line(axes, [(one.max_mm, one.live_rate) for one in planned], OURS, "FBA, live", "-", 2.6),
         _line(axes, rounded, LIVE, "best of deflate, brotli,\nzstd: live", "-", 1.8),
-        _line(axes, [(one.own.max_mm, one.live.live_rate) for one in compared], LIGHT[LIVE],
-              "the same, with what\nFBA chose to send", "-", 1.4),
         _line(axes, [(one.own.max_mm, one.file.file_rate) for one in compared], FILE,
               "best of deflate, brotli,\nzstd, xz: a file", "--", 1.4),
     ]  # fmt: skip
+    chosen_numbers = [(one.own.max_mm, one.live.live_rate) for one in compared]
+    if not set(chosen_numbers) <= set(rounded):
+        label = "the same, with what\nFBA chose to send"
+        labels.append(_line(axes, chosen_numbers, LIGHT[LIVE], label, "-", 1.4))
     unplanned = [one for one in own if one.method == UNPLANNED]
     for one in unplanned:
         axes.plot(one.max_mm, one.live_rate, "o", markerfacecolor="white", color=OURS, markersize=5)

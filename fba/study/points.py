@@ -14,6 +14,7 @@ from fba.codec import Encoder, EncoderOptions, decode, encode_with_statistics, p
 from fba.face.resolve import known_faps, resolve
 from fba.planning import Tolerance, encode_planned, encode_within_tolerance, plan_compact
 from fba.planning.rate import RateEncoder
+from fba.study.errors import ROOT, TURN
 from fba.study.subjects import BODY, FACE, Subject
 
 QUANTISERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 31)
@@ -80,6 +81,9 @@ def decode_subject(subject: Subject, data: bytes) -> Coded:
     index = subject.animation.index - subject.animation.index[0]
     own = received.index - received.index[0]
     if len(own) != len(index) or (own != index).any():
+        if subject.kind == BODY:  # the short way, as players go
+            shown[:, : ROOT.start] = np.unwrap(shown[:, : ROOT.start], axis=0, period=TURN)
+            shown[:, ROOT.stop :] = np.unwrap(shown[:, ROOT.stop :], axis=0, period=TURN)
         shown = np.stack([np.interp(index, own, column) for column in shown.T], axis=1)
     return Coded(
         len(data), -(-info.plane_bits // 8), shown, values.astype(np.int64), np.flatnonzero(mask.any(axis=0))

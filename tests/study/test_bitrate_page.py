@@ -49,7 +49,9 @@ def test_results_hold_every_setting(results: dict[str, list[Result]], name: str)
     )
     for group in groups:
         own = {(one.method, one.point) for one in group if not one.numbers}
-        assert own == {point[:2] for point in operating_points(group[0].kind)}
+        points = {point[:2] for point in operating_points(group[0].kind)}
+        assert own <= points
+        assert all("kbit/s" in point for _, point in points - own)  # rates too low for some file
         assert compare(group)
 
 
@@ -59,7 +61,8 @@ def test_sums_are_those_of_the_single_files(results: dict[str, list[Result]], na
         for total in (one for one in group if one.subject == "all" and not one.numbers):
             parts = [one for one in group if (one.method, one.point) == (total.method, total.point)]
             single = [one for one in parts if one.subject != "all"]
-            assert len(single) == total.subjects
+            if total.subjects > 1:
+                assert len(single) == total.subjects
             assert sum(one.file_bytes or 0 for one in single) == total.file_bytes
             assert sum(one.frames for one in single) == total.frames
             assert max(one.max_mm for one in single) == total.max_mm
