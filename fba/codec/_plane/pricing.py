@@ -66,31 +66,34 @@ def choose_levels(layout: Layout, state: State, row: Int32, weights: Float64, pr
 
 @compiled
 def _choose_level(coding: Coding, slot: int, value: int, weight: float, price: float) -> int:
-    """Return the level of one slot: from the nearest one outwards, as long as a better one may come."""
+    """Return the level of one slot: the nearest one, or one on the way to it that takes fewer bits.
+
+    What is still stays still, and nothing goes too far or back, even where that would take fewer bits: it
+    would be seen to tremble.
+    """
     low = int(coding.minimum[slot])
     high = low + int(coding.models.size[slot]) - 1
     last, step = int(coding.last[slot]), int(coding.step[slot])
     nearest = min(max(quantise_change(value, last, step), low), high)
     if math.isinf(weight):
         return nearest
-    if math.isinf(price):
+    if nearest == 0 or math.isinf(price):
         return 0
     best = nearest
     least = _cost(coding, slot, nearest, value, weight, price)
-    if low <= 0 <= high:  # no change costs the fewest bits nearly always: it shortens the search
-        cost = _cost(coding, slot, 0, value, weight, price)
-        if cost <= least:
-            best, least = 0, cost
-    for direction in (-1, 1):
-        level = nearest + direction
-        while low <= level <= high:
-            error = float(value - last - level * step)
-            if weight * error * error >= least:
-                break
-            cost = _cost(coding, slot, level, value, weight, price)
-            if cost < least:
-                best, least = level, cost
-            level += direction
+    cost = _cost(coding, slot, 0, value, weight, price)
+    if cost <= least:  # which is so nearly always: it shortens the search
+        best, least = 0, cost
+    towards = -1 if nearest > 0 else 1
+    level = nearest + towards
+    while level != 0:
+        error = float(value - last - level * step)
+        if weight * error * error >= least:
+            break
+        cost = _cost(coding, slot, level, value, weight, price)
+        if cost < least:
+            best, least = level, cost
+        level += towards
     return best
 
 
