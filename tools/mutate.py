@@ -211,6 +211,8 @@ FIT_PLANS_TEST = "tests/planning/test_fit_plans.py"
 FIT_TEST = "tests/face/learning/test_learn_fit.py"
 FIT_STREAMS_TEST = "tests/planning/test_fit_streams.py"
 REGRESSION = "fba/face/learning/_regression.py"
+RATE_BUCKET, RATE_ENCODER = "fba/planning/rate/bucket.py", "fba/planning/rate/encoder.py"
+PRICING, RATE_TEST = "fba/codec/_plane/pricing.py", "tests/planning/test_rate_control.py"
 PATHS, PATHS_TEST = "fba/planning/paths.py", "tests/planning/test_paths.py"
 FACE_SEARCH, MESH_ERROR = "fba/planning/face_search.py", "fba/planning/mesh_error.py"
 FACE_TOLERANCE_TEST = "tests/planning/test_face_tolerance.py"
@@ -233,6 +235,27 @@ MUTANTS = (
     ),
     Mutant("fba/planning/fit_streams.py", "(linked, ~linked):", "(linked | ~linked,):", FIT_STREAMS_TEST),
     Mutant("fba/planning/fit_streams.py", 'keep_masks=("face",)', "keep_masks=()", FIT_STREAMS_TEST),
+    Mutant(RATE_BUCKET, "max(0.0, self.level - ", "(self.level - ", RATE_TEST),
+    Mutant(RATE_BUCKET, "self.peak = max(self.peak, self.level)", "self.peak = self.level", RATE_TEST),
+    Mutant(RATE_ENCODER, "if bits <= room or price == HOLD:", "if True:", RATE_TEST),
+    Mutant(RATE_ENCODER, "        if over > 0:\n", "        if over > 1e9:\n", RATE_TEST),
+    Mutant(
+        RATE_ENCODER,
+        "        if bits + self._spare > self.bucket.room:\n            return None\n",
+        "",
+        RATE_TEST,
+    ),
+    Mutant(
+        RATE_ENCODER,
+        "            late, self._late = self._late, None\n",
+        "            return b''\n",
+        RATE_TEST,
+    ),
+    Mutant(
+        "fba/planning/rate/search.py", "if distance < least:", "if distance > least or not best:", RATE_TEST
+    ),
+    Mutant("fba/planning/rate/expectations.py", "FAST_FAPS] = FAST", "FAST_FAPS] = SLOW", RATE_TEST),
+    Mutant(PRICING, "    if nearest == 0 or math.isinf(price):\n        return 0\n", "", RATE_TEST),
     Mutant("fba/planning/plan.py", "    if not any(used):", "    if True:", PLANS_TEST),
     Mutant(PATHS, "total = sums[i] + cost[change + low]", "total = sums[i]", PATHS_TEST),
     Mutant(PATHS, "highest = min(highest, (upper", "highest = max(highest, (upper", PATHS_TEST),

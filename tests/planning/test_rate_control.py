@@ -11,6 +11,7 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
+from fba.capture.live import widest_faces
 from fba.errors import RangeError
 from fba.face.resolve import resolve
 from fba.parameters import bap_steps, fap_steps
@@ -28,11 +29,13 @@ def moving_face(rng: np.random.Generator, length: int, kind: str) -> FaceTrack:
     steps = np.asarray(fap_steps())
     values = np.zeros((length, 68))
     if kind != "silence":
-        strength = 8 if kind != "noise" else 60
+        strength = 60 if kind in ("noise", "shock") else 8
         speed = rng.normal(0, strength, (length, 68))
         if kind == "bursts":
             speed *= (np.arange(length) // 15 % 3 == 0)[:, None] * 4
         values = 200 * np.sin(np.cumsum(speed, axis=0) / 200)
+    if kind == "shock":
+        values[: length // 2] = 0
     if kind == "jumps":
         values = np.where((np.arange(length) // 20 % 2)[:, None], values + 900, values)
     values = np.rint(values) * steps
@@ -93,6 +96,7 @@ def coded(animation: Animation, rate: float, buffer: float = 1.0) -> tuple[bytes
         ("noise", 25, 900, 1.0),
         ("noise", 60, 20_000, 0.1),
         ("silence", 25, 700, 1.4),
+        ("shock", 25, 900, 0.9),
         ("bursts", 25, 1000, 1.0),
         ("jumps", Fraction(30000, 1001), 1000, 1.0),
         ("gaps", 25, 800, 1.0),
@@ -117,6 +121,17 @@ def test_every_plane_fits_the_buffer(kind: str, fps: Fraction | int, rate: float
         assert animation.face is not None
         there = np.isin(animation.index - animation.index[0], decoded.index - decoded.index[0])
         assert np.array_equal(decoded.face.viseme[:, 0], animation.face.viseme[there, 0])
+
+
+@pytest.mark.parametrize("kind", ["shock", "noise"])
+def test_planes_fit_however_little_is_given_up(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fba.planning.rate.encoder.COARSEST", 1e-9)
+    monkeypatch.setattr("fba.planning.rate.encoder.FULL", 10.0)
+    animation = made(kind)
+    encoder = RateEncoder(950, 1.0, VISAGE, finest=0)
+    data = encoder.push_animation(animation) + encoder.finish()
+    assert max(levels(data, 950)) <= 950
+    assert encoder.statistics.over == 0
 
 
 @cache
@@ -230,6 +245,37 @@ def test_an_angle_that_goes_on_past_half_a_turn_takes_the_short_way() -> None:
     assert np.abs(off).max() < 2000
 
 
+def test_what_is_still_stays_still() -> None:
+    animation = made("noise", 150)
+    assert animation.face is not None
+    values = animation.face.values.copy()
+    still = [6, 18, 31, 48]
+    values[:, still] = values[0, still]
+    half_still = Animation(animation.rate, animation.index, FaceTrack(values, animation.face.mask))
+    decoded = fba.decode(coded(half_still, 1000, 1.5)[0])
+    assert decoded.face is not None
+    assert len(decoded) > 40
+    for column in still:
+        shown = decoded.face.values[:, column]
+        assert (np.diff(np.abs(shown - values[0, column])) <= 0).all(), column  # nearer, never away
+
+
+def test_a_live_blink_is_seen() -> None:
+    """Nothing is known but how far lids go: ranges must leave room for how fast they do."""
+    animation = made("speech", 60)
+    assert animation.face is not None
+    values = animation.face.values.copy()
+    values[:, 18:20] = 0
+    values[40:43, 18:20] = np.array([500, 1000, 400])[:, None]
+    blinking = Animation(animation.rate, animation.index, FaceTrack(values, animation.face.mask))
+    encoder = RateEncoder(6000, 1.0, VISAGE)
+    encoder.expect(widest_faces())
+    decoded = fba.decode(encoder.push_animation(blinking) + encoder.finish())
+    assert decoded.face is not None
+    shown = np.interp(blinking.index, decoded.index, decoded.face.values[:, 18])
+    assert np.abs(shown - values[:, 18]).max() < 100
+
+
 def test_what_begins_later_comes_as_soon_as_there_is_room() -> None:
     animation = made("speech", 120)
     assert animation.face is not None
@@ -270,6 +316,9 @@ def test_a_leaky_bucket() -> None:
     assert bucket.level_at(0.1) == 30
     bucket.drain(0.3)
     assert bucket.level == 10
+    bucket.add(5)
+    assert bucket.level == 15
     bucket.drain(5)
     assert bucket.level == 0
+    bucket.add(1)
     assert bucket.peak == 40
