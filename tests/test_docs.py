@@ -56,6 +56,7 @@ ILLUSTRATIONS = {
     ("docs/bitrate.md", "pip install '.[study]'"): "installs packages, and measures for a minute",
     ("docs/capture-live.md", "fba capture livelink --play -o face.fba"): WINDOW,
     ("docs/capture-live.md", "fba capture livelink -o face.fba"): SENT,
+    ("docs/capture-live.md", "fba capture livelink -o face.fba --bitrate 3000 --buffer 1s"): SENT,
     ("docs/capture-live.md", "fba capture livelink -o - | fba play -"): WINDOW,
     ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
     ("docs/develop.md", "./dev test"): CHECKOUT,
