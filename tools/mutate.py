@@ -35,6 +35,11 @@ class Mutant(NamedTuple):
 
 CLOCK = "fba/codec/_stream/clock.py"
 TIME_BASE = "fba/codec/_time_base.py"
+EMOTION = "fba/emotion"
+RULES_TEST = "tests/emotion/test_mixing_rules.py"
+EXPRESSIONS_TEST = "tests/emotion/test_named_expressions.py"
+READING_TEST = "tests/emotion/test_read_expressions.py"
+EXPRESS_TEST = "tests/cli/emotions/test_express.py"
 FULL_TURNS = "fba/codec/_plane/full_turns.py"
 RANGES = "fba/codec/_ranges.py"
 HEADERS = "fba/codec/_headers.py"
@@ -911,6 +916,30 @@ MUTANTS = (
     ),
     Mutant(
         f"{POINTS}/neutral.py", "frames = _best(sum(told, turned), length)", "frames = whole", POINTS_TEST
+    ),
+    Mutant(
+        f"{EMOTION}/rules.py", "free = added_moved * (1 - leader.moved)", "free = added_moved", RULES_TEST
+    ),
+    Mutant(
+        f"{EMOTION}/rules.py",
+        "near = np.abs(own.faps - centre) <=",
+        "near = np.abs(own.faps - centre) >",
+        RULES_TEST,
+    ),
+    Mutant(f"{EMOTION}/rules.py", "largest - one) / (largest + one)", "largest - one) * 0", RULES_TEST),
+    Mutant(f"{EMOTION}/profiles.py", "amount = one.sign * (", "amount = (", EXPRESSIONS_TEST),
+    Mutant(
+        f"{EMOTION}/performance.py",
+        "copies = fill(blend.faps, moving)[1]",
+        "copies = moving.copy()",
+        EXPRESS_TEST,
+    ),
+    Mutant(f"{EMOTION}/recogniser.py", "BLINK = 0.5", "BLINK = 0.0", READING_TEST),
+    Mutant(f"{EMOTION}/recogniser.py", "LASTING = 1.5", "LASTING = 0.001", READING_TEST),
+    Mutant(f"{EMOTION}/likelihood.py", "SPEECH = 1.0", "SPEECH = 0.1", READING_TEST),
+    Mutant(f"{EMOTION}/likelihood.py", "VISIBLE = 0.2", "VISIBLE = 0.0", READING_TEST),
+    Mutant(
+        f"{EMOTION}/likelihood.py", "CAPTURED = 0.2, 0.2, 0.35", "CAPTURED = 0.2, 0.2, 1e-9", READING_TEST
     ),
     Mutant(f"{MARKERS}/pupils.py", "opening > SHUT * neutral", "opening > 0 * neutral", POINTS_TEST),
     Mutant(f"{POINT_FILES}/_points.py", "and not _is_deep(positions)", "and False", POINT_TABLES_TEST),

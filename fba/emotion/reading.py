@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +18,8 @@ from fba.tracks import FaceTrack
 
 BASELINES = ("none", "start", "median")
 """What is taken for the face at rest: as the standard has it, the first moments, the middle of each FAP."""
-START = 0.5
-"""Seconds of the first moments."""
+START, START_SHARE = 0.5, 0.1
+"""Seconds of the first moments, and the most of a recording that they are."""
 CHUNK = 4096
 """Frames that are read at once."""
 MOUTH_GROUPS = (2, 8)
@@ -44,7 +44,7 @@ class Readings:
     def summary(self) -> dict[str, Any]:
         """Return shares of frames by label with mean intensities, most frequent first, and the main family.
 
-        "main" is the label of most frames that show something; None if none does.
+        "main" is the label that is shown most, frames times intensity; None if none is.
         """
         counts = Counter(one.label for one in self.readings)
         shares = [
@@ -55,9 +55,13 @@ class Readings:
             }
             for label, count in counts.most_common()
         ]
-        shown = [row["label"] for row in shares if row["label"] not in (NEUTRAL, UNKNOWN)]
+        amounts: dict[str, float] = defaultdict(float)
+        for one in self.readings:
+            if one.label not in (NEUTRAL, UNKNOWN):
+                amounts[one.label] += one.intensity
+        main = max(amounts, key=lambda label: amounts[label], default=None)
         changes = sum(a.label != b.label for a, b in zip(self.readings, self.readings[1:], strict=False))
-        return {"main": shown[0] if shown else None, "shares": shares, "changes": changes}
+        return {"main": main, "shares": shares, "changes": changes}
 
 
 def read_expressions(
@@ -67,8 +71,9 @@ def read_expressions(
 
     Works on what a face shows (`fba.face.resolve`), so that visemes, FAP 2 and mates take part. model: as
     for `resolve`. baseline: what is taken for the face at rest and subtracted: "none", nothing, as FAPs
-    count from the neutral face; "start", the mean of the first half second; "median", of each FAP, for a
-    recording in which a face is mostly at rest. The head's angles are never read.
+    count from the neutral face; "start", the mean of the first half second, or of a tenth of a short
+    recording; "median", of each FAP, for a recording in which a face is mostly at rest. The head's angles are
+    never read.
 
     Raises OptionError for an animation without a face or without frames, and for another baseline.
     """
@@ -105,5 +110,6 @@ def find_known_faps(track: FaceTrack) -> Bool:
 def _find_rest(shown: Any, times: Float64, baseline: str) -> Float64 | None:
     if baseline == "none":
         return None
-    rest = np.median(shown, axis=0) if baseline == "median" else shown[times < START].mean(axis=0)
+    first = times <= min(START, START_SHARE * float(times[-1]))
+    rest = np.median(shown, axis=0) if baseline == "median" else shown[first].mean(axis=0)
     return np.asarray(rest, dtype=np.float64)

@@ -241,3 +241,18 @@ def test_a_track_that_sends_nothing_is_neutral_with_nothing_known() -> None:
     readings = emotion.read_expressions(Animation(25, np.arange(3), FaceTrack.empty(3)))
     assert len(readings.unsent) == 66
     assert readings.summary()["main"] is None
+
+
+def test_films_that_begin_at_rest_are_read_from_there() -> None:
+    """An offset, as a guessed face at rest has it: raised brows that are none."""
+    rise = np.concatenate([np.zeros(10), np.linspace(0, 1, 20), np.ones(20)])
+    faps = rise[:, None] * emotion.expression("anger").faps
+    faps[:, columns("raise_l_i", "raise_r_i", "raise_l_m", "raise_r_m")] += 170
+    mask = np.ones(faps.shape, bool)
+    mask[:, :2] = False
+    track = FaceTrack(np.rint(faps).astype(np.int32) * mask, mask)
+    animation = Animation(25, np.arange(50), track)
+    readings = emotion.read_expressions(animation, baseline="start")
+    assert readings.summary()["main"] == "anger"
+    assert [readings.readings[frame].label for frame in (0, 49)] == ["neutral", "anger"]
+    assert emotion.read_expressions(animation).readings[0].label != "neutral"

@@ -49,8 +49,8 @@ BASELINES = ("none", "start", "median")
     type=click.Choice(BASELINES),
     default=BASELINES[0],
     show_default=True,
-    help="The face at rest, for captures whose zero is not: start: the first half second; median: of each "
-    "FAP, where a face is mostly at rest.",
+    help="The face at rest: none: as FAPs count from it; start: the first half second, for films that begin "
+    "at rest; median: of each FAP, where a face is mostly at rest.",
 )
 @click.option(
     "--model",
@@ -96,7 +96,14 @@ def command(
         outputs.write(output, _csv(readings).encode())
         outputs.say(f"{display_name(output)}: {len(readings)} frames; {tables.summary_text(readings)}")
     elif as_json:
-        print_json({**readings.summary(), "unsent": readings.unsent, "frames": list(_rows(readings))})
+        print_json(
+            {
+                **readings.summary(),
+                "baseline": baseline,
+                "unsent": readings.unsent,
+                "frames": list(_rows(readings)),
+            }
+        )
     else:
         click.echo(f"{file}: {len(readings)} frames; {tables.summary_text(readings)}")
         for line in tables.reading_lines(readings, every=frames):

@@ -106,6 +106,8 @@ def reading_lines(readings: Readings, *, every: bool) -> Iterator[str]:
             line = f"{time:7.2f}s  {one.label:11}  {intensity:>4}  {point[0]:>4}  {point[1]:>5}  {nearest}"
             yield line.rstrip()
         before = one.label
+    if readings.baseline != "none":
+        yield f"the face at rest is subtracted (--baseline {readings.baseline})"
     if readings.unsent:
         count = len(readings.unsent)
         yield f"FAPs that are never sent, or always 0, and say nothing: {count} of {FAP_COUNT - 2}"
