@@ -15,7 +15,7 @@ COPIED = {
     "security.md": "SECURITY.md",
     "changelog.md": "CHANGELOG.md",
 }
-REFERENCE = ("fba", "player", "face", "body", "emotion", "capture", "formats", "codec")
+REFERENCE = ("fba", "player", "face", "body", "emotion", "capture", "persona", "formats", "codec")
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^]]*\])*)\]\(([^()\s]+)\)")
 
 

@@ -76,6 +76,8 @@ ILLUSTRATIONS = {
     ("docs/measure.md", "./dev bench --summary > results.md"): "takes ten minutes",
     ("docs/motion-capture.md", POOR): "what is said of another file",
     ("docs/motion-capture.md", MISMATCH): "a warning, with figures of another file",
+    ("docs/persona.md", "fba persona evaluate"): "takes minutes; tests/persona measures fewer contents",
+    ("docs/persona.md", "python -m fba.persona.training"): "makes a file of the checkout again",
     ("docs/play.md", "fba play face.fba"): WINDOW,
     ("docs/play.md", "fba play face.fba --paused"): WINDOW,
     ("docs/play.md", "fba play face.fba --audio voice.mp3 --audio-offset -0.04"): WINDOW,

@@ -194,6 +194,9 @@ ORIGIN_TEST = "tests/formats/test_step_choice.py -k origin"
 TRANSPARENCY_TEST = "tests/player/gl/test_transparency.py"
 WRINKLES_TEST = "tests/player/figure/test_wrinkles.py"
 EMOTE_TEST = "tests/emotion/test_emotional_modification.py"
+PERSONA_RULE, PERSONA_POINTS = "fba/persona/recognition/rule.py", "fba/persona/points/registration.py"
+PERSONA_TESTS = "tests/persona/test_persona_points.py tests/persona/test_persona_recognition.py"
+PERSONA_USE = "tests/persona/test_persona_learning.py"
 STRIP_TEST = "tests/player/session/test_emotion_trace.py"
 HEAD_TURN_TEST = "tests/formats/test_step_choice.py -k head"
 MEASURED_TEST = "tests/body/gait/test_measured.py"
@@ -225,6 +228,14 @@ BODY_TOLERANCE_TEST = "tests/planning/test_body_tolerance.py"
 DISPLACEMENT_TEST = "tests/body/test_displacement.py"
 
 MUTANTS = (
+    Mutant(PERSONA_RULE, "LEAST = 0.1", "LEAST = 0.08", PERSONA_TESTS),
+    Mutant(PERSONA_RULE, "SECOND = 0.6", "SECOND = 0.58", PERSONA_TESTS),
+    Mutant(PERSONA_POINTS, "np.radians(30.0)", "np.radians(32.0)", PERSONA_TESTS),
+    Mutant(PERSONA_POINTS, "cosine * laid[..., 0] - sine * deep", "laid[..., 0]", PERSONA_TESTS),
+    Mutant(PERSONA_POINTS, "MISFIT = 0.25", "MISFIT = 1.25", PERSONA_TESTS),
+    Mutant("fba/persona/performance.py", "EASE = 2", "EASE = 3", PERSONA_USE),
+    Mutant("fba/persona/learning.py", ".min()) >= least", ".min()) >= 0", PERSONA_USE),
+    Mutant("fba/persona/learning.py", "REST = 1.5", "REST = 0.0", PERSONA_USE),
     Mutant(REGRESSION, "RIDGE = 1e-3", "RIDGE = 1e-1", FIT_TEST),
     Mutant(REGRESSION, "if most - len(chosen) <= len(lacking):", "if False:", FIT_TEST),
     Mutant(REGRESSION, "= 1.0", "= 0.999", FIT_TEST),

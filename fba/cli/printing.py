@@ -46,13 +46,16 @@ def colour_grade(text: str, grade: str) -> str:
     return click.style(text, fg={"good": "green", "fair": "yellow", "poor": "red"}[grade])
 
 
-def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of a file and cells, under the names of the columns behind that of the file."""
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], first: str = "file") -> None:
+    """Print rows of a file and cells, under the names of the columns behind that of the file.
+
+    first: what the first column has, if it is no file.
+    """
     from rich.console import Console
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False)
-    table.add_column("file", overflow="fold")
+    table.add_column(first, overflow="fold")
     for column in columns:
         table.add_column(column, justify="right")
     for row in rows:

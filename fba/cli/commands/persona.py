@@ -241,7 +241,7 @@ def evaluate_command(users: int, seed: int, as_json: bool) -> None:
         rows.append([name, "", *(f"{100 * mean_reduction(some, way):.1f} %" for way in WAYS)])
     agreement = (f"{100 * found.agreement[way]:.1f} %" if way in found.agreement else "" for way in WAYS)
     rows.append(["class kept", "", *agreement])
-    print_table(columns, rows)
+    print_table(columns, rows, "content")
     click.echo(f"masks of two consecutive frames of an actor: {found.consecutive:.2f} mm")
 
 
