@@ -20,13 +20,11 @@ from fba.parameters import BAP_COUNT
 from fba.planning.body_rows import BodyRows, BodyTarget, add_error, all_rows, blocks, free_room
 from fba.planning.paths import Bounds, find_path
 
-MARGIN = 0.99
-"""Share of the tolerance that the search fills: what turns is taken to go straight."""
 SWEEPS = 3
 """Rounds over all BAPs."""
 CHECKS = 6
 """Times that less is allowed, or frames left out are taken back, where a body is too far off."""
-HOPELESS = 1.25
+HOPELESS = 1.6
 """Shares of the tolerance beyond which the quantiser is too coarse: less would not help."""
 PLANE_BITS, SKIP_BITS = 6, 4
 """Bits of a P plane that no BAP pays for, and more where frames are left out behind it."""
@@ -38,13 +36,15 @@ class BodyEffort:
 
     steps: int64 (296,), of the quantiser. scale: table steps in each. share: of the tolerance that each BAP
     may take in the first round. gap_share: of the tolerance, what may be taken up before, by frames that are
-    left out; 0 leaves none out. most: frames left out in a row.
+    left out; 0 leaves none out. margin: share of the tolerance that the search fills; where no BAP alone can
+    bring a frame back, less leaves room. most: frames left out in a row.
     """
 
     steps: Int64
     scale: int
     share: float = 0.7
     gap_share: float = 0.7
+    margin: float = 0.99
     most: int = 16
 
 
@@ -110,7 +110,7 @@ class _Search:
     def __init__(self, target: BodyTarget, base: Float64, keys: Int64, effort: BodyEffort) -> None:
         self.target, self.effort, self.keys = target, effort, keys
         self.frames = np.arange(len(base))
-        self.limit = np.full(len(base), MARGIN)
+        self.limit = np.full(len(base), effort.margin)
         self.wanted = _interpolated(self.frames, keys, base)
         self.shown = self.wanted.copy()
         self.moved = np.asarray(self.wanted.any(axis=0))

@@ -30,10 +30,14 @@ REDUCED = (0.5, 0.3)
 """Shares of the tolerance that joints which are no longer turned may take."""
 EFFORTS = ((0.5, 0.8), (0.7, 0.7), (0.5, 0.6))
 """Share of a BAP and share of gaps, see `BodyEffort`, of the searches that are tried for each of those."""
+MARGINS = (0.99, 0.93, 0.86, 0.78)
+"""Shares of the tolerance that searches fill: the next where the one before left frames beyond it."""
 GIVEN_UP = 2
 """Searches far beyond the tolerance after which a quantiser is too coarse."""
 STANDING = 0.9
 """Share of the tolerance of feet that half a step of the root may take: legs must make up for it."""
+SPARE = 0.15
+"""Share of the tolerance that is left for quantisers where frames are left out."""
 FRAMES_SEARCHED = 1600
 """Frames, times searches: longer streams are searched less often."""
 
@@ -174,7 +178,11 @@ def _searched(
         steps = bap_steps(options.bap_steps) * scale
         within, hopeless = False, 0
         for share, gap_share, base in efforts:
-            found = search_baps(target, base, gaps, BodyEffort(steps, scale, share, gap_share))
+            for margin in MARGINS:
+                effort = BodyEffort(steps, scale, share, min(gap_share, margin - SPARE), margin)
+                found = search_baps(target, base, gaps, effort)
+                if found.longest <= 1 or found.longest > HOPELESS:
+                    break
             if found.longest <= 1 or (quant == 1 and not hopeless):
                 within |= found.longest <= 1
                 yield _to_send(animation, found), chosen

@@ -143,3 +143,15 @@ def test_what_is_printed_of_a_body(run: Run, gesture: Path, tmp_path: Path) -> N
     assert "no quantiser keeps the body within 0.01 mm" in done.err
     done = run("encode", gesture, *given, "1cm", "--bap-quant", "2")
     assert "--bap-quant and --body-tolerance contradict each other" in " ".join(done.err.split())
+
+
+def test_a_capture_is_compared_with_the_frames_that_players_fill_in(run: Run, tmp_path: Path) -> None:
+    lines = (Path(fba.__file__).parent / "samples" / "hello.bvh").read_text().splitlines()
+    first = lines.index("MOTION") + 3
+    lines[first - 2] = "Frames: 150"
+    (tmp_path / "short.bvh").write_text("\n".join(lines[: first + 150]) + "\n")
+    given = ("--fps", "12", "--body-tolerance", "2cm", "--json")
+    found = json.loads(run("encode", tmp_path / "short.bvh", "-o", tmp_path / "a.fba", *given).out)
+    assert found["tolerance"]["frames_left_out"] > 5
+    assert found["tolerance"]["body"]["largest_mm"] <= 20.0
+    assert found["verdict"] == "good"

@@ -224,7 +224,10 @@ def command(
     if captures and animation.body is not None:
         with Progress("comparing", None):
             source, lead = taken.body_of(animation)
-            decoded, _ = taken.body_of(_decode(coded.data, bap_steps=table))
+            shown = _decode(coded.data, bap_steps=table)
+            if len(shown) < len(animation):  # players fill in the frames that were left out
+                shown = shown.resample(shown.rate)
+            decoded, _ = taken.body_of(shown)
             reports = capture_report.compare_captures(
                 captures, source, decoded, coded.clamped, ground=str(capture["ground"]), detailed=detailed,
                 format=format, clip=clip, options=capture, lead=lead,
