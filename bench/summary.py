@@ -127,6 +127,19 @@ ROWS = (
         "test_face_capture.py::test_ten_minutes_of_blendshapes",
     ),
     Row(
+        "an hour of FAPs, encoded with the preset `compact`",
+        "66 FAPs at 25 Hz; warm, one core",
+        "{seconds:.1f} s of processor, {ratio:.0f} times the plain encoder",
+        "test_planning.py::test_an_hour_compact",
+    ),
+    Row(
+        "a frame of a face at a bit rate, as it comes",
+        "44 FAPs at 20 kbit/s, which leaves no frame out; warm, one core",
+        "{median:.2f} ms, {slow:.2f} ms in 99 % of frames; {rate:,.0f} frames/s",
+        "test_planning.py::test_a_frame_at_a_bit_rate[20000]",
+        "fba capture livelink --bitrate",
+    ),
+    Row(
         "BAPs to 87 joint matrices",
         "186 BAPs, 2000 poses a call; warm, one core, `out=`",
         "{rate:,.0f} poses/s, {ratio:.1f} times NumPy",
