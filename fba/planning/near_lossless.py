@@ -37,6 +37,10 @@ TRIED = 3
 """Of them, so many: the coarsest that each FAP by itself could take, and the next finer ones."""
 EFFORTS = ((0.9, 1.1, 4), (1.1, 0.9, 4), (0.7, 1.1, 4), (0.9, 0.9, 10), (0.9, 1.1, 10), (1.1, 0.7, 4))
 """Share, share of gaps, and most frames left out, of the searches that are tried; the best of all first."""
+FAILURES = 3
+"""Searches without a result after which a quantiser is given up."""
+WORSE = 1.1
+"""How much more a finer quantiser takes than a coarser one, for still finer ones not to be tried."""
 FRAMES_SEARCHED = 18_000
 """Frames, times searches: longer streams are searched less often."""
 INTRA_BITS = 2000
@@ -144,7 +148,10 @@ def _encode_face(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FbaWarning)  # given above
             for plan in _search(source, tolerance):
-                found_data, statistics = plan.encode()
+                try:
+                    found_data, statistics = plan.encode()
+                except RangeError:  # between frames left out, values change by more than a plane carries
+                    continue
                 if len(found_data) < len(data) or not _is_within(smallest, tolerance):
                     found = _measured(found_data, statistics, source, plan.options)
                     if _is_within(found, tolerance):
@@ -194,7 +201,7 @@ def _search(source: _Source, tolerance: Tolerance) -> Iterator[Plan]:
     if not any(one.groups for _, one in segments):
         return
     efforts = min(max(FRAMES_SEARCHED // len(source.animation), 1), len(EFFORTS))
-    tried = TRIED if efforts > 1 else 1
+    tried, least = TRIED if efforts > 1 else 1, np.inf
     for quant in reversed(QUANTS):
         if not tried:
             break
@@ -209,6 +216,10 @@ def _search(source: _Source, tolerance: Tolerance) -> Iterator[Plan]:
         else:
             tried -= 1
             yield _assemble(source, plan, segments, found, quant)
+            bits = sum(one.bits for _, one in found)
+            if bits > WORSE * least:  # still finer ones take still more
+                return
+            least = min(least, bits)
 
 
 def _best(
@@ -216,7 +227,9 @@ def _best(
 ) -> FoundFaps | None:
     """Return the cheapest of several searches; None where the quantiser is too coarse."""
     best = None
-    for share, gap_share, most in EFFORTS[:efforts]:
+    for number, (share, gap_share, most) in enumerate(EFFORTS[:efforts]):
+        if best is None and number >= FAILURES:
+            break
         below = best.bits if best is not None else np.inf
         found = search_faps(segment, basis, meter, Effort(quant, share, gap_share, most), below)
         best = found if found.within else best

@@ -175,6 +175,15 @@ def test_what_is_sent_may_change_and_stop() -> None:
     assert measure(changing, data)[0] <= 0.5
 
 
+def test_ramps_that_only_single_steps_carry() -> None:
+    """With frames left out, changes would be beyond 1860 steps; an I plane has no room for the value."""
+    values = np.zeros((25, 68), dtype=np.int32)
+    values[:, 14 - 1] = 1500 * np.minimum(np.arange(25), np.arange(25)[::-1])  # thrust_jaw, in steps of 1
+    ramp = Animation(25, np.arange(25), FaceTrack(values, np.tile(np.arange(68) == 13, (25, 1))))
+    data, _ = encode_within_tolerance(ramp)
+    assert measure(ramp, data)[0] <= 0.5
+
+
 def test_values_between_steps_and_a_tolerance_too_small_for_them() -> None:
     face = made_face(5, 40)
     uneven = FaceTrack(face.values + np.where(face.mask, 1, 0).astype(np.int32) * (STEPS > 1), face.mask)
