@@ -29,6 +29,7 @@ OPTIONS = {
     "limits": "limit",
     "clip": "clip",
     "face": "face",
+    "aspect": "aspect",
     "sync": "sync",
     "offset": "offset",
     "joints": "maps",

@@ -25,7 +25,12 @@ MOST_RATE = 10_000
 
 
 def read_recording(
-    path: Path, *, fps: Fraction | None = None, face: str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path,
+    *,
+    fps: Fraction | None = None,
+    face: str | None = None,
+    aspect: float | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> TrackedFace:
     """Return what a tracker saw, from a file of points.
 
@@ -51,7 +56,7 @@ def read_recording(
             "is no file of tracked points: a Persona is learnt from points of a film", path=path
         )
     with naming_file(path):
-        return from_point_motion(motion)
+        return from_point_motion(motion, aspect=aspect)
 
 
 def write_recording(face: TrackedFace, path: Path) -> None:

@@ -92,6 +92,14 @@ def test_points_of_other_trackers_are_read(persona: Path, run: Run, tmp_path: Pa
     assert len(fba.read(tmp_path / "a.fap")) == 60
 
 
+def test_the_aspect_of_a_picture_may_be_given(persona: Path, run: Run, tmp_path: Path) -> None:
+    motion = film(FaceModel.default(), 478, frames=40, share=True, turn=0.3).motion
+    (tmp_path / "user.csv").write_bytes(point_files.wide(motion))
+    play = ("persona", "play", tmp_path / "user.csv", "--persona", persona, "-o", tmp_path / "a.fap")
+    assert "give its aspect with --aspect 1.778" in run(*play)[2]
+    assert run(*play, "--aspect", "16:9")[::2] == (0, "")
+
+
 def test_what_is_no_recording(persona: Path, run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.fap").write_text("2.1 a 25 1\n" + "0 " * 67 + "0\n0\n")
     code, _, err = run("persona", "learn", tmp_path / "a.fap", "-o", tmp_path / "a.persona")

@@ -11,6 +11,7 @@ import click
 from fba.cli import options
 from fba.cli.command import Group, examples
 from fba.cli.inputs import EXISTING, input_file
+from fba.cli.marker_options import AspectType
 from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
 from fba.cli.printing import print_json, print_table
 from fba.limits import Limits
@@ -45,6 +46,12 @@ _neutral_option = click.option(
     type=SpanType(),
     metavar="FROM-TO",
     help="Seconds of each recording in which the face rests; default: the first second.",
+)
+_aspect_option = click.option(
+    "--aspect",
+    type=AspectType(),
+    metavar="W:H",
+    help="Width and height of the picture, 16:9 or 1920x1080; default: what makes the points a face.",
 )
 _fps_option = options.fps_option("Frame rate of recordings that do not say theirs.")
 
@@ -86,6 +93,7 @@ def command() -> None:
     type=OutputType(),
     help="Also write a page with masks, classes and plots.",
 )
+@_aspect_option
 @_fps_option
 @options.face_option
 @options.no_clobber_option
@@ -98,6 +106,7 @@ def learn_command(
     neutral: tuple[float, float] | None,
     warm_up: int,
     report: Path | None,
+    aspect: float | None,
     fps: Fraction | None,
     face: str | None,
     no_clobber: bool,
@@ -118,7 +127,7 @@ def learn_command(
     from fba.persona.learning import learn
     from fba.persona.storage import save_persona
 
-    faces = [_read(path, fps, face, limit) for path in actors]
+    faces = [_read(path, fps, face, aspect, limit) for path in actors]
     persona = learn(faces, name or actors[0].stem, neutral=[neutral] * len(faces), warm_up=warm_up)
     with outputs.file(output) as file:
         save_persona(persona, file)
@@ -173,6 +182,7 @@ def info_command(file: Path, as_json: bool, limit: Limits) -> None:
 )
 @_neutral_option
 @click.option("--no-head", is_flag=True, help="Leave out how the user's head turns.")
+@_aspect_option
 @_fps_option
 @options.face_option
 @options.no_clobber_option
@@ -186,6 +196,7 @@ def play_command(
     means: str,
     neutral: tuple[float, float] | None,
     no_head: bool,
+    aspect: float | None,
     fps: Fraction | None,
     face: str | None,
     no_clobber: bool,
@@ -207,7 +218,7 @@ def play_command(
 
     persona = None if persona_file is None else _load(persona_file, limit)
     user = None if user_file is None else _load(user_file, limit)
-    recording = _read(file, fps, face, limit)
+    recording = _read(file, fps, face, aspect, limit)
     animation = play(recording, persona, means=means, neutral=neutral, user=user, head=not no_head)
     extra: dict[str, Any] = {"clamp": True} if writing.name == "fba" else {}
     with outputs.file(output) as target:
@@ -245,11 +256,13 @@ def evaluate_command(users: int, seed: int, as_json: bool) -> None:
     click.echo(f"masks of two consecutive frames of an actor: {found.consecutive:.2f} mm")
 
 
-def _read(path: Path, fps: Fraction | None, face: str | None, limits: Limits) -> TrackedFace:
+def _read(
+    path: Path, fps: Fraction | None, face: str | None, aspect: float | None, limits: Limits
+) -> TrackedFace:
     from fba.persona.recordings import read_recording
 
     with input_file(path) as file:
-        return read_recording(file, fps=fps, face=face, limits=limits)
+        return read_recording(file, fps=fps, face=face, aspect=aspect, limits=limits)
 
 
 def _load(path: Path, limits: Limits) -> Persona:
