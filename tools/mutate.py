@@ -304,7 +304,6 @@ MUTANTS = (
     Mutant(
         BODY_SEARCH, "np.maximum(target.longest(base, rows), effort.gap_share)", "5.0", BODY_TOLERANCE_TEST
     ),
-    Mutant(BODY_SEARCH, "            if best.longest <= 1 or", "            if True or", BODY_TOLERANCE_TEST),
     Mutant(BODY_ROWS, "tolerances[block, 1:][stands.T] = ", "tolerances[:0, :1] = ", BODY_TOLERANCE_TEST),
     Mutant(BODY_ROWS, "        if low > high:", "        if False:", BODY_TOLERANCE_TEST),
     Mutant(
