@@ -271,7 +271,12 @@ MUTANTS = (
         "fba/planning/rate/search.py", "if distance < least:", "if distance > least or not best:", RATE_TEST
     ),
     Mutant("fba/planning/rate/expectations.py", "FAST_FAPS] = FAST", "FAST_FAPS] = SLOW", RATE_TEST),
-    Mutant(PRICING, "    if nearest == 0 or math.isinf(price):\n        return 0\n", "", RATE_TEST),
+    Mutant(
+        PRICING,
+        "math.isinf(price):\n        return 0",
+        "math.isinf(price):\n        return nearest",
+        RATE_TEST,
+    ),
     Mutant("fba/planning/plan.py", "    if not any(used):", "    if True:", PLANS_TEST),
     Mutant(PATHS, "total = sums[i] + cost[change + low]", "total = sums[i]", PATHS_TEST),
     Mutant(PATHS, "highest = min(highest, (upper", "highest = max(highest, (upper", PATHS_TEST),

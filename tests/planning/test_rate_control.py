@@ -12,10 +12,12 @@ import pytest
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
 from fba.capture.live import widest_faces
+from fba.codec import Encoder
 from fba.errors import RangeError
 from fba.face.resolve import resolve
 from fba.parameters import bap_steps, fap_steps
 from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate, measure_errors
+from fba.planning.rate.visibility import slot_weights
 
 VISAGE = EncoderOptions(bap_steps="visage", clamp=True)
 FACE = [3, 4, 5, 6, 7, 12, 13, 14, 19, 20, 23, 24, 31, 32, 48, 49, 50]
@@ -307,6 +309,27 @@ def test_what_begins_later_and_never_fits_is_not_sent() -> None:
     assert decoded.face is not None
     assert np.array_equal(decoded.face.mask, np.broadcast_to(mask[0], decoded.face.mask.shape))
     assert decoded.face.values[-1, 2:10].any()
+
+
+def test_the_next_plane_at_no_price_and_at_any() -> None:
+    animation = made("noise", 3)
+    assert animation.face is not None
+    encoder = Encoder(VISAGE)
+    encoder.begin_segment(animation)
+    encoder.push_animation(animation[:1])
+    encoder.settle(1)
+    plane = encoder.next_plane(animation[1:2])
+    assert plane is not None
+    still = plane.with_levels(plane.levels(slot_weights(), np.inf))
+    assert still.face is not None
+    assert np.array_equal(still.face.values[0], animation.face.values[0])
+    levels = plane.levels(slot_weights(), 0.0)
+    exact = plane.with_levels(levels)
+    assert exact == animation[1:2]
+    before, plane_bits = encoder.bits, plane.bits(levels)
+    encoder.push_animation(exact)
+    encoder.settle(2)
+    assert encoder.bits - before == plane_bits
 
 
 def test_a_leaky_bucket() -> None:
