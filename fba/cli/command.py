@@ -30,6 +30,7 @@ OPTIONS = {
     "clip": "clip",
     "face": "face",
     "aspect": "aspect",
+    "neutral": "neutral",
     "sync": "sync",
     "offset": "offset",
     "joints": "maps",

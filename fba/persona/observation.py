@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
-from fba.errors import ModelError, OptionError
+from fba.errors import FbaWarning, ModelError, OptionError, Remedy
 from fba.persona.points import Registered, TrackedFace, register
 from fba.persona.points.layout import PARTS, flat_mask
 from fba.persona.recognition import Labels, Recogniser, decide
@@ -16,6 +17,10 @@ from fba.persona.recognition.displacements import displacements
 Neutral = int | tuple[float, float] | None
 NEUTRAL_FRAMES = 30
 """Frames at the start whose median is the neutral face: a second."""
+LIDS = (14, 23), (11, 13)
+"""Middles of the upper lids, and of the lower ones."""
+WIDER = 1.35
+"""Ratio of the usual opening of eyes to that of the neutral face from which on that is none."""
 FEWEST = 5
 """Frames at least that tell a neutral face."""
 
@@ -69,10 +74,25 @@ def observe(
         raise ModelError(f"{len(rest)} frames tell the neutral face; at least {FEWEST} are needed")
     still = np.asarray(np.median(registered.points[rest], axis=0))
     points = registered.points[rows]
+    _check_eyes(points, still)
     moved = {part: displacements(points, still, part) for part in PARTS}
     scores = {part: recogniser.components[part].scores(moved[part]) for part in PARTS}
     labels = {part: decide(recogniser.components[part].network(scores[part])) for part in PARTS}
     return Observation(rows, points, still, moved, scores, labels, registered)
+
+
+def _check_eyes(points: Float64, still: Float64) -> None:
+    """Warn where eyes are mostly wider than in the neutral face: it is none, so all else would be off."""
+    upper, lower = ([number - 1 for number in pair] for pair in LIDS)
+    usual = np.median((points[:, upper, 1] - points[:, lower, 1]).mean(axis=1))
+    rest = float((still[upper, 1] - still[lower, 1]).mean())
+    if usual > WIDER * rest:
+        warnings.warn(
+            FbaWarning(
+                "the eyes are half closed in the frames of the neutral face, and wider in most others"
+            ).with_remedies(Remedy("neutral", "say where the face rests with {}", "2.0-2.5")),
+            stacklevel=3,
+        )
 
 
 def _neutral_rows(face: TrackedFace, usable: Bool, neutral: Neutral) -> Intp:

@@ -169,6 +169,12 @@ def test_neutral_frames_may_be_given(actor: Act) -> None:
     )
 
 
+def test_eyes_that_are_half_closed_at_rest_are_told(actor: Act, persona: Persona) -> None:
+    shut = dict(actor.apex)["UFAU_43"] / actor.face.rate
+    with pytest.warns(FbaWarning, match="the eyes are half closed in the frames of the neutral face"):
+        play(actor.face, persona, neutral=(float(shut) - 0.1, float(shut) + 0.1))
+
+
 def test_a_persona_brings_users_to_the_actor() -> None:
     """Tables 5.1 and 5.2 of the source by relation: 38.1 and 35.4 %; here with few contents."""
     found = evaluate(styles={"asymmetry": Style(mouth=1.3, lopsided=0.6)}, users=1, names=NAMES)
