@@ -953,6 +953,9 @@ MUTANTS = (
     Mutant(f"{EMOTION}/recogniser.py", "LASTING = 1.5", "LASTING = 0.001", READING_TEST),
     Mutant(f"{EMOTION}/likelihood.py", "SPEECH = 1.0", "SPEECH = 0.1", READING_TEST),
     Mutant(f"{EMOTION}/likelihood.py", "VISIBLE = 0.2", "VISIBLE = 0.0", READING_TEST),
+    Mutant(f"{EMOTION}/likelihood.py", "7: 0.06, 10: 0.08", "7: 0.001, 10: 0.001", READING_TEST),
+    Mutant(f"{EMOTION}/features.py", "np.minimum(gaze, 0), np.maximum(gaze, 0)", "gaze, gaze", READING_TEST),
+    Mutant(f"{EMOTION}/reading.py", "SILENT = 1.0", "SILENT = 0.0", READING_TEST),
     Mutant(
         f"{EMOTION}/likelihood.py", "CAPTURED = 0.2, 0.2, 0.35", "CAPTURED = 0.2, 0.2, 1e-9", READING_TEST
     ),

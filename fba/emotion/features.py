@@ -57,7 +57,9 @@ def features() -> Features:
 
 
 def measure(faps: Float64, known: Bool) -> Float64:
-    """Return the features of FAPs (..., 68): float64 (..., F). The lids are as if the gaze were level.
+    """Return the features of FAPs (..., 68): float64 (..., F). What lids do to follow the gaze is left out.
+
+    Lids follow it in captures of blendshapes; from action units and in many streams they do not.
 
     known: bool (68,), the FAPs that say something; a mean is that of these. Where none is known it is 0.
     """
@@ -67,7 +69,9 @@ def measure(faps: Float64, known: Bool) -> Float64:
         pitch = values[..., _PITCH + side]
         for lid, follows in zip((_UPPER, _LOWER), LID_PER_GAZE, strict=True):
             if known[lid + side]:
-                values[..., lid + side] -= follows * pitch
+                gaze = follows * pitch
+                lids = values[..., lid + side]
+                values[..., lid + side] = lids - np.clip(lids, np.minimum(gaze, 0), np.maximum(gaze, 0))
     size = np.abs(table.weights)
     share = (size @ known) / size.sum(axis=1)
     weights = table.weights / np.where(table.folded | (share == 0), 1.0, share)[:, None]

@@ -20,6 +20,8 @@ BASELINES = ("none", "start", "median")
 """What is taken for the face at rest: as the standard has it, the first moments, the middle of each FAP."""
 START, START_SHARE = 0.5, 0.1
 """Seconds of the first moments, and the most of a recording that they are."""
+SILENT = 1.0
+"""Seconds for which a FAP must be 0 throughout to be taken for one that is not sent."""
 CHUNK = 4096
 """Frames that are read at once."""
 MOUTH_GROUPS = (2, 8)
@@ -30,7 +32,7 @@ class Readings:
     """What a face shows in each frame of an animation.
 
     times: float64 (T,), seconds. readings: T. baseline: one of `BASELINES`. unsent: names of FAPs that the
-    file never sends, or that are 0 throughout; they say nothing.
+    file never sends, or that are 0 throughout a second or more; they say nothing.
     """
 
     times: Float64
@@ -83,7 +85,9 @@ def read_expressions(
         raise OptionError("there is no face to read: the animation sends no FAPs")
     times = (animation.index - animation.index[0]) / float(animation.rate)
     shown = resolve(animation.face, model)
-    known = find_known_faps(animation.face) & shown.any(axis=0)
+    known = find_known_faps(animation.face)
+    if len(shown) >= SILENT * animation.rate:
+        known &= shown.any(axis=0)
     at_rest = _find_rest(shown, times, baseline)
     recogniser = Recogniser(animation.rate, known=known, baseline=at_rest)
     readings: list[Reading] = []

@@ -171,6 +171,41 @@ def talking(rng: np.random.Generator, frames: int) -> Iterator[np.ndarray]:
         yield 0.3 * emotion.expression("anger").faps + rng.normal(0, 25, 68)
 
 
+@pytest.mark.parametrize("follow", [False, True])
+@pytest.mark.parametrize("pitch", [-27_000, 27_000])
+def test_eyes_that_look_up_or_down_show_nothing(pitch: int, follow: bool) -> None:
+    """Lids follow the gaze in captures of blendshapes, and stay where they are in those of action units."""
+    faps = np.zeros(68)
+    faps[columns("pitch_")] = pitch
+    if follow:
+        faps[columns("close_t_")] = 0.0089 * pitch
+        faps[columns("close_b_")] = -0.0054 * pitch
+    reading = read_one(faps)
+    assert reading.label == "neutral"
+    assert reading.probability > 0.9
+
+
+def test_narrow_eyes_alone_are_no_anger() -> None:
+    """OpenFace sees narrow eyes in most faces; they last throughout a recording."""
+    rows = np.full((75, 2), [0.22, 0.05])
+    face = from_action_units(ActionUnitMotion((7, 10), rows, np.arange(75) / 25, 25)).face  # type: ignore[arg-type]
+    assert face is not None
+    labels = Counter(one.label for one in Recogniser(25).push_frames(resolve(face)))
+    assert labels["neutral"] >= 70, labels
+
+
+def test_zeros_of_a_picture_say_something() -> None:
+    """A FAP that is 0 throughout is taken for one that is never sent, but not from a moment on."""
+    values = np.zeros((50, 68), np.int32)
+    values[:, columns("raise_l_i", "raise_r_i")] = 100
+    mask = np.ones_like(values, bool)
+    mask[:, :2] = False
+    picture = emotion.read_expressions(Animation(25, np.arange(1), FaceTrack(values[:1], mask[:1])))
+    assert picture.unsent == ()
+    film = emotion.read_expressions(Animation(25, np.arange(50), FaceTrack(values, mask)))
+    assert len(film.unsent) == 64
+
+
 def test_labels_do_not_flicker() -> None:
     frames = list(talking(np.random.default_rng(5), 250))
     recogniser = Recogniser(25)
