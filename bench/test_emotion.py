@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fba import emotion
+from fba import Animation, FaceTrack, emotion
 
 FRAMES = 200_000
 LIVE = 500
@@ -37,6 +37,19 @@ def test_mixing_expressions(benchmark: Any, report: Callable[[str], None]) -> No
     each = benchmark.stats.stats.median / len(path)
     benchmark.extra_info.update(seconds=each)
     report(f"a point of the plane: {1e6 * each:.0f} microseconds")
+
+
+def test_a_performance_in_a_mood(benchmark: Any, report: Callable[[str], None]) -> None:
+    rng = np.random.default_rng(0)
+    mask = np.ones((FRAMES, 68), dtype=bool)
+    mask[:, :2] = False
+    values = np.rint(rng.normal(0, 60, (FRAMES, 68))).astype(np.int32)
+    performance = Animation(100, np.arange(FRAMES), FaceTrack(values, mask))
+    moods = [emotion.Mood("anger", 70), emotion.Mood("sadness", 40, start=100, end=500)]
+    benchmark.pedantic(emotion.emote, (performance, moods), rounds=3, warmup_rounds=1)
+    rate = FRAMES / benchmark.stats.stats.median
+    benchmark.extra_info.update(frames_per_second=rate)
+    report(f"emote: {rate:,.0f} frames/s")
 
 
 def test_reading_live(benchmark: Any, report: Callable[[str], None]) -> None:

@@ -26,8 +26,8 @@ RATES = {FACE: (2.0, 3.0, 4.0), BODY: (6.0, 12.0, 24.0)}
 """Mean rates, kbit/s, that a live encoder holds."""
 NO_SPARE_INTRA = 1e9
 """Bits that an I plane counts where only needed ones shall come."""
-TOLERANCES = (0.2, 0.5, 1.0, 2.0)
-"""Millimetres by which vertices of the face may be off."""
+TOLERANCES = {FACE: (0.2, 0.5, 1.0, 2.0), BODY: (10.0, 20.0)}
+"""Millimetres by which vertices of the face, or points 3 cm off joints of the body, may be off."""
 WITH_RIVALS = {FACE: (1, 2, 6, 12, 24), BODY: (1, 2, 4, 6, 12)}
 """Quantisers at which rivals code the same numbers."""
 
@@ -118,10 +118,13 @@ def encode_live(subject: Subject) -> bytes:
 
 
 def encode_near(subject: Subject, millimetres: float) -> bytes:
-    """Return a stream that keeps every vertex within a distance. RangeError where none does."""
-    return encode_within_tolerance(
-        subject.animation, Tolerance(face=1e-3 * millimetres), options_for(subject, 1)
-    )[0]
+    """Return a stream that keeps every vertex or joint within a distance, standing feet within half.
+
+    RangeError where none does.
+    """
+    limit = 1e-3 * millimetres
+    tolerance = Tolerance(face=limit) if subject.kind == FACE else Tolerance(joint=limit, foot=limit / 2)
+    return encode_within_tolerance(subject.animation, tolerance, options_for(subject, 1))[0]
 
 
 def encode_live_at_rate(subject: Subject, rate: float) -> bytes:
@@ -152,8 +155,8 @@ def operating_points(kind: str) -> tuple[Point, ...]:
     ]
     if kind == FACE:
         found.append(Point("FBA exact", "quantiser 1", partial(encode_with_preset, preset="exact", quant=1)))
-        found += [
-            Point("FBA tolerance", f"{limit:g} mm", partial(encode_near, millimetres=limit), True)
-            for limit in TOLERANCES
-        ]
+    found += [
+        Point("FBA tolerance", f"{limit:g} mm", partial(encode_near, millimetres=limit), True)
+        for limit in TOLERANCES[kind]
+    ]
     return tuple(found)
