@@ -21,7 +21,7 @@ from fba.codec._whole_stream import decode
 from fba.codec.block import Block
 from fba.codec.code_length import INTRA_BITS, code_lengths, level_bits, range_limit, step_scale
 from fba.codec.frame_buffer import DecodedFrames, FrameBuffer
-from fba.codec.quantisation import coarsest_quantisers, count_rounded, exact_quantisers, quantise
+from fba.codec.quantisation import coarsest_quantisers, count_rounded, exact_quantisers, levels, quantise
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
 from fba.codec.stream_info import PartInfo, StreamInfo, probe_stream
 from fba.codec.verification import Verification, digest, verify_stream
@@ -57,6 +57,7 @@ __all__ = [
     "encode_with_statistics",
     "exact_quantisers",
     "level_bits",
+    "levels",
     "marked_table",
     "probe_stream",
     "quantise",

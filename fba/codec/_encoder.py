@@ -156,6 +156,22 @@ class Encoder:
         self._ranges = fitting_ranges(expected, self.options)
         self._resumable = set()
 
+    def begin_learning(self, limits: dict[str, Int64]) -> None:
+        """Make the next frame an I plane with ranges for its own values, and for changes up to these limits.
+
+        limits: int64 (68,) or (296,) by "face" and "body": by how many quantiser steps P planes may raise or
+        lower each parameter. As `begin_segment`, where nothing more is known of what comes.
+        """
+        parts = {"face": (slots.FACE_BIT, slots.FAPS.start, 2), "body": (slots.BODY_BIT, slots.BAPS.start, 0)}
+        self._ranges, self._resumable = {}, set()
+        for name, changes in limits.items():
+            part, first, skipped = parts[name]  # visemes and expressions have ranges of their own
+            both = np.stack([changes[skipped:]] * 2)
+            self._ranges[part] = Ranges(part, self.options)
+            self._ranges[part].widen(
+                np.arange(both.shape[1]) + first, np.concatenate([np.zeros_like(both), both])
+            )
+
     def settle(self, following: int) -> bytes:
         """Encode the last frame pushed, now that the index of the next is known; return complete bytes."""
         if self._pending is not None:

@@ -6,6 +6,7 @@ standard suggests and `fba.face.resolve` follows (see `fba.face.mates`).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations
@@ -71,8 +72,8 @@ def choose_faps(
             continue
         least = np.full(bits.shape[1:], np.inf)
         equal = _equal_pairs(values, related, cuts)
-        for few in _subsets(related, smallest):
-            own = np.where(_derive_others(related, few, equal, fit), bits[list(few)].sum(axis=0), np.inf)
+        for few in subsets(related, smallest):
+            own = np.where(derive_others(related, few, equal, fit), bits[list(few)].sum(axis=0), np.inf)
             better = shown & (own < least)
             least[better] = own[better]
             for column in related:
@@ -81,7 +82,8 @@ def choose_faps(
     return Choice(sent, total)
 
 
-def _subsets(related: tuple[int, ...], smallest: int) -> list[tuple[int, ...]]:
+def subsets(related: tuple[int, ...], smallest: int) -> list[tuple[int, ...]]:
+    """Return the subsets of at least so many, the smallest first."""
     return [one for size in range(smallest, len(related) + 1) for one in combinations(related, size)]
 
 
@@ -107,10 +109,10 @@ def _equal_pairs(values: Int32, related: tuple[int, ...], cuts: Cuts) -> dict[tu
     return result
 
 
-def _derive_others(
+def derive_others(
     related: tuple[int, ...],
     sent: tuple[int, ...],
-    equal: dict[tuple[int, int], Bool],
+    equal: Mapping[tuple[int, int], Bool | np.bool_],
     fit: FitChoice | None,
 ) -> Bool | np.bool_:
     """Return bool (C, C): whether the sent FAPs and a FIT give all related ones, from one cut to another."""

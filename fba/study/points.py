@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float64, Int64
-from fba.codec import Encoder, EncoderOptions, decode, encode_with_statistics, probe_stream
+from fba.codec import EncoderOptions, decode, encode_with_statistics, probe_stream
 from fba.face.resolve import known_faps, resolve
-from fba.planning import Tolerance, encode_planned, encode_within_tolerance, plan_compact
+from fba.planning import LiveEncoder, Tolerance, encode_planned, encode_within_tolerance, plan_compact
 from fba.planning.rate import RateEncoder
 from fba.study.errors import ROOT, TURN
 from fba.study.subjects import BODY, FACE, Subject
@@ -112,8 +112,8 @@ def encode_with_known_ranges(subject: Subject) -> bytes:
 
 
 def encode_live(subject: Subject) -> bytes:
-    """Return the stream of an encoder that gets one frame at a time and knows nothing of the next."""
-    encoder = Encoder(options_for(subject, 1))
+    """Return the stream of an encoder that gets one frame at a time and knows nothing of the next but one."""
+    encoder = LiveEncoder(options_for(subject, 1))
     return b"".join(encoder.push(frame) for frame in subject.animation) + encoder.finish()
 
 

@@ -16,6 +16,7 @@ import fba
 from fba import Animation, FaceTrack
 from fba.cli.main import main
 from fba.errors import FormatError, OptionError
+from fba.planning import LiveEncoder
 from fba.study import (
     Result,
     make_page,
@@ -83,7 +84,7 @@ def test_every_setting_has_a_row_and_the_others_have_one_for_its_values(results:
 def test_rates_are_of_whole_streams_and_of_whole_packets(
     short_face: Animation, results: list[Result]
 ) -> None:
-    encoder = fba.Encoder()
+    encoder = LiveEncoder()
     data = encoder.push_animation(short_face) + encoder.finish()
     (live,) = [one for one in results if (one.method, one.point) == (UNPLANNED, "quantiser 1")]
     assert live.file_bytes == len(data)

@@ -12,6 +12,7 @@ import numpy as np
 from fba.animation import Animation, Frame
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, write_mark
 from fba.errors import FbaWarning, RangeError, Remedy
+from fba.planning.frame_order import check_order
 from fba.planning.rate.bucket import LeakyBucket
 from fba.planning.rate.expectations import expected_motion, quantiser_for
 from fba.planning.rate.visibility import slot_weights
@@ -142,26 +143,14 @@ class RateEncoder:
         return self._encoder.ending()
 
     def _push(self, frame: Animation) -> bytes:
-        if self._last is not None:
-            self._check(frame)
+        before = self._late if self._late is not None else self._last
+        if before is not None:
+            check_order(before, frame)
         self.statistics.frames += 1
         if self._last is not None and int(frame.index[0]) < self._due:
             self._late = frame
             return b""
         return self._push_due(frame)
-
-    def _check(self, frame: Animation) -> None:
-        """Raise ValueError for a frame that cannot come after those before it."""
-        before = self._late if self._late is not None else self._last
-        assert before is not None
-        if frame.rate != before.rate:
-            raise ValueError(
-                f"the stream has {before.rate} frames/s, this frame {frame.rate}; resample it first"
-            )
-        if frame.index[0] <= before.index[0]:
-            raise ValueError(
-                f"frame index {frame.index[0]} comes after {before.index[0]}; they must increase"
-            )
 
     def _push_due(self, frame: Animation) -> bytes:
         """Encode a frame if the buffer has room for it."""
