@@ -220,6 +220,7 @@ FIT_TEST = "tests/face/learning/test_learn_fit.py"
 FIT_STREAMS_TEST = "tests/planning/test_fit_streams.py"
 REGRESSION = "fba/face/learning/_regression.py"
 RATE_BUCKET, RATE_ENCODER = "fba/planning/rate/bucket.py", "fba/planning/rate/encoder.py"
+LIVE_ENCODER, LIVE_TEST = "fba/planning/live_encoder.py", "tests/planning/test_live_encoder.py"
 PRICING, RATE_TEST = "fba/codec/_plane/pricing.py", "tests/planning/test_rate_control.py"
 PATHS, PATHS_TEST = "fba/planning/paths.py", "tests/planning/test_paths.py"
 FACE_SEARCH, MESH_ERROR = "fba/planning/face_search.py", "fba/planning/mesh_error.py"
@@ -251,6 +252,10 @@ MUTANTS = (
     ),
     Mutant("fba/planning/fit_streams.py", "(linked, ~linked):", "(linked | ~linked,):", FIT_STREAMS_TEST),
     Mutant("fba/planning/fit_streams.py", 'keep_masks=("face",)', "keep_masks=()", FIT_STREAMS_TEST),
+    Mutant(LIVE_ENCODER, "WIDER = 2", "WIDER = 1", LIVE_TEST),
+    Mutant(LIVE_ENCODER, "(self._seen > self.limits)", "(self._seen > self.limits + 60)", LIVE_TEST),
+    Mutant(LIVE_ENCODER, "used[related] = used[related].any()", "pass", LIVE_TEST),
+    Mutant(LIVE_ENCODER, "mask = self._sent & ~interpolated", "mask = face.mask", LIVE_TEST),
     Mutant(RATE_BUCKET, "max(0.0, self.level - ", "(self.level - ", RATE_TEST),
     Mutant(RATE_BUCKET, "self.peak = max(self.peak, self.level)", "self.peak = self.level", RATE_TEST),
     Mutant(RATE_ENCODER, "if bits <= room or price == HOLD:", "if True:", RATE_TEST),

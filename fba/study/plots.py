@@ -61,11 +61,13 @@ def draw_rates(group: Sequence[Result]) -> bytes:
     unplanned = [one for one in own if one.method == UNPLANNED]
     for one in unplanned:
         axes.plot(one.max_mm, one.live_rate, "o", markerfacecolor="white", color=OURS, markersize=5)
-    for one in unplanned[:1]:
-        axes.annotate("FBA, live, with nothing known before", (one.max_mm, one.live_rate), xytext=(8, 0),
-                      textcoords="offset points", va="center", color=OURS, fontsize=8.5)  # fmt: skip
     rates = [one.live_rate for one in own] + [one.live.live_rate for one in compared]
     rates += [one.file.file_rate for one in compared] + [rate for _, rate in rounded]
+    above = 1.25 * max(rate for rate in rates if rate)
+    for one in unplanned[:1]:  # it may lie among the lines
+        axes.annotate("FBA, live, with nothing known before", (one.max_mm, one.live_rate),
+                      xytext=(one.max_mm, above), color=OURS, fontsize=8.5, arrowprops={
+                          "arrowstyle": "-", "color": OURS, "linewidth": 0.7, "relpos": (0, 0)})  # fmt: skip
     _scale(axes, kind, [one.max_mm for one in own], [rate for rate in rates if rate])
     for published in published_rates():
         if published.kind == kind and published.short:
