@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.animation import Animation, Frame
-from fba.arrays import Bool, Int32, Int64
+from fba.arrays import Bool, Int64
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, levels, quantise, range_limit, step_scale
 from fba.errors import FbaWarning
 from fba.face.mates import fill
@@ -86,7 +86,7 @@ class LiveEncoder:
         frame = quantise(frame, self.options)
         face = None if frame.face is None else self._face.push(frame.face)
         body = None if frame.body is None else self._body.push(frame.body)
-        shown = _Shown(replace(frame, face=face, body=body), self._face.as_it_comes)
+        shown = _Shown(replace(frame, face=face, body=body), self._face.as_it_comes, self._face.sent)
         data = b"" if self._waiting is None else self._encode(self._waiting, shown)
         self._waiting = shown
         return data
@@ -111,25 +111,31 @@ class LiveEncoder:
 
 
 class _Part(NamedTuple):
-    """The face or the body of a frame. as_it_comes: its mask says what is sent; else that is to be chosen."""
+    """The face or the body of a frame.
+
+    as_it_comes: its mask says what is sent; else that is to be chosen, of a face among what the source sent,
+    bool (68,), where that suffices.
+    """
 
     track: FaceTrack | BodyTrack
     as_it_comes: bool = False
+    source_sent: Bool | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """A frame with the values that it shows. face_as_it_comes: unless they need visemes and expressions."""
+    """A frame with the values that it shows. The others: see `_Part`."""
 
     animation: Animation
     face_as_it_comes: bool
+    face_sent: Bool
 
     @property
     def parts(self) -> dict[str, _Part]:
         """The parts of the frame, by name."""
         found = {}
         if self.animation.face is not None:
-            found[FACE] = _Part(self.animation.face, self.face_as_it_comes)
+            found[FACE] = _Part(self.animation.face, self.face_as_it_comes, self.face_sent)
         if self.animation.body is not None:
             found[BODY] = _Part(self.animation.body)
         return found
@@ -144,6 +150,12 @@ class _FaceSource:
         self._sent = np.zeros((1, FAP_COUNT), dtype=np.bool_)
         self.as_it_comes = False
 
+    @property
+    def sent(self) -> Bool:
+        """FAPs that were sent so far, bool (68,)."""
+        sent: Bool = self._sent[0]
+        return sent
+
     def push(self, face: FaceTrack) -> FaceTrack:
         """Return a face (1 frame) with the values that it shows, or else to be sent as it is.
 
@@ -152,7 +164,7 @@ class _FaceSource:
         if self.as_it_comes:
             return face
         self._values = np.where(face.mask, face.values, self._values)
-        self._sent |= face.mask
+        self._sent = self._sent | face.mask
         if face.viseme.any() or face.expression.any():
             self.as_it_comes = True
             return self._all_in_force(face)
@@ -201,6 +213,7 @@ class _Learnt:
         self.limits: Int64 = np.zeros(count, dtype=np.int64)
         self._sent: Bool = np.zeros(count, dtype=np.bool_)
         self._used: Bool = np.zeros(count, dtype=np.bool_)  # FAPs that moved, and all that may copy them
+        self._source_sent: Bool = np.zeros(count, dtype=np.bool_)
         self._apart: Bool = np.zeros((count, count), dtype=np.bool_)  # pairs of FAPs that were not equal
         self._seen: Int64 = np.ones(count, dtype=np.int64)  # largest changes, up or down
         self._last: Int64 = np.zeros(count, dtype=np.int64)
@@ -226,9 +239,9 @@ class _Learnt:
         if part.as_it_comes:
             self._sent = part.track.mask[0]
         else:
-            rows = [one.track.values[0] for one in (part, following) if one and not one.as_it_comes]
-            for values in rows:
-                self._use(values, face=isinstance(part.track, FaceTrack))
+            for one in (part, following):
+                if one is not None and not one.as_it_comes:
+                    self._use(one)
             self._sent = self._chosen_faps() if isinstance(part.track, FaceTrack) else self._used.copy()
         self.limits = np.array([range_limit(one, self._scale) for one in (WIDER * self._seen).tolist()])
 
@@ -260,28 +273,33 @@ class _Learnt:
         held = np.where(sent, values, 0)
         return bool(((fill(held, sent)[0] if isinstance(track, FaceTrack) else held) == values).all())
 
-    def _use(self, values: Int32, *, face: bool) -> None:
-        """Remember which values (N,) are not 0, and which FAPs are not equal."""
+    def _use(self, part: _Part) -> None:
+        """Remember which values are not 0, which FAPs are not equal, and which the source sends."""
+        values = part.track.values[0]
         used = values.astype(np.bool_)
-        if face:
+        if part.source_sent is not None:
             for related in map(list, related_faps()):
                 used[related] = used[related].any()
             self._apart |= values[:, None] != values[None]
+            self._source_sent = part.source_sent
         self._used |= used
 
     def _chosen_faps(self) -> Bool:
-        """Return bool (68,): the fewest FAPs that give all others, and those that were sent before."""
+        """Return bool (68,): the fewest FAPs that give all others, and those that were sent before.
+
+        FAPs that the source never sent follow their mates when it is sent as it comes; they must not have
+        been sent by then.
+        """
         sent = self._sent.copy()
         sent[:2] = False
+        own = sent | self._source_sent
         for related in related_faps():
             if not self._used[related[0]]:
                 continue
             equal = {pair: np.bool_(not self._apart[pair]) for pair in permutations(related, 2)}
             before = {column for column in related if sent[column]}
-            few = next(
-                few
-                for few in subsets(related, 1)
-                if before.issubset(few) and derive_others(related, few, equal, None)
-            )
+            choices = [few for few in subsets(related, 1) if before.issubset(few)]
+            giving = [few for few in choices if derive_others(related, few, equal, None)]
+            few = next((few for few in giving if own[list(few)].all()), giving[0])
             sent[list(few)] = True
         return sent

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +66,17 @@ def test_all_that_is_shown_comes_back(seed: int) -> None:
     )
     animation = made_animation(seed)
     assert_same_shown(encoded(animation, options)[0], animation, options)
+
+
+@pytest.mark.parametrize("seed", [3, 12, 15, 26, 30])
+def test_visemes_and_expressions_that_come_late_show_the_same(seed: int) -> None:
+    animation = made_animation(seed)
+    face = animation.face
+    assert face is not None
+    mask, viseme, expression = face.mask.copy(), face.viseme.copy(), face.expression.copy()
+    mask[:50, :2], viseme[:50], expression[:50] = False, 0, 0
+    late = replace(animation, face=FaceTrack(face.values, mask, viseme, expression, face.interpolated))
+    assert_same_shown(encoded(late)[0], late, EncoderOptions())
 
 
 def test_a_plane_leaves_when_the_next_frame_comes() -> None:
