@@ -256,6 +256,7 @@ MUTANTS = (
     Mutant(LIVE_ENCODER, "(self._seen > self.limits)", "(self._seen > self.limits + 60)", LIVE_TEST),
     Mutant(LIVE_ENCODER, "used[related] = used[related].any()", "pass", LIVE_TEST),
     Mutant(LIVE_ENCODER, "if own[list(few)].all()", "if True", LIVE_TEST),
+    Mutant(LIVE_ENCODER, "> FAR).any()", "> 9).any()", LIVE_TEST),
     Mutant(LIVE_ENCODER, "mask = self._sent & ~interpolated", "mask = face.mask", LIVE_TEST),
     Mutant(RATE_BUCKET, "max(0.0, self.level - ", "(self.level - ", RATE_TEST),
     Mutant(RATE_BUCKET, "self.peak = max(self.peak, self.level)", "self.peak = self.level", RATE_TEST),

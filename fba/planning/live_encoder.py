@@ -15,7 +15,7 @@ from fba.codec import Encoder, EncoderOptions, EncoderStatistics, levels, quanti
 from fba.errors import FbaWarning
 from fba.face.mates import fill
 from fba.face.resolve import Resolver
-from fba.parameters import FAP_COUNT
+from fba.parameters import BAP_COUNT, FAP_COUNT, baps
 from fba.planning.derived_faps import derive_others, interpolated_faps, related_faps, subsets
 from fba.planning.frame_order import check_order
 from fba.tracks import BodyTrack, FaceTrack
@@ -23,6 +23,10 @@ from fba.tracks import BodyTrack, FaceTrack
 FACE, BODY = "face", "body"
 WIDER = 2
 """How much further ranges reach than the largest change so far, up or down."""
+FAR = 0.9
+"""Part of what an I plane can carry from which on no more I planes are planned: later ones might not."""
+FAR_STEPS = 240
+"""Quantiser steps that ranges then reach at least."""
 MANY = 1 << 20
 """More steps than any range holds."""
 
@@ -37,10 +41,11 @@ class LiveEncoder:
     It supposes that what is 0 stays 0 (and is not sent), that FAPs which equal their left/right mates or
     their counterparts on the other contour of the lips stay so (and are left to the player, mask type 2), and
     that changes stay within narrow ranges. A frame that shows otherwise becomes an I plane, which sends more
-    and has wider ranges. As soon as a viseme or an expression shows, faces are sent as they come.
+    and has wider ranges. Before a body is further away than I planes reach, one sends all of it and has wide
+    ranges. As soon as a viseme or an expression shows, faces are sent as they come.
 
-    Gives an FbaWarning where the first of these redefines itself, since all FAPs in force come with it, or
-    where FAPs that were sent are interpolated then. Raises as `Encoder` does.
+    Gives an FbaWarning where the first viseme or expression redefines itself, since all FAPs in force come
+    with it, or where FAPs that were sent are interpolated then. Raises as `Encoder` does.
     """
 
     def __init__(self, options: EncoderOptions | None = None) -> None:
@@ -86,7 +91,9 @@ class LiveEncoder:
         frame = quantise(frame, self.options)
         face = None if frame.face is None else self._face.push(frame.face)
         body = None if frame.body is None else self._body.push(frame.body)
-        shown = _Shown(replace(frame, face=face, body=body), self._face.as_it_comes, self._face.sent)
+        shown = _Shown(
+            replace(frame, face=face, body=body), self._face.as_it_comes, self._face.sent, self._body.sent
+        )
         data = b"" if self._waiting is None else self._encode(self._waiting, shown)
         self._waiting = shown
         return data
@@ -113,13 +120,13 @@ class LiveEncoder:
 class _Part(NamedTuple):
     """The face or the body of a frame.
 
-    as_it_comes: its mask says what is sent; else that is to be chosen, of a face among what the source sent,
-    bool (68,), where that suffices.
+    source_sent: bool (N,), what was sent so far. as_it_comes: the mask says what is sent; else that is to be
+    chosen, of a face among what the source sent where that suffices.
     """
 
     track: FaceTrack | BodyTrack
+    source_sent: Bool
     as_it_comes: bool = False
-    source_sent: Bool | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,15 +136,16 @@ class _Shown:
     animation: Animation
     face_as_it_comes: bool
     face_sent: Bool
+    body_sent: Bool
 
     @property
     def parts(self) -> dict[str, _Part]:
         """The parts of the frame, by name."""
         found = {}
         if self.animation.face is not None:
-            found[FACE] = _Part(self.animation.face, self.face_as_it_comes, self.face_sent)
+            found[FACE] = _Part(self.animation.face, self.face_sent, self.face_as_it_comes)
         if self.animation.body is not None:
-            found[BODY] = _Part(self.animation.body)
+            found[BODY] = _Part(self.animation.body, self.body_sent)
         return found
 
 
@@ -189,17 +197,17 @@ class _FaceSource:
 
 
 class _BodySource:
-    """What bodies hold that come one by one."""
+    """What bodies hold that come one by one. sent: bool (296,), BAPs that were sent so far."""
 
     def __init__(self) -> None:
-        self._values = np.zeros(0, dtype=np.int32)
+        self.sent: Bool = np.zeros(BAP_COUNT, dtype=np.bool_)
+        self._values = np.zeros((1, BAP_COUNT), dtype=np.int32)
 
     def push(self, body: BodyTrack) -> BodyTrack:
         """Return a body (1 frame) with the values that are in force."""
-        before = self._values if len(self._values) else np.zeros(body.values.shape[1], dtype=np.int32)
-        values = np.where(body.mask, body.values, before)
-        self._values = values[0]
-        return BodyTrack(values, np.ones_like(body.mask))
+        self.sent = self.sent | body.mask[0]
+        self._values = np.where(body.mask, body.values, self._values)
+        return BodyTrack(self._values, np.ones_like(body.mask))
 
 
 class _Learnt:
@@ -221,6 +229,10 @@ class _Learnt:
         self._options = options
         self._scale = step_scale(options, body=isinstance(track, BodyTrack))
         self._widest = range_limit(MANY, self._scale)
+        self._far = False
+        self._away = np.zeros(count, dtype=np.bool_)  # what goes away for good: bodies, but not their angles
+        if isinstance(track, BodyTrack):
+            self._away[:] = [one.unit != "1e-5 rad" for one in baps()]
 
     def push(self, part: _Part) -> bool:
         """Take the next frame; return whether a P plane carries it, as far as it is not beyond all ranges."""
@@ -228,9 +240,14 @@ class _Learnt:
         if self._begun:
             self._see(now - self._last)
         self._last = now
-        fits = self._begun and self._shows(part) and not (self._sent & (self._seen > self.limits)).any()
-        self._begun = True
-        return fits
+        begun, self._begun = self._begun, True
+        reach = np.abs(now) / self._widest
+        if not self._far and (reach[self._away] > FAR).any():
+            self._far = True
+            return False
+        beyond = self._far or bool((reach > 1)[self._sent].any())  # the encoder knows which plane is nearer
+        fits = beyond or not (self._sent & (self._seen > self.limits)).any()
+        return begun and fits and self._shows(part)
 
     def extend(self, part: _Part, following: _Part | None) -> None:
         """Send what the last frame and the one after it show, and widen the ranges for what changes more."""
@@ -243,7 +260,11 @@ class _Learnt:
                 if one is not None and not one.as_it_comes:
                     self._use(one)
             self._sent = self._chosen_faps() if isinstance(part.track, FaceTrack) else self._used.copy()
-        self.limits = np.array([range_limit(one, self._scale) for one in (WIDER * self._seen).tolist()])
+        wanted = WIDER * self._seen
+        if self._far:
+            wanted = np.maximum(WIDER * wanted, FAR_STEPS)
+            self._sent = self._sent if part.as_it_comes else self._sent | part.source_sent
+        self.limits = np.array([range_limit(one, self._scale) for one in wanted.tolist()])
 
     def track_to_send(self, part: _Part) -> FaceTrack | BodyTrack:
         """Return the track of a frame with what is sent of it."""
@@ -277,7 +298,7 @@ class _Learnt:
         """Remember which values are not 0, which FAPs are not equal, and which the source sends."""
         values = part.track.values[0]
         used = values.astype(np.bool_)
-        if part.source_sent is not None:
+        if isinstance(part.track, FaceTrack):
             for related in map(list, related_faps()):
                 used[related] = used[related].any()
             self._apart |= values[:, None] != values[None]

@@ -13,6 +13,7 @@ import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
 from fba.codec import Encoder, quantise
 from fba.face.resolve import resolve
+from fba.parameters import bap_steps, baps
 from fba.planning import LiveEncoder
 from fba.tracks import hold
 from made_motion import made_animation
@@ -166,6 +167,20 @@ def test_parts_may_come_and_go() -> None:
     assert expected is not None
     assert np.array_equal(shown[:20], expected.values[:20])
     assert np.array_equal(shown[30:], expected.values[30:])
+
+
+def test_a_body_may_walk_further_than_i_planes_reach() -> None:
+    away = next(one for one in baps() if one.unit != "1e-5 rad")
+    step = int(bap_steps("iso")[away.number - 1])
+    values = np.zeros((90, 296), dtype=np.int32)
+    values[:, away.number - 1] = np.arange(90) * 50 * step  # I planes carry 1860 steps
+    values[60:, 40] = 20 * bap_steps("iso")[40]
+    body = BodyTrack(values, np.ones(values.shape, dtype=bool))
+    options = EncoderOptions(clamp=True)
+    animation = Animation(25, np.arange(90), body=body)
+    data, encoder = encoded(animation, options)
+    assert not encoder.statistics.clamped
+    assert_same_shown(data, animation, options)
 
 
 def test_frames_in_a_wrong_order_and_none() -> None:
