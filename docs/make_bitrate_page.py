@@ -50,7 +50,7 @@ def make_page() -> str:
 def _figures(faces: list[Result], bodies: list[Result]) -> dict[str, str]:
     """Return the numbers in the text, by name."""
     exact, near = compare(faces)[0], best_within(faces, LIMITS["face"])
-    body = compare(bodies)[0]
+    body, near_body = compare(bodies)[0], best_within(bodies, LIMITS["body"])
     rounded = max(
         (
             one.own
@@ -79,6 +79,10 @@ def _figures(faces: list[Result], bodies: list[Result]) -> dict[str, str]:
         "unplanned_body": rate_text(_live_rate(bodies, UNPLANNED)),
         "known": rate_text(_live_rate(faces, KNOWN)),
         "known_body": rate_text(_live_rate(bodies, KNOWN)),
+        "near_body": rate_text(near_body.own.live_rate),
+        "near_body_error": error_text(near_body.own.max_mm),
+        "near_body_feet": error_text(near_body.own.feet_mm),
+        "near_body_deflate": rate_text(near_body.live.live_rate),
         "body_error": error_text(body.own.max_mm),
         "body_99": error_text(body.own.p99_mm),
     }

@@ -148,10 +148,21 @@ def test_what_is_printed_of_a_body(run: Run, gesture: Path, tmp_path: Path) -> N
 def test_a_capture_is_compared_with_the_frames_that_players_fill_in(run: Run, tmp_path: Path) -> None:
     lines = (Path(fba.__file__).parent / "samples" / "hello.bvh").read_text().splitlines()
     first = lines.index("MOTION") + 3
-    lines[first - 2] = "Frames: 150"
-    (tmp_path / "short.bvh").write_text("\n".join(lines[: first + 150]) + "\n")
+    lines[first - 2] = "Frames: 80"
+    (tmp_path / "short.bvh").write_text("\n".join(lines[: first + 80]) + "\n")
     given = ("--fps", "12", "--body-tolerance", "2cm", "--json")
     found = json.loads(run("encode", tmp_path / "short.bvh", "-o", tmp_path / "a.fba", *given).out)
     assert found["tolerance"]["frames_left_out"] > 5
     assert found["tolerance"]["body"]["largest_mm"] <= 20.0
     assert found["verdict"] == "good"
+
+
+def test_a_tolerance_is_for_what_is_there(run: Run, talk: Path, gesture: Path, tmp_path: Path) -> None:
+    given = ("-o", tmp_path / "a.fba", "--bap-steps", "visage", "--body-tolerance", "1cm")
+    done = run("encode", talk, *given)
+    assert done.code == 2
+    assert "--body-tolerance is for bodies, and the input has none" in " ".join(done.err.split())
+    done = run("encode", talk, gesture, *given)
+    assert done.code == 2
+    assert "give --tolerance for it as well" in " ".join(done.err.split())
+    assert not (tmp_path / "a.fba").exists()

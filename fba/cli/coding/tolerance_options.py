@@ -59,6 +59,14 @@ def encode_near(
     """
     from fba.planning import Tolerance, encode_within_tolerance
 
+    if body is not None and animation.body is None:
+        raise click.UsageError(
+            "--body-tolerance is for bodies, and the input has none; give --tolerance for faces"
+        )
+    if face is None and animation.face is not None:
+        raise click.UsageError(
+            "the input has a face, too: give --tolerance for it as well as --body-tolerance"
+        )
     given = {} if face is None else {"face": face}
     if body is not None:
         given |= {"joint": body, "foot": body / 2}
