@@ -152,7 +152,7 @@ def _anchor(axes: Any, one: Published) -> None:
                       ha="right", va="top", **style)  # fmt: skip
     elif one.max_mm:
         axes.plot(one.max_mm, one.low, "D", color=QUIET, markersize=5)
-        axes.annotate(f"published: {text},\nof other data", (one.max_mm, one.low), xytext=(0, -8), va="top",
+        axes.annotate(f"published: {text},\nof other data", (one.max_mm, one.low), xytext=(0, 10), va="bottom",
                       textcoords="offset points", **style)  # fmt: skip
     else:
         axes.axhspan(one.low, one.high, color=QUIET, alpha=0.12, linewidth=0)
