@@ -7,7 +7,14 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
-from fba.codec import Encoder, coarsest_quantisers, code_lengths, quantise
+from fba.codec import (
+    Encoder,
+    coarsest_quantisers,
+    code_lengths,
+    count_rounded,
+    exact_quantisers,
+    quantise,
+)
 from fba.parameters import bap_steps, faps
 
 
@@ -79,6 +86,55 @@ def test_coarsest_quantisers_keep_all_values() -> None:
     assert still.fap_quant == 2
     unquantised = EncoderOptions(fap_quant=0)
     assert coarsest_quantisers(Animation(25, np.arange(2), FaceTrack.empty(2)), unquantised) == unquantised
+
+
+def test_values_between_steps_are_counted_and_kept_where_planes_can_carry_them() -> None:
+    values = np.zeros((4, 68), dtype=np.int32)
+    values[:, 2] = [0, 4, 7, 8]  # open_jaw has steps of 4
+    values[:, 13] = [0, 1, 2, 3]
+    mask = np.tile(np.isin(np.arange(68), (2, 13)), (4, 1))
+    body = np.zeros((4, 296), dtype=np.int32)
+    body[:, 0] = [0, 1, 2, 3]
+    animation = Animation(25, np.arange(4), FaceTrack(values, mask), BodyTrack(body, body >= 0))
+    options = EncoderOptions()
+    rounded = count_rounded(animation, options)
+    assert rounded["face"] == 1
+    assert rounded["body"] == 3
+    exact = exact_quantisers(animation, options)
+    assert (exact.fap_quant, exact.bap_quant) == (0, 0)
+    assert count_rounded(animation, exact) == {}
+    assert fba.decode(fba.encode(animation, exact)) == animation
+    assert exact_quantisers(animation, options, parts=("face",)).bap_quant == options.bap_quant
+    values[3, 2] = 5001  # no plane carries that change as it is
+    far = Animation(25, np.arange(4), FaceTrack(values, mask))
+    assert exact_quantisers(far, options) == options
+    assert count_rounded(Animation(25, np.arange(4), FaceTrack.empty(4)), options) == {}
+
+
+def test_what_the_next_plane_may_bring() -> None:
+    values = np.zeros((12, 68), dtype=np.int32)
+    values[:, 13] = [0] + [5] * 10 + [8]
+    animation = Animation(25, np.arange(12), FaceTrack(values, np.tile(np.arange(68) == 13, (12, 1))))
+    encoder = Encoder()
+    encoder.push_animation(animation[:11])
+    encoder.settle(11)
+    before = encoder.bits
+    plane = encoder.next_plane(animation[11:12])
+    assert plane is not None
+    assert plane.levels(np.ones(372), 0.0).tolist() == [3]
+    assert plane.levels(np.full(372, np.inf), np.inf).tolist() == [3]
+    assert plane.levels(np.ones(372), np.inf).tolist() == [0]
+    cheap, dear = (plane.levels(np.full(372, weight), 1.0) for weight in (100.0, 1e-3))
+    assert cheap.tolist() == [3]
+    assert dear.tolist() == [0]  # what is still stays still
+    assert plane.with_levels(np.array([2])).face.values[0, 13] == 7  # type: ignore[union-attr]
+    bits = plane.bits(np.array([3]))
+    assert encoder.bits == before  # nothing was written
+    encoder.push_animation(animation[11:12])
+    encoder.settle(12)
+    assert encoder.bits - before == bits
+    more = FaceTrack(values, np.tile(np.isin(np.arange(68), (13, 14)), (12, 1)))  # another FAP: an I plane
+    assert encoder.next_plane(Animation(25, np.arange(12), more)[11:12]) is None
 
 
 def test_a_segment_begins_with_an_i_plane_and_ranges_of_its_own() -> None:

@@ -42,6 +42,19 @@ for stream in [*streams, long]:
         if frame.face is not None:
             values.update(frame.face.viseme.tobytes() + frame.face.expression.tobytes())
 result["values"] = values.hexdigest()
+from fba.codec import Encoder, EncoderOptions, code_lengths
+import numpy as np
+moving = motion.animation(motion.face(30), motion.body(30))
+options = EncoderOptions()
+lengths = [code_lengths(one, np.array([0, 11, 30]), options) for one in (moving.face, moving.body)]
+result["lengths"] = [round(float(one.sum()), 6) for one in lengths]
+encoder = Encoder(options)
+encoder.push_animation(moving[:20])
+encoder.settle(20)
+plane = encoder.next_plane(moving[20:21])
+chosen = [plane.levels(np.full(372, 1e-4), price) for price in (0.0, 0.5, 4.0, float("inf"))]
+result["levels"] = [hashlib.sha256(one.tobytes()).hexdigest() for one in chosen]
+result["bits"] = [plane.bits(one) for one in chosen]
 report = fuzz.run(find_target("stream"), streams[:3], count=60, seed=3)
 result["fuzz"] = [report.accepted, report.refused, report.salvaged, report.planes]
 result["findings"] = [finding.reason for finding in report.findings]
@@ -81,7 +94,7 @@ def test_the_same_without_machine_code(way: str, usual: dict[str, object]) -> No
     assert result["compiled"] is False
     if way == "no numba":
         assert result["numba"] is False
-    same = ("bytes", "long", "values", "fuzz", "findings")
+    same = ("bytes", "long", "values", "fuzz", "findings", "lengths", "levels", "bits")
     assert {name: result[name] for name in same} == {name: usual[name] for name in same}
 
 
