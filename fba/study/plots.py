@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -152,8 +153,9 @@ def _anchor(axes: Any, one: Published) -> None:
                       ha="right", va="top", **style)  # fmt: skip
     elif one.max_mm:
         axes.plot(one.max_mm, one.low, "D", color=QUIET, markersize=5)
-        axes.annotate(f"published: {text},\nof other data", (one.max_mm, one.low), xytext=(0, 10),
-                      va="bottom", textcoords="offset points", **style)  # fmt: skip
+        words = "\n".join(wrap(f"published: {text}, of other data", 34))
+        axes.annotate(words, (one.max_mm, one.low), xytext=(0, 10), va="bottom",
+                      textcoords="offset points", **style)  # fmt: skip
     else:
         axes.axhspan(one.low, one.high, color=QUIET, alpha=0.12, linewidth=0)
         axes.annotate(f"published, {text}", (0.01, 1.03 * one.low), xycoords=("axes fraction", "data"),
