@@ -193,6 +193,7 @@ SLIDE_TEST = "tests/formats/test_step_choice.py -k 'slide or sways'"
 ORIGIN_TEST = "tests/formats/test_step_choice.py -k origin"
 TRANSPARENCY_TEST = "tests/player/gl/test_transparency.py"
 WRINKLES_TEST = "tests/player/figure/test_wrinkles.py"
+REST_TEST = "tests/persona/test_persona_points.py"
 EMOTE_TEST = "tests/emotion/test_emotional_modification.py"
 PERSONA_RULE, PERSONA_POINTS = "fba/persona/recognition/rule.py", "fba/persona/points/registration.py"
 PERSONA_TESTS = "tests/persona/test_persona_points.py tests/persona/test_persona_recognition.py"
@@ -817,6 +818,9 @@ MUTANTS = (
     Mutant(
         "fba/emotion/modification.py", "0.0) * (1 - spoken)\n    parted", "0.0) * 0.0\n    parted", EMOTE_TEST
     ),
+    Mutant("fba/persona/rest.py", "NO_REST = 4.0", "NO_REST = 4000.0", REST_TEST),
+    Mutant("fba/persona/rest.py", "(angles[:, 1] / TURNED) ** 2", "0.0", REST_TEST),
+    Mutant("fba/persona/rest.py", "(gap / MILLIMETRES) ** 2", "0.0", REST_TEST),
     Mutant("fba/emotion/modification.py", "offsets[:, JAW] *= spoken", "pass", EMOTE_TEST),
     Mutant("fba/emotion/modification.py", "LIDS_APART = 1024.0", "LIDS_APART = 1100.0", EMOTE_TEST),
     Mutant("fba/emotion/modification.py", "reach: float = 1.2", "reach: float = 3.0", EMOTE_TEST),

@@ -8,7 +8,6 @@ import numpy.typing as npt
 from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.parameters import FAP_COUNT
-from fba.persona.observation import NEUTRAL_FRAMES
 from fba.persona.performance import (
     DEFAULT_MEANS,
     HEAD,
@@ -24,6 +23,7 @@ from fba.persona.points.registration import MISFIT, MOST_TURNED, register_points
 from fba.persona.recognition import Recogniser, decide
 from fba.persona.recognition.displacements import displacements
 from fba.persona.recognition.faps import face_scale, mask_faps, measure_fapu
+from fba.persona.rest import NEUTRAL_FRAMES
 
 
 class LivePersona:

@@ -13,16 +13,11 @@ from fba.persona.points import Registered, TrackedFace, register
 from fba.persona.points.layout import PARTS, flat_mask
 from fba.persona.recognition import Labels, Recogniser, decide
 from fba.persona.recognition.displacements import displacements
+from fba.persona.rest import FEWEST, eye_opening, find_rest
 
 Neutral = int | tuple[float, float] | None
-NEUTRAL_FRAMES = 30
-"""Frames at the start whose median is the neutral face: a second."""
-LIDS = (14, 23), (11, 13)
-"""Middles of the upper lids, and of the lower ones."""
 WIDER = 1.35
 """Ratio of the usual opening of eyes to that of the neutral face from which on that is none."""
-FEWEST = 5
-"""Frames at least that tell a neutral face."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +52,9 @@ def observe(
 ) -> Observation:
     """Return what is seen of a face.
 
-    neutral: frames of the neutral face: None for the first second that is used, a frame, or (from, to) in
-    seconds. warm_up: frames at the start that are left out, as trackers need some until they follow a face.
+    neutral: frames of the neutral face: None for the first second that is used, or, where the face does not
+    rest then, the frames that `find_rest` finds; a frame; or (from, to) in seconds. warm_up: frames at the
+    start that are left out, as trackers need some until they follow a face.
 
     Raises ModelError where no frame can be used, saying why; OptionError for frames of the neutral face
     that cannot.
@@ -69,7 +65,11 @@ def observe(
     rows = np.flatnonzero(usable)
     if not len(rows):
         raise ModelError(_why_none(face, registered, warm_up))
-    rest = _neutral_rows(face, usable, neutral)
+    rest = (
+        rows[find_rest(registered.points[rows], face.angles[rows], face.times[rows] - face.times[0])]
+        if neutral is None
+        else _neutral_rows(face, usable, neutral)
+    )
     if len(rest) < FEWEST and neutral is None and len(rows) >= FEWEST:
         raise ModelError(f"{len(rest)} frames tell the neutral face; at least {FEWEST} are needed")
     still = np.asarray(np.median(registered.points[rest], axis=0))
@@ -83,10 +83,7 @@ def observe(
 
 def _check_eyes(points: Float64, still: Float64) -> None:
     """Warn where eyes are mostly wider than in the neutral face: it is none, so all else would be off."""
-    upper, lower = ([number - 1 for number in pair] for pair in LIDS)
-    usual = np.median((points[:, upper, 1] - points[:, lower, 1]).mean(axis=1))
-    rest = float((still[upper, 1] - still[lower, 1]).mean())
-    if usual > WIDER * rest:
+    if np.median(eye_opening(points)) > WIDER * float(eye_opening(still)):
         warnings.warn(
             FbaWarning(
                 "the eyes are half closed in the frames of the neutral face, and wider in most others"
@@ -95,10 +92,8 @@ def _check_eyes(points: Float64, still: Float64) -> None:
         )
 
 
-def _neutral_rows(face: TrackedFace, usable: Bool, neutral: Neutral) -> Intp:
+def _neutral_rows(face: TrackedFace, usable: Bool, neutral: int | tuple[float, float]) -> Intp:
     """Return the frames of the neutral face."""
-    if neutral is None:
-        return np.flatnonzero(usable)[:NEUTRAL_FRAMES]
     if isinstance(neutral, int):
         if not 0 <= neutral < len(face) or not usable[neutral]:
             raise OptionError(f"neutral: frame {neutral} has no face that looks into the camera")

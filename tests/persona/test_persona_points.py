@@ -11,7 +11,7 @@ from scipy.spatial import procrustes
 from scipy.spatial.distance import directed_hausdorff
 
 from fba.capture.points import PointMotion
-from fba.errors import ModelError
+from fba.errors import FbaWarning, ModelError
 from fba.face import FaceModel, FeaturePointFace
 from fba.persona import TrackedFace, from_point_motion
 from fba.persona.points import fit_similarity, hausdorff_distance, mask_distance, register
@@ -24,6 +24,8 @@ from fba.persona.points.layout import (
     standard_points,
     triangles,
 )
+from fba.persona.recognition.faps import mask_faps, measure_fapu
+from fba.persona.rest import find_rest
 from fba_conformance.captures.tracked_actor import film
 
 RANDOM = np.random.default_rng(0)
@@ -158,3 +160,37 @@ def test_points_in_another_order_are_refused() -> None:
     motion = film(FaceModel.default(), 68, frames=20, flat=True).motion
     with pytest.raises(ModelError, match="another tracker's, or in another order"):
         from_point_motion(PointMotion(np.roll(motion.positions, 9, axis=1), motion.times, motion.rate))
+
+
+def test_a_film_that_does_not_begin_at_rest_has_its_rest_found() -> None:
+    points = np.tile(standard_points()[:64, :2], (120, 1, 1))
+    points += np.random.default_rng(2).normal(0, 0.1, points.shape)
+    upper, lower, lip = [14 - 1, 23 - 1], [11 - 1, 13 - 1], 33 - 1
+    opening = points[0, upper, 1] - points[0, lower, 1]
+    points[:50, upper, 1] -= 0.7 * opening  # eyes half shut
+    points[80:, lip, 1] -= 12.0  # the mouth open
+    angles, times = np.zeros((120, 3)), np.arange(120) / 30
+    with pytest.warns(FbaWarning, match=r"does not rest in the first second.*frames from (\d\.\d\d) to"):
+        rows = find_rest(points, angles, times)
+    assert len(rows) >= 5
+    assert 50 <= rows[0] <= rows[-1] < 80
+    angles[50:70, 1] = 0.6  # turned away
+    with pytest.warns(FbaWarning, match="does not rest"):
+        rows = find_rest(points, angles, times)
+    assert 70 <= rows[0] <= rows[-1] < 80
+
+
+def test_the_first_second_is_taken_where_it_rests() -> None:
+    points = np.tile(standard_points()[:64, :2], (90, 1, 1))
+    points[40:, 33 - 1, 1] -= 12.0
+    assert find_rest(points, np.zeros((90, 3)), np.arange(90) / 30).tolist() == list(range(30))
+    assert find_rest(points[50:53], np.zeros((3, 3)), np.arange(3) / 30).tolist() == [0, 1, 2]
+
+
+def test_lids_open_only_so_far() -> None:
+    moved = np.zeros((1, 86, 3))
+    moved[:, :, 1] = 40.0
+    faps = mask_faps(moved, measure_fapu(standard_points()[:64, :2]), np.zeros(5))
+    assert faps[0, [18, 19]].tolist() == [-450, -450]
+    moved[:, :, 1] = -40.0
+    assert mask_faps(moved, measure_fapu(standard_points()[:64, :2]), np.zeros(5))[0, 20] == -150
