@@ -7,15 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fba.arrays import Array, Float32, Float64
+from fba.arrays import Float32, Float64
 from fba.body.displacement import displacements
 from fba.face import Deformer, FaceModel
+from fba.face.deform.distances import vertex_distances
 from fba.study.subjects import FACE
 
 HEAD_TURN = slice(47, 50)
 """FAPs 48 to 50: the head's rotation, 1e-5 rad."""
-BLOCK = 64
-"""Frames whose vertices are in memory at once."""
 ROOT = slice(180, 183)
 """BAPs 181 to 183: the root's position in millimetres; all others are angles."""
 TURN = 2e5 * np.pi
@@ -47,7 +46,8 @@ def measure_errors(kind: str, source: Float64, shown: Float64, rate: float) -> E
     apart = shown - source
     if kind == FACE:
         turn = float(np.degrees(1e-5 * np.abs(apart[:, HEAD_TURN]).max(initial=0.0)))
-        return Errors(_face_errors(source, shown), turn, 0.0, float(np.abs(apart).max(initial=0.0)))
+        millimetres = (1000.0 * vertex_distances(_deformer(), source, shown)).astype(np.float32)
+        return Errors(millimetres, turn, 0.0, float(np.abs(apart).max(initial=0.0)))
     root = apart[:, ROOT].copy()
     apart -= TURN * np.rint(apart / TURN)
     apart[:, ROOT] = root
@@ -60,19 +60,3 @@ def measure_errors(kind: str, source: Float64, shown: Float64, rate: float) -> E
 @cache
 def _deformer() -> Deformer:
     return Deformer(FaceModel.default())
-
-
-def _differing(source: Array, shown: Array) -> Array:
-    """Return the numbers of frames that are not shown as they were."""
-    return np.flatnonzero((source != shown).any(axis=1))
-
-
-def _face_errors(source: Float64, shown: Float64) -> Float32:
-    """Return the largest displacement of a vertex in each frame, float32 (T,), millimetres."""
-    result = np.zeros(len(source), dtype=np.float32)
-    frames = _differing(source, shown)
-    for start in range(0, len(frames), BLOCK):
-        block = frames[start : start + BLOCK]
-        apart = _deformer().local(source[block]) - _deformer().local(shown[block])
-        result[block] = 1000.0 * np.sqrt(np.einsum("tvi,tvi->tv", apart, apart).max(axis=1))
-    return result

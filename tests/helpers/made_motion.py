@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from fba import Animation, BodyTrack, FaceTrack
+from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
 from fba.parameters import bap_steps, fap_groups, faps
 
 LENGTH = 120
@@ -59,3 +59,14 @@ def made_animation(seed: int) -> Animation:
             (walk * bap_steps("iso") * moving).astype(np.int32), np.tile(rng.random(296) < 0.5, (LENGTH, 1))
         )
     return Animation(Fraction(25), index, made_face(rng), body)
+
+
+def made_options(rng: np.random.Generator) -> EncoderOptions:
+    """Return options of an encoder that limits what it cannot carry, drawn at random."""
+    return EncoderOptions(
+        fap_quant=int(rng.choice([1, 1, 3])),
+        bap_quant=int(rng.choice([1, 4])),
+        intra_period=float(rng.choice([0.5, 2])) if rng.random() < 0.3 else None,
+        start_codes=bool(rng.random() < 0.3),
+        clamp=True,
+    )

@@ -16,7 +16,7 @@ from fba.face.resolve import resolve
 from fba.parameters import bap_steps, baps
 from fba.planning import LiveEncoder
 from fba.tracks import hold
-from made_motion import made_animation
+from made_motion import made_animation, made_options
 
 
 def encoded(animation: Animation, options: EncoderOptions | None = None) -> tuple[bytes, LiveEncoder]:
@@ -58,13 +58,7 @@ def sent_at(data: bytes) -> list[set[int]]:
 @pytest.mark.parametrize("seed", range(24))
 def test_all_that_is_shown_comes_back(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    options = EncoderOptions(
-        fap_quant=int(rng.choice([1, 1, 3])),
-        bap_quant=int(rng.choice([1, 4])),
-        intra_period=float(rng.choice([0.5, 2])) if rng.random() < 0.3 else None,
-        start_codes=bool(rng.random() < 0.3),
-        clamp=True,
-    )
+    options = made_options(rng)
     animation = made_animation(seed)
     assert_same_shown(encoded(animation, options)[0], animation, options)
 

@@ -17,7 +17,7 @@ from fba.face.resolve import resolve, shown_faps
 from fba.parameters import faps
 from fba.planning import encode_planned, plan_compact, plan_exact
 from fba.planning.segments import Cuts, cheapest_segments, find_cuts
-from made_motion import LENGTH, MATES, made_animation, made_face
+from made_motion import LENGTH, MATES, made_animation, made_face, made_options
 
 
 def held(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -30,13 +30,7 @@ def held(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
 def test_a_face_shows_the_same_and_a_body_holds_the_same(seed: int, preset: str) -> None:
     animation = made_animation(seed)
     rng = np.random.default_rng(seed)
-    options = EncoderOptions(
-        fap_quant=int(rng.choice([1, 1, 3])),
-        bap_quant=int(rng.choice([1, 4])),
-        intra_period=float(rng.choice([0.5, 2])) if rng.random() < 0.3 else None,
-        start_codes=bool(rng.random() < 0.3),
-        clamp=True,
-    )
+    options = made_options(rng)
     expected = quantise(animation, options)
     assert animation.face is not None
     assert expected.face is not None
