@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import gc
 import tracemalloc
 import weakref
@@ -243,6 +244,31 @@ def test_an_encoder_refuses_what_does_not_go_on() -> None:
         encoder.push(motion.animation(face, index=[0, 1, 2])[1])
     with pytest.raises(ValueError, match="the stream has 25 frames/s, this frame 30"):
         encoder.push(motion.animation(face, rate=30, index=[0, 1, 2])[2])
+
+
+@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("pushed", [1, 4, 9])
+def test_copies_go_on_as_their_originals_do(name: str, pushed: int) -> None:
+    """A copy whose arrays are no longer parts of one another would code with some old ranges and steps."""
+    animation = performance(name)
+    original, begun = Encoder(), bytearray()
+    for frame in animation[:pushed]:
+        begun += original.push(frame)
+    other = copy.deepcopy(original)
+    ends = []
+    for encoder in (original, other):
+        encoder.begin_segment(animation[: pushed + 1], EncoderOptions(fap_quant=3, bap_quant=3))
+        ends.append(b"".join(encoder.push(frame) for frame in animation[pushed:]) + encoder.finish())
+    assert ends[0] == ends[1]
+
+    stream = bytes(begun) + ends[0]
+    half = len(stream) // 2
+    decoder = Decoder()
+    decoder.push(stream[:half])
+    copied = copy.deepcopy(decoder)
+    frames, same = (reader.push(stream[half:]) + reader.finish() for reader in (decoder, copied))
+    assert frames == same
+    assert frames[-1].index == 11
 
 
 def test_decoders_go_without_the_garbage_collector() -> None:

@@ -136,6 +136,25 @@ def test_planes_fit_however_little_is_given_up(kind: str, monkeypatch: pytest.Mo
     assert encoder.statistics.over == 0
 
 
+@pytest.mark.parametrize("seed", range(24))
+def test_masks_that_change_at_any_amplitude(seed: int) -> None:
+    """Each change of the mask is an I plane that is tried first: with the models that the plane will have."""
+    rng = np.random.default_rng(seed)
+    amplitude, rate = int(rng.integers(200, 1801)), float(rng.uniform(2000, 20_000))
+    values, mask = rng.integers(-amplitude, amplitude + 1, (60, 68)), np.zeros((60, 68), dtype=bool)
+    starts = np.cumsum(rng.integers(3, 15, 20))
+    for start in [0, *starts[starts < 60]]:
+        mask[start:, 2:] = rng.random(66) < rng.uniform(0.2, 1)
+    animation = Animation(Fraction(25), np.arange(60), FaceTrack(np.where(mask, values, 0), mask))
+    encoder = RateEncoder(rate, 2.0, EncoderOptions(clamp=True))
+    data = encoder.push_animation(animation) + encoder.finish()
+    assert encoder.statistics.over == 0
+    level = levels(data, rate)
+    assert max(level) <= 2 * rate
+    assert max(level[:-1], default=0) <= encoder.bucket.peak + 1e-6  # the end of the stream is spare
+    assert len(fba.decode(data)) == encoder.statistics.planes
+
+
 @cache
 def one_by_one() -> bytes:
     encoder = RateEncoder(900, 1.0, VISAGE)

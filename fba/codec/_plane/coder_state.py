@@ -24,31 +24,43 @@ _SELECT_LIMITS = np.array(
 _INT32 = np.iinfo(np.int32)
 
 
+def _row(number: int) -> property:
+    """Return a property of `Models`: this row of its numbers, int64 (372,), to be read and written."""
+
+    def row(models: Models) -> Int64:
+        numbers: Int64 = models.state.numbers[number]
+        return numbers
+
+    return property(row)
+
+
 class Models:
     """State that encoder and decoder must share, as arrays over the 372 slots (see `slots`).
 
     `i_minimum`, `i_size`, `minimum`, `size`: smallest level and number of symbols, for I and P planes.
     `step`, `last`: quantiser step and last value. `lowest`, `highest`: limits of values. All are rows of
     `state`, which also holds the adaptive models of P planes (see `arithmetic`): those of the body once one
-    comes, because they take 4 MB.
+    comes, because they take 4 MB. The rows are looked up, never kept: in a copy they would be arrays apart
+    from its state.
     """
+
+    i_minimum, i_size = _row(loops.I_MINIMUM), _row(loops.I_SIZE)
+    minimum, size = _row(loops.P_MINIMUM), _row(loops.P_SIZE)
+    step, last = _row(loops.STEP), _row(loops.LAST)
+    lowest, highest = _row(loops.LOWEST), _row(loops.HIGHEST)
 
     def __init__(self, bap_table: str = "iso") -> None:
         self.bap_table = bap_table
         self.limits = default_limits().copy()
         numbers = np.zeros((loops.NUMBERS, slots.SLOTS), dtype=np.int64)
         numbers[[loops.I_SIZE, loops.P_SIZE, loops.STEP, loops.TOTAL]] = 1
-        self.i_minimum, self.i_size = numbers[loops.I_MINIMUM], numbers[loops.I_SIZE]
-        self.minimum, self.size = numbers[loops.P_MINIMUM], numbers[loops.P_SIZE]
-        self.step, self.last = numbers[loops.STEP], numbers[loops.LAST]
-        self.lowest, self.highest = numbers[loops.LOWEST], numbers[loops.HIGHEST]
+        self.state = State(numbers, _table(slots.BAPS.start), _table(slots.BAPS.start))
         self.lowest[:] = _INT32.min
         self.highest[:] = _INT32.max
         self.lowest[slots.AMOUNTS] = -2 * INTENSITY_MAX  # the quantiser may round them past 0..63
         self.highest[slots.AMOUNTS] = 2 * INTENSITY_MAX
         self.lowest[list(_SELECTS)] = 0
         self.highest[list(_SELECTS)] = _SELECT_LIMITS[list(_SELECTS)]
-        self.state = State(numbers, _table(slots.BAPS.start), _table(slots.BAPS.start))
 
     def begin_object(self) -> None:
         """Forget all ranges that were sent; the I planes that must come set the rest."""

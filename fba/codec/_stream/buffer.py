@@ -17,13 +17,18 @@ class Buffer:
         self.offset = 0
         self._allocate(_SMALLEST)
 
+    @property
+    def data(self) -> UInt8:
+        """The bytes as an array that compiled code can read, a view of those that are searched."""
+        return np.frombuffer(self._bytes, dtype=np.uint8)
+
     def append(self, chunk: bytes | bytearray | memoryview) -> None:
         """Append bytes at the end."""
         new = np.frombuffer(chunk, dtype=np.uint8)
         need = self.length + len(new)
-        if need > len(self.data):
+        if need > len(self._bytes):
             old = self.data[: self.length]
-            self._allocate(max(need, 2 * len(self.data)))
+            self._allocate(max(need, 2 * len(self._bytes)))
             self.data[: self.length] = old
         self.data[self.length : need] = new
         self.length = need
@@ -47,5 +52,4 @@ class Buffer:
         return position, self._bytes[position + 3]
 
     def _allocate(self, size: int) -> None:
-        self._bytes = bytearray(size)  # searched; `data` is a view of it that compiled code can read
-        self.data: UInt8 = np.frombuffer(self._bytes, dtype=np.uint8)
+        self._bytes = bytearray(size)
