@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,8 +15,44 @@ from fba.capture.motion import SkeletonMotion, read_axis
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
 CLEAR_UP = 0.75
 """Length of the mean of upright directions from which on the motion says which way is up."""
-FLOOR_NEAR = 0.12
-"""Share of the size within which the lowest joints are at height 0."""
+FRAMES = 400
+"""Frames that are asked where the body rests."""
+NEAR = 0.06
+"""Share of a body's height within which joints above the lowest touch the floor."""
+SLOW = 0.2
+"""Heights of a body a second up to which a joint rests."""
+STEP = 0.1
+"""Seconds between two moments that tell whether a joint rests."""
+BESIDE = 0.15
+"""Share of a body's height by which its middle may be beside what carries it."""
+CARRIED = 0.4
+"""Share of frames in which joints rest on a floor, if there is one."""
+MIDDLE = ("l_hip", "r_hip", "l_shoulder", "r_shoulder")
+LEG = 0.5
+"""Share of a body's height that a leg takes."""
+
+
+@dataclass(frozen=True)
+class Up:
+    """The axis of a source that points up.
+
+    axis: such as "+z". confidence: 0 to 1. reason: for people. doubt: what is to be said, where the axis is
+    not the rest pose's, or people seem to lie or hang; else empty. instead: the axis that it may be, too.
+    """
+
+    axis: str
+    confidence: float
+    reason: str
+    doubt: str = ""
+    instead: str = "+y"
+
+
+@dataclass(frozen=True)
+class _Floor:
+    """What joints rest on along an axis: whether they do at all, and whether that carries the body alone."""
+
+    touched: bool
+    carries: bool
 
 
 def find_up_axis(
@@ -25,40 +61,111 @@ def find_up_axis(
     mapped: Mapping[str, int],
     at_rest: standing.Stance,
     up: str,
-) -> tuple[str, float, str]:
-    """Return the axis that points up, the confidence, and a reason.
+) -> Up:
+    """Return the axis that points up.
 
-    positions: (T, J, 3), of the source. up: as given.
+    positions: (T, J, 3), of the source, of some frames. up: as given.
+
+    What the format says counts, else the axis of the rest pose, unless joints rest on a floor along another
+    axis and not along it: from feet to head is not up of somebody who lies, crawls, hangs or flies.
     """
     if up != "auto":
-        return up, 1.0, f"{up} as given"
-    if motion.up and motion.declared:  # VRM: such files are not turned on the way
-        return motion.up, 1.0, f"{motion.up}, as the format says"
+        return Up(up, 1.0, f"{up} as given")
+    if motion.up:
+        return Up(motion.up, 1.0, f"{motion.up}, as the format says")
     stance = standing.measure(positions, mapped)
     weight = np.exp(-((stance.distance / 20.0) ** 2)) + 0.02
     mean = (stance.up * weight[:, None]).sum(axis=0) / weight.sum()
     axis = nearest_axis(mean)
     clear = float(mean @ axis)
     stands = bool((stance.angles.get("thigh", np.zeros(1)) <= standing.MOST["thigh"]).any())
-    own = nearest_axis(at_rest.up[0]) if bool(at_rest.possible[0]) else None
-    own = read_axis(motion.up) if motion.up else own
-    source = "as the format says" if motion.up else "as in the rest pose"
-    if own is None and not stands and axis[0] != 0:
-        return _name(axis), 0.4, f"perhaps {_name(axis)}: trunks point along it, but nobody ever stands"
-    if own is None or (own == axis).all():
-        if clear >= CLEAR_UP or (own is not None and clear > 0):
-            agrees = f", {source}" if own is not None else ""
-            return _name(axis), max(clear, 0.8 if own is not None else 0.0), (
-                f"{_name(axis)}: people stand along it{agrees} ({100 * clear:.0f} %)"
-            )  # fmt: skip
-        return _name(axis), clear * 0.6, f"perhaps {_name(axis)}: the body is upright for little of the time"
-    floors = [_stands_on_zero(positions, candidate) for candidate in (own, axis)]
-    if stands and clear >= CLEAR_UP and (floors[1] or not floors[0]):
-        return _name(axis), 0.8, (
-            f"{_name(axis)}: the body stands along it while it moves, not along {_name(own)}, {source}"
-        )  # fmt: skip
-    sure = 0.7 if not stands or clear < CLEAR_UP or floors[0] else 0.4
-    return _name(own), sure, f"{_name(own)}, {source}; the body hardly stands upright"
+    upright = stands and clear >= CLEAR_UP
+    trunk = _name(axis)
+    if not bool(at_rest.possible[0]):
+        return _find_freely(motion, mapped, trunk, clear, stands)
+    own = _name(nearest_axis(at_rest.up[0]))
+    if own == trunk and clear >= CLEAR_UP:
+        return Up(own, max(clear, 0.8), (
+            f"{own}: people stand along it, as in the rest pose ({100 * clear:.0f} %)"
+        ))  # fmt: skip
+    floors = {name: _find_floor(motion, mapped, name) for name in UPS}
+    stood = upright and floors[trunk].carries
+    if floors[own].carries or (floors[own].touched and not stood):
+        doubt = ""
+        if trunk != own and clear >= CLEAR_UP and floors[trunk].touched:
+            doubt = f"joints rest on a floor along it, as in the rest pose, but trunks point along {trunk}"
+        return Up(own, 0.8, f"{own}, as in the rest pose: joints rest on a floor along it", doubt, trunk)
+    others = [trunk] if upright else []
+    found = next((name for name in (*others, "+y", "+z") if floors[name].carries), None)
+    if found is None:
+        doubt = f"bodies are stretched along {trunk}, and joints rest on no floor along any axis"
+        reason = f"{own}, as in the rest pose; joints rest on no floor along any axis"
+        return Up(own, 0.6, reason, doubt if trunk != own else "", trunk)
+    does = "people stand" if found == trunk else "joints rest on a floor"
+    reason = f"{found}: {does} along it, and nothing rests along {own}, the rest pose's"
+    doubt = f"{does} along it, while the rest pose stands along {own}, where no joint rests in the motion"
+    return Up(found, 0.7, reason, doubt, own)
+
+
+def _find_freely(
+    motion: SkeletonMotion, mapped: Mapping[str, int], trunk: str, clear: float, stands: bool
+) -> Up:
+    """Return the axis that points up in a file whose rest pose nobody can take.
+
+    trunk: the axis along which trunks point, clear: how much they do. stands: whether anybody does.
+    """
+    if not stands and trunk[1] == "x":
+        return Up(trunk, 0.4, f"perhaps {trunk}: trunks point along it, but nobody ever stands")
+    first = [trunk] if clear >= CLEAR_UP and trunk in ("+y", "+z") else []
+    floors = {name: _find_floor(motion, mapped, name) for name in {"+y", "+z", trunk}}
+    found = next((name for name in (*first, "+y", "+z") if floors[name].touched), trunk)
+    if found != trunk:
+        doubt = f"joints rest on a floor along it, but trunks point along {trunk}, and the rest pose is none"
+        return Up(found, 0.6, f"{found}: joints rest on a floor along it", doubt, trunk)
+    if clear < CLEAR_UP:
+        return Up(trunk, clear * 0.6, f"perhaps {trunk}: the body is upright for little of the time")
+    doubt = ""
+    if trunk != "+y" and floors["+y"].carries:
+        doubt = "trunks point along it, but joints rest on a floor along +y as well"
+    elif trunk != "+y" and not floors[trunk].touched:
+        doubt = "trunks point along it, but joints rest on no floor"
+    return Up(trunk, clear, f"{trunk}: people stand along it ({100 * clear:.0f} %)", doubt)
+
+
+def _find_floor(motion: SkeletonMotion, mapped: Mapping[str, int], up: str) -> _Floor:
+    """Return what joints rest on if an axis points up: the lowest of all that keep their places."""
+    step = max(1, round(STEP * motion.rate))
+    last = max(len(motion) - 1 - step, 0)
+    rows = np.unique(np.linspace(0, last, min(last + 1, FRAMES)).astype(np.intp))
+    places, later = (
+        replace(motion, rotations=motion.rotations[some], positions=motion.positions[some]).world()[1]
+        for some in (rows, np.minimum(rows + step, len(motion) - 1))
+    )
+    joints = sorted(set(mapped.values()))
+    size = _height(places, mapped)
+    axis = read_axis(up)
+    heights = places[:, joints] @ axis
+    level = float(np.percentile(heights.min(axis=1), 10))
+    moved = np.linalg.norm(later[:, joints] - places[:, joints], axis=2)
+    rests = (heights < level + NEAR * size) & (moved < SLOW * size * step / float(motion.rate))
+    touched = rests.any(axis=1)
+    middle = [joints.index(mapped[name]) for name in MIDDLE if name in mapped] or list(range(len(joints)))
+    flat = places[:, joints] * (1 - np.abs(axis))
+    centre = flat[:, middle].mean(axis=1)
+    ends = [np.where(rests[..., None], flat, -sign * np.inf) for sign in (1, -1)]
+    room = BESIDE * size
+    above = ((centre < ends[0].max(axis=1) + room) & (centre > ends[1].min(axis=1) - room)).all(axis=1)
+    return _Floor(float(touched.mean()) >= CARRIED, float((touched & above).mean()) >= CARRIED)
+
+
+def _height(places: Float64, mapped: Mapping[str, int]) -> float:
+    """Return the height of a body in the source's unit, by its legs; without legs, the largest extent."""
+    for side in "lr":
+        chain = [mapped.get(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")]
+        if None not in chain:
+            bones = np.diff(places[0, [joint for joint in chain if joint is not None]], axis=0)
+            return float(np.linalg.norm(bones, axis=1).sum()) / LEG
+    return float(np.ptp(places, axis=1).max())
 
 
 def find_upright(motion: SkeletonMotion, mapped: Mapping[str, int]) -> Float64:
@@ -95,10 +202,3 @@ def nearest_axis(direction: Float64) -> Float64:
 def _name(axis: Float64) -> str:
     best = int(np.argmax(np.abs(axis)))
     return ("+" if axis[best] > 0 else "-") + "xyz"[best]
-
-
-def _stands_on_zero(positions: Float64, axis: Float64) -> bool:
-    """Whether the lowest joints are close to height 0 along an axis."""
-    size = float(np.ptp(positions, axis=1).max())
-    lowest = float(np.percentile((positions @ axis).min(axis=1), 20))
-    return abs(lowest) < FLOOR_NEAR * size

@@ -133,11 +133,35 @@ def _is_below(motion: SkeletonMotion, joint: int, above: int) -> bool:
 
 def _unknown_bones(motion: SkeletonMotion, mapped: Mapping[str, int]) -> ModelError:
     found = ", ".join(f"{motion.names[number]} as {joint}" for joint, number in list(mapped.items())[:4])
-    names = ", ".join(motion.names[:8]) + (", ..." if len(motion.names) > 8 else "")
     seen = f"; only {found} could be found" if found else ""
     return ModelError(
-        f"no arms or legs are found among these {len(motion.names)} joint names: {names}{seen}"
+        f"no human skeleton is found: no arms or legs are among these {len(motion.names)} joint names: "
+        f"{_listed(motion)}{seen}; {_sought()}"
     ).with_remedies(joints_remedy())
+
+
+def check_extent(motion: SkeletonMotion) -> None:
+    """Raise ModelError for a motion whose joints are all at one place, as of a thing that moves as one."""
+    if np.ptp(motion.rest(), axis=0).any():
+        return
+    count = len(motion.names)
+    many = "is but one joint" if count == 1 else f"are {count} joints, all at one place"
+    raise ModelError(
+        f"no human skeleton is found: there {many} ({_listed(motion)}), as of a thing that moves as a whole; "
+        f"{_sought()}; choose a file, or a clip, with a person's skeleton"
+    )
+
+
+def _listed(motion: SkeletonMotion) -> str:
+    return ", ".join(motion.names[:8]) + (", ..." if len(motion.names) > 8 else "")
+
+
+def _sought() -> str:
+    """Return which names were looked for."""
+    return (
+        "looked for were hips, legs and arms by the names of many makers (Hips, LeftUpLeg, LeftArm; pelvis, "
+        "thigh_l, upperarm_l; l_hip, l_shoulder) and by words in names"
+    )
 
 
 def joints_remedy() -> Remedy:

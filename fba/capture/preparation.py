@@ -6,6 +6,7 @@ ask again. Each answer has a confidence; below `LEAST` the motion is refused wit
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -19,9 +20,9 @@ from fba.capture._rest_choice import choose_rest
 from fba.capture._rest_correction import correct_rest
 from fba.capture._rest_from_motion import rest_from_motion, with_rest
 from fba.capture._up_axis import UPS, find_up_axis, nearest_axis, turn_axes
-from fba.capture.bones import find_bones, joints_remedy, refuse_swapped_sides
+from fba.capture.bones import check_extent, find_bones, joints_remedy, refuse_swapped_sides
 from fba.capture.motion import SkeletonMotion, read_axis
-from fba.errors import ModelError, Remedy
+from fba.errors import FbaWarning, ModelError, Remedy
 
 LEAST = 0.5
 """Confidence below which a motion is refused."""
@@ -77,14 +78,14 @@ def prepare(
             f"the motion has {len(motion)} frames, from 0; there is no frame {rest} to rest in"
         ).with_remedies(Remedy("rest", "choose one of these with {}", "0"))
     matching.check_root(skeleton)
-    if not np.ptp(motion.rest(), axis=0).any():
-        raise ModelError("the source's joints all coincide in its rest pose; it has no bones")
+    check_extent(motion)
     family, mapped, sure, how = find_bones(motion, joints, skeleton)
     confidence, reasons = {"bones": sure}, {"bones": how}
     few = _few(motion)
     quaternions, positions = few.world()
     at_rest = standing.measure(motion.rest()[None], mapped)
-    axis, confidence["up"], reasons["up"] = find_up_axis(motion, positions, mapped, at_rest, up)
+    found_up = find_up_axis(motion, positions, mapped, at_rest, up)
+    axis, confidence["up"], reasons["up"] = found_up.axis, found_up.confidence, found_up.reason
     turn = rotations.between(read_axis(axis), np.array([0.0, 1.0, 0.0]))
     level = motion if axis == "+y" else turn_axes(motion, turn)
     if joints is None:
@@ -110,6 +111,10 @@ def prepare(
         level = correct_rest(level, mapped)
     result = Preparation(level, mapped, family, chosen, axis, confidence, reasons)
     _refuse_doubt(result, joints is not None, rest != "auto", up != "auto")
+    if found_up.doubt:
+        warning = FbaWarning(f"up is taken to be {axis}: {found_up.doubt}")
+        remedy = Remedy("up", "if another axis points up, say which with {}", f"'{found_up.instead}'")
+        warnings.warn(warning.with_remedies(remedy), stacklevel=3)
     return result
 
 

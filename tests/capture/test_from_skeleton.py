@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import fba
 from capture_bodies import ARM, bone_errors, limb_bones, motion, source_places
 from fba import Animation
 from fba.body import BapSolver, Skeleton
@@ -20,7 +21,7 @@ from fba.capture.comparison.figure import find_up, result_figure, source_figure
 from fba.capture.comparison.measurement import source_scale
 from fba.capture.comparison.soles import sole_heights
 from fba.capture.comparison.standing import find_floor, find_standing
-from fba.errors import FbaWarning, ModelError
+from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.bvh import reader
 from fba.parameters import bap_numbers, baps
 
@@ -233,7 +234,7 @@ def test_resampling_turns_by_slerp() -> None:
 
 def test_bodies_that_cannot_be_placed() -> None:
     flat = motion("T", scale=0.0)
-    with pytest.raises(ModelError, match="coincide"):
+    with pytest.raises(ModelError, match="no human skeleton is found: there are 21 joints, all at one place"):
         from_skeleton(flat)
     empty = motion("T", frames=0)
     with pytest.raises(ModelError, match="no frames"):
@@ -247,7 +248,9 @@ def test_bodies_that_cannot_be_placed() -> None:
     legless = SkeletonMotion(
         nose, parents, whole.offsets[keep], whole.rotations[:, keep], whole.positions, whole.rate
     )
-    with pytest.raises(ModelError, match=r"no arms or legs are found.*Hips as HumanoidRoot"):
+    with pytest.raises(
+        ModelError, match=r"no human skeleton is found: no arms or legs.*Hips as HumanoidRoot"
+    ):
         from_skeleton(legless)
     given = ("HumanoidRoot", "vl5", "vl3", "vc7", "skullbase", "l_hip", "r_hip")
     with pytest.warns(FbaWarning) as said:
@@ -255,6 +258,12 @@ def test_bodies_that_cannot_be_placed() -> None:
     texts = [str(warning.message) for warning in said]
     assert any("unit is unknown" in text for text in texts)
     assert any("no joints for l_knee, l_ankle, r_knee, r_ankle;" in text for text in texts)
+
+
+def test_what_is_no_figure_is_said_to_be_none(shared: Path) -> None:
+    """A picture of a fox whose star alone moves."""
+    with pytest.raises(FormatError, match=r"no human skeleton is found: there is but one joint \(Star.001\)"):
+        fba.read(shared / "data/foreign/bodies/fox.glb")
 
 
 def test_contradictory_motion() -> None:

@@ -16,7 +16,7 @@ from fba.capture._named_bones import _fingers
 from fba.capture.bones import find_bones
 from fba.capture.comparison import find_up
 from fba.capture.preparation import prepare
-from fba.errors import ModelError
+from fba.errors import FbaWarning, ModelError
 
 SKELETON = Skeleton.default()
 
@@ -47,7 +47,8 @@ def test_the_motion_says_which_way_is_up() -> None:
     turn = Rotation.from_euler("x", 90, degrees=True)
     captured = motion("T", 8, turns={"Hips": turn})
     captured = replace(captured, positions=np.tile([0.0, 0.0, 1.0], (8, 1)))
-    ready = prepare(captured, SKELETON)
+    with pytest.warns(FbaWarning, match=r"up is taken to be \+z: people stand along it, .* with up='\+y'"):
+        ready = prepare(captured, SKELETON)
     assert ready.up == "+z"
     assert ready.motion.positions[0] == pytest.approx([0, 1, 0])
     assert prepare(captured, SKELETON, up="+y").up == "+y"
@@ -63,7 +64,8 @@ def test_only_somebody_who_stands_overrules_the_file() -> None:
     """One pose of a dancer, whose trunk lies level, does not say that the rest pose lies."""
     captured = motion("T", 1, turns=LEAP)
     captured = replace(captured, positions=np.array([[0.0, 0.0, 1.0]]))
-    assert prepare(captured, SKELETON).up == "+y"
+    with pytest.warns(FbaWarning, match=r"no floor along any axis|trunks point along"):
+        assert prepare(captured, SKELETON).up == "+y"
     assert prepare(replace(captured, up="+y"), SKELETON, rest="file").up == "+y"
     mapped = prepare(captured, SKELETON, up="+y").mapped
     assert find_up(replace(captured, up="+y"), mapped) == pytest.approx(np.eye(3))
@@ -74,9 +76,9 @@ def test_the_report_finds_up_by_those_who_stand() -> None:
     dog = {"Hips": Rotation.from_euler("x", 130, degrees=True),
            "LeftUpLeg": Rotation.from_euler("x", -80, degrees=True),
            "RightUpLeg": Rotation.from_euler("x", -80, degrees=True)}  # fmt: skip
-    stretched = replace(motion("T", 3, turns=dog), up="+y")
+    stretched = motion("T", 3, turns=dog)
     mapped = find_bones(stretched, None, SKELETON)[1]
-    assert find_up(stretched, mapped) == pytest.approx(np.eye(3))
+    assert find_up(replace(stretched, up="+y"), mapped) == pytest.approx(np.eye(3))
     lain = motion("T", 1, turns={"Hips": Rotation.from_euler("x", -90, degrees=True)})
     both = replace(stretched, rotations=np.concatenate([stretched.rotations, lain.rotations]),
                    positions=np.concatenate([stretched.positions, lain.positions]))  # fmt: skip
@@ -84,10 +86,10 @@ def test_the_report_finds_up_by_those_who_stand() -> None:
 
 
 def test_what_a_format_declares_is_not_overruled() -> None:
-    """Somebody whom a VRM animation lays down lies."""
+    """Somebody whom a VRM animation, or a glTF file, lays down lies."""
     lying = motion("T", 3, turns={"Hips": Rotation.from_euler("x", 90, degrees=True)})
-    assert prepare(replace(lying, up="+y"), SKELETON).up == "+z"
-    names = prepare(lying, SKELETON).mapped.items()
+    assert prepare(replace(lying, up="+y"), SKELETON).up == "+y"
+    names = find_bones(lying, None, SKELETON)[1].items()
     declared = replace(lying, up="+y", declared={lying.names[number]: joint for joint, number in names})
     assert prepare(declared, SKELETON).up == "+y"
     assert find_up(declared, dict(names)) == pytest.approx(np.eye(3))

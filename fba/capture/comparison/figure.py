@@ -93,14 +93,14 @@ def result_figure(solver: BapSolver, baps: Array) -> Figure:
 def find_up(motion: SkeletonMotion, mapped: Mapping[str, int]) -> Float64:
     """Return (3, 3), the rotation of the source's frame that brings up what is up in its motion.
 
-    That is the axis along which the person stands; where nobody does, the one that the format names, else the
-    one from feet to head in most frames, else that of the rest pose.
+    That is the one that the format names, else the axis along which the person stands; where nobody does, the
+    one from feet to head in most frames, else that of the rest pose. `prepare` looks for a floor besides.
     """
     top = [mapped[j] for j in ("skullbase", "vc7", "l_shoulder", "r_shoulder") if j in mapped]
     low = [mapped[j] for j in ("l_ankle", "r_ankle", "l_knee", "r_knee") if j in mapped]
     if not top or not low:
         return np.eye(3)
-    if motion.up and motion.declared:
+    if motion.up:
         return rotations.between(read_axis(motion.up), np.array([0.0, 1.0, 0.0]))
     _, positions = motion.world()
     rest = motion.rest()[None]
@@ -111,7 +111,6 @@ def find_up(motion: SkeletonMotion, mapped: Mapping[str, int]) -> Float64:
     axis = np.array([0.0, 1.0, 0.0])
     for stands in (
         unit(head - feet)[straight],
-        read_axis(motion.up)[None] if motion.up else np.zeros((0, 3)),
         unit(head - feet),
         unit(rest[:, top].mean(axis=1) - rest[:, low].mean(axis=1)),
     ):
