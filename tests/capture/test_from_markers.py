@@ -375,6 +375,9 @@ def test_captures_without_a_face() -> None:
     body = MarkerMotion(tuple(f"m{n}" for n in range(40)), random, np.arange(5) / 100, Fraction(100))
     with pytest.raises(ModelError, match="their shape is not that of a face"):
         find_face(body)
+    for spread in (0.0, 1e-38, 1e5):  # as damaged files have
+        with pytest.raises(ModelError, match="in no unit of length that a face has"):
+            find_face(replace(body, positions=spread * random))
     skin = FaceModel.default().of_kind("skin")[0].vertices
     scalp = skin[(skin[:, 1] > 0.06) & (skin[:, 2] > -0.09)][::7][:60]
     labels = tuple(f"m{n}" for n in range(len(scalp)))

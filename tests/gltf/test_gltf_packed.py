@@ -204,5 +204,5 @@ class TestDraco:
     ) -> None:
         path = self.sheet(self.data(), 4, 6).save(tmp_path / "a.glb")
         monkeypatch.setitem(sys.modules, "DracoPy", None)
-        with pytest.raises(ModelError, match="pip install DracoPy"):
+        with pytest.raises(ModelError, match=r'"mpeg4-fba\[draco\]"'):
             read_gltf(path)

@@ -14,6 +14,7 @@ from fba.capture.blendshapes.motion import ShapeMotion
 from fba.capture.blendshapes.shape_table import with_mates
 from fba.capture.sampling import frame_numbers, interpolate
 from fba.errors import ModelError
+from fba.face.gaze import limit_gaze
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import FAP_COUNT, fap_numbers
 from fba.tracks import FaceTrack
@@ -78,6 +79,7 @@ def convert_rows(
         raise ModelError(f"no name of a shape is known here: {listed}; expected ARKit's, such as 'jawOpen'")
     values += amounts
     part_lids(values)
+    limit_gaze(values)
     rounded = np.rint(np.clip(values, -LARGEST, LARGEST)).astype(np.int32)
     sent = with_mates(moved | turned)
     return FaceTrack(rounded, np.broadcast_to(sent, rounded.shape))

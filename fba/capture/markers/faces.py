@@ -55,7 +55,8 @@ class Traits:
     each other's names, as optical markers do. camera: whether a head that looks along z looks into the
     camera, and turns are counted from there; otherwise from the neutral face. untold: FAPs that they do not
     tell. rests: name -> frames in which a point is where it is in a neutral face, for those whose frames are
-    others than those of the whole face.
+    others than those of the whole face. raised: name -> metres by which a point is above its neutral place
+    even in these frames.
     """
 
     still: frozenset[str] | None = None
@@ -64,6 +65,7 @@ class Traits:
     camera: bool = False
     untold: frozenset[int] = frozenset()
     rests: Mapping[str, Intp] = field(default_factory=dict)
+    raised: Mapping[str, float] = field(default_factory=dict)
 
     def find_still(self, places: Mapping[str, str]) -> list[int]:
         """Return numbers of the points in a map, name -> place, that the head alone moves."""
@@ -239,6 +241,7 @@ def find_face(
     for n, name in enumerate(names):
         if name in traits.rests:
             neutral_local[n] = np.median(local[traits.rests[name], n], axis=0)
+        neutral_local[n, 1] -= traits.raised.get(name, 0.0)
     known = {places[name]: neutral_local[n] for n, name in enumerate(names) if places[name] != "head"}
     points = complete_points(known, model.points)
     _open_by_blinks(points, places, names, local - neutral_local, motion.times)

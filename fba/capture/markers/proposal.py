@@ -92,6 +92,11 @@ def _lay_onto(cloud: Float64, model: FaceModel, up: str) -> tuple[Float64, float
     key = np.array(list(_skin_points(model).values()))
     size = float(np.sqrt(((cloud - cloud.mean(axis=0)) ** 2).sum(axis=1).mean()))
     usual = float(np.sqrt(((key - key.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    if not SIZES[0] * usual < max(FACTORS) * size or not min(FACTORS) * size < SIZES[1] * usual:
+        raise ModelError(
+            "no built-in set has the names of these markers, and their shape is not that of a face: they "
+            f"spread over {size:.2g} m in no unit of length that a face has"
+        ).with_remedies(GIVE_MAP)
     factor = min((1.0, *FACTORS), key=lambda each: abs(np.log(each * size / usual)))
     starts = []
     for axis in _up_axes(up):

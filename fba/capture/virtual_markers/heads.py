@@ -17,7 +17,7 @@ from fba.capture.virtual_markers.followers import find_followers
 from fba.capture.virtual_markers.influence import WalkedMesh
 from fba.errors import ModelError
 from fba.face.authoring.surface.binding import SURFACE_KINDS
-from fba.face.authoring.surface.landmarks import weld_skin
+from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface
 from fba.face.feature_points import names, row_of
 from fba.face.importers import import_model, sniff
@@ -81,6 +81,14 @@ class MarkedHead:
     def followers(self) -> Any:
         """Sparse float64 (N, S): how far each vertex goes with each vertex of the skin."""
         return find_followers(self.parts, self.rows, self.skin, self.metres, self.model)
+
+    @cached_property
+    def landmarks(self) -> Landmarks | None:
+        """Contours on the skin, in metres; None where its feature points do not tell."""
+        try:
+            return find_landmarks(self.skin, self.points * self.metres, self.bound)
+        except ModelError:  # a face without units
+            return None
 
     @cached_property
     def face(self) -> Intp:

@@ -22,13 +22,15 @@ class Influence:
 
     vertices: intp (K,), the centre first, in the order in which the walk meets them. distances: float64 (K,)
     from the centre, in the unit of the mesh. levels: intp (K,), 1 for the centre, 2 for those next to it, and
-    so on. radius: of the cylinder.
+    so on. radius: of the cylinder. given: float64 (K,), shares that do not follow from the distance; None if
+    they do.
     """
 
     vertices: Intp
     distances: Float64
     levels: Intp
     radius: float
+    given: Float64 | None = None
 
     @property
     def shares(self) -> Float64:
@@ -36,6 +38,8 @@ class Influence:
 
         At the ends of a cylinder that is longer than wide, the distance is more than the radius: 0, too.
         """
+        if self.given is not None:
+            return self.given
         return np.maximum(1.0 - self.distances / self.radius, 0.0)
 
 
@@ -113,6 +117,12 @@ def give_to_nearest(influences: Sequence[Influence]) -> list[Influence]:
     kept[order[first]] = True
     ends = np.cumsum([len(each.vertices) for each in influences])[:-1]
     return [
-        Influence(each.vertices[mine], each.distances[mine], each.levels[mine], each.radius)
+        Influence(
+            each.vertices[mine],
+            each.distances[mine],
+            each.levels[mine],
+            each.radius,
+            None if each.given is None else each.given[mine],
+        )
         for each, mine in zip(influences, np.split(kept, ends), strict=True)
     ]

@@ -12,6 +12,7 @@ from fba.name_maps import list_names
 
 ASSIGNMENTS = ("shared", "exclusive")
 OVERLAPS = ("match", "add")
+GAZES = ("none", "camera")
 MOST_SHARE = 10.0
 """Largest share by which one marker goes with another."""
 LARGEST = 1e9
@@ -27,7 +28,8 @@ class VirtualMarker:
     the cylinder's length, along z. Both in the unit of the head. fixed: the face does not move it; what the
     capture says of it is how the head moves. follows: the captured marker that it goes with, "" for that of
     its own name: so a marker on the outer lip takes the inner one along, where nothing can be glued. share:
-    how far it goes with that one, above 0: the ends of a lid go less far than its middle.
+    how far it goes with that one, above 0. lid: the vertex is on the margin of a lid; instead of a cylinder,
+    rows along the lid move, up to the radius above the margin, see `lids.find_rows`.
     """
 
     vertex: int | None
@@ -36,6 +38,7 @@ class VirtualMarker:
     fixed: bool = False
     follows: str = ""
     share: float = 1.0
+    lid: bool = False
 
     def __post_init__(self) -> None:
         if self.follows and (self.fixed or self.vertex is None):
@@ -44,6 +47,8 @@ class VirtualMarker:
             raise OptionError(
                 f"a share, from above 0 to {MOST_SHARE:g}, is of what another marker does, not {self.share:g}"
             )
+        if self.lid and (self.fixed or self.vertex is None):
+            raise OptionError("a lid's marker needs a vertex, and cannot be fixed")
         if self.vertex is None:
             if not self.fixed:
                 raise OptionError(
@@ -78,7 +83,9 @@ class MarkerMapping:
     alone. overlap: how displacements of shared vertices go together. "match": so that each centre goes where
     its marker goes. "add": they are added, as in the source of this method, and centres go too far where
     markers are close to each other. scale: two fixed markers; the distance of their vertices over their own
-    is the scale of all displacements; () for the farthest apart. made_for: the mesh, None if unknown.
+    is the scale of all displacements; () for the farthest apart. gaze: "none", eyes stay in the head as they
+    are, or "camera": they turn against the head, so that they keep looking where they did. squint: 0 to 1, by
+    which share eyes are narrowed, whatever the markers of lids do. made_for: the mesh, None if unknown.
 
     Raises OptionError for parts that contradict each other.
     """
@@ -87,6 +94,8 @@ class MarkerMapping:
     assignment: str = "shared"
     overlap: str = "match"
     scale: tuple[str, ...] = ()
+    gaze: str = "none"
+    squint: float = 0.0
     made_for: MadeFor | None = None
 
     def __post_init__(self) -> None:
@@ -94,9 +103,12 @@ class MarkerMapping:
         for what, value, known in (
             ("assignment", self.assignment, ASSIGNMENTS),
             ("overlap", self.overlap, OVERLAPS),
+            ("gaze", self.gaze, GAZES),
         ):
             if value not in known:
                 raise OptionError(f"{what} must be one of {', '.join(known)}, not {value!r}")
+        if not 0 <= self.squint <= 1:
+            raise OptionError(f"squint must be from 0 to 1, not {self.squint:g}")
         taken: dict[int, str] = {}
         for name, marker in self.markers.items():
             if marker.vertex is not None and marker.vertex in taken:

@@ -28,6 +28,7 @@ KEYS = {
     "fixed": bool,
     "follows": str,
     "share": (int, float),
+    "lid": bool,
 }
 MARKER_WORDS = {int: "a whole number", (int, float): "a number", bool: "true or false", str: "a text"}
 COUNTS, TEXTS = ("vertices", "triangles"), ("name", "connectivity", "shape")
@@ -68,6 +69,10 @@ def write_mapping(path: Path, mapping: MarkerMapping) -> None:
         f"assignment = {_text(mapping.assignment)}",
         f"overlap = {_text(mapping.overlap)}",
     ]
+    if mapping.gaze != "none":
+        lines.append(f"gaze = {_text(mapping.gaze)}")
+    if mapping.squint:
+        lines.append(f"squint = {mapping.squint!r}")
     if mapping.scale:
         lines.append(f"scale = [{', '.join(_text(name) for name in mapping.scale)}]")
     lines += ["", f"[{TABLE}]"]
@@ -94,23 +99,27 @@ def _read_marker(name: str, entry: Any) -> VirtualMarker:
         radius = float(entry.get("radius", 0.0))
         depth = float(entry.get("depth", radius))
         follows, share = entry.get("follows", ""), float(entry.get("share", 1.0))
-        return VirtualMarker(entry.get("vertex"), radius, depth, fixed, follows, share)
+        lid = bool(entry.get("lid", False))
+        return VirtualMarker(entry.get("vertex"), radius, depth, fixed, follows, share, lid)
     except (OptionError, OverflowError) as error:
         raise OptionError(f"{name!r}: {error}") from None
 
 
 def _read_settings(table: Any) -> dict[str, Any]:
-    settings = _checked_table(table, "settings", ("assignment", "overlap", "scale"))
+    settings = _checked_table(table, "settings", ("assignment", "overlap", "scale", "gaze", "squint"))
     result: dict[str, Any] = {}
-    for key in ("assignment", "overlap"):
+    for key in ("assignment", "overlap", "gaze"):
         if key in settings:
             if not isinstance(settings[key], str):
                 raise OptionError(f"settings: {key} must be a word, not {settings[key]!r}")
             result[key] = settings[key]
+    squint = settings.get("squint", 0.0)
+    if isinstance(squint, bool) or not isinstance(squint, int | float):
+        raise OptionError(f"settings: squint must be a number from 0 to 1, not {squint!r}")
     scale = settings.get("scale", [])
     if not isinstance(scale, list) or not all(isinstance(name, str) for name in scale):
         raise OptionError(f"settings: scale must be a list of two markers, not {scale!r}")
-    return {**result, "scale": tuple(scale)}
+    return {**result, "squint": float(squint), "scale": tuple(scale)}
 
 
 def _read_head(table: Any) -> MadeFor:
@@ -138,6 +147,8 @@ def _entry(marker: VirtualMarker) -> str:
         parts += [f"vertex = {marker.vertex}", f"radius = {marker.radius!r}", f"depth = {marker.depth!r}"]
     if marker.fixed:
         parts.append("fixed = true")
+    if marker.lid:
+        parts.append("lid = true")
     if marker.follows:
         parts.append(f"follows = {_text(marker.follows)}")
     if marker.share != 1.0:

@@ -16,6 +16,7 @@ from fba.capture.markers.neutral import neutral_frames
 from fba.capture.markers.stabilisation import follow_head, relate_poses, remove_poses
 from fba.capture.virtual_markers.alignment import align
 from fba.capture.virtual_markers.heads import MarkedHead
+from fba.capture.virtual_markers.lids import Eye, find_eyes, narrow, turn_to_camera
 from fba.capture.virtual_markers.mapping import MarkerMapping
 from fba.capture.virtual_markers.weights import MarkerWeights, find_weights
 from fba.errors import FbaWarning, ModelError
@@ -55,7 +56,9 @@ class MarkerPerformance:
     (T, K, 3), how far each marker moves from the neutral face, in the head's axes and unit; 0 where it is
     fixed. rotation (T, 3, 3), shift (T, 3): the head's motion. scale: the head's units per metre of the
     capture. cloud: float64 (T, M, 3), all markers of the capture as they are in the head's axes, NaN where
-    one was not seen. weights: which vertices go with which markers.
+    one was not seen. weights: which vertices go with which markers. rest: float64 (N, 3), the vertices from
+    which they move: the head's, or with narrowed eyes. eyes: those that look at the camera. looks: float64
+    (T, 3, 3), how they turn in the head.
     """
 
     head: MarkedHead
@@ -68,6 +71,9 @@ class MarkerPerformance:
     scale: float
     cloud: Float64
     weights: MarkerWeights
+    rest: Float64
+    eyes: tuple[Eye, ...]
+    looks: Float64
     _moves: Float64 = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -88,13 +94,16 @@ class MarkerPerformance:
 
     def vertices(self, frame: int) -> Float64:
         """Return the head's vertices in a frame, float64 (N, 3), without the head's motion."""
-        result: Float64 = self.head.vertices + self.weights.shares @ self._moves[frame]
-        return result
+        return self.vertices_between(frame, frame, 0.0)
 
     def vertices_between(self, frame: int, after: int, share: float) -> Float64:
         """Return the vertices between two frames. share: of the later one, 0..1."""
         moves = self._moves[frame] + share * (self._moves[after] - self._moves[frame])
-        result: Float64 = self.head.vertices + self.weights.shares @ moves
+        result: Float64 = self.rest + self.weights.shares @ moves
+        if self.eyes:
+            turn = rotations.part(self.looks[frame], self.looks[after], share)
+            for eye in self.eyes:
+                result[eye.rows] = (result[eye.rows] - eye.centre) @ turn.T + eye.centre
         return result
 
     def pose_between(self, frame: int, after: int, share: float) -> Float64:
@@ -177,7 +186,8 @@ def perform_steady(
     for n, (name, marker) in enumerate(kept.items()):
         source = marker.follows or name
         if not marker.fixed and source in columns:  # one that was left out stays where it is
-            displacements[:, n] = marker.share * local[:, columns[source]]
+            left = 1 - mapping.squint if marker.lid else 1.0  # to the lids of narrowed eyes
+            displacements[:, n] = left * marker.share * local[:, columns[source]]
     # the head's motion about the point that the neutral markers' middle is laid onto
     middle, there = markers.neutral[placed].mean(axis=0), centres.mean(axis=0)
     rotation = turn @ markers.rotation @ turn.T
@@ -186,8 +196,24 @@ def perform_steady(
     cloud = np.einsum("ij,tkj->tki", scale * turn, motion.positions - middle) + there
     return MarkerPerformance(
         head, mapping, motion.rate, motion.times, displacements, rotation, shift, scale, cloud,
-        find_weights(head, mapping),
+        find_weights(head, mapping), _find_rest(head, mapping.squint), _find_looking(head, mapping.gaze),
+        turn_to_camera(rotation),
     )  # fmt: skip
+
+
+def _find_rest(head: MarkedHead, squint: float) -> Float64:
+    return head.vertices + narrow(head, squint) if squint else head.vertices
+
+
+def _find_looking(head: MarkedHead, gaze: str) -> tuple[Eye, ...]:
+    """Return the eyes that look at the camera; none if they stay in the head."""
+    eyes = find_eyes(head) if gaze == "camera" else ()
+    if gaze == "camera" and not eyes:
+        raise ModelError(
+            f"{head.name} has no eyes that could look at the camera: none of its parts is of the kind eye. "
+            "Give a face model, or leave out the gaze"
+        )
+    return eyes
 
 
 def _measure_scale(head: MarkedHead, mapping: MarkerMapping, markers: SteadyMarkers, usual: float) -> float:

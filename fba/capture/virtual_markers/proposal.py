@@ -11,8 +11,9 @@ from fba.capture.markers.marker_maps import find_map
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.targets import HEAD, RIGID, target_points
 from fba.capture.virtual_markers.alignment import align
-from fba.capture.virtual_markers.companions import LIDS, find_companions
+from fba.capture.virtual_markers.companions import find_companions
 from fba.capture.virtual_markers.heads import MarkedHead
+from fba.capture.virtual_markers.lids import lid_at, lid_height
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
 from fba.errors import ModelError
 from fba.face.feature_points import row_of
@@ -29,6 +30,8 @@ RADII = (0.010, 0.045)
 """Smallest and largest radius that is proposed, metres on a head of natural size."""
 FIRST_RADIUS = 0.03
 """Metres, on a head of natural size, that the first virtual marker reaches."""
+LIDS = ("3.1", "3.2", "3.3", "3.4")
+"""Middles of lids."""
 EYE_CORNERS = ("3.7", "3.11", "3.12", "3.8")
 LID_REACH = 0.8
 """Share of the way to the nearer corner of the eye that a lid's radius is: a walk that reaches the corner
@@ -44,7 +47,7 @@ def propose_mapping(
     the cloud's shape. A marker at a feature point that the head has gets its vertex; one that the face does
     not move is fixed. Others are laid onto the nearest skin between them, and some
     virtual markers follow captured ones, see `find_companions`. The radius reaches just beyond the
-    third nearest of the other markers.
+    third nearest of the other markers; lids move by their rows, see `lids.find_rows`.
 
     Raises ModelError where too few places are known.
     """
@@ -73,11 +76,12 @@ def propose_mapping(
     ]
     vertices |= _lay_others(motion, head, vertices, others)
     radii = _radii(head, vertices, places)
-    markers = {
-        name: VirtualMarker(vertices[name], radii[name], radii[name], name in fixed)
-        for name in motion.names
-        if name in vertices
-    }
+    markers = {}
+    for name in motion.names:
+        if name in vertices:
+            lid = lid_at(head, vertices[name]) if places.get(name) in LIDS else ""
+            radius = round(lid_height(head, lid), 6) if lid else radii[name]
+            markers[name] = VirtualMarker(vertices[name], radius, radius, name in fixed, lid=bool(lid))
     markers |= find_companions(head, vertices, places, motion.names)
     # what is on a cap, or where this head has no skin, still tells how the head moves
     markers |= {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,8 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture.virtual_markers.heads import MarkedHead
 from fba.capture.virtual_markers.influence import Influence, give_to_nearest
-from fba.capture.virtual_markers.mapping import MarkerMapping
+from fba.capture.virtual_markers.lids import find_rows
+from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
 
 LEAST_DIRECTION = 0.05
 """Combinations of markers that their overlapping reach hardly tells apart, relative to the clearest, are left
@@ -37,18 +39,31 @@ class MarkerWeights:
         return result
 
 
+def find_influences(head: MarkedHead, markers: Iterable[VirtualMarker]) -> list[Influence]:
+    """Return what virtual markers with a vertex move, each for itself, as vertices of the head's skin.
+
+    Errors as of `WalkedMesh.walk` and `find_rows`.
+    """
+    listed = list(markers)
+    number = head.skin.number
+    walked = head.walked.walk([(int(number[each.vertex or 0]), each.radius, each.depth) for each in listed])
+    return [
+        find_rows(head, each.vertex or 0, each.radius) if each.lid else influence
+        for each, influence in zip(listed, walked, strict=True)
+    ]
+
+
 def find_weights(head: MarkedHead, mapping: MarkerMapping) -> MarkerWeights:
     """Return the weights of all virtual markers that have a vertex, in their order.
 
-    What is not skin goes with it as `find_followers` says. Errors as of `WalkedMesh.walk`.
+    What is not skin goes with it as `find_followers` says. Errors as of `find_influences`.
     """
     from scipy.sparse import csr_array
 
     markers = mapping.centres
     names = tuple(markers)
     number = head.skin.number
-    centres = [(int(number[each.vertex or 0]), each.radius, each.depth) for each in markers.values()]
-    influences = head.walked.walk(centres)
+    influences = find_influences(head, markers.values())
     if mapping.assignment == "exclusive":
         influences = give_to_nearest(influences)
     rows = np.concatenate([np.zeros(0, np.intp), *(each.vertices for each in influences)])
@@ -57,6 +72,6 @@ def find_weights(head: MarkedHead, mapping: MarkerMapping) -> MarkerWeights:
     on_skin = csr_array((values, (rows, columns)), shape=(len(head.skin), len(names)))
     solve = np.eye(len(names))
     if mapping.overlap == "match" and names:
-        overlap = on_skin[[centre for centre, _, _ in centres]].toarray()
+        overlap = on_skin[number[[each.vertex or 0 for each in markers.values()]]].toarray()
         solve = np.linalg.pinv(overlap, rcond=LEAST_DIRECTION)
     return MarkerWeights(names, tuple(influences), (head.followers @ on_skin).tocsr(), solve)

@@ -12,6 +12,7 @@ import click
 
 from fba.cli import options
 from fba.cli.command import Command, examples, usage_errors
+from fba.cli.inputs import ExistingPath
 from fba.cli.joint_options import MapType, Pair
 from fba.cli.marker_options import NeutralType
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
@@ -40,8 +41,8 @@ Neutral = str | int | tuple[float, float]
         "fba markers face.csv scan.obj --map mapping.toml -o moved.glb",
     ),
 )
-@click.argument("capture", metavar="CAPTURE", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.argument("head", metavar="[HEAD]", required=False, type=click.Path(exists=True, path_type=Path))
+@click.argument("capture", metavar="CAPTURE", type=ExistingPath(dir_okay=False))
+@click.argument("head", metavar="[HEAD]", required=False, type=ExistingPath())
 @click.option(
     "-o",
     "--output",
@@ -66,7 +67,7 @@ Neutral = str | int | tuple[float, float]
     "the capture's name with .virtual.toml.",
 )
 @options.no_clobber_option
-@click.option("--points", type=click.Path(exists=True, path_type=Path), metavar="FILE",
+@click.option("--points", type=ExistingPath(), metavar="FILE",
               help="Feature points of HEAD (CSV, JSON, FDP). Default: a file beside HEAD with the same name, "
               "else what is found.")  # fmt: skip
 @click.option(
@@ -91,6 +92,18 @@ Neutral = str | int | tuple[float, float]
     show_default=True,
     metavar="auto|first|N|FROM-TO",
     help="The neutral face is found, the first moment, frame N, or between two times.",
+)
+@click.option(
+    "--gaze",
+    type=click.Choice(["none", "camera"]),
+    help="Eyes stay in the head as they are, or keep looking at the camera while it turns. Default: as the "
+    "mapping says, none in a new one.",
+)
+@click.option(
+    "--squint",
+    type=click.FloatRange(0, 100),
+    metavar="PERCENT",
+    help="Narrow the eyes by this share of their opening. Default: as the mapping says, 0 in a new one.",
 )
 @click.option("--marker", metavar="NAME", help="Marker whose reach is shown in colours.")
 @click.option(
@@ -120,6 +133,8 @@ def command(
     assignment: str | None,
     overlap: str | None,
     neutral: Neutral,
+    gaze: str | None,
+    squint: float | None,
     marker: str | None,
     cloud: str | None,
     camera: str,
@@ -158,7 +173,11 @@ def command(
         shown = read_head(head, points=points, up=up, limits=limit)
         mapping = _find_mapping(motion, shown, saved, maps, limit, needed=output is not None)
     mapping = replace(
-        mapping, assignment=assignment or mapping.assignment, overlap=overlap or mapping.overlap
+        mapping,
+        assignment=assignment or mapping.assignment,
+        overlap=overlap or mapping.overlap,
+        gaze=gaze or mapping.gaze,
+        squint=mapping.squint if squint is None else squint / 100,
     )
     if marker is not None and marker not in (*motion.names, *mapping.markers):
         from fba.name_maps import list_names
@@ -304,6 +323,7 @@ def _find_mapping(
 def _put(mapping: MarkerMapping, head: MarkedHead, name: str, vertex: str) -> MarkerMapping:
     """Return a mapping with a marker on a vertex, "" to take it away."""
     from fba.capture.virtual_markers import VirtualMarker
+    from fba.capture.virtual_markers.lids import lid_at
     from fba.capture.virtual_markers.proposal import usual_radius
 
     if not vertex:
@@ -311,7 +331,8 @@ def _put(mapping: MarkerMapping, head: MarkedHead, name: str, vertex: str) -> Ma
     old = mapping.markers.get(name)
     number = int(vertex[:18])
     if old is not None and old.vertex is not None:
-        return mapping.changed(name, replace(old, vertex=number))
+        lid = old.lid and bool(lid_at(head, number))
+        return mapping.changed(name, replace(old, vertex=number, lid=lid))
     radius = usual_radius(mapping, head)
     return mapping.changed(name, VirtualMarker(number, radius, radius, old is not None and old.fixed))
 

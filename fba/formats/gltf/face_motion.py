@@ -17,6 +17,7 @@ from fba.arrays import Bool, Float64
 from fba.capture.blendshapes.combination import combine, part_lids
 from fba.capture.blendshapes.shape_table import amounts_of, with_mates
 from fba.errors import FbaWarning
+from fba.face.gaze import limit_gaze
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
 from fba.formats.gltf.clips import choose_clip
 from fba.formats.gltf.humanoid import find_humanoid
@@ -76,6 +77,7 @@ def read_face_motion(gltf: Gltf, clip: Clip, times: Float64, *, head: bool = Fal
     if not sent.any():
         return None
     part_lids(values)
+    limit_gaze(values)
     rounded = np.rint(np.clip(values, -LARGEST, LARGEST)).astype(np.int32)
     return FaceTrack(rounded, np.broadcast_to(with_mates(sent), rounded.shape))
 

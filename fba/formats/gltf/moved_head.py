@@ -45,7 +45,8 @@ def write_moved_head(path: Path, performance: MarkerPerformance, name: str = "")
     for number, part in enumerate(performance.head.parts):
         if not len(part.triangles):
             continue
-        shape = replace(part, vertices=(part.vertices * np.float32(metres)).astype(np.float32))
+        rest = performance.rest[performance.head.rows[number]]
+        shape = replace(part, vertices=(rest * metres).astype(np.float32))
         primitive = materials.primitive(shape)
         mesh: dict[str, Any] = {"name": part.name, "primitives": [primitive]}
         child = builder.add("nodes", {"name": part.name})
@@ -54,6 +55,10 @@ def write_moved_head(path: Path, performance: MarkerPerformance, name: str = "")
         adopt(builder, node, child)
         if weights is not None:
             clip.animate(child, "weights", weights)
+        for eye in performance.eyes:
+            if eye.part == number:
+                centre = eye.centre * metres
+                move(builder, clip, child, performance.looks, centre - performance.looks @ centre)
     builder.root["scene"] = 0
     builder.add("scenes", {"nodes": [node]})
     if clip.channels:

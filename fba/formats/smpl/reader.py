@@ -42,6 +42,10 @@ JAW_OPEN = np.radians(20.0)
 """Angle of the jaw at which the mouth is as open as by a shape "jawOpen" of weight 1."""
 SLOWEST, FASTEST = 0.1, 10_000
 """Frames per second below and beyond which a rate is damage."""
+MOST_TURN = 1000.0
+"""Largest number of a rotation vector, radians; more is damage."""
+FARTHEST = 1e6
+"""Largest coordinate of the root's path, metres; more is damage."""
 UPRIGHT = 0.6
 """Least share of the mean direction of heads along an axis for that axis to be up."""
 
@@ -107,14 +111,22 @@ def _read(path: Path, fps: Fraction | int | str | None, limits: Limits) -> _Moti
     path_of_root = arrays.get("trans", np.zeros((count, 3)))
     if path_of_root.shape != (count, 3):
         raise FormatError(f"trans has the shape {path_of_root.shape}, not ({count}, 3)", path=path)
-    parts = {"poses": poses, "trans": path_of_root, "jaw": jaw, "eyes": eyes}
-    for name, values in parts.items():
-        if values is not None and not np.isfinite(values).all():
-            row = int(np.argwhere(~np.isfinite(values))[0][0])
-            raise FormatError(f"frame {row}: {name} has a number that is not finite", path=path)
+    _check_sizes(path, MOST_TURN, "rad", {"poses": poses, "pose_jaw": jaw, "pose_eye": eyes})
+    _check_sizes(path, FARTHEST, "m", {"trans": path_of_root})
     rate = _rate(arrays, fps, path)
     turns = poses.reshape(count, -1, 3)
     return _Motion(turns, path_of_root, jaw, None if eyes is None else eyes.reshape(count, 2, 3), rate)
+
+
+def _check_sizes(path: Path, most: float, unit: str, arrays: Mapping[str, Float64 | None]) -> None:
+    """Raise FormatError unless all numbers of arrays (T, N) lie within -most..most."""
+    for name, values in arrays.items():
+        if values is not None and not (within := np.abs(values) <= most).all():
+            frame, column = np.argwhere(~within)[0].tolist()
+            raise FormatError(
+                f"frame {frame}: {name} must be finite numbers of at most {most:g} {unit}",
+                path=path, token=f"{values[frame, column]:g}",
+            )  # fmt: skip
 
 
 def _rate(arrays: dict[str, Any], fps: Fraction | int | str | None, path: Path) -> Fraction:

@@ -16,9 +16,11 @@ from fba.arrays import Bool, Float64
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers import MarkedHead, MarkerMapping, MarkerPerformance, VirtualMarker
 from fba.capture.virtual_markers.influence import Influence, give_to_nearest
+from fba.capture.virtual_markers.lids import lid_at
 from fba.capture.virtual_markers.mapping_files import write_mapping
 from fba.capture.virtual_markers.performance import Neutral, SteadyMarkers, perform_steady, steady
 from fba.capture.virtual_markers.proposal import usual_radius
+from fba.capture.virtual_markers.weights import find_influences
 from fba.errors import FbaError, FbaWarning, OptionError
 
 
@@ -123,7 +125,8 @@ class MarkerEditing:
         depth = old.depth if old is not None and old.depth > 0 else radius
         placed = VirtualMarker(vertex, radius, depth)
         if old is not None:
-            placed = replace(placed, fixed=old.fixed, follows=old.follows)
+            lid = old.lid and bool(lid_at(self.head, vertex))
+            placed = replace(placed, fixed=old.fixed, follows=old.follows, lid=lid)
         self._change("vertex", self.mapping.changed(self.current, placed))
 
     def resize(self, radius: float, depth: float) -> None:
@@ -142,7 +145,7 @@ class MarkerEditing:
         elif old.vertex is None and not fixed:
             marker = None
         else:
-            marker = replace(old, fixed=fixed)
+            marker = replace(old, fixed=fixed, lid=False)
         self._change("fixed", self.mapping.changed(self.current, marker))
 
     def assign(self, assignment: str) -> None:
@@ -227,11 +230,8 @@ class MarkerEditing:
         centres = self.mapping.centres
         if self.current not in centres:
             return None
-        number = self.head.skin.number
         chosen = centres if self.mapping.assignment == "exclusive" else {self.current: centres[self.current]}
-        found = self.head.walked.walk(
-            [(int(number[each.vertex or 0]), each.radius, each.depth) for each in chosen.values()]
-        )
+        found = find_influences(self.head, chosen.values())
         if self.mapping.assignment == "exclusive":
             found = give_to_nearest(found)
         return found[list(chosen).index(self.current)]

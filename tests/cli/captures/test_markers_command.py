@@ -63,11 +63,12 @@ def test_a_proposed_mapping_is_written_changed_and_used(
     assert proposed.made_for.name == "head.obj"
     assert proposed.markers["8.2"].vertex == small_head().bound[row_of()["8.2"]]
     code, out, err = run(
-        "markers", *files, "--map", first, "--map", "8.2=7", "--map", "9.3=", "--overlap", "add", "-o", second
-    )
+        "markers", *files, "--map", first, "--map", "8.2=7", "--map", "9.3=", "--overlap", "add",
+        "--gaze", "camera", "--squint", "30", "-o", second,
+    )  # fmt: skip
     assert (code, err) == (0, "")
     changed = read_mapping(second)
-    assert changed.overlap == "add"
+    assert (changed.overlap, changed.gaze, changed.squint) == ("add", "camera", 0.3)
     assert changed.markers["8.2"] == replace(proposed.markers["8.2"], vertex=7)
     assert set(proposed.markers) - set(changed.markers) == {"9.3"}
     code, _, err = run("markers", *files, "--map", first, "-o", second, "--no-clobber")

@@ -126,8 +126,9 @@ def test_bones_of_eyes_and_jaw(tmp_path: Path) -> None:
         skull["rotation"] = [-float(np.sin(np.pi / 4)), 0, 0, float(np.cos(np.pi / 4))]
 
     edit(path, turn)  # its own z is now the head's y: -60 degrees about it look to the right
-    yaw = column(fba.read(path), "yaw_l_eyeball") / 1e5
-    np.testing.assert_allclose(np.degrees(yaw), -60 * RAMP, atol=0.5)
+    with pytest.warns(FbaWarning, match="eyes that turn further than 34 degrees"):
+        yaw = column(fba.read(path), "yaw_l_eyeball") / 1e5
+    np.testing.assert_allclose(np.degrees(yaw), [0, -15, -30, -34.4, -34.4], atol=0.5)
 
 
 def test_unknown_targets_are_named(tmp_path: Path) -> None:
@@ -203,3 +204,19 @@ def test_a_mesh_that_turns_turns_the_head(tmp_path: Path) -> None:
         assert animation.body is None
         np.testing.assert_allclose(column(animation, name) / 1e5, np.radians(degrees * RAMP), atol=1e-3)
         assert column(animation, "open_jaw")[-1] > 800
+
+
+@pytest.mark.parametrize("degrees", [40.0, 83.0, 166.0])
+def test_eyes_do_not_turn_into_the_head(tmp_path: Path, degrees: float) -> None:
+    """A gaze that goes round to the back of the head stops where eyes do, on its side, and this is said."""
+    gaze = [Rotation.from_euler("Y", [degrees * s], degrees=True) for s in RAMP]
+    path = write_person(
+        tmp_path / "a.vrma", clips={"look": {"head": [Rotation.identity()] * len(gaze)}},
+        extension="VRMC_vrm_animation", gaze=gaze,
+    )  # fmt: skip
+    with pytest.warns(FbaWarning, match="eyes that turn further than 34 degrees"):
+        animation = fba.read(path)
+    assert animation.face is not None
+    yaw = animation.face.values[:, fap_numbers()["yaw_l_eyeball"] - 1]
+    assert yaw.max() == 60_000
+    assert yaw.min() >= 0

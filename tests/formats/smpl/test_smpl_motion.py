@@ -109,7 +109,18 @@ def test_rates(tmp_path: Path) -> None:
     [
         ({"poses": np.zeros((FRAMES, 100))}, r"poses has the shape \(9, 100\); expected frames of 66, 72"),
         ({"poses": np.zeros((0, 156))}, r"poses has the shape \(0, 156\)"),
-        ({"poses": np.full((FRAMES, 156), np.nan)}, "frame 0: poses has a number that is not finite"),
+        (
+            {"poses": np.full((FRAMES, 156), np.nan)},
+            r"frame 0: poses must be finite numbers .*\(found 'nan'\)",
+        ),
+        (
+            {"poses": np.full((FRAMES, 156), 1e199)},
+            "frame 0: poses must be finite numbers of at most 1000 rad",
+        ),
+        (
+            {"poses": body().reshape(FRAMES, -1), "trans": np.full((FRAMES, 3), -1e300)},
+            "frame 0: trans must be finite numbers of at most 1e",
+        ),
         ({"poses": np.zeros((FRAMES, 156)), "trans": np.zeros((3, 3))}, r"trans has the shape \(3, 3\)"),
         ({"poses": np.zeros((FRAMES, 156)), "mocap_framerate": 0.0}, "its frame rate must be 0.1 to 10000"),
         ({"root_orient": np.zeros((9, 3)), "pose_body": np.zeros((8, 63))}, "differ in their frames"),
