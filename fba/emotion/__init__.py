@@ -1,6 +1,6 @@
 """Emotions as FAPs: named expressions, measured profiles, mixtures by rules, the plane of emotions.
 
-Digest faces-and-emotions.md, sections 7 and 8. `expression` gives one by name, `combine` mixes them,
+After chapter 8 of the thesis in docs/emotion.md. `expression` gives one by name, `combine` mixes them,
 `expression_at` finds one for an activation and an evaluation, `perform` makes an `Animation` of them.
 """
 

@@ -53,7 +53,7 @@ class Blend:
 
 
 def combine(weights: Mapping[str, float], rules: Rules | None = None) -> Blend:
-    """Return expressions mixed by the rules of the digest (faces-and-emotions.md, 8.7).
+    """Return expressions mixed by the rules of `fba.emotion.rules`.
 
     weights: intensities, 0 to 100, by name or alias; "neutral" adds nothing. rules: their parameters.
 

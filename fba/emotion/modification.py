@@ -1,4 +1,4 @@
-"""`emote`: a performance played in a mood. Digest emotional-markers.md, section 6.
+"""`emote`: a performance played in a mood. Section 3.6 of the second thesis in docs/emotion.md.
 
 A mood moves the rest shape of the face, and the performance is added. Where the mood has brought a feature
 near its limit already, the performance moves it less. Eyes that the performer shuts are shut, and lips that
@@ -18,7 +18,7 @@ from fba.arrays import Bool, Float64, Int32
 from fba.easing import smoothstep
 from fba.emotion.blending import combine
 from fba.emotion.expressions import expressions
-from fba.emotion.moods import Mood, MoodCurve, intensity_curves
+from fba.emotion.moods import Mood, MoodCurve, check_spans, intensity_curves
 from fba.emotion.rules import Rules, limited
 from fba.errors import OptionError
 from fba.face.expressions import Definitions
@@ -91,14 +91,15 @@ def emote(
     What the face shows (`fba.face.resolve`, with a model's definitions of visemes and expressions) is sent as
     low-level FAPs, all within the standard's limits. Frames without any mood keep their values.
 
-    Raises OptionError for an animation without a face, or without moods, and for moods that contradict each
-    other.
+    Raises OptionError for an animation without a face, or without moods, for moods that contradict each
+    other, and for a mood that begins after the performance ends or ends before it begins.
     """
     if animation.face is None or not len(animation):
         raise OptionError("there is no face to put into a mood")
     if not moods:
         raise OptionError("no mood is given")
     times = (animation.index - animation.index[0]) / float(animation.rate)
+    check_spans(moods, float(times[-1]))
     curves = intensity_curves(moods, times.astype(np.float64))
     shown = resolve(animation.face, model)
     curves = curves or {next(iter(expressions())).name: np.zeros(len(animation))}  # neutral

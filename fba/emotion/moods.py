@@ -99,6 +99,20 @@ class MoodCurve:
         return np.asarray(self.intensities[first] + share * step)
 
 
+def check_spans(moods: Sequence[Mood | MoodCurve], length: float) -> None:
+    """Raise OptionError for a mood that a performance of `length` seconds does not reach."""
+    for mood in moods:
+        if not isinstance(mood, Mood):
+            continue
+        if mood.start is not None and mood.start > length:
+            raise OptionError(
+                f"{mood.name!r} begins at {mood.start:g} s, but the performance ends at {length:g} s: give "
+                "an earlier time"
+            )
+        if mood.end is not None and mood.end <= 0:
+            raise OptionError(f"{mood.name!r} ends at {mood.end:g} s: the performance begins at 0 s")
+
+
 def intensity_curves(moods: Sequence[Mood | MoodCurve], times: Float64) -> dict[str, Float64]:
     """Return the intensity of every expression at some times (T,), seconds: float64 (T,) by name.
 

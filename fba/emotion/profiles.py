@@ -1,7 +1,7 @@
 """What moves in each of the six families, and how far it was measured to move.
 
-Digest faces-and-emotions.md, Tables 8-3 (`vocabulary.csv`) and 8-4 (`measured.csv`). The measured values are
-changes of distances on a face, in FAPU; `sign` turns them into FAPs (section 8.5 of the digest).
+Tables 8-3 (`vocabulary.csv`) and 8-4 (`measured.csv`) of the thesis that docs/emotion.md names. The measured
+values are changes of distances on a face, in FAPU; `sign` turns them into FAPs.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 from fba.arrays import Bool, Float64, Intp
 from fba.emotion.expression import FAMILIES, NEUTRAL_POINT
@@ -32,6 +33,9 @@ BLINK = 0.5
 """Seconds after which lids that are shut are no blink any more, and count."""
 SHUT = 400
 """An upper lid that is this far down, in IRISD, may belong to a blink."""
+HELD, HELD_SHARE = 2.0, 0.5
+"""Brows that were lower than this share of their height at any time in these seconds may stress a word; those
+that are held show something."""
 NEAREST = 3
 """Expressions that a reading lists."""
 LEAST = 0.02
@@ -96,13 +100,15 @@ class Recogniser:
         self._baseline = None if baseline is None else _row(baseline, "baseline").astype(np.float64)
         self._seconds = 1 / float(rate)
         self._shut_for = math.inf  # lids that are shut from the start are shut
+        self._heights = np.zeros(0)  # of the brows in the last frames; held before the first
         self._state: Float64 | None = None  # of each label
         self._within: Float64 | None = None  # of each name and intensity, within its label
 
     def prepare(self) -> None:
         """Compute what frames are compared with, so that not even the first waits for it."""
         for known in (self._known, self._known & ~_lids()):
-            model(known)
+            for accents in (False, True):
+                model(known, accents)
         _states()
 
     def push(self, faps: npt.ArrayLike) -> Reading:
@@ -129,15 +135,14 @@ class Recogniser:
         return readings
 
     def _log_probabilities(self, values: Float64) -> Float64:
-        """Return logs for (T, 68) frames, of which those in a blink are read without the lids."""
-        blinking = self._find_blinks(values)
-        if not blinking.any():
-            return model(self._known).log_probabilities(values)
+        """Return logs for (T, 68) frames: those in a blink without the lids, those in an accent with it."""
+        blinking, accented = self._find_blinks(values), self._find_accents(values)
         logs = np.empty((len(values), 2 + len(candidates()) * len(INTENSITIES)))
-        without_lids = self._known & ~_lids()
-        for chosen, known in ((blinking, without_lids), (~blinking, self._known)):
-            if chosen.any():
-                logs[chosen] = model(known).log_probabilities(values[chosen])
+        for lids, known in ((True, self._known & ~_lids()), (False, self._known)):
+            for accents in (False, True):
+                chosen = (blinking == lids) & (accented == accents)
+                if chosen.any():
+                    logs[chosen] = model(known, accents).log_probabilities(values[chosen])
         return logs
 
     def _find_blinks(self, values: Float64) -> Bool:
@@ -151,6 +156,21 @@ class Recogniser:
             self._shut_for = self._shut_for + self._seconds if shut else 0.0
             blinking[frame] = shut and self._shut_for <= BLINK
         return blinking
+
+    def _find_accents(self, values: Float64) -> Bool:
+        """Return which frames have brows that were raised a moment ago: bool (T,)."""
+        sides = [[column for column in side if self._known[column]] for side in _BROWS]
+        heights = [values[:, side].mean(axis=1) for side in sides if side]
+        if not heights or not len(values):
+            return np.zeros(len(values), dtype=bool)
+        height = np.max(heights, axis=0)
+        before = max(1, round(HELD / self._seconds))
+        missing = np.full(before - len(self._heights), height[0])
+        every = np.concatenate([missing, self._heights, height])
+        self._heights = every[-before:]
+        lowest = sliding_window_view(every, before + 1).min(axis=1)
+        accented: Bool = (height > 0) & (lowest < HELD_SHARE * height)
+        return accented
 
     def _advance(self, logs: Float64 | None) -> None:
         """Take in the logs of a frame, (2 + 7 N,); None for one that says nothing."""
@@ -256,4 +276,5 @@ def _lids() -> Bool:
 
 
 _UPPER_LIDS = tuple(fap_numbers()[f"close_t_{side}_eyelid"] - 1 for side in "lr")
+_BROWS = tuple([fap_numbers()[f"raise_{side}_{part}_eyebrow"] - 1 for part in "mo"] for side in "lr")
 _STRENGTHS = np.array(INTENSITIES)

@@ -1,6 +1,6 @@
 """The two rules by which expressions mix: of one family, and of two.
 
-Digest faces-and-emotions.md, section 8.7. The source gives no numbers; those here are named parameters.
+Section 8.4 of the thesis in docs/emotion.md, which gives no numbers; those here are named parameters.
 """
 
 from __future__ import annotations
@@ -177,10 +177,10 @@ def _dominance(activations: list[float], rules: Rules) -> list[float]:
 
 
 def _grow(value: float, crossover: float) -> float:
-    """Return 0 at 0, rising to 1 at the crossover."""
-    if value >= crossover:
-        return 1.0
-    return float(smoothstep(value / crossover))
+    """Return 0 at 0, rising to 1 at the crossover; if that is 0, 1 for all that is more than 0."""
+    if value <= 0:
+        return 0.0
+    return 1.0 if value >= crossover else float(smoothstep(value / crossover))
 
 
 def limited(values: Floating) -> Float32:

@@ -1,4 +1,4 @@
-"""Activation and evaluation of words by Whissel: `whissel.csv`, digest faces-and-emotions.md, Table 8-1."""
+"""Activation and evaluation of words by Whissel: `whissel.csv`, Table 8-1 of the source (docs/emotion.md)."""
 
 from __future__ import annotations
 

@@ -88,6 +88,8 @@ def test_side_by_side(run: Run, still: Path, tmp_path: Path) -> None:
         (("--emotion", "angry=5@2"), "write times as @2s-6s"),
         (("--emotion", "angry=5", "--from", "soon"), "is no time"),
         (("--emotion", "angry=5", "--from", "3", "--to", "2"), "give an end after that"),
+        (("--emotion", "angry=5", "--from", "50s"), "'anger' begins at 50 s, but the performance ends at"),
+        (("--emotion", "angry=5", "--to", "-2s"), "'anger' ends at -2 s: the performance begins at 0 s"),
         (("--emotion", "angry=5", "--emotion", "anger=9"), "at the same time"),
         (("--emotion", "angry=5", "--size", "64x64"), "--size goes with a picture"),
         (("--emotion", "angry=5", "--side-by-side"), "--side-by-side goes with a picture"),
@@ -110,11 +112,12 @@ def test_mistakes(run: Run, still: Path, tmp_path: Path, given: tuple[str, ...],
         ("seconds,emotion,intensity\n1\n", "must be numbers"),
         ("", "the column 'seconds' is missing"),
         ("\0\0", "the column 'seconds' is missing"),
+        ("seconds,emotion,intensity\n1,\udcff,5\n", "is not UTF-8 text (byte 28); save it as UTF-8"),
     ],
 )
 def test_tables_that_are_none(run: Run, still: Path, tmp_path: Path, table: str, said: str) -> None:
     keys, out = tmp_path / "keys.csv", tmp_path / "out.fba"
-    keys.write_text(table)
+    keys.write_text(table, encoding="utf-8", errors="surrogateescape")
     done = run("emote", still, "-o", out, "--keys", keys)
     assert done.code == 1
     assert said in " ".join(done.err.split())

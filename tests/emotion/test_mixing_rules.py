@@ -60,9 +60,28 @@ def test_intensity_counts_in_activation() -> None:
     assert mix_families((surprise, anger), Rules())[BROW] == pytest.approx(-200)
 
 
-def test_equal_activations_share() -> None:
-    mixed = mix_families((part({BROW: 200}), part({BROW: -100}, family="anger")), Rules())
-    assert mixed[BROW] == pytest.approx(50)
+@pytest.mark.parametrize("crossover", [0, 0.1])
+def test_equal_activations_share(crossover: float) -> None:
+    pair = (part({BROW: 200}), part({BROW: -100}, family="anger"))
+    assert mix_families(pair, Rules(crossover=crossover))[BROW] == pytest.approx(50)
+
+
+@pytest.mark.parametrize(("lead", "brow", "lid"), [(5.001, 200, -20), (4.999, -200, -50)])
+def test_without_a_crossover_the_rules_take_hold_at_once(lead: float, brow: float, lid: float) -> None:
+    first = part({JAW: 600, BROW: 200}, activation=lead, family="surprise")
+    second = part({BROW: -200, LID: -50}, activation=5, family="anger")
+    mixed = mix_families((first, second), Rules(reduction=0.4, crossover=0))
+    assert mixed[[BROW, LID]] == pytest.approx([brow, lid])
+
+
+def test_without_a_crossover_all_expressions_mix() -> None:
+    """Named ones together and in pairs of one family, also where one has no intensity."""
+    rules = Rules(crossover=0)
+    assert emotion.combine({one.name: 100 for one in emotion.expressions()}, rules).faps.any()
+    assert emotion.combine({"fear": 60, "terror": 60, "joy": 30}, rules).faps.any()
+    assert emotion.combine({"fear": 60, "joy": 0}, rules).faps == pytest.approx(
+        emotion.combine({"fear": 60}).faps
+    )
 
 
 def test_a_third_comes_in_reduced_after_the_second() -> None:

@@ -4,10 +4,12 @@ from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import fba
 from fba import Animation, FaceTrack, emotion
 from fba.capture import ActionUnitMotion, from_action_units
 from fba.emotion import Reading, Recogniser
@@ -183,6 +185,84 @@ def test_eyes_that_look_up_or_down_show_nothing(pitch: int, follow: bool) -> Non
     reading = read_one(faps)
     assert reading.label == "neutral"
     assert reading.probability > 0.9
+
+
+def raised(seconds: float, height: float, *, sides: str = "lr", smile: float = 0.0) -> Animation:
+    """Brows that rise within a fifth of a second and fall after some time; eyes and mouth are known, at rest.
+
+    Inner, middle and outer ends in the proportions of people who nod: 1, 0.7 and 0.5.
+    """
+    frames = round(25 * seconds)
+    shape = np.interp(np.arange(frames + 40), [15, 20, 15 + frames, 20 + frames], [0, 1, 1, 0])
+    rows = np.tile(smile * emotion.expression("smile").faps, (len(shape), 1))
+    for part, share in (("i", 1.0), ("m", 0.7), ("o", 0.5)):
+        rows[:, columns(*(f"raise_{side}_{part}_eyebrow" for side in sides))] += (
+            share * height * shape[:, None]
+        )
+    rows[0, columns("close_", "open_")] = 1  # sent, though the eyes stay as they are
+    mask = np.ones(rows.shape, bool)
+    mask[:, :2] = False
+    return Animation(25, np.arange(len(rows)), FaceTrack(np.rint(rows).astype(np.int32) * mask, mask))
+
+
+@pytest.mark.parametrize("height", [100, 200, 300])
+@pytest.mark.parametrize("seconds", [0.5, 1.6])
+def test_brows_that_stress_a_word_are_no_surprise(seconds: float, height: float) -> None:
+    labels = Counter(one.label for one in emotion.read_expressions(raised(seconds, height)).readings)
+    assert labels["neutral"] >= 0.95 * labels.total(), labels
+
+
+def test_a_smile_with_raised_brows_is_joy() -> None:
+    readings = emotion.read_expressions(raised(1.6, 200, smile=0.8))
+    assert {one.label for one in readings.readings} == {"joy"}
+
+
+def test_a_brow_that_is_raised_alone_is_no_surprise_however_long() -> None:
+    labels = Counter(one.label for one in emotion.read_expressions(raised(6, 200, sides="l")).readings)
+    assert labels["neutral"] >= 0.95 * labels.total(), labels
+
+
+def test_brows_that_stay_up_are_surprise() -> None:
+    """Also from the first frame on, as in a picture."""
+    film = raised(6, 300)
+    labels = [one.label for one in emotion.read_expressions(film).readings]
+    assert labels[15:60].count("neutral") >= 43
+    assert labels[100] == "surprise"
+    later = Animation(25, np.arange(20), FaceTrack(film.face.values[40:60], film.face.mask[40:60]))  # type: ignore[union-attr]
+    assert emotion.read_expressions(later).summary()["main"] == "surprise"
+
+
+def test_people_who_nod_are_not_surprised(shared: Path) -> None:
+    """Twelve recordings, of which eight were read as surprise when raised brows alone were."""
+    found = {
+        number: emotion.read_expressions(fba.read(shared / f"vectors/real/yes_{number}.fap")).summary()
+        for number in range(12)
+    }
+    assert "surprise" not in {one["main"] for one in found.values()}, found
+
+
+def test_the_sample_that_says_hello_is_not_surprised() -> None:
+    summary = emotion.read_expressions(
+        fba.read(Path(fba.__file__).parent / "samples" / "hello.fap")
+    ).summary()
+    assert summary["main"] == "joy"
+    assert sum(one["share"] for one in summary["shares"] if one["label"] == "surprise") < 0.15
+
+
+@pytest.mark.parametrize(
+    ("name", "family", "share"),
+    [
+        ("anger", "anger", 0.84),
+        ("fear", "fear", 0.84),
+        ("joy", "joy", 0.84),
+        ("happy-for", "joy", 0.84),
+        ("hate", "anger", 0.84),
+        ("disgust", "disgust", 0.8),
+    ],
+)
+def test_expressions_of_another_maker(shared: Path, name: str, family: str, share: float) -> None:
+    readings = emotion.read_expressions(fba.read(shared / f"data/xface/{name}.fap")).readings
+    assert np.mean([one.label == family for one in readings]) >= share
 
 
 def test_narrow_eyes_alone_are_no_anger() -> None:

@@ -14,10 +14,10 @@ import numpy as np
 from fba.cli import options
 from fba.cli.command import Command, examples, usage_errors
 from fba.cli.emotions.pictures import draw, option_errors, picture_kind
-from fba.cli.inputs import EXISTING, read_input, read_model
+from fba.cli.inputs import EXISTING, ExistingPath, read_input, read_model
 from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
 from fba.cli.printing import Progress, seconds_text
-from fba.errors import FormatError
+from fba.errors import SAVE_AS_UTF8, FormatError
 from fba.limits import Limits
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ class MoodType(click.ParamType[tuple[str, float | None, float | None]]):
 @options.no_clobber_option
 @click.option(
     "--model",
-    type=click.Path(exists=True, path_type=Path),
+    type=ExistingPath(),
     metavar="FILE",
     help="The face whose visemes and expressions IN means, and that is drawn; default: the built-in head.",
 )
@@ -257,7 +257,9 @@ def _read_keys(path: Path) -> list[MoodCurve]:
                         f"{row['seconds']!r} and {row['intensity']!r}"
                     ) from None
                 keys[str(row["emotion"]).strip()].append(key)
-    except (UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError as error:
+        raise FormatError(f"is not UTF-8 text (byte {error.start}); {SAVE_AS_UTF8}", path=path) from None
+    except csv.Error as error:
         raise FormatError(f"{path}: no table of keys ({error})") from error
     if not keys:
         raise FormatError(f"{path}: there are no keys behind the header")

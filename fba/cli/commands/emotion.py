@@ -13,7 +13,7 @@ import click
 from fba.cli import options
 from fba.cli.command import Command, examples
 from fba.cli.emotions import tables
-from fba.cli.inputs import EXISTING, read_input, read_model
+from fba.cli.inputs import EXISTING, ExistingPath, read_input, read_model
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import print_json
 from fba.errors import FormatError
@@ -54,7 +54,7 @@ BASELINES = ("none", "start", "median")
 )
 @click.option(
     "--model",
-    type=click.Path(exists=True, path_type=Path),
+    type=ExistingPath(),
     metavar="FILE",
     help="The face whose visemes and expressions a stream shows; default: the built-in head.",
 )
