@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from fba.atomic import atomic
-from fba.errors import FormatError, OptionError
+from fba.errors import SAVE_AS_UTF8, FormatError, OptionError
 from fba.limits import Limits
 from fba.source import Path, read_whole
 
@@ -47,7 +47,7 @@ def read_toml(path: Path, expected: str, limits: Limits) -> dict[str, Any]:
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
-        raise FormatError(f"is not UTF-8 text (byte {error.start})", path=path) from None
+        raise FormatError(f"is not UTF-8 text (byte {error.start}); {SAVE_AS_UTF8}", path=path) from None
     except (ValueError, RecursionError) as error:  # a plain ValueError: a number of thousands of digits
         line = re.search(r"at line (\d+)", str(error))
         raise FormatError(

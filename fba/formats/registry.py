@@ -179,21 +179,21 @@ def formats() -> tuple[Format, ...]:
             read_motion=lazy("smpl.reader", "read_motion"),
         ),
         Format(
-            "livelink", (".csv",), "table of blendshapes: Live Link Face's, or with ARKit's names",
-            lazy("face_tables.livelink_csv", "sniff"), lazy("face_tables.livelink_csv", "read"),
-            lazy("face_tables.livelink_writer", "write"), ("face",),
-            written="table of blendshapes as Live Link Face's",
-            read_face=lazy("face_tables.livelink_csv", "read_face"),
-        ),
-        Format(
             "openface", (".csv",), "action units, pose and gaze of OpenFace",
             lazy("face_tables.openface", "sniff"), lazy("face_tables.openface", "read"), None, ("face",),
             read_face=lazy("face_tables.openface", "read_face"),
         ),
         Format(
-            "pyfeat", (".csv",), "action units of py-feat",
+            "pyfeat", (".csv",), "blendshapes or action units of py-feat",
             lazy("face_tables.pyfeat", "sniff"), lazy("face_tables.pyfeat", "read"), None, ("face",),
             read_face=lazy("face_tables.pyfeat", "read_face"),
+        ),
+        Format(
+            "livelink", (".csv",), "table of blendshapes: Live Link Face's, or with ARKit's names",
+            lazy("face_tables.livelink_csv", "sniff"), lazy("face_tables.livelink_csv", "read"),
+            lazy("face_tables.livelink_writer", "write"), ("face",),
+            written="table of blendshapes as Live Link Face's",
+            read_face=lazy("face_tables.livelink_csv", "read_face"),
         ),
         Format(
             "livelink-udp", (".udp",), "recorded datagrams of Live Link Face",
@@ -327,7 +327,7 @@ def writer_for(path: Path, format: str | None = None) -> Format:
                 path=path,
                 token=suffix or None,
             ).with_remedies(Remedy("format", "or name it with {}", "'fba'", "fba.write"))
-        writer = by_suffix[0]
+        writer = next((entry for entry in by_suffix if entry.write is not None), by_suffix[0])
     if writer.write is None:
         raise UnsupportedError(
             f"{os.fspath(path)}: {writer.name.upper()} can be read only; write one of "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -17,7 +18,9 @@ from fba.capture.points.places import change_places, write_places
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel
 from fba.face.authoring import author
+from fba.formats.face_tables.points_csv import read_points
 from fba.parameters import faps
+from fba_conformance.captures.performances import speech
 from fba_conformance.captures.tracked_actor import PointTake, film
 from small_head import small_head
 
@@ -137,6 +140,73 @@ def test_the_neutral_face_of_a_film_is_found() -> None:
     np.testing.assert_allclose(face.faps[60:, smile], 0, atol=15)
     np.testing.assert_allclose(face.faps[:35, 18], 0, atol=30)
     assert face.faps[60:, 18].min() > 750
+
+
+INNER, MIDDLE, OUTER = (30, 31), (32, 33), (34, 35)
+"""Columns of FAPs 31 to 36, raised brows."""
+SQUEEZE = (36, 37)
+BROWS_478 = (336, 285, 334, 282, 300, 276, 107, 55, 105, 52, 70, 46)
+
+
+def brow_film(mood: str, share: float, *, lower: float = 0.0, frames: int = 120) -> PointTake:
+    """Return a film of a face that talks, and at first rests; then, for a share, it holds its brows.
+
+    mood: "surprise" (up by 250) or "anger" (down and together). lower: metres by which its brows are lower
+    than the actor's.
+    """
+    amounts = {"surprise": (250.0, 250.0, 200.0, 0.0), "anger": (-200.0, -150.0, -60.0, 150.0)}[mood]
+    performed = speech(frames, 30, 1).astype(float)
+    performed[:, 30:38] *= 0.3
+    held = np.arange(frames) >= frames * (1 - share)
+    for columns, amount in zip((INNER, MIDDLE, OUTER, SQUEEZE), amounts, strict=True):
+        performed[np.ix_(held, columns)] += amount
+    take = film(actor(), 478, metric=True, performed=performed, turn=0.3)
+    positions = take.motion.positions.copy()
+    positions[:, BROWS_478, 1] += lower
+    return replace(take, motion=replace(take.motion, positions=positions))
+
+
+@pytest.mark.parametrize("share", [0.6, 0.8])
+@pytest.mark.parametrize("lower", [-0.003, 0.0, 0.002])
+@pytest.mark.parametrize("mood", ["surprise", "anger"])
+def test_brows_that_are_held_for_most_of_a_film_are_no_rest(mood: str, lower: float, share: float) -> None:
+    """Before, what was held for more than half of a film was 0, and its rest the opposite mood."""
+    take = brow_film(mood, share, lower=lower)
+    with pytest.warns(FbaWarning, match=r"brows rest as at .* mm (higher|lower).*neutral=12"):
+        face = find_point_face(take.motion)
+    for columns in (INNER, MIDDLE, OUTER):
+        off = (face.faps - take.faps)[:, columns].mean()
+        assert abs(off) < 75, (columns, off)  # of the 200 and more that the mood is: talk moves brows by 66
+
+
+@pytest.mark.parametrize(("mood", "way", "lower"), [("surprise", 1, 0.0), ("anger", -1, 0.002)])
+def test_brows_that_are_held_throughout_are_shown_in_part_and_said(mood: str, way: int, lower: float) -> None:
+    """Hardly a face has brows that high or low: a sixth of the mood, and more, remains."""
+    take = brow_film(mood, 1.0, lower=lower)
+    with pytest.warns(FbaWarning, match=r"than they usually rest, even then.*neutral=12"):
+        face = find_point_face(take.motion)
+    brows = face.faps[:, [*INNER, *MIDDLE]].mean()
+    assert brows * way > 30
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", FbaWarning)
+        face = find_point_face(take.motion, neutral=5)  # who says what is neutral, is believed
+    assert abs(face.faps[:, [*INNER, *MIDDLE]].mean()) < 40
+
+
+def test_a_doubt_about_brows_is_said() -> None:
+    """A face with low brows that raises them most of the time is as likely one that lowers them at times."""
+    with pytest.warns(FbaWarning, match="or it is the other way round, which is hard to tell"):
+        find_point_face(brow_film("surprise", 0.8, lower=0.0045).motion)
+
+
+@pytest.mark.parametrize("name", ["mediapipe_single_face", "mediapipe_WolfgangLanger_Pexels"])
+def test_brows_of_real_films_rest_as_they_mostly_are(shared: Path, name: str) -> None:
+    motion = read_points(shared / f"data/capture/{name}.csv")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", FbaWarning)
+        face = find_point_face(replace(motion, aspect=16 / 9))
+    for columns in (INNER, MIDDLE, OUTER):
+        assert abs(np.median(face.faps[:, columns])) < 60
 
 
 def test_eyes_that_are_shut_do_not_look_elsewhere() -> None:

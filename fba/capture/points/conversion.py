@@ -137,6 +137,7 @@ def prepare(
         points = even_sizes(points, template, fixed)
     _check_face(points, template)
     rests: dict[str, Intp] = {}
+    raised: dict[str, float] = {}
     rest: Neutral | slice = neutral
     if neutral == "auto":
         found = find_rests(points, places, template, motion.times[seen])
@@ -144,13 +145,21 @@ def prepare(
             rows = np.flatnonzero(seen)
             rest = slice(int(rows[found.whole.start]), int(rows[found.whole.stop - 1]) + 1)
             rests = {name: rows[found.parts[place]] for name, place in places.items() if place in found.parts}
+            brows = [name for name, place in places.items() if place.startswith("4.")]
+            raised = dict.fromkeys(brows, found.raised) if found.raised else {}
     elif isinstance(neutral, int) and 0 <= neutral < len(seen) and not seen[neutral]:
         raise OptionError(f"neutral: frame {neutral} has no face")
     points = _bridge(points, motion, limits)
     taken = MarkerMotion(names, points, motion.times, motion.rate, "m", "+y", motion.name)
     untold = frozenset() if motion.metric or motion.flat else GUESSED
     traits = Traits(
-        still=still, depth=not motion.flat, confused=False, camera=True, untold=untold, rests=rests
+        still=still,
+        depth=not motion.flat,
+        confused=False,
+        camera=True,
+        untold=untold,
+        rests=rests,
+        raised=raised,
     )
     return Prepared(taken, places, rest, traits)
 

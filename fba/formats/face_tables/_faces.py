@@ -23,6 +23,10 @@ CONFIDENT = 0.5
 """Confidence below which numbers of a row mean nothing."""
 USUAL = 30
 """Rate of a single picture."""
+FILMS = (24, 25, 30, 48, 50, 60, 120)
+"""Rates of films."""
+LARGEST_TURN, MOST = 2.0, 99
+"""Radians that heads and eyes of tracked faces do not reach, and the percentage of angles that tell."""
 PICTURES = 500
 """Rows a second from which on times are none."""
 UPRIGHT = np.diag([1.0, -1.0, -1.0])
@@ -79,9 +83,13 @@ def row_times(
     """
     if len(rows) == 1:
         return np.zeros(1), Fraction(fps or USUAL), []
-    if seconds is not None and ":" in table.rows[rows[0]][seconds]:
-        seconds = None  # py-feat's "00:03" is too coarse to be the time of a frame
     findings = []
+    if seconds is not None and ":" in table.rows[rows[0]][seconds]:
+        if fps is None and frame is not None:
+            fps = _film_rate(table, rows, seconds, frame)
+            if fps is not None:
+                findings.append(f"its whole seconds are those of a film of {float(fps):g} frames in a second")
+        seconds = None  # py-feat's "00:03" is too coarse to be the time of a frame
     counted = seconds is not None or frame is not None
     if seconds is not None and _are_pictures(table, seconds):
         if fps is None:
@@ -111,6 +119,26 @@ def row_times(
         raise FormatError(error.finding, path=table.path) from error
 
 
+def _film_rate(table: Table, rows: Int64, seconds: int, frame: int) -> Fraction | None:
+    """Return the rate of films that fits whole seconds "00:03" at numbers of frames; None where several do.
+
+    A rate a thousandth lower, as television has it, is taken where no whole one fits.
+    """
+    frames = table.numbers([frame])[rows, 0]
+    try:
+        minute, second = np.array(
+            [[int(part) for part in table.rows[row][seconds].split(":")] for row in rows.tolist()]
+        ).T
+    except ValueError:
+        return None
+    for slower in (Fraction(1), Fraction(1000, 1001)):
+        rates = [rate * slower for rate in FILMS]
+        fitting = [rate for rate in rates if (frames // float(rate) == 60 * minute + second).all()]
+        if fitting:
+            return fitting[0] if len(fitting) == 1 else None
+    return None
+
+
 def find_missing(intensities: Float64, times: Float64, rate: Fraction) -> list[str]:
     """Return what is missing of action units (T, N) at times (T,), a sentence each."""
     seen = np.isnan(intensities).sum(axis=1) == 0
@@ -127,6 +155,19 @@ def _are_pictures(table: Table, seconds: int) -> bool:
     """Whether times are those of pictures whose times are unknown: a thousand of them in a second."""
     times = table.numbers([seconds])[:, 0]
     return len(times) > 1 and bool(0 < np.median(np.diff(times)) * PICTURES <= 1)
+
+
+def angle_unit(angles: Float64) -> tuple[float, list[str]]:
+    """Return what angles (T, N) of heads and eyes must be multiplied by to be radians, and what is odd.
+
+    Faces that are tracked do not look backwards: in radians, they turn less than `LARGEST_TURN`.
+    """
+    known = np.abs(angles[~np.isnan(angles)])
+    if not len(known) or np.percentile(known, MOST) <= LARGEST_TURN:
+        return 1.0, []
+    return float(np.radians(1.0)), [
+        "angles of head and eyes are taken as degrees: in radians, it would face away"
+    ]
 
 
 def head_angles(turns: Float64) -> Float64:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -56,14 +56,16 @@ def read_unit_rows(
     layout: UnitLayout,
     face: str | None,
     fps: Fraction | int | str | None,
+    ids: Sequence[str] | None = None,
 ) -> UnitRows:
     """Return action units of one face. columns: action unit -> number of its column.
 
-    face: which one, where there are several. fps: frames in a second, for tables without times. Raises
-    FormatError.
+    face: which one, where there are several. fps: frames in a second, for tables without times. ids: whose
+    face each row is of; None for what the column of faces says. Raises FormatError.
     """
     column = number_columns(table)
-    ids = table.column(column[layout.face]) if layout.face in column else [""] * len(table.rows)
+    if ids is None:
+        ids = table.column(column[layout.face]) if layout.face in column else [""] * len(table.rows)
     rows = choose_rows(table, ids, face)
     times, rate, findings = row_times(table, rows, column.get(layout.seconds), column.get("frame"), fps)
     units = sorted(columns)

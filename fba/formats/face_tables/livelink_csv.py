@@ -7,6 +7,8 @@ Face counts 60 frames a second, while frames come every 1.0016 of these: the tim
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path as FilePath
 from typing import NamedTuple
@@ -19,6 +21,8 @@ from fba.capture.blendshapes import ShapeMotion
 from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_rate
 from fba.errors import FormatError, ModelError, Remedy
+from fba.face.shape_names import arkit_names
+from fba.formats.face_tables._faces import angle_unit
 from fba.formats.face_tables._shape_rows import (
     check_weights,
     find_lacks,
@@ -33,7 +37,7 @@ from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
 FEWEST = 5
-"""Shapes with ARKit's names that make a table one of blendshapes."""
+"""Shapes with ARKit's names or synonyms that make a table one of blendshapes; beside times, one is enough."""
 TIME_CODE = ("timecode",)
 SECONDS = ("time", "timestamp", "seconds", "times", "timesec", "timeseconds", "timestampms", "timems", "t")
 FRAMES = ("frame", "framenumber", "frameid", "frameidx", "frameindex")
@@ -50,7 +54,7 @@ def sniff(head: bytes, suffix: str) -> bool:
     """Whether the first line of a file names shapes of ARKit, as cells of a table."""
     if head[:1] in b"{[\x06" or b"\0" in head[:64]:
         return False
-    return sum(shape_of(name) is not None for name in header_names(head)) >= FEWEST
+    return _are_enough(header_names(head))
 
 
 def read(
@@ -92,16 +96,17 @@ def read_face(
     times = _read_times(table, fps)
     head = eyes = None
     still = []
+    unit, odd = angle_unit(table.numbers(columns.head + columns.eyes))
     if columns.head:
-        yaw, pitch, roll = table.numbers(columns.head).T
+        yaw, pitch, roll = table.numbers(columns.head).T * unit
         head = np.stack([-pitch, yaw, roll], axis=1)  # up and left are positive there
         still += ["head"] if not np.nan_to_num(head).any() else []
     if columns.eyes:
-        eyes = table.numbers(columns.eyes) * [-1, -1, 1, 1]  # right and down are positive there
+        eyes = table.numbers(columns.eyes) * unit * [-1, -1, 1, 1]  # right and down are positive there
         still += ["eyes"] if not np.nan_to_num(eyes).any() else []
     motion = ShapeMotion(
         tuple(shapes), weights, times.seconds, times.rate, head=head, eyes=eyes, start=times.start,
-        name=FilePath(path).stem, findings=tuple(_findings(table, columns, weights, times, still)),
+        name=FilePath(path).stem, findings=tuple(odd + _findings(table, columns, weights, times, still)),
     )  # fmt: skip
     return find_swap(motion, swap, expected=_is_of_the_app(table.names)) if times.coded else motion
 
@@ -124,6 +129,14 @@ class _Times(NamedTuple):
     coded: bool
 
 
+def _are_enough(names: Sequence[str]) -> bool:
+    """Whether columns with these names are a table of blendshapes: several, or ARKit's own beside times."""
+    if sum(shape_of(name) is not None for name in names) >= FEWEST:
+        return True
+    timed = any(key_of(name) in (*TIME_CODE, *SECONDS, *FRAMES, *COUNT) for name in names)
+    return timed and any(name[:1].lower() + name[1:] in arkit_names() for name in names)
+
+
 def _find_columns(table: Table) -> _Columns:
     """Return which column is what. Raises FormatError for too few shapes, or a name that occurs twice."""
     by_key: dict[str, int] = {}
@@ -141,7 +154,7 @@ def _find_columns(table: Table) -> _Columns:
         elif key_of(name):
             by_key.setdefault(key_of(name), number)
             strange.append(name)
-    if len(shapes) < FEWEST:
+    if not _are_enough(table.names):
         raise FormatError(
             f"{len(shapes)} of {len(table.names)} columns are blendshapes; expected at least {FEWEST} of "
             f"ARKit's, such as EyeBlinkLeft and JawOpen; it has {named(list(table.names))}",
@@ -205,13 +218,23 @@ def _is_of_the_app(names: tuple[str, ...]) -> bool:
     )
 
 
+def _gather(names: list[str]) -> list[str]:
+    """Return names, of those that differ in their numbers alone the first with how many they are."""
+    alike: dict[str, list[str]] = {}
+    for name in names:
+        alike.setdefault(re.sub(r"\d+", "#", name), []).append(name)
+    return [
+        same[0] if len(same) == 1 else f"{same[0]} and {len(same) - 1} like it" for same in alike.values()
+    ]
+
+
 def _findings(
     table: Table, columns: _Columns, weights: Float64, times: _Times, still: list[str]
 ) -> list[str]:
     """Return what is odd about a table, a sentence each."""
     findings = []
     if columns.strange:
-        findings.append(f"columns that mean nothing here are left out: {named(columns.strange)}")
+        findings.append(f"columns that mean nothing here are left out: {named(_gather(columns.strange))}")
     if still:
         findings.append(f"all angles of {' and '.join(still)} are 0, as where the app does not record them")
     if table.cut:

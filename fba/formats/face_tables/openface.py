@@ -18,7 +18,14 @@ from fba.animation import Animation
 from fba.arrays import Float64, Int64
 from fba.capture.action_units import ActionUnitMotion
 from fba.errors import FormatError
-from fba.formats.face_tables._faces import eye_angles, find_missing, head_angles, to_animation
+from fba.formats.face_tables._faces import (
+    angle_unit,
+    eye_angles,
+    find_missing,
+    head_angles,
+    to_animation,
+    tracked_rows,
+)
 from fba.formats.face_tables._tables import Table, header_names, read_table
 from fba.formats.face_tables._unit_rows import UnitLayout, number_columns, read_unit_rows
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -81,8 +88,9 @@ def read_face(
         columns = {VERSION_3[unit]: number for unit, number in columns.items()}
         findings.append("AU01_r to AU08_r are taken as OpenFace 3's: action units 1, 6, 12, 15, 17, 2, 9, 10")
     rows = read_unit_rows(table, columns, LAYOUT, face, fps)
-    turns = _turns(table, column)
+    turns, odd = _turns(table, column)
     turns = None if turns is None else turns[rows.numbers]
+    findings += odd
     findings += rows.findings + find_missing(rows.intensities, rows.times, rows.rate)
     return ActionUnitMotion(
         rows.units, rows.intensities, rows.times, rows.rate,
@@ -92,14 +100,15 @@ def read_face(
     )  # fmt: skip
 
 
-def _turns(table: Table, column: dict[str, int]) -> Float64 | None:
-    """Return rotations (T, 3, 3) of the head in the camera's axes; None without a pose."""
+def _turns(table: Table, column: dict[str, int]) -> tuple[Float64 | None, list[str]]:
+    """Return rotations (T, 3, 3) of the head in the camera's axes, None without a pose; what is odd."""
     if not set(POSE) <= set(column):
-        return None
+        return None, []
     angles = np.nan_to_num(table.numbers([column[name] for name in POSE]))
+    unit, odd = angle_unit(angles[tracked_rows(table, column)])
+    angles *= unit
     x, y, z = (rotations.axis_matrices(axis, angles[:, axis]) for axis in range(3))
-    result: Float64 = x @ y @ z
-    return result
+    return np.asarray(x @ y @ z), odd
 
 
 def _eyes(table: Table, column: dict[str, int], rows: Int64, turns: Float64 | None) -> Float64 | None:
@@ -114,6 +123,7 @@ def _eyes(table: Table, column: dict[str, int], rows: Int64, turns: Float64 | No
         return eye_angles(left, right, turns)
     if set(ANGLES) <= set(column):
         angles = np.nan_to_num(table.numbers([column[name] for name in ANGLES])[rows])
+        angles *= angle_unit(angles)[0]
         ahead = np.stack([np.tan(angles[:, 0]), np.tan(angles[:, 1]), np.full(len(angles), -1.0)], axis=1)
         return eye_angles(ahead, ahead, turns)
     return None

@@ -8,7 +8,7 @@ in many ways: a list of frames (or an object with one), each with a time and, so
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path as FilePath
 from typing import Any
@@ -29,10 +29,12 @@ from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_whole
 
 FEWEST = 5
-"""Shapes with ARKit's names that make an object or a list one of blendshapes."""
+"""Synonyms of ARKit's names that make an object or a list one of blendshapes; of its own, one is enough."""
 CATEGORIES = ("categoryName", "category_name", "displayName", "name")
 SCORES = ("score", "value", "weight")
 TIMES = ("time", "timestamp", "timestampms", "timems", "timestampseconds", "seconds", "t", "ts")
+NONE = (*TIMES, "neutral", "frame", "index", "id")
+"""Names of numbers beside shapes that need not be mentioned, without case and other signs."""
 LISTS = ("frames", "results", "data", "records", "samples", "blendshapes")
 DEEPEST = 6
 """Levels of lists and objects in a frame that are searched."""
@@ -47,7 +49,7 @@ def sniff(head: bytes, suffix: str) -> bool:
     if head.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] not in (b"{", b"["):
         return False
     small = head.lower()
-    return sum(f'"{name.lower()}"'.encode() in small for name in arkit_names()) >= FEWEST
+    return any(f'"{name.lower()}"'.encode() in small for name in arkit_names())
 
 
 def read(
@@ -74,13 +76,14 @@ def read_face(
     FormatError, LimitError.
     """
     document = read_json(path, limits)
-    names, weights, stamps = _beat(document, path) or _frames(document, path)
+    names, weights, stamps, strange = _beat(document, path) or _frames(document, path)
     limits.check_frames(len(weights), f"{path}: the recording")
     check_weights(weights, names, path)
     times, rate = frame_times(stamps, len(weights), fps, path)
+    odd = [f"names that mean nothing here are left out: {named(strange)}"] if strange else []
     return ShapeMotion(
         tuple(names), weights, times, rate, name=FilePath(path).stem,
-        findings=tuple(find_lacks(names, weights, times, rate)),
+        findings=tuple(odd + find_lacks(names, weights, times, rate)),
     )  # fmt: skip
 
 
@@ -99,8 +102,8 @@ def read_json(path: Path, limits: Limits) -> Any:
         raise FormatError(f"is no JSON that can be read: {error}", path=path) from error
 
 
-def _beat(document: Any, path: Path) -> tuple[list[str], Float64, list[Any]] | None:
-    """Return names, weights (T, N) and times of BEAT's layout; None for others."""
+def _beat(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], list[str]] | None:
+    """Return names, weights (T, N) and times of BEAT's layout, and names that are none; None for others."""
     if not (isinstance(document, dict) and isinstance(document.get("names"), list)):
         return None
     frames = document.get("frames")
@@ -120,22 +123,24 @@ def _beat(document: Any, path: Path) -> tuple[list[str], Float64, list[Any]] | N
             )
         rows.append([_number(row[column], number, path) for column in columns])
         stamps.append(frame.get("time"))
-    return known, np.array(rows), stamps
+    strange = [str(name) for name, shape in zip(document["names"], names, strict=True) if shape is None]
+    return known, np.array(rows), stamps, strange
 
 
-def _frames(document: Any, path: Path) -> tuple[list[str], Float64, list[Any]]:
-    """Return names, weights (T, N) and times of a list of frames with scores in them."""
+def _frames(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], list[str]]:
+    """Return names, weights (T, N) and times of a list of frames with scores in them; names that are none."""
     frames = _list_of_frames(document)
     if frames is None:
         raise FormatError("holds no list of frames with scores of blendshapes", path=path)
-    found = [next(_scores(frame, DEEPEST), {}) for frame in frames]
+    found, others = zip(*(next(_scores(frame, DEEPEST), ({}, [])) for frame in frames), strict=True)
     names = list(dict.fromkeys(name for scores in found for name in scores))
+    strange = list(dict.fromkeys(name for each in others for name in each if key_of(name) not in NONE))
     _check_names(names, path)
     rows = [
         [_number(scores.get(name, np.nan), number, path) for name in names]
         for number, scores in enumerate(found)
     ]
-    return names, np.array(rows), [frame_time(frame) for frame in frames]
+    return names, np.array(rows), [frame_time(frame) for frame in frames], strange
 
 
 def _list_of_frames(document: Any) -> list[Any] | None:
@@ -150,27 +155,40 @@ def _list_of_frames(document: Any) -> list[Any] | None:
     return None
 
 
-def _scores(value: Any, levels: int) -> Iterator[dict[str, Any]]:
-    """Yield objects of ARKit's name -> score that a value contains."""
+def _scores(value: Any, levels: int) -> Iterator[tuple[dict[str, Any], list[str]]]:
+    """Yield objects of ARKit's name -> score that a value contains, and other names of numbers in them."""
     if levels < 0:
         return
     if isinstance(value, dict):
-        direct = {shape: value[name] for name in value if (shape := shape_of(name)) is not None}
-        if len(direct) >= FEWEST:
-            yield direct
+        direct = {
+            shape: score for name, score in value.items()
+            if not isinstance(score, dict | list | str) and (shape := shape_of(name)) is not None
+        }  # fmt: skip
+        if _are_enough(direct, value):
+            yield direct, [name for name, score in value.items() if _is_other(name, score)]
             return
         parts = list(value.values())
     elif isinstance(value, list):
         pairs = (_category(entry) for entry in value)
         listed = {pair[0]: pair[1] for pair in pairs if pair is not None}
-        if len(listed) >= FEWEST:
-            yield listed
+        if _are_enough(listed, listed):
+            yield listed, []
             return
         parts = value if len(value) <= MOST_PARTS else []
     else:
         return
     for part in parts:
         yield from _scores(part, levels - 1)
+
+
+def _are_enough(shapes: Mapping[str, Any], names: Iterable[str]) -> bool:
+    """Whether shapes, found under these names, are those of a face: several, or one of ARKit's own names."""
+    return len(shapes) >= FEWEST or bool(shapes and set(arkit_names()).intersection(names))
+
+
+def _is_other(name: str, score: Any) -> bool:
+    """Whether something in an object of shapes is a number under another name."""
+    return isinstance(score, int | float) and shape_of(name) is None
 
 
 def _category(entry: Any) -> tuple[str, Any] | None:
@@ -185,8 +203,8 @@ def _category(entry: Any) -> tuple[str, Any] | None:
 
 def _check_names(names: list[str], path: Path) -> None:
     """Raise FormatError for too few shapes, or one that comes twice."""
-    if len(names) < FEWEST:
-        raise FormatError(f"{len(names)} shapes have ARKit's names; expected at least {FEWEST}", path=path)
+    if not names:
+        raise FormatError("no shape has one of ARKit's names, such as jawOpen or eyeBlinkLeft", path=path)
     twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
     if twice:
         raise FormatError(f"shapes come twice: {named(twice)}", path=path)

@@ -144,14 +144,22 @@ def test_what_is_refused(tmp_path: Path) -> None:
 
 
 def test_pyfeat(tmp_path: Path) -> None:
-    text = pyfeat_csv(STRENGTHS, frames=np.arange(ROWS) * 2.0)
+    """Probabilities up to a half are nothing; 1 is what units usually are, C of FACS's A to E: 0.6."""
+    text = pyfeat_csv({**STRENGTHS, 43: WAVE}, frames=np.arange(ROWS) * 2.0)
     path = saved(tmp_path, text)
     assert format_of(path).name == "pyfeat"
     with pytest.raises(FormatError, match="no column of times; give the frame rate of the film with fps=30"):
         pyfeat.read_face(path)
     motion = pyfeat.read_face(path, fps=50)
-    assert (motion.units, motion.rate) == (UNITS, 25)
-    np.testing.assert_allclose(motion.intensities, np.stack(list(STRENGTHS.values()), axis=1), atol=1e-5)
+    assert isinstance(motion, ActionUnitMotion)
+    order = tuple(sorted((*UNITS, 43)))
+    assert (motion.units, motion.rate) == (order, 25)
+    units = {**STRENGTHS, 43: WAVE}
+    for column, unit in enumerate(order):
+        strongest = 1.0 if unit in (43, 45) else 0.6
+        expected = strongest * np.maximum(2 * units[unit] - 1, 0)
+        np.testing.assert_allclose(motion.intensities[:, column], expected, atol=1e-5)
+    assert "how likely each is to be there, not how strong it is" in motion.findings[0]
     assert "pose is left out" in motion.findings[-1]
     people = ["Ann", "Bo"] * (ROWS // 2)
     twice = np.repeat(np.arange(ROWS // 2), 2).astype(float)
@@ -167,7 +175,9 @@ def test_the_samples(shared: Path) -> None:
     assert motion.head is not None
     assert motion.eyes is not None
     assert 0.2 < motion.head[:, 0].mean() < 0.4
-    assert len(pyfeat.read_face(shared / "data/capture/Feat_Test.csv").units) == 20
+    old = pyfeat.read_face(shared / "data/capture/Feat_Test.csv")
+    assert isinstance(old, ActionUnitMotion)
+    assert len(old.units) == 20
 
 
 def shown(units: dict[int, Float64 | float]) -> dict[str, int]:

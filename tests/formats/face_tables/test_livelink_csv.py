@@ -198,6 +198,7 @@ def test_tables_of_other_programs(tmp_path: Path) -> None:
     assert fba.read(path, fps=50).rate == 50
 
 
+@pytest.mark.filterwarnings("ignore:eyes that turn further:fba.errors.FbaWarning")
 def test_emotions_beside_the_shapes_are_left_out_and_named(tmp_path: Path) -> None:
     text = livelink_csv({**WEIGHTS, "Angry": np.ones(ROWS), "Happy": np.ones(ROWS)})
     path = saved(tmp_path, text)
@@ -233,6 +234,7 @@ def test_a_long_gap_holds_and_then_goes_over(tmp_path: Path) -> None:
     assert (jaw[2 * 60 + 30 :] == 400).all()
 
 
+@pytest.mark.filterwarnings("ignore:eyes that turn further:fba.errors.FbaWarning")
 def test_a_row_that_was_cut_off(tmp_path: Path) -> None:
     path = saved(tmp_path, livelink_csv(WEIGHTS)[:-200])
     with pytest.warns(FbaWarning, match="the last row is incomplete"):
@@ -256,7 +258,7 @@ def broken(line: int, old: str, new: str) -> str:
         (broken(7, ",0.", ",61."), r"face\.csv:7: eyeBlinkLeft has the weight 61\..*are these percent\?"),
         (broken(1, "EyeBlinkLeft", "JawOpen"), r"face\.csv:1: columns 'JawOpen' and 'JawOpen' are one shape"),
         (livelink_csv(WEIGHTS).split("\n", 1)[0], r"has no row behind the header"),
-        (livelink_csv({"JawOpen": np.ones(3)}), r"is in no format known here"),
+        (livelink_csv({"mouth open": np.ones(3)}), r"is in no format known here"),
         ("a,b\n1,2\n3,4\n", r"is in no format known here"),
     ],
 )

@@ -144,6 +144,7 @@ def test_arrays_of_objects_are_not_run(tmp_path: Path) -> None:
         read_points(saved(tmp_path, "a.npz", arrays(flat())[:-300]))
 
 
+@pytest.mark.filterwarnings("ignore:brows rest as:fba.errors.FbaWarning")
 def test_real_tracks(shared: Path) -> None:
     found = read_points(shared / "data/capture/mediapipe_single_face.csv")
     assert (len(found), found.count, found.share, found.flat) == (72, 478, True, False)
