@@ -35,6 +35,7 @@ from fba_conformance.captures.face_files import (  # noqa: E402
     pyfeat_csv,
 )
 from fba_conformance.captures.tracked_actor import film  # noqa: E402
+from fba_conformance.fuzz._small_head import small_head, small_head_fdp, small_head_obj, small_head_xface  # noqa: E402
 from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
@@ -172,7 +173,7 @@ EPFS = {
         "BIN " + "-61 " * 296, "GDR 1",
         "FBM 1", "FFR 1", "ISI 0", "",
     ],
-    "one_plane": ["FBM 1", "FFR 0", "ISI 1", "FMT 3 0" + " 0" * 16, "FQU 3", ""],
+    "one_plane": ["FBM 1", "FFR 0", "ISI 1", "FMT 3" + " 0" * 9, "FQU 3", ""],
 }  # fmt: skip
 OBJ = """# c
 mtllib a.mtl
@@ -266,6 +267,31 @@ def meshes() -> dict[str, bytes]:
     }
 
 
+def small_heads() -> dict[str, bytes]:
+    """Return the small head as one PLY file of each form."""
+    vertices, triangles = [], []
+    for part_vertices, part_triangles in small_head().values():
+        triangles += [tuple(len(vertices) + n for n in triangle) for triangle in part_triangles]
+        vertices += part_vertices.round(4).tolist()
+    forms = {"ascii": "ascii", "little": "<", "big": ">"}
+    return {f"ply_{name}": ply(np.array(vertices), triangles, form) for name, form in forms.items()}
+
+
+def small_head_gltf() -> bytes:
+    """Return the small head as a glTF document, a node for each part."""
+    sheet = Sheet()
+    sheet.json |= {"meshes": [], "nodes": []}
+    for name, (vertices, triangles) in small_head().items():
+        position = sheet.array(vertices.round(4))
+        indices = sheet.array(np.ravel(triangles), "u2")
+        sheet.json["meshes"].append(
+            {"name": name, "primitives": [{"attributes": {"POSITION": position}, "indices": indices}]}
+        )
+        sheet.json["nodes"].append({"name": name, "mesh": len(sheet.json["meshes"]) - 1})
+    sheet.json["scenes"] = [{"nodes": list(range(len(sheet.json["nodes"])))}]
+    return sheet.glb()
+
+
 def saved(folder: Path) -> dict[str, dict[str, bytes]]:
     """Return models and cached arrays as the program saves them."""
     face().save(folder / "face.glb")
@@ -329,21 +355,36 @@ def live() -> dict[str, bytes]:
 
 
 def markers() -> dict[str, bytes]:
-    """Return captures of markers in all formats: a few that fell, and a face in a table."""
-    names = ("a", "b", "c", "d")
-    positions = np.arange(36.0).reshape(3, 4, 3) / 50
-    positions[1, 2] = np.nan
-    some = MarkerMotion(names, positions, np.arange(3) / 25, Fraction(25))
-    kinds = ("float.c3d", "mips_integers.c3d", "dec.c3d", "usual.trc", "motive.csv", "nexus.csv")
-    kinds += ("qualisys.tsv", "long.csv")
-    found = {kind: marker_files.MAKERS[kind](some) for kind in kinds}
+    """Return captures of a face's markers in all formats: a mouth that opens, with one marker lost."""
     points = dict(zip(feature_point_names(), neutral_points(), strict=True))
     named = ("2.1", "2.10", "8.1", "8.2", "8.3", "8.4", "4.1", "4.2", "9.3", "9.12", "9.15", "11.1", "11.2")
-    still = np.array([[points[name] for name in named]] * 3)
-    still[1:, 0, 1] -= 0.01
-    face_of_points = MarkerMotion(tuple(f"p{name}" for name in named), still, np.arange(3) / 25, Fraction(25))
-    found["wide.csv"] = marker_files.wide(face_of_points)
+    positions = np.array([[points[name] for name in named]] * 3)
+    positions[1:, 0, 1] -= 0.01
+    positions[1, 7] = np.nan
+    motion = MarkerMotion(tuple(f"p{name}" for name in named), positions, np.arange(3) / 25, Fraction(25))
+    kinds = ("float.c3d", "mips_integers.c3d", "dec.c3d", "usual.trc", "motive.csv", "nexus.csv")
+    kinds += ("qualisys.tsv", "long.csv")
+    found = {
+        **{kind: marker_files.MAKERS[kind](motion) for kind in kinds},
+        "wide.csv": marker_files.wide(motion),
+    }
     return {f"markers_{name.replace('.', '_')}": data for name, data in found.items()}
+
+
+def smpl() -> dict[str, bytes]:
+    """Return motions of SMPL bodies that stand, by one array of poses and by parts, with jaw and eyes."""
+    turns = np.zeros((3, 55, 3))
+    turns[:, 0, 0] = np.pi / 2
+    turns[:, 16, 2], turns[:, 17, 2], turns[:, 18, 1] = -1.2, 1.2, -np.linspace(0, 1, 3)
+    turns[:, 22:25] = 0.1
+    poses = turns.reshape(3, -1)
+    common = {"trans": np.zeros((3, 3)), "mocap_frame_rate": np.array(30.0)}
+    parts = {
+        "root_orient": poses[:, :3], "pose_body": poses[:, 3:66], "pose_jaw": poses[:, 66:69],
+        "pose_eye": poses[:, 69:75],
+    }  # fmt: skip
+    layouts = {"body": {"poses": poses[:, :156]}, "whole": {"poses": poses}, "parts": parts}
+    return {name: point_files.archive({**arrays, **common}) for name, arrays in layouts.items()}
 
 
 def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
@@ -362,6 +403,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
         },
         "capture": {**faces(), **markers()},
         "live": live(),
+        "smpl": smpl(),
         "obj": {"triangles": OBJ.encode()},
         "mtl": {"two": MTL.encode()},
         "mapping": {"all": MAPPING.encode()},
@@ -371,12 +413,12 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
         "points": {"csv": CSV.encode(), "json": JSON.encode(), "fdp": FDP.encode(), "xface": XFACE.encode()},
     }  # fmt: skip
     files |= saved(folder)
-    files["import"] = {"obj": OBJ.encode(), **{f"ply_{name}": data for name, data in meshes().items()}}
+    files["import"] = {"obj": small_head_obj(), **small_heads()}
     files["import"] |= {
         "head": files["face"]["face"],
-        "gltf": textured().glb(),
-        "xface": XFACE.encode(),
-        "fdp": FDP.encode(),
+        "gltf": small_head_gltf(),
+        "xface": small_head_xface(),
+        "fdp": small_head_fdp(),
     }
     return files
 

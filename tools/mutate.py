@@ -679,7 +679,6 @@ MUTANTS = (
         VIRTUAL_FILES_TEST,
     ),
     Mutant(f"{VIRTUAL}/proposal.py", "LID_REACH = 0.8", "LID_REACH = 1.1", VIRTUAL_TEST),
-    Mutant(f"{VIRTUAL}/companions.py", "1 - shares[nearest] ** 2", "1 - shares[nearest]", VIRTUAL_TEST),
     Mutant(f"{VIRTUAL}/companions.py", "LIP_DEPTH = 0.012, 0.004", "LIP_DEPTH = 0.03, 0.03", VIRTUAL_TEST),
     Mutant(f"{VIRTUAL}/performance.py", "marker.follows or name", "name", VIRTUAL_TEST),
     Mutant(f"{VIRTUAL}/proposal.py", "NEAR = 0.015", "NEAR = 0.15", MAP_PAGE_TEST),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from collections.abc import Callable
 from typing import Any
 
@@ -82,8 +83,22 @@ def lines(frames: list[Any]) -> bytes:
 
 def arrays(motion: PointMotion, **others: Any) -> bytes:
     """Return an archive of arrays: `landmarks`, and others by name."""
+    return archive({"landmarks": motion.positions, **others})
+
+
+def archive(arrays: dict[str, Any]) -> bytes:
+    """Return an .npz of arrays whose bytes depend on nothing else.
+
+    Those of `np.savez` depend on Python: since 3.11.4 `zipfile` leaves out a field that is asked for in vain.
+    """
     file = io.BytesIO()
-    np.savez_compressed(file, landmarks=motion.positions, **others)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as members:
+        for name, values in arrays.items():
+            member = io.BytesIO()
+            np.save(member, values)
+            info = zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0))
+            info.create_system = 3  # Unix, everywhere
+            members.writestr(info, member.getvalue())
     return file.getvalue()
 
 

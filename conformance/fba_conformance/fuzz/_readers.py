@@ -27,6 +27,7 @@ from fba.face.model import FaceModel
 from fba.formats.bvh import reader as bvh
 from fba.formats.epf.epf import read_epf, write_epf
 from fba.formats.gltf import reader as gltf
+from fba.formats.smpl import reader as smpl
 from fba.formats.text.bap import read_bap, write_bap
 from fba.formats.text.fap import read_fap, write_fap
 from fba.gltf.reader import read_gltf
@@ -37,6 +38,7 @@ from fba.mesh.ply import read_ply
 from fba.mesh.vrml import read_vrml
 from fba.mesh.wfm import read_wfm
 from fba_conformance.fuzz._outcome import ContractError, Outcome
+from fba_conformance.fuzz._small_head import small_head_obj, small_head_points, small_head_vrml
 
 _WORLD = b"""#VRML V2.0 utf8
 Shape { geometry IndexedFaceSet {
@@ -93,15 +95,31 @@ def check_bvh(data: bytes, folder: Path) -> Outcome:
 
 
 def check_gltf(data: bytes, folder: Path) -> Outcome:
-    """Read a glTF file; of every second one the motion, and of every fourth make BAPs."""
-    way = crc32(data) % 4
+    """Read a glTF file; of every second one with animations the motion, and of every fourth make BAPs."""
+    way = crc32(data) % 4 if b'"animations"' in data else 0
     read = read_gltf if way < 2 else gltf.read_motion if way == 2 else fba.read
     return _check_file(data, folder / ("input.glb" if data[:4] == b"glTF" else "input.gltf"), read)
 
 
 def check_capture(data: bytes, folder: Path) -> Outcome:
-    """Read the capture of a face as FAPs."""
-    return _check_file(data, folder / "input.csv", fba.read)
+    """Read the capture of a face as FAPs; where it has no times, at 30 frames per second."""
+    return _check_file(data, folder / "input.csv", _read_with_rate)
+
+
+def check_smpl(data: bytes, folder: Path) -> Outcome:
+    """Read the motion of an SMPL body; of every fourth one, make BAPs."""
+    return _check_file(
+        data, folder / "input.npz", _read_with_rate if crc32(data) % 4 == 0 else smpl.read_motion
+    )
+
+
+def _read_with_rate(path: Path) -> object:
+    try:
+        return fba.read(path)
+    except FbaError as error:
+        if not any(remedy.argument == "fps" for remedy in error.remedies):
+            raise
+        return fba.read(path, fps=30)
 
 
 def check_live(data: bytes, folder: Path) -> Outcome:
@@ -186,7 +204,10 @@ def check_points(data: bytes, folder: Path) -> Outcome:
 
 
 def check_import(data: bytes, folder: Path) -> Outcome:
-    """Import a face from any kind of file that is recognised by its content."""
+    """Import a face from any kind of file that is recognised by its content, with what may lie beside it."""
+    (folder / "head.wrl").write_bytes(small_head_vrml())
+    (folder / "input.points.csv").write_bytes(small_head_points())
+    (folder / "input.obj").write_bytes(small_head_obj())
     return _check_file(data, folder / "input", import_model)
 
 
