@@ -2,14 +2,17 @@
 
 A figure is made of what the row's benchmark stores in `benchmark.extra_info`, in the run that prints it. So
 a new row needs an entry in ROWS and a benchmark that stores its numbers; then put what the command prints
-into the README. tests/test_bench.py checks that ROWS, the README and the benchmarks agree.
+into the README. `./dev bench --check` compares the figures that do not depend on the machine, and
+tests/test_bench.py checks that ROWS, the README and the benchmarks agree.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import sys
 import tempfile
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +30,7 @@ class Row:
 
     result, conditions: text of the first two columns. figure: a format string over the benchmark's
     `extra_info`. benchmark: its pytest id below bench/. command: an `fba` command that shows the same.
+    fixed: whether the figure is the same on every machine.
     """
 
     result: str
@@ -34,6 +38,7 @@ class Row:
     figure: str
     benchmark: str
     command: str = ""
+    fixed: bool = False
 
     @property
     def source(self) -> str:
@@ -64,6 +69,7 @@ ROWS = (
         "{decoded} of {count}",
         "test_results.py::test_vectors_of_others",
         "fba conformance FOLDER",
+        fixed=True,
     ),
     Row(
         "the same, encoded again to the same bytes",
@@ -71,6 +77,7 @@ ROWS = (
         "{encoded} of {to_encode}",
         "test_results.py::test_vectors_of_others",
         "fba conformance FOLDER",
+        fixed=True,
     ),
     Row(
         "test vectors that come with `fba`, both ways",
@@ -78,12 +85,14 @@ ROWS = (
         "{passed} of {count}",
         "test_results.py::test_own_vectors",
         "fba conformance",
+        fixed=True,
     ),
     Row(
         "size of the 41 real streams, encoded again with fitted ranges",
         "the same values; bytes of all together",
         "{percent:.0f} % of the original",
         "test_results.py::test_size_of_real_streams",
+        fixed=True,
     ),
     Row("decoding", f"{STREAM}, new arrays", CODED, "test_codec.py::test_decode"),
     Row("encoding, ranges fitted", STREAM, CODED, "test_codec.py::test_encode"),
@@ -105,6 +114,7 @@ ROWS = (
         "within {worst:.1f} degrees, {mean:.2f} on average",
         "test_results.py::test_captures",
         "fba encode --report --json",
+        fixed=True,
     ),
     Row(
         "BVH to BAPs: height of the feet on the ground against the source's, scaled",
@@ -113,6 +123,7 @@ ROWS = (
         "within 1 cm in {feet_within:.2f} % of frames",
         "test_results.py::test_captures",
         "fba encode --report --json",
+        fixed=True,
     ),
     Row(
         "50 markers on a face (C3D) to a stream",
@@ -187,6 +198,7 @@ ROWS = (
         "{errors} errors, {warnings} warnings",
         "test_results.py::test_validation[built-in head]",
         "fba model validate --default",
+        fixed=True,
     ),
     Row(
         "MakeHuman's head against the standard",
@@ -194,6 +206,7 @@ ROWS = (
         "{errors} errors, {warnings} warnings",
         "test_results.py::test_validation[MakeHuman's FAPs]",
         "fba model validate base.obj --only faps",
+        fixed=True,
     ),
     Row(
         "the same",
@@ -201,6 +214,7 @@ ROWS = (
         "{errors} errors, {warnings} warnings",
         "test_results.py::test_validation[MakeHuman]",
         "fba model validate base.obj",
+        fixed=True,
     ),
     Row(
         "pictures of the built-in person",
@@ -304,10 +318,10 @@ def figure(row: Row, measured: dict[str, dict[str, Any]], reasons: dict[str, str
     return f"not measured: {reasons.get(row.benchmark, 'the benchmark did not run')}"
 
 
-def measure(output: Path) -> tuple[int, dict[str, dict[str, Any]], dict[str, str]]:
-    """Runs the benchmarks of all rows: pytest's exit code; by benchmark, extra_info, or why it has none."""
+def measure(rows: Sequence[Row], output: Path) -> tuple[int, dict[str, dict[str, Any]], dict[str, str]]:
+    """Runs the benchmarks of rows: pytest's exit code; by benchmark, extra_info, or why it has none."""
     reasons = Reasons()
-    names = dict.fromkeys(f"bench/{row.benchmark}" for row in ROWS)
+    names = dict.fromkeys(f"bench/{row.benchmark}" for row in rows)
     code = pytest.main(["--rootdir", str(ROOT), f"--benchmark-json={output}", *names], plugins=[reasons])
     text = output.read_text(encoding="utf-8") if output.exists() else ""
     entries = json.loads(text)["benchmarks"] if text else []
@@ -315,10 +329,49 @@ def measure(output: Path) -> tuple[int, dict[str, dict[str, Any]], dict[str, str
     return code, {name: found for name, found in measured.items() if name not in reasons.of}, reasons.of
 
 
+def readme_figures() -> list[str]:
+    """The figures in the README's table, a row each, in the order of ROWS."""
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    begin = lines.index(f"| {' | '.join(HEADER)} |") + 2
+    return [line.split(" | ")[2] for line in lines[begin : begin + len(ROWS)]]
+
+
+def agree(shown: str, measured: str) -> bool:
+    """Whether two figures say the same: whole numbers exactly, decimals within 3 % or one unit."""
+    number = re.compile(r"\d+(?:\.\d+)?")
+    if number.sub("#", shown) != number.sub("#", measured):
+        return False
+    pairs = zip(number.findall(shown), number.findall(measured), strict=True)
+    return all(a == b if "." not in a + b else _near(a, b) for a, b in pairs)
+
+
+def _near(shown: str, measured: str) -> bool:
+    place = 10.0 ** -len(shown.partition(".")[2])
+    return abs(float(shown) - float(measured)) <= max(1.001 * place, 0.03 * float(shown))
+
+
+def check() -> int:
+    """Measures what is the same on every machine, and compares it with the README; 1 where they differ."""
+    rows = [row for row in ROWS if row.fixed]
+    shown = dict(zip(ROWS, readme_figures(), strict=True))
+    with tempfile.TemporaryDirectory() as folder, redirect_stdout(sys.stderr):
+        code, measured, reasons = measure(rows, Path(folder) / "measured.json")
+    for row in rows:
+        now = figure(row, measured, reasons)
+        if row.benchmark not in measured or agree(shown[row], now):
+            print(f"ok: {row.result}: {now}")
+        else:
+            print(f"WRONG: {row.result}: {now}; the README says {shown[row]}")
+            code = 1
+    return int(code)
+
+
 def main() -> int:
     """Prints the table on standard output; what pytest says goes to standard error."""
+    if "--check" in sys.argv[1:]:
+        return check()
     with tempfile.TemporaryDirectory() as folder, redirect_stdout(sys.stderr):
-        code, measured, reasons = measure(Path(folder) / "measured.json")
+        code, measured, reasons = measure(ROWS, Path(folder) / "measured.json")
     lines = [row.line(figure(row, measured, reasons)) for row in ROWS]
     print(f"| {' | '.join(HEADER)} |", "|---|---|---|---|", *lines, sep="\n")
     return int(code)

@@ -76,6 +76,10 @@ class FbaWarning(_Remediable, UserWarning):
     """The input was read, but something in it was odd; the text says what and what was assumed."""
 
 
+SAVE_AS_UTF8 = "save it as UTF-8"
+"""What to do with a text file in another encoding."""
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return " (did you mean 'joy'?)" for an error about an unknown word, or "" if no known word is close."""
     from difflib import get_close_matches

@@ -70,6 +70,30 @@ def test_every_command_named_exists(command: str) -> None:
         assert option in told.output
 
 
+@pytest.mark.parametrize(
+    ("shown", "measured", "same"),
+    [
+        ("177 of 177", "177 of 177", True),
+        ("177 of 177", "176 of 177", False),
+        ("0.33 degrees", "0.34 degrees", True),
+        ("0.33 degrees", "0.36 degrees", False),
+        ("22.0 mm", "22.6 mm", True),
+        ("22.0 mm", "10.6 mm", False),
+        ("22.0 mm", "22.0 cm", False),
+    ],
+)
+def test_figures_of_the_readme_agree_with_what_is_measured(shown: str, measured: str, same: bool) -> None:
+    assert summary.agree(shown, measured) is same
+
+
+def test_the_size_of_the_first_stream_is_what_the_readme_says(tmp_path: Path) -> None:
+    samples = [str(ROOT / "fba" / "samples" / name) for name in ("hello.fap", "hello.bvh")]
+    out = tmp_path / "hello.fba"
+    assert CliRunner().invoke(group, ["encode", *samples, "-o", str(out), "--fps", "25"]).exit_code == 0
+    (said,) = re.findall(r"one stream of (\d+) kB", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert round(out.stat().st_size / 1000) == int(said)
+
+
 def test_a_row_without_a_figure_says_why() -> None:
     row = Row("speed", "warm", "{rate:,.0f} a second", "test_a.py::test_b[c]", "fba bench FILE")
     assert summary.figure(row, {row.benchmark: {"rate": 12345.6}}, {}) == "12,346 a second"

@@ -51,7 +51,10 @@ POOR = "fba: poor: walk.bvh: right hand faces 129 degrees off in frame 407; --re
 ILLUSTRATIONS = {
     ("README.md", "./dev demo --out demo"): CHECKOUT,
     ("README.md", ". .venv/bin/activate"): "chooses an environment",
-    ("README.md", "pip install ."): "makes an environment; .ci/run installs the wheel and runs the demo",
+    (
+        "README.md",
+        'pip install ".[player]"',
+    ): "makes an environment, as .ci/run does",
     ("CONTRIBUTING.md", "./dev setup"): CHECKOUT,
     ("docs/bitrate.md", "pip install '.[study]'"): "installs packages, and measures for a minute",
     ("docs/capture-live.md", "fba capture livelink --play -o face.fba"): WINDOW,
@@ -77,7 +80,7 @@ ILLUSTRATIONS = {
     ("docs/motion-capture.md", POOR): "what is said of another file",
     ("docs/motion-capture.md", MISMATCH): "a warning, with figures of another file",
     ("docs/persona.md", "fba persona evaluate"): "takes minutes; tests/persona measures fewer contents",
-    ("docs/persona.md", "python -m fba.persona.training"): "makes a file of the checkout again",
+    ("docs/persona.md", "python -m fba.persona.training -o default.recogniser"): "trains for a minute",
     ("docs/play.md", "fba play face.fba"): WINDOW,
     ("docs/play.md", "fba play face.fba --paused"): WINDOW,
     ("docs/play.md", "fba play face.fba --audio voice.mp3 --audio-offset -0.04"): WINDOW,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.cli.printing import colour_grade
-from fba.errors import FbaError
+from fba.errors import FbaError, FbaWarning
 from fba.parameters import baps
 
 if TYPE_CHECKING:
@@ -93,37 +94,46 @@ def compare_captures(
     file with several, by name or number. options: those with which captures were read, of which joints, rest,
     up and scale count. lead: frames of a capture that are before the animation's first one.
     """
+    from fba import rotations
     from fba.body import Skeleton
     from fba.capture import retarget_report
-    from fba.capture.bones import find_bones
     from fba.capture.comparison import compare
     from fba.capture.comparison.measurement import rows_of
+    from fba.capture.motion import read_axis
+    from fba.capture.preparation import prepare
     from fba.formats import format_of
 
     given = {
         name: value for name, value in (options or {}).items() if name in ("joints", "rest", "scale", "up")
     }
+    asked = {name: value for name, value in given.items() if name != "scale"}
     reports = []
     for path in captures:
         reader = format_of(path, format)
         assert reader.read_motion is not None  # the caller names captures only
         try:
             motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": clip}))
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", FbaWarning)  # the reader has said it
+                ready = prepare(motion, Skeleton.default(), **asked)
             if lead:
                 motion = rows_of(motion.resample(animation.rate), slice(lead, None))
-            _, mapped, _, _ = find_bones(motion, given.get("joints"), Skeleton.default())
         except FbaError:  # the file has a face alone, and the body comes from another
             if detailed:
                 raise
             continue
         level = 0.0 if ground == "floor" else None
-        up = _rotation_up(str(given.get("up", "auto")))
+        up = rotations.between(read_axis(ready.up), np.array([0.0, 1.0, 0.0]))
         most = None if detailed else SAMPLE
         scale = (options or {}).get("scale")
-        comparison = compare(motion, decoded, mapped, scale=scale, up=up, level=level, most=most)
+        comparison = compare(motion, decoded, ready.mapped, scale=scale, up=up, level=level, most=most)
         comparison = comparison.with_more(_clamped_differences(clamped))
-        bones = asdict(retarget_report(motion, animation, **given)) if detailed else None
-        reports.append(CaptureReport(path, motion, mapped, decoded, comparison, bones, up, scale))
+        bones = None
+        if detailed:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", FbaWarning)
+                bones = asdict(retarget_report(motion, animation, **given))
+        reports.append(CaptureReport(path, motion, ready.mapped, decoded, comparison, bones, up, scale))
     return reports
 
 
@@ -269,16 +279,6 @@ source's bones. Blue is left, red is right; palms are light, backs of hands dark
 {measures}</dl>
 </html>
 """
-
-
-def _rotation_up(axis: str) -> Float64 | None:
-    """Return (3, 3), what brings an axis such as "+z" to +y; None for "auto"."""
-    if axis == "auto":
-        return None
-    from fba import rotations
-
-    named = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
-    return rotations.between(named, np.array([0.0, 1.0, 0.0]))
 
 
 def _clamped_differences(clamped: Mapping[str, ClampedParameter]) -> tuple[Difference, ...]:

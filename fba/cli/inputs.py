@@ -17,7 +17,7 @@ import click
 from fba.animation import Animation
 from fba.cli import step_tables
 from fba.cli.command import STANDARD_INPUT
-from fba.errors import FbaError, FbaWarning, FormatError, OptionError
+from fba.errors import FbaError, FbaWarning, FormatError, OptionError, did_you_mean
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEPS_AUTO
 from fba.source import read_whole
@@ -33,16 +33,39 @@ if TYPE_CHECKING:
 NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
 
 
-class InputType(click.Path):
+class ExistingPath(click.Path):
+    """A file or folder that exists; the error for one that does not names the nearest that does."""
+
+    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True, allow_dash: bool = False) -> None:
+        super().__init__(
+            exists=True, file_okay=file_okay, dir_okay=dir_okay, allow_dash=allow_dash, path_type=Path
+        )
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        path = Path(os.fsdecode(value))
+        if not os.path.lexists(path) and not (self.allow_dash and str(path) == "-"):
+            self.fail(f"{str(path)!r} does not exist{did_you_mean(path.name, _neighbours(path))}", param, ctx)
+        return Path(os.fsdecode(super().convert(value, param, ctx)))
+
+
+def _neighbours(path: Path) -> list[str]:
+    """Return the names in the folder of a path, none if it cannot be listed."""
+    try:
+        return os.listdir(path.parent)
+    except OSError:
+        return []
+
+
+class InputType(ExistingPath):
     """An existing file, "-" for standard input."""
 
     def __init__(self) -> None:
-        super().__init__(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
+        super().__init__(dir_okay=False, allow_dash=True)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if str(value) in NAMES_OF_STANDARD_INPUT:
             return Path("-")
-        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        path = super().convert(value, param, ctx)
         return path if str(path) != "-" else path.absolute()  # it was "./-", a file of that name
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from collections import defaultdict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from fba.cli.printing import table_lines
 
 if TYPE_CHECKING:
     from fba.face.checks import Finding
@@ -86,12 +90,8 @@ def model_as_json(model: FaceModel) -> dict[str, Any]:
 
 def print_model(model: FaceModel) -> None:
     """Print a model's properties; lengths in millimetres."""
-    from rich.console import Console
-    from rich.table import Table
-
     from fba.face.fapu import PER_DISTANCE
 
-    console = Console(width=None if Console().is_terminal else 160, highlight=False)
     click.echo(f"{model.name or 'face'}: {summary(model)}")
     low, high = model.vertices.min(axis=0), model.vertices.max(axis=0)
     click.echo(f"  size     {' x '.join(f'{extent * 1000:.0f}' for extent in high - low)} mm")
@@ -108,24 +108,20 @@ def print_model(model: FaceModel) -> None:
         click.echo(f"  missing  {', '.join(model.missing)}")
     for line in lost_lines(model):
         click.echo(f"  {line}")
-    parts = Table("part", "kind", box=None, pad_edge=False, padding=(0, 3, 0, 0))
-    for heading in ("vertices", "triangles"):
-        parts.add_column(heading, justify="right")
-    parts.add_column("surface")
+    parts = []
     for part in model.parts:
         surface = "texture" if part.material.texture is not None else ""
         surface = surface or ("colours" if part.colours is not None else "plain")
-        parts.add_row(part.name, part.kind, str(len(part.vertices)), str(len(part.triangles)), surface)
-    units = Table("FAPU", box=None, pad_edge=False, padding=(0, 3, 0, 0))
-    units.add_column("distance", justify="right")
-    units.add_column("one step", justify="right")
-    units.add_column("what it is")
+        parts.append((part.name, part.kind, str(len(part.vertices)), str(len(part.triangles)), surface))
+    units = []
     for unit, what in UNITS.items():
         step = model.fapu[unit]
-        units.add_row(unit, f"{step * PER_DISTANCE * 1000:.1f} mm", f"{step * 1e6:.1f} um", what)
-    for table in (parts, units):
-        console.print()
-        console.print(table)
+        units.append((unit, f"{step * PER_DISTANCE * 1000:.1f} mm", f"{step * 1e6:.1f} um", what))
+    for head, rows, to_right in (
+        (("part", "kind", "vertices", "triangles", "surface"), parts, (2, 3)),
+        (("FAPU", "distance", "one step", "what it is"), units, (1, 2)),
+    ):
+        click.echo("\n".join(["", *table_lines(head, rows, to_right=to_right, width=_width(), gap=3)]))
 
 
 def findings_as_json(findings: Sequence[Finding]) -> dict[str, Any]:
@@ -172,23 +168,21 @@ def judge_import(findings: Sequence[Finding]) -> tuple[str, str]:
 
 def print_findings(name: str, findings: Sequence[Finding]) -> None:
     """Print a table of findings, errors first, and a line that counts them."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
     errors = [finding for finding in findings if finding.severity == "error"]
     warnings = [finding for finding in findings if finding.severity != "error"]
     if findings:
-        table = Table(
-            "", "about", "rule", "found", "expected", box=None, pad_edge=False, padding=(0, 2, 0, 0)
-        )
-        for finding in (*errors, *warnings):
-            style = "bold red" if finding.severity == "error" else "yellow"
-            cells = (finding.subject, finding.rule, finding.found, finding.expected)
-            table.add_row(Text(finding.severity, style=style), *map(Text, cells))
-        Console(width=None if Console().is_terminal else 160, highlight=False).print(table)
+        rows = [(f.severity, f.subject, f.rule, f.found, f.expected) for f in (*errors, *warnings)]
+        for line in table_lines(("", "about", "rule", "found", "expected"), rows, width=_width()):
+            kind = line.partition(" ")[0]
+            styled = click.style(kind, fg="red" if kind == "error" else "yellow", bold=kind == "error")
+            click.echo(line.replace(kind, styled, 1) if kind else line)
     counts = f"{_count(len(errors), 'error')}, {_count(len(warnings), 'warning')}"
     click.echo(f"{name}: {counts if findings else 'meets the standard'}")
+
+
+def _width() -> int:
+    """Return how many characters wide a table may be."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
 
 
 def _count(number: int, word: str) -> str:

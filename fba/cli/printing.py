@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
-from collections.abc import Sequence
+import textwrap
+import time
+from collections.abc import Collection, Sequence
+from datetime import timedelta
 from fractions import Fraction
-from typing import Any
+from itertools import zip_longest
+from threading import Event, Thread
+from typing import TextIO
 
 import click
 
-LONGEST_ROW = 1 << 16
-"""Characters of a row: names of files are shorter."""
+NARROWEST = 12
+"""Characters to which a column of a table is folded at most."""
+BAR_WIDTH, BAR_PERIOD = 30, 0.1
+"""Characters of a progress bar, and seconds after which it is drawn again."""
 
 
 def print_json(value: object) -> None:
@@ -49,79 +57,92 @@ def colour_grade(text: str, grade: str) -> str:
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], first: str = "file") -> None:
     """Print rows of a file and cells, under the names of the columns behind that of the file.
 
-    first: what the first column has, if it is no file.
+    first: what the first column has, if it is no file. On a terminal, long names are folded; a program that
+    reads it finds every row on one line.
     """
-    from rich.console import Console
-    from rich.table import Table
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    click.echo(
+        "\n".join(table_lines([first, *columns], rows, to_right=range(1, 1 + len(columns)), width=width))
+    )
 
-    table = Table(box=None, pad_edge=False)
-    table.add_column(first, overflow="fold")
-    for column in columns:
-        table.add_column(column, justify="right")
-    for row in rows:
-        table.add_row(*row)
-    wide = Console(width=LONGEST_ROW)
-    # On a terminal, long names are folded; a program that reads it finds every row on one line.
-    console = Console(width=None if wide.is_terminal else max(160, wide.measure(table).maximum))
-    with console.capture() as text:  # rich, as it prints, would exit with 1 where a pipe is closed
-        console.print(table)
-    click.echo(text.get(), nl=False)
+
+def table_lines(
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    to_right: Collection[int] = (),
+    width: int | None = None,
+    gap: int = 2,
+) -> list[str]:
+    """Return the lines of a table, its columns `gap` spaces apart.
+
+    to_right: numbers of the columns, from 0, whose cells end at the right edge. width: characters of a line
+    at most; cells are folded to keep to it, the widest columns first.
+    """
+    table = [head, *rows]
+    sizes = [max(map(len, column)) for column in zip(*table, strict=True)]
+    while width is not None and sum(sizes) + gap * (len(sizes) - 1) > width and max(sizes) > NARROWEST:
+        sizes[sizes.index(max(sizes))] -= 1
+    lines = []
+    for row in table:
+        cells = [textwrap.wrap(cell, size) or [""] for cell, size in zip(row, sizes, strict=True)]
+        for parts in zip_longest(*cells, fillvalue=""):
+            padded = [
+                part.rjust(size) if column in to_right else part.ljust(size)
+                for column, (part, size) in enumerate(zip(parts, sizes, strict=True))
+            ]
+            lines.append((" " * gap).join(padded).rstrip())
+    return lines
 
 
 class Progress:
     """A progress bar on standard error, if that is a terminal; for a `with` statement.
 
-    total: number of steps. While it is None, the bar only moves, and shows the seconds so far.
+    total: number of steps. While it is None, only the seconds so far are shown.
     """
 
     def __init__(self, label: str, total: int | None) -> None:
-        self._label, self._total = label, total
-        self._bar: Any = None
-        self._task: Any = None
+        self._label, self._total, self._done = label, total, 0
+        self._over = Event()
+        self._drawing: Thread | None = None
 
     def __enter__(self) -> Progress:
         if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import (
-                BarColumn,
-                MofNCompleteColumn,
-                Task,
-                TextColumn,
-                TimeElapsedColumn,
-                TimeRemainingColumn,
-            )
-            from rich.progress import Progress as Bar
-            from rich.text import Text
-
-            class Steps(MofNCompleteColumn):
-                def render(self, task: Task) -> Text:
-                    return Text() if task.total is None else super().render(task)  # not "0/?"
-
-            class Time(TimeRemainingColumn):
-                def render(self, task: Task) -> Text:
-                    return TimeElapsedColumn().render(task) if task.total is None else super().render(task)
-
-            columns = (
-                TextColumn("{task.description}"),
-                BarColumn(),
-                Steps(),
-                Time(),
-            )
-            self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
-            self._bar.start()
-            self._task = self._bar.add_task(self._label, total=self._total)
+            self._drawing = Thread(target=self._draw, args=(sys.stderr, time.monotonic()), daemon=True)
+            self._drawing.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+        if self._drawing is not None:
+            self._over.set()
+            self._drawing.join()
 
     def advance(self, count: int = 1) -> None:
         """Show that more steps are done."""
-        if self._bar is not None:
-            self._bar.update(self._task, advance=count)
+        self._done += count
 
     def show(self, done: int, total: int) -> None:
         """Show the number of steps done, and the total."""
-        if self._bar is not None:
-            self._bar.update(self._task, completed=done, total=total)
+        self._done, self._total = done, total
+
+    def _draw(self, terminal: TextIO, begun: float) -> None:
+        """Draw the bar again and again, and remove it at the end.
+
+        The cursor stays at the beginning of the line, so that messages are written over the bar.
+        """
+        blank = " " * (shutil.get_terminal_size().columns - 1)
+        while True:
+            terminal.write(f"{self._line(time.monotonic() - begun)}{blank}"[: len(blank)] + "\r")
+            terminal.flush()
+            if self._over.wait(BAR_PERIOD):
+                break
+        terminal.write(blank + "\r")
+        terminal.flush()
+
+    def _line(self, seconds: float) -> str:
+        done, total = self._done, self._total
+        if total is None:
+            return f"{self._label}  {timedelta(seconds=int(seconds))}"
+        share = min(done / max(total, 1), 1.0)
+        left = f"  {timedelta(seconds=round(seconds / share - seconds))} left" if share else ""
+        return f"{self._label}  [{'#' * round(share * BAR_WIDTH):<{BAR_WIDTH}}]  {done}/{total}{left}"

@@ -13,7 +13,7 @@ import click
 
 from fba.cli import inputs, options
 from fba.cli.command import Decorated
-from fba.cli.inputs import EXISTING
+from fba.cli.inputs import EXISTING, ExistingPath
 from fba.cli.joint_options import Pair, body_map_option
 from fba.limits import Limits
 
@@ -76,14 +76,14 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]
         SceneOptions,
         click.option(
             "--model",
-            type=click.Path(exists=True, path_type=Path),
+            type=ExistingPath(),
             metavar="FILE",
             help="The face: a .glb of this project, or another that can be imported. "
             "Default: the built-in head.",
         ),
         click.option(
             "--body",
-            type=click.Path(exists=True, dir_okay=False, path_type=Path),
+            type=ExistingPath(dir_okay=False),
             metavar="FILE",
             help="The body: one of this project, or any skinned person (.glb, .vrm) with its own head. "
             "Default: the built-in person.",
@@ -129,7 +129,7 @@ def sound_options(kind: str = "Sound") -> Callable[[Decorated], Decorated]:
         SoundOptions,
         click.option(
             "--audio",
-            type=click.Path(exists=True, dir_okay=False, path_type=Path),
+            type=ExistingPath(dir_okay=False),
             metavar="FILE",
             help=f"{kind}, from the first frame. Default: the WAV file of the same name beside the input.",
         ),

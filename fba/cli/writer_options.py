@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli.command import Decorated
-from fba.cli.inputs import read_body, read_model
+from fba.cli.inputs import ExistingPath, read_body, read_model
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
@@ -26,7 +26,7 @@ FLAGS = {
     "axes": "--axes",
 }
 """The options for the writers' keywords."""
-FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+FILE = ExistingPath(dir_okay=False)
 
 
 def writer_options(command: Decorated) -> Decorated:
@@ -46,7 +46,7 @@ def writer_options(command: Decorated) -> Decorated:
             ),
             click.option(
                 "--model",
-                type=click.Path(exists=True, path_type=Path),
+                type=ExistingPath(),
                 metavar="FILE",
                 help="glTF: the face; default: the built-in head.",
             ),

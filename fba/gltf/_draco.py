@@ -51,8 +51,8 @@ def _decode(data: bytes, packing: Value, view: Value) -> Any:
         import DracoPy
     except ImportError:
         raise packing.error(
-            "the mesh is packed by Draco, which DracoPy reads: pip install DracoPy. Or convert the file: "
-            "npx @gltf-transform/cli copy in.glb out.glb"
+            'the mesh is packed by Draco, which DracoPy reads: pip install "mpeg4-fba[draco]". Or convert '
+            "the file: npx @gltf-transform/cli copy in.glb out.glb"
         ) from None
     try:
         mesh = DracoPy.decode(data)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import select
 import socket
 import threading
@@ -60,10 +61,12 @@ class Receiver:
             opened.close()
             where = f"{self._host or 'any address'}, UDP port {self.port}"
             reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-            raise FbaError(
-                f"{where}: cannot be listened on: {reason}; close the program that uses it, or give another "
-                "port here and in the sender"
-            ) from error
+            remedy = (
+                "give an address of this machine, or none for all"
+                if isinstance(error, socket.gaierror) or getattr(error, "errno", 0) == errno.EADDRNOTAVAIL
+                else "close the program that uses it, or give another port here and in the sender"
+            )
+            raise FbaError(f"{where}: cannot be listened on: {reason}; {remedy}") from error
         with contextlib.suppress(OSError):  # a smaller buffer will do
             opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
         opened.setblocking(False)

@@ -11,6 +11,8 @@ from fba.atomic import PathLike, check_target, write_error
 from fba.capture.live import widest_faces
 from fba.codec import Encoder, EncoderOptions
 from fba.codec.settings import FrameRate
+from fba.errors import OptionError
+from fba.planning import LiveEncoder
 from fba.planning.rate import RateEncoder
 
 RATES = Fraction(1), Fraction(240)
@@ -89,7 +91,10 @@ class StreamRecorder:
     targets: where it goes. frames, size: written so far. rate: frames per second; 0 before the first.
     options: by default those of captures: values that no plane carries are brought as near as can be, and a
     body's steps are the finer ones, named behind the end. bit_rate: bits a second that are held, as far as
-    `buffer` seconds of them; None for all that is sent. See `fba.planning.rate.RateEncoder`.
+    `buffer` seconds of them; None for all that is sent. See `fba.planning.rate.RateEncoder`. compact: whether
+    only those parameters are sent that players do not derive from others; see `fba.planning.LiveEncoder`.
+
+    Raises OptionError for both at once.
     """
 
     def __init__(
@@ -99,16 +104,20 @@ class StreamRecorder:
         *,
         bit_rate: float | None = None,
         buffer: float = 1.0,
+        compact: bool = False,
     ) -> None:
+        if compact and bit_rate is not None:
+            raise OptionError("compact and bit_rate contradict each other: the bit rate decides what is sent")
         self.options = options or EncoderOptions(clamp=True, bap_steps="visage", mark=True)
         self.frames = self.size = 0
         self.rate = Fraction(0)
-        self.encoder: Encoder | RateEncoder
-        if bit_rate is None:
-            self.encoder = Encoder(self.options)
+        self.encoder: Encoder | RateEncoder | LiveEncoder
+        if compact:
+            self.encoder = LiveEncoder(self.options)  # it finds its ranges itself
         else:
-            self.encoder = RateEncoder(bit_rate, buffer, self.options)
-        self.encoder.expect(widest_faces())
+            own = None if bit_rate is None else RateEncoder(bit_rate, buffer, self.options)
+            self.encoder = own or Encoder(self.options)
+            self.encoder.expect(widest_faces())
         self.targets = tuple(targets)
 
     def push(self, animation: Animation) -> None:
@@ -143,10 +152,10 @@ def _write_all(file: BinaryIO, data: bytes) -> None:
         view = view[file.write(view) :]
 
 
-def warm_up(*, bodies: bool = False, rated: bool = False) -> None:
+def warm_up(*, bodies: bool = False, rated: bool = False, compact: bool = False) -> None:
     """Compile what encodes faces, and bodies, before datagrams come, which would be lost meanwhile.
 
-    rated: at a bit rate.
+    rated: at a bit rate. compact: as `StreamRecorder` takes it.
     """
     import numpy as np
 
@@ -162,7 +171,7 @@ def warm_up(*, bodies: bool = False, rated: bool = False) -> None:
     if bodies:
         solver = BapSolver()
         solver.solve(solver.pose(turns))
-    recorder = StreamRecorder([], bit_rate=1e6 if rated else None)
+    recorder = StreamRecorder([], bit_rate=1e6 if rated else None, compact=compact)
     for frame in range(3):
         part = slice(frame, frame + 1)
         shown = None if body is None else body[part]

@@ -72,6 +72,31 @@ def test_a_rate_can_be_given_wherever_one_is_asked_for(
         assert (code, err) == (0, "")
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["info", "hedless.fap"],
+        ["render", "headless.fpa", "-o", "a.png"],
+        ["play", "headles.fap"],
+        ["emote", "Headless.fap", "-o", "a.fap"],
+        ["render", "--model", "headless.glb", "-o", "a.png"],
+    ],
+)
+def test_the_nearest_name_of_a_missing_file_is_given(
+    run: Run, headless: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
+) -> None:
+    monkeypatch.chdir(headless.parent)
+    code, _, err = run(*command)
+    assert code == 2
+    assert "does not exist (did you mean 'headless.fap'?)" in err
+
+
+def test_a_program_that_does_not_exist_is_one_message(run: Run) -> None:
+    code, out, err = run("conformance", "--decoder", "no-such-decoder {in} {out}")
+    assert (code, out) == (2, "")
+    assert "there is no program 'no-such-decoder' here; give its path, or a name on PATH" in err
+
+
 def test_info_has_the_salvage_that_it_names(run: Run, cut: Path) -> None:
     code, _, err = run("info", cut)
     assert code == 1

@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from fba.cli.model_text import error_lines, judge_import
+from fba.cli.printing import table_lines
 from fba.face import FaceModel, checks, feature_point_names
 from fba.face.checks import Finding
 from fba_player.export.contact_sheet import TILE
@@ -247,3 +248,19 @@ def test_validate_checks_every_fap(run: Run) -> None:
     told = json.loads(out)
     assert told["errors"] == 0, told["findings"]
     assert code == 0
+
+
+def test_tables_are_folded_to_the_width_of_a_terminal() -> None:
+    head, rows = ("file", "bytes"), [("a_long_name_of_a_file.fba", "12"), ("b.fba", "3456")]
+    assert table_lines(head, rows, to_right=(1,)) == [
+        "file                       bytes",
+        "a_long_name_of_a_file.fba     12",
+        "b.fba                       3456",
+    ]
+    assert table_lines(head, rows, to_right=(1,), width=20) == [
+        "file           bytes",
+        "a_long_name_o     12",
+        "f_a_file.fba",
+        "b.fba           3456",
+    ]
+    assert max(map(len, table_lines(("name", "text"), [("x", "words " * 40)], width=30))) <= 30

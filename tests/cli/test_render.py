@@ -426,3 +426,23 @@ def test_a_camera_at_the_face_goes_along_with_it(run: Run, tmp_path: Path) -> No
     face = slice(20, 40), slice(30, 50)
     assert np.abs(first[face] - last[face]).mean() < 12
     assert np.abs(last[face] - last[2, 2]).mean() > 20
+
+
+@pytest.mark.parametrize(
+    ("rate", "options", "said"),
+    [
+        (120, (), ", 60 frames/s, 120 in the file (another rate: --fps)"),
+        (120, ("--fps", "120"), ""),
+        (50, (), ""),
+    ],
+)
+def test_a_film_of_a_fast_capture_has_a_usual_rate(
+    rate: int, options: tuple[str, ...], said: str, run: Run, opengl: None, tmp_path: Path
+) -> None:
+    fba.write(tmp_path / "fast.fba", Animation(rate, np.arange(rate // 5), fba.FaceTrack.empty(rate // 5)))
+    out = tmp_path / "pictures" / "%03d.png"
+    code, text, _ = run("render", tmp_path / "fast.fba", "-o", out, *SMALL, *options)
+    assert code == 0
+    assert text == f"{tmp_path / 'pictures'}: 96x72{said}\n"
+    shown = rate if options or not said else 60
+    assert len(list((tmp_path / "pictures").iterdir())) == shown // 5

@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
 FOREIGN = (
     "numpy", "numba", "scipy.interpolate", "scipy.optimize", "scipy.sparse.csgraph", "scipy.sparse.linalg",
-    "scipy.spatial.transform", "click", "rich.console", "rich.table", "rich.progress",
+    "scipy.spatial.transform", "click",
     "moderngl", "av", "PIL.Image", "PIL.PngImagePlugin",
 )  # fmt: skip
 """Modules of others that both programs find imported, those of them that are installed."""

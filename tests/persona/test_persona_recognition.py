@@ -13,6 +13,7 @@ from fba.persona.points.layout import PARTS
 from fba.persona.recognition import decide, train
 from fba.persona.recognition.component import DIMENSIONS, ENOUGH, UNITS, find_axes, train_component
 from fba.persona.recognition.network import _loss
+from fba.persona.training import __main__ as training
 from fba.persona.training.classes import class_faps, face_classes, part_classes
 from fba.persona.training.examples import Examples, make_examples
 
@@ -90,6 +91,21 @@ def test_components_are_those_of_the_worked_example() -> None:
     np.testing.assert_allclose(shares, [4 / 4.25, 0.25 / 4.25], atol=0.01)
     np.testing.assert_allclose(found.spread, spread)
     np.testing.assert_allclose(found.scores(values[:1]), ((values[:1] - found.mean) / spread) @ found.axes.T)
+
+
+def test_training_writes_only_where_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def make_none(*_: object) -> Examples:
+        raise AssertionError("it must not begin")
+
+    monkeypatch.setattr("fba.persona.training.__main__.make_examples", make_none)
+    for options, said in (([], "required: -o"), (["-o", str(tmp_path / "no" / "a")], "there is no folder")):
+        monkeypatch.setattr("sys.argv", ["training", *options])
+        with pytest.raises(SystemExit) as ended:
+            training.main()
+        assert ended.value.code == 2
+        assert said in capsys.readouterr().err
 
 
 def test_the_default_is_as_good_as_the_source_asks(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.animation import Animation
+from fba.cli.inputs import ExistingPath
 
 if TYPE_CHECKING:
     from fba.codec import EncoderOptions
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 fit_option = click.option(
     "--fit",
     metavar="HEAD.glb",
-    type=click.Path(exists=True, path_type=Path),
+    type=ExistingPath(),
     help="Leave to this head the FAPs that it computes to within 3 mm by its interpolation table, which "
     "`fba model learn-fit` makes. The stream must be played with --model HEAD.glb.",
 )

@@ -15,6 +15,7 @@ from fba.cli.options import is_given
 if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.codec import Encoder, EncoderOptions
+    from fba.planning import LiveEncoder
     from fba.planning.rate import RateEncoder, RateStatistics, ShownErrors
 
 BITS = {"": 1.0, "bit/s": 1.0, "kbit/s": 1e3, "Mbit/s": 1e6}
@@ -103,7 +104,7 @@ def encode_held(
     return found.data, HeldRate(bitrate, seconds, found.statistics, found.options.fap_quant, errors)
 
 
-def held_by(encoder: Encoder | RateEncoder) -> HeldRate | None:
+def held_by(encoder: Encoder | RateEncoder | LiveEncoder) -> HeldRate | None:
     """Return what a live encoder held to; None for one without a rate. Its errors are not known."""
     from fba.planning.rate import RateEncoder
 

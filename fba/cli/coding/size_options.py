@@ -14,6 +14,7 @@ from fba.cli.coding.fit_options import fit_option
 from fba.cli.coding.rate_options import check_buffer, rate_options
 from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Decorated
+from fba.cli.inputs import ExistingPath
 
 PRESETS = ("reference", "exact", "compact")
 
@@ -65,7 +66,7 @@ def size_options(command: Decorated) -> Decorated:
             ),
             click.option(
                 "--model",
-                type=click.Path(exists=True, path_type=Path),
+                type=ExistingPath(),
                 metavar="FILE",
                 help="The face that all receivers have: with --preset compact, what its interpolation table "
                 "(FIT) gives is not sent; with --tolerance, its vertices count. Default: the built-in head.",

@@ -17,6 +17,7 @@ from fba.cli import options
 from fba.cli.clamped_values import clamped_lines
 from fba.cli.coding import rate_options
 from fba.cli.command import Command, examples
+from fba.cli.inputs import ExistingPath
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import rate_text, seconds_text
 from fba.errors import FbaError
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from fba.live.recording import Target
 
 KINDS = ("livelink", "ifacialmocap", "vtube", "vmc")
+PRESETS = ("reference", "compact")
 LONGEST_NEUTRAL = 60.0
 
 
@@ -34,6 +36,7 @@ LONGEST_NEUTRAL = 60.0
     epilog=examples(
         "fba capture livelink -o face.fba",
         "fba capture livelink --play --subject Anna",
+        "fba capture livelink -o face.fba --preset compact",
         "fba capture livelink -o face.fba --bitrate 1500",
         "fba capture ifacialmocap --ask 192.168.0.20 -o face.fba --seconds 60",
         "fba capture vtube --ask 192.168.0.20 --play",
@@ -85,11 +88,17 @@ LONGEST_NEUTRAL = 60.0
     "T-pose. Default: all counts as it is sent.",
 )
 @click.option("--swap", is_flag=True, help="MouthLeft and MouthRight, JawLeft and JawRight change places.")
+@click.option(
+    "--preset",
+    type=click.Choice(PRESETS),
+    help="What is sent: all that comes (reference, the default), or only what players do not derive from "
+    "other FAPs, and nothing that never moved so far (compact).",
+)
 @options.fap_quant_option
 @rate_options.rate_options
 @click.option(
     "--model",
-    type=click.Path(exists=True, path_type=Path),
+    type=ExistingPath(),
     metavar="FILE",
     help="With --play, the face that is shown. Default: the built-in head.",
 )
@@ -107,6 +116,7 @@ def command(
     fps: Fraction | None,
     neutral: float | None,
     swap: bool,
+    preset: str | None,
     fap_quant: int,
     bitrate: float | None,
     buffer: float | None,
@@ -126,6 +136,11 @@ def command(
     rate_options.check_buffer()
     if bitrate is not None and options.is_given("fap_quant"):
         raise click.UsageError("--quant and --bitrate contradict each other: the bit rate decides how finely")
+    if bitrate is not None and preset is not None:
+        raise click.UsageError(
+            "--preset and --bitrate contradict each other: the bit rate decides what is sent"
+        )
+    compact = preset == "compact"
     written = [] if output is None else [Output("-o", output)]
     outputs = Outputs(written, [] if model is None else [model], no_clobber=no_clobber)
     if play:
@@ -139,11 +154,12 @@ def command(
     found = find_kind(kind)
     if ask is not None and not found.asked_port:
         raise click.UsageError(f"--ask: {found.description} sends by itself; enter our address in the app")
-    warm_up(bodies=found.bodies, rated=bitrate is not None)
+    warm_up(bodies=found.bodies, rated=bitrate is not None, compact=compact)
     targets, stream = _targets(output, play=play)
     recorder = StreamRecorder(
         targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage", mark=True),
         bit_rate=bitrate, buffer=rate_options.DEFAULT_BUFFER if buffer is None else buffer,
+        compact=compact,
     )  # fmt: skip
     capture = Capture(
         found, recorder.push, sender=sender, rate=fps, swap=swap, neutral=neutral,

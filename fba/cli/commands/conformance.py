@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ import click
 from fba.atomic import atomic
 from fba.cli import options
 from fba.cli.command import Command, examples
+from fba.cli.inputs import ExistingPath
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress
 
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
         "fba conformance ../vectors                        # a folder with an index.json",
     ),
 )
-@click.argument("folder", required=False, type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("folder", required=False, type=ExistingPath(file_okay=False))
 @click.option(
     "--decoder",
     metavar="COMMAND",
@@ -134,6 +136,11 @@ def _program(option: str, text: str, places: Sequence[str], timeout: float) -> P
         program = parse_program(text, seconds=timeout)
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint=option) from error
+    if shutil.which(program.words[0]) is None:
+        raise click.BadParameter(
+            f"there is no program {program.words[0]!r} here; give its path, or a name on PATH",
+            param_hint=option,
+        )
     unknown = unknown_places(program, places)
     if unknown:
         known = ", ".join(f"{{{name}}}" for name in places)

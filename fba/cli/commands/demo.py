@@ -29,7 +29,7 @@ CAPTURE = "talk.c3d"
 """Markers on somebody's face."""
 SECONDS_BEFORE_NOTICE = 4.0
 """Seconds after which a line explains the wait."""
-COMPILING = "compiling for this machine, on the first run only: about a minute in all"
+COMPILING = "compiling for this machine, on the first run only: about half a minute in all"
 
 
 @click.command(cls=Command, epilog=examples("fba demo", "fba demo --no-play --out demo/"))
@@ -82,11 +82,14 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     decoded = read(stream)
     click.echo(f"decoded: {len(decoded)} frames at {rate_text(decoded.rate)} frames/s")
     _encode_capture(capture, talk, outputs)
-    again = as_typed(f"fba play {shlex.quote(str(stream))}")
-    click.echo(f"to see it again: {again}")
-    if play is not False and _play(player, decoded, asked=play is True):
-        return
-    _render(player, decoded, video, picture)
+    shown = play is not False and _play(player, decoded, asked=play is True)
+    if not shown:
+        _render(player, decoded, video, picture)
+    quoted = shlex.quote(str(stream))
+    if shown or (play is False and _can_open_a_window(player)):
+        click.echo(f"to see it again: {as_typed(f'fba play {quoted}')}")
+    else:
+        click.echo(f"other pictures: {as_typed(f'fba render {quoted} -o picture.png --time 1.5')}")
 
 
 def _encode_capture(capture: Path, stream: Path, outputs: Outputs) -> None:
@@ -117,8 +120,20 @@ def _play(player: object, animation: Animation, *, asked: bool) -> bool:
     return True
 
 
+def _can_open_a_window(player: object) -> bool:
+    try:
+        player.check_display()  # type: ignore[attr-defined]
+    except DisplayError:
+        return False
+    return True
+
+
 def _render(player: object, animation: Animation, video: Path, picture: Path) -> None:
-    with Progress("rendering", None) as step:
-        player.render(animation, video, size=(640, 360), progress=step.show)  # type: ignore[attr-defined]
     player.render(animation, picture, time=float(animation.times[0]) + 2.0)  # type: ignore[attr-defined]
-    click.echo(f"rendered: {video} and {picture}")
+    try:
+        with Progress("rendering", None) as step:
+            player.render(animation, video, size=(640, 360), progress=step.show)  # type: ignore[attr-defined]
+    except DisplayError as error:  # films need more than pictures
+        click.echo(f"rendered: {picture}; no film: {error}")
+    else:
+        click.echo(f"rendered: {video} and {picture}")

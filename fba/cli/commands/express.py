@@ -12,6 +12,7 @@ from fba.cli import options
 from fba.cli.command import Command, examples
 from fba.cli.emotions import tables
 from fba.cli.emotions.pictures import PICTURES, draw, option_errors, picture_kind
+from fba.cli.inputs import ExistingPath
 from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
 from fba.cli.printing import seconds_text
 
@@ -90,7 +91,7 @@ class PointType(click.ParamType[tuple[float, float]]):
 @click.option("--nearness", type=float, help="One family: how near such a FAP must be to stay; 0 to 1.")
 @click.option(
     "--model",
-    type=click.Path(exists=True, path_type=Path),
+    type=ExistingPath(),
     metavar="FILE",
     help="Pictures: the face; default: the built-in head.",
 )

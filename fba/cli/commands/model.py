@@ -13,6 +13,7 @@ import click
 
 from fba.cli import options
 from fba.cli.command import Group, examples
+from fba.cli.inputs import ExistingPath
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, colour_grade, print_json
 from fba.cli.subcommands import model_learn_fit
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from fba.face.checks import Finding
     from fba.face.model import FaceModel
 
-SOURCE = click.Path(exists=True, path_type=Path)
+SOURCE = ExistingPath()
 KINDS = ("makehuman", "gltf", "obj", "ply", "wfm", "fdp")
 POINT_FILES = "FDP, CSV or JSON file"
 PART = click.option(
@@ -233,7 +234,7 @@ def import_(
         "fba model points avatar.glb -o avatar.points.csv",
     ),
 )
-@click.argument("head", metavar="HEAD", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("head", metavar="HEAD", type=ExistingPath(dir_okay=False))
 @click.option(
     "-o", "--output", metavar="POINTS.csv", required=True, type=OutputType(), help="File of points to write."
 )
@@ -323,7 +324,7 @@ def _draw_sheet(model: FaceModel, file: Path) -> None:
         "fba model fit points.csv --unit cm --model head.glb --name Ada -o ada.glb",
     ),
 )
-@click.argument("points", metavar="POINTS", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("points", metavar="POINTS", type=ExistingPath(dir_okay=False))
 @_output_option
 @options.no_clobber_option
 @click.option(

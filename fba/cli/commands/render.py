@@ -108,7 +108,7 @@ class SheetType(click.ParamType[str | int]):
 @click.option("--transparent", is_flag=True, help="PNG without a background.")
 @click.option("--replace", is_flag=True, help="Overwrite numbered pictures that exist.")
 @scene_options.scene_options(
-    fps="Frame rate of the film; default: the input's own, or a whole fraction of it.",
+    fps="Frame rate of the film; default: the input's own, or a whole fraction of it, at most 60 (GIF: 25).",
     arrange="Several files: side by side (default), or the others as drawings over the first.",
 )
 def command(
@@ -203,7 +203,7 @@ def command(
         if sheet is not None:
             made = _frames_sheet(scene, sheet, Path(name), tile=size, camera=how.camera, start=start, end=end)
         else:
-            made = _size(size, name)
+            made = _size(size, name) + (_rate_text(scene, name) if film and how.fps is None else "")
             with Progress("rendering", None) as step, usage_errors():
                 render(
                     scene,
@@ -281,6 +281,16 @@ def _size(size: tuple[int, int] | None, output: str) -> str:
 
     width, height = picture_size(size, output)
     return f"{width}x{height}"
+
+
+def _rate_text(scene: Showable, output: str) -> str:
+    """Return the frame rate of the film as text, where it is not that of the file; else nothing."""
+    from fba_player.export.render import film_rate
+
+    own, rate = scene.timeline.rate, film_rate(scene.timeline.rate, output)
+    if rate == own:
+        return ""
+    return f", {float(rate):.5g} frames/s, {float(own):.5g} in the file (another rate: --fps)"
 
 
 def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, int] | None) -> str:

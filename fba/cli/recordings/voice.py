@@ -12,6 +12,7 @@ import click
 from fba.animation import Animation
 from fba.cli import options
 from fba.cli.command import Decorated
+from fba.cli.inputs import ExistingPath
 from fba.cli.outputs import STANDARD, Output, Outputs
 from fba.cli.printing import clock_text, seconds_text
 from fba.errors import FormatError
@@ -39,7 +40,7 @@ def audio_options(command: Decorated) -> Decorated:
     """Add the options that put a sound beside the stream."""
     audio = click.option(
         "--audio",
-        type=click.Path(exists=True, dir_okay=False, path_type=Path),
+        type=ExistingPath(dir_okay=False),
         metavar="FILE",
         help="A sound that was recorded with the capture: the part that goes with the stream is written "
         "beside it, OUT.wav, where fba play and fba render find it.",

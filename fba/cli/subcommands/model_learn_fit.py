@@ -12,7 +12,7 @@ import click
 from fba.cli import options
 from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, read_input
+from fba.cli.inputs import EXISTING, ExistingPath, read_input
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress
 from fba.errors import FbaError
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @options.no_clobber_option
 @click.option(
-    "--model", metavar="FILE", type=click.Path(exists=True, path_type=Path),
+    "--model", metavar="FILE", type=ExistingPath(),
     help="Model that gets the table, in place of one that it has. Default: the built-in head.",
 )  # fmt: skip
 @click.option(

@@ -1,5 +1,5 @@
-"""`python -m fba.persona.training -o FILE` makes the trained default again: the same file from the same
-seed."""
+"""`python -m fba.persona.training -o FILE` trains what recognises expressions: from one seed always the
+same."""
 
 from __future__ import annotations
 
@@ -11,16 +11,13 @@ from fba.persona.training.bosphorus import read_database
 from fba.persona.training.examples import make_examples
 from fba.persona.training.training import train_recogniser
 
-DEFAULT = Path(__file__).parents[1] / "recognition" / "default.recogniser"
 PEOPLE, EACH = 40, 6
 
 
 def main() -> None:
     """Make examples, train, write the file, and print how well each part is recognised."""
     parser = argparse.ArgumentParser(prog="python -m fba.persona.training", description=main.__doc__)
-    parser.add_argument(
-        "-o", "--output", type=Path, default=DEFAULT, help="file to write; default: the one of fba"
-    )
+    parser.add_argument("-o", "--output", type=Path, required=True, help="file to write")
     parser.add_argument("--people", type=int, default=PEOPLE, help="faces that are made up")
     parser.add_argument("--each", type=int, default=EACH, help="examples of each class of each of them")
     parser.add_argument("--seed", type=int, default=1)
@@ -28,6 +25,8 @@ def main() -> None:
         "--bosphorus", type=Path, metavar="FOLDER", help="train with scans in Bosphorus's layout"
     )
     given = parser.parse_args()
+    if not given.output.parent.is_dir():
+        parser.error(f"{given.output}: there is no folder {given.output.parent}; make it first")
     about = f"{given.people} faces, {given.each} examples of each of 35 classes, seed {given.seed}"
     examples = make_examples(given.people, given.each, given.seed)
     if given.bosphorus is not None:

@@ -156,7 +156,8 @@ def _choose_encoder(av: Any) -> str:
         if name in av.codec.codecs_available:
             return name
     raise DisplayError(
-        "this build of PyAV has no H.264 encoder; install av from its own wheels (pip install av)"
+        "this build of PyAV has no H.264 encoder; install av from its own wheels: "
+        "pip install --only-binary=:all: av"
     )
 
 

@@ -32,8 +32,8 @@ Progress = Callable[[int, int], None]
 
 __all__ = ["film_rate", "record", "render", "write_picture"]
 
-SMOOTH_RATES = (Fraction(10), Fraction(120))
-"""Frames per second, least and most, of a film for which no rate is given."""
+SMOOTH_RATES = (Fraction(10), Fraction(60))
+"""Frames per second, least and most, of a film for which no rate is given: screens show no more than 60."""
 MOST_FRAMES = 1_000_000
 """Most frames of a film: a longer one comes from damaged times, or a part of it was meant."""
 SLACK = 0.001
@@ -133,7 +133,7 @@ def record(
     if not math.isfinite(audio_offset):
         raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
     suffix = os.path.splitext(os.fspath(path))[1].lower()
-    gif, numbered = suffix == ".gif", is_sequence(path)
+    numbered = is_sequence(path)
     transparent = transparent or _is_transparent(shown)
     if transparent and not numbered:
         raise UnsupportedError(
@@ -142,15 +142,7 @@ def record(
         )
     if numbered and audio is not None:
         raise ValueError("pictures have no sound; leave the audio out, or write an .mp4")
-    if fps is None:
-        rate = film_rate(shown.timeline.rate)
-        if gif:
-            from fba_player.export._gif import gif_rate
-
-            rate = gif_rate(rate)
-    else:
-        rate = Fraction(fps)
-    rate = exact_rate(rate)
+    rate = exact_rate(film_rate(shown.timeline.rate, path) if fps is None else Fraction(fps))
     first, count = _frame_range(shown, rate, start, end)
     width, height = picture_size(size, path)
     if size is not None and min(width, height) < 1:
@@ -188,12 +180,18 @@ def as_scene(subject: Animation | Showable) -> Showable:
     return Scene(subject) if isinstance(subject, Animation) else subject
 
 
-def film_rate(rate: Fraction) -> Fraction:
-    """The frame rate of a film: that of the animation, or a multiple or fraction of it from 10 to 120."""
+def film_rate(rate: Fraction, path: PathLike | None = None) -> Fraction:
+    """Return the frame rate of a film: that of the animation, or a multiple or fraction of it from 10 to 60.
+
+    path: of the film; a GIF has at most 25.
+    """
     low, high = SMOOTH_RATES
-    if rate < low:
-        return rate * math.ceil(low / rate)
-    return rate / math.ceil(rate / high)
+    rate = rate * math.ceil(low / rate) if rate < low else rate / math.ceil(rate / high)
+    if path is not None and os.fspath(path).lower().endswith(".gif"):
+        from fba_player.export._gif import gif_rate
+
+        return gif_rate(rate)
+    return rate
 
 
 def _check_name(path: PathLike) -> None:

@@ -88,10 +88,14 @@ def missing_text(names: Iterable[str]) -> str:
 
 
 def cure(error: Exception, package: str) -> str:
-    """What to install against an error of an import: the library that it names, else the Python package."""
+    """Return what to install against an error of an import: the library that it names, else the package.
+
+    package: of Python, or this one with the extra that brings it: "mpeg4-fba[films]".
+    """
     library = re.match(r"(lib\S+): cannot open shared object file", str(error))
     if library is None:
-        return f"Install it with: pip install {package}"
+        quoted = f'"{package}"' if "[" in package else package  # shells read brackets as a pattern
+        return f"Install it with: pip install {quoted}"
     if library[1] in PACKAGES:
         return how_to_install([library[1]])
     return f"Install the system library {library[1]}"

@@ -262,16 +262,20 @@ class Transport:
         self._motion = self._motion_from(clock(), here)
 
     def text(self) -> str:
-        """Time, frame and speed as text: "0:01.240 / 0:04.000   frame 31 / 100   1x"."""
+        """Time, frame and speed as text: "0:01.240 / 0:04.000   frame 31 / 99   1x"."""
         time = self.time
         parts = [
             f"{clock_text(time - self.start)} / {clock_text(self.duration)}",
-            f"frame {self._timeline.position(time)[0] + 1} / {self._timeline.frames}",
+            self.frame_text(),
             f"{self.speed:g}x",
         ]
         if self.loop:
             parts.append("loop")
         return "   ".join(parts)
+
+    def frame_text(self) -> str:
+        """Return the numbers of the current and of the last frame, from 0: "frame 31 / 99"."""
+        return f"frame {self.frame} / {self._timeline.frames - 1}"
 
     def timecode(self, time: float | None = None) -> str:
         """The time code "h:mm:ss:ff" of a time, by default the current one.

@@ -18,6 +18,8 @@ MOST_TRAVEL = 4.0
 """The camera follows a performance that moves further than this (m)."""
 NEAR = 0.12
 """Movement (m) below which the camera's distance is not enlarged."""
+ARMS = 1.0
+"""Half the width (m) of a person with stretched arms."""
 LOWER = 0.09
 """Metres below the root of a person who walks away at which the middle of the picture is."""
 HEAD = "skullbase"
@@ -62,7 +64,7 @@ def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HE
         x, y, z = (float(v) for v in positions[0, 0])
         more = _head_above(positions, names, headroom)
         subject = Subject(
-            (x, y - LOWER + more / 2, z), BODY_SUBJECT.half_height + more / 2, BODY_SUBJECT.half_width
+            (x, y - LOWER + more / 2, z), BODY_SUBJECT.half_height + more / 2, _reach(positions)
         )
         return Extent(subject, follows=True, legs_move=legs_move)
     low, high = low - np.array([0.10, 0.06, 0.10]), high + np.array([0.10, max(headroom, HEADROOM), 0.10])
@@ -74,6 +76,14 @@ def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HE
     towards = float(np.linalg.norm(path - (x, z), axis=1).max())  # from any side
     subject = Subject((x, y, z), tall, max(wide, BODY_SUBJECT.half_width), max(towards - NEAR, 0.0))
     return Extent(subject, follows=False, legs_move=legs_move)
+
+
+def _reach(positions: Float64) -> float:
+    """Return half the width that a walker takes, metres: more than usual with arms stretched out."""
+    if not np.isfinite(positions).all():
+        return BODY_SUBJECT.half_width
+    ways = np.linalg.norm((positions - positions[:, :1])[..., [0, 2]], axis=2)
+    return min(max(float(ways.max()), BODY_SUBJECT.half_width), ARMS)
 
 
 def _head_above(positions: Float64, names: tuple[str, ...], headroom: float) -> float:

@@ -59,6 +59,7 @@ class CompareScene(Timed[CompareTimeline]):
         self.timeline = CompareTimeline([scene.timeline for scene in scenes])
         self.arrangement = arrangement
         self._yaw = 0.0
+        self._stands = [np.array(scene.subject.centre) for scene in scenes]
         self._drawings = [_drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
         self._apart: float | None = None
         self._differences: dict[tuple[int, int], Differences] = {}
@@ -141,6 +142,7 @@ class CompareScene(Timed[CompareTimeline]):
         else:
             subjects = [scene.face_subject for scene in self.scenes]
             self._apart = SHOULDERS
+        self._stands = [np.array(one.centre) for one in subjects]
         return camera.fit(self._all(subjects), aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
@@ -207,14 +209,19 @@ class CompareScene(Timed[CompareTimeline]):
             return self._height(number)
         widths = [self._half_width(scene) for scene in self.scenes]
         along = sum(widths[:number]) - sum(widths[number + 1 :])
-        return np.asarray(self._right() * along * APART + self._height(number))
+        # Recordings begin anywhere: each figure is brought to where the first one is.
+        to_first = (self._stands[0] - self._stands[number]) * (1.0, 0.0, 1.0)
+        height = self._height(number) * (0.0, 1.0, 0.0)
+        return np.asarray(self._right() * along * APART + to_first + height)
 
     def _half_width(self, scene: Scene) -> float:
-        """Half the width that each figure takes; heads take less than whole bodies."""
+        """Half the width that a figure takes: of a body its own, of heads that of the widest."""
         if self._apart is not None:
             return self._apart
-        alike = [one.subject.half_width for one in self.scenes if one.has_body == scene.has_body]
-        return max(*alike, SHOULDERS) if self.has_body else max(alike)
+        if scene.has_body:
+            return max(scene.subject.half_width, SHOULDERS)
+        heads = max(one.subject.half_width for one in self.scenes if not one.has_body)
+        return max(heads, SHOULDERS) if self.has_body else heads
 
     def _height(self, number: int) -> Float64:
         """(3,): the shift that brings a head alone to the height of heads on bodies."""

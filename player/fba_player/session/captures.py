@@ -48,7 +48,7 @@ class Captures:
 
     def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
         """Save a picture, uint8 (H, W, 4), as PNG; returns its path, or None, with a notice, if it fails."""
-        path = self._unused_path(f"-{self.session.transport.frame + 1:04d}", ".png")
+        path = self._unused_path(f"-{self.session.transport.frame:04d}", ".png")
         try:
             write_picture(path, pixels, transparent=transparent)
         except (OSError, FbaError) as error:

@@ -18,6 +18,7 @@ from typing import Any
 
 from fba.atomic import PathLike
 from fba.errors import FbaWarning
+from fba_player.gl.context import cure
 from fba_player.playback.transport import Transport
 from fba_player.sound._device_clock import SoundClock
 from fba_player.sound._mixer import SoundMixer
@@ -152,7 +153,10 @@ def _open_device(rate: int, backend: str | None) -> Any:
     try:
         import miniaudio
     except ImportError as error:
-        raise NoDeviceError(f"the package miniaudio is missing; pip install miniaudio: {error}") from error
+        raise NoDeviceError(
+            f"it needs the Python package miniaudio, which cannot be imported: {error}. "
+            + cure(error, "mpeg4-fba[player]")
+        ) from error
     silent = miniaudio.Backend.NULL
     with _silence_stderr():
         device = miniaudio.PlaybackDevice(

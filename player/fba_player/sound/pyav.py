@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fba.errors import DisplayError
+from fba_player.gl.context import cure
 
 
 def import_av(purpose: str = "films need") -> Any:
@@ -14,7 +15,7 @@ def import_av(purpose: str = "films need") -> Any:
     except ImportError as error:
         raise DisplayError(
             f"{purpose} the Python package av (PyAV), which cannot be imported: {error}. "
-            "Install it with: pip install av"
+            + cure(error, "mpeg4-fba[films]")
         ) from error
     return av
 

@@ -204,7 +204,7 @@ class Bar:
         frame = session.scene.timeline.position(time)[0]
         if not self._held:
             to.add_line((x, top), (x, bottom), theme.packed(theme.TEXT, 0.45))
-        text = f"{clock_text(time)}   frame {frame + 1}"
+        text = f"{clock_text(time)}   frame {frame}"
         info = session.source.info
         if info.plane_bits is not None and info.plane_intra is not None and frame < len(info.plane_bits):
             kind = "I" if info.plane_intra[frame] else "P"

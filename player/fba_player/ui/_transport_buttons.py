@@ -72,7 +72,7 @@ class Buttons:
         if full:
             imgui.same_line(0, 16)
             imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + 4)
-            text = f"frame {transport.frame + 1} / {session.scene.timeline.frames}"
+            text = transport.frame_text()
             imgui.text_colored(theme.FAINT, text + ("   waiting" if transport.waiting else ""))
 
     def _right(self, session: Session, wide: float, y: float, taken: float) -> None:

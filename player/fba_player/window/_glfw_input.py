@@ -75,7 +75,10 @@ class GlfwInput:
         glfw = self._glfw
         if self._gui is not None:
             self._send_key_to_imgui(key, action, modifiers)
-            if action != glfw.RELEASE and self._gui.io.want_text_input:
+            # Text that is typed is no key of ours; but Esc closes a list, whose search field has the keys.
+            closes = key == glfw.KEY_ESCAPE and self._session.popup
+            if action != glfw.RELEASE and self._gui.io.want_text_input and not closes:
+                self._on_input()
                 return
         if action == glfw.RELEASE:
             return

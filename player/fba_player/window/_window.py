@@ -213,7 +213,7 @@ class Window:
 
                 self._gui = Gui(self._gl, session)
             except (ImportError, RuntimeError) as error:
-                remedy = cure(error, "imgui-bundle")
+                remedy = cure(error, "mpeg4-fba[player]")
                 warnings.warn(
                     f"the window has no panels, as imgui cannot be used: {error}. {remedy}",
                     FbaWarning,
@@ -304,7 +304,7 @@ class Window:
         if page_of(self.session) is not None:
             text = self._title + (" (not saved)" if self.session.unsaved else "")
         else:
-            text = f"{self._title} - frame {self.transport.frame + 1} / {self.session.scene.timeline.frames}"
+            text = f"{self._title} - {self.transport.frame_text()}"
         if text != self._shown_title:
             self._glfw.set_window_title(self._window, text)
             self._shown_title = text

@@ -30,7 +30,7 @@ def start_glfw(problems: list[str], instead: str = HOW_WITHOUT) -> Any:
     except ImportError as error:
         raise DisplayError(
             f"the window needs the Python package glfw, which cannot be used: {error}. "
-            f"{cure(error, 'glfw')}. {instead}"
+            f"{cure(error, 'mpeg4-fba[player]')}{'' if instead == HOW_WITHOUT else f'. {instead}'}"
         ) from error
     glfw.set_error_callback(lambda code, text: problems.append(decode(text)))
     if not glfw.init():

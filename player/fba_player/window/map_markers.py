@@ -24,7 +24,7 @@ def check_window() -> None:
         import imgui_bundle  # noqa: F401 - the page is made with it
     except ImportError as error:
         raise DisplayError(
-            f"the page for markers needs imgui: {error}. {cure(error, 'imgui-bundle')}. {WITHOUT}"
+            f"the page for markers needs imgui: {error}. {cure(error, 'mpeg4-fba[player]')}. {WITHOUT}"
         ) from error
     check_display(WITHOUT)
 

@@ -28,7 +28,7 @@ def check_window() -> None:
         import imgui_bundle  # noqa: F401 - the page is made with it
     except ImportError as error:
         raise DisplayError(
-            f"the page for points needs imgui: {error}. {cure(error, 'imgui-bundle')}. {BY_HAND}"
+            f"the page for points needs imgui: {error}. {cure(error, 'mpeg4-fba[player]')}. {BY_HAND}"
         ) from error
     check_display(BY_HAND)
 

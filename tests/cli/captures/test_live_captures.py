@@ -16,6 +16,8 @@ from typing import Any
 import pytest
 
 import fba
+from fba.face.resolve import resolve
+from fba.parameters import fap_numbers
 from fba_conformance.captures.face_files import datagram
 
 LOCAL = "127.0.0.1"
@@ -87,6 +89,28 @@ def test_a_capture_at_a_bit_rate(run: Callable[..., Any], tmp_path: Path) -> Non
     assert "--buffer goes with --bitrate" in said.err
 
 
+def test_a_compact_capture_shows_the_same_with_less(run: Callable[..., Any], tmp_path: Path) -> None:
+    """Both sides of the telephone's face move alike: a compact stream leaves one of them to the player."""
+    path, port, masks = tmp_path / "a.fba", free_port(), {}
+    for preset in ("reference", "compact"):
+        with telephone(port, junk=b""):
+            options = ("-o", path, "--seconds", 0.4, "--preset", preset)
+            assert run("capture", "livelink", "--port", port, "--host", LOCAL, *options).code == 0
+        face = fba.read(path).face
+        assert face is not None
+        masks[preset] = face.mask[-1]
+        shown = resolve(face)
+        smiles = [fap_numbers()[f"raise_{side}_cornerlip"] - 1 for side in "lr"]
+        assert shown[:, smiles[0]].any()
+        assert (shown[:, smiles[0]] == shown[:, smiles[1]]).all()
+    assert masks["reference"][smiles].all()
+    assert masks["compact"][smiles].sum() == 1
+    assert masks["compact"].sum() < 0.7 * masks["reference"].sum()
+    said = run("capture", "livelink", "-o", path, "--bitrate", 1500, "--preset", "compact")
+    assert said.code == 2
+    assert "--preset and --bitrate contradict each other" in said.err
+
+
 def test_interruptions_end_it_with_the_file_complete(run: Callable[..., Any], tmp_path: Path) -> None:
     path, port = tmp_path / "a.fba", free_port()
     before = signal.getsignal(signal.SIGINT)
@@ -154,7 +178,12 @@ def test_a_telephone_is_asked(run: Callable[..., Any], tmp_path: Path) -> None:
         (
             ["livelink", "-o", "a.fba", "--host", "203.0.113.9", "--seconds", "0.1"],
             1,
-            "cannot be listened on",
+            "cannot be listened on: Cannot assign requested address; give an address of this machine",
+        ),
+        (
+            ["livelink", "-o", "a.fba", "--host", "300.1.1.1", "--seconds", "0.1"],
+            1,
+            "; give an address of this machine, or none for all",
         ),
         (["nothing", "-o", "a.fba"], 2, "is not one of"),
     ],

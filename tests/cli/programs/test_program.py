@@ -50,7 +50,7 @@ def test_started_by_dev(epf: Path, typed: str, program: str) -> None:
 
 
 def test_started_as_a_module(epf: Path) -> None:
-    error = ran(sys.executable, "-m", "fba", "info", epf)
+    error = ran(sys.executable, "-m", "fba", "info", epf, PATH=os.devnull)
     assert f"use it with `{sys.executable} -m fba encode IN.fap" in error.stderr
     folder = os.path.dirname(sys.executable)
     on_path = ran("python", "-m", "fba", "info", epf, PATH=f"{folder}{os.pathsep}{os.environ['PATH']}")
@@ -94,5 +94,17 @@ def test_only_commands_are_replaced() -> None:
 @pytest.mark.slow
 def test_the_hint_of_the_demo(tmp_path: Path) -> None:
     out = tmp_path / "my demo"
-    done = ran(sys.executable, "-m", "fba", "demo", "--no-play", "--out", out, FBA_DEV="./dev")
-    assert f"to see it again: ./dev fba play '{out}/hello.fba'\n" in done.stdout
+    done = ran(
+        sys.executable,
+        "-m",
+        "fba",
+        "demo",
+        "--no-play",
+        "--out",
+        out,
+        FBA_DEV="./dev",
+        DISPLAY="",
+        WAYLAND_DISPLAY="",
+    )
+    assert f"other pictures: ./dev fba render '{out}/hello.fba' -o picture.png --time 1.5\n" in done.stdout
+    assert "to see it again" not in done.stdout  # where no window can be opened

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 import fba
 from fba import Animation
@@ -20,9 +22,13 @@ main()
 """
 
 
-def bare(programs: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+PLAIN = BARE.replace('"moderngl", "glcontext", ', '"av", "miniaudio", ')
+"""A Python without the extras: it draws, but has no films, sound or windows."""
+
+
+def bare(programs: Path, folder: Path, *arguments: str, code: str = BARE) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [programs / "python", "-c", BARE, *arguments], cwd=folder, capture_output=True, text=True, check=False
+        [programs / "python", "-c", code, *arguments], cwd=folder, capture_output=True, text=True, check=False
     )
 
 
@@ -67,8 +73,47 @@ def test_what_draws_says_what_is_missing(line: str, stream: Path, programs: Path
     assert done.returncode == 1
     (said,) = done.stderr.splitlines()
     assert said.startswith("fba: error: ")
-    assert "pip install glfw" in said or "pip install moderngl" in said
+    assert said.endswith(('"mpeg4-fba[player]"', "install moderngl"))
     assert sorted(path.name for path in stream.parent.iterdir()) == ["face.fba"]
+
+
+@pytest.mark.parametrize(
+    ("line", "extra"),
+    [
+        ("play face.fba", "player"),
+        ("markers talk.c3d", "player"),
+        ("render face.fba -o face.mp4 --size 64x48", "films"),
+        ("render face.fba -o face.gif --size 64x48", "films"),
+    ],
+)
+def test_what_needs_an_extra_names_it(line: str, extra: str, stream: Path, programs: Path) -> None:
+    shutil.copy(Path(fba.__path__[0]) / "samples" / "talk.c3d", stream.parent)
+    done = bare(programs, stream.parent, *line.split(), code=PLAIN)
+    assert done.returncode == 1
+    (said,) = done.stderr.splitlines()
+    assert said.startswith("fba: error: ")
+    assert f'"mpeg4-fba[{extra}]"' in said
+    assert sorted(path.name for path in stream.parent.iterdir()) == ["face.fba", "talk.c3d"]
+
+
+def test_the_plain_package_draws_a_picture(stream: Path, programs: Path, opengl: None) -> None:
+    line = "render face.fba -o face.png --size 64x48"
+    done = bare(programs, stream.parent, *line.split(), code=PLAIN)
+    assert (done.returncode, done.stderr) == (0, "")
+    with Image.open(stream.parent / "face.png") as picture:
+        assert picture.size == (64, 48)
+        assert len(picture.getcolors(64 * 48) or ()) > 100  # something is drawn
+
+
+@pytest.mark.slow
+def test_the_demo_of_the_plain_package_says_why_there_is_no_film(
+    tmp_path: Path, programs: Path, opengl: None
+) -> None:
+    done = bare(programs, tmp_path, "demo", "--no-play", "--out", "demo", code=PLAIN)
+    assert done.returncode == 0, done.stderr
+    assert "rendered: demo/hello.png; no film: films need" in done.stdout
+    assert '"mpeg4-fba[films]"' in done.stdout
+    assert not (tmp_path / "demo" / "hello.mp4").exists()
 
 
 def test_the_player_can_be_imported_and_its_figures_move(tmp_path: Path, programs: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.face.authoring import author
+from fba.face.authoring.author import author_lids
 from fba.face.checks import check_faps
 from fba.face.feature_points import row_of
 from fba.face.model import Part
@@ -54,6 +56,21 @@ def test_without_eyes_tongue_and_teeth_the_rest_plays() -> None:
     assert model.lost[23] == "there is no left eyeball"
     assert model.lost[45] == "there is no tongue"
     assert set(model.table_of) == set(range(3, 69)) - set(model.lost)
+
+
+def test_an_eye_without_a_lids_margin_has_no_opening() -> None:
+    """A shape may close an eye of which a feature point is missing, so that no margin is found."""
+    parts, points, bound = grid_head()
+    corners = ("3.7", "3.11", "3.1")
+    upper_lid = points[row_of()["3.1"]].copy()
+    model = author(parts, points, bound=bound)
+    shape = np.zeros((sum(len(part.vertices) for part in parts), 3))
+    assert author_lids(model, {19: [shape]}) == {}
+    lost_points, lost_bound = model.points.copy(), model.bound.copy()
+    lost_bound[[row_of()[name] for name in corners]] = -1
+    lost_points[row_of()["3.1"]] = upper_lid + np.array([0, 0, 0.05])
+    lost = replace(model, points=lost_points, bound=lost_bound)
+    assert author_lids(lost, {19: [shape], 21: [shape]}) == {}
 
 
 @pytest.mark.parametrize(

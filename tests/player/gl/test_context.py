@@ -64,8 +64,8 @@ def test_a_picture_without_opengl_names_libraries_and_packages(
             "libice.so.9: cannot open shared object file: No such file or directory",
             "system library libice.so.9",
         ),
-        ("No module named 'imgui_bundle'", "pip install imgui-bundle"),
+        ("No module named 'imgui_bundle'", 'pip install "mpeg4-fba[player]"'),
     ],
 )
 def test_a_package_is_blamed_only_where_it_is_to_blame(error: str, said: str) -> None:
-    assert said in cure(ImportError(error), "imgui-bundle")
+    assert said in cure(ImportError(error), "mpeg4-fba[player]")

@@ -313,7 +313,7 @@ def test_timecodes_of_frames(index: int, rate: Fraction, text: str) -> None:
 def test_text() -> None:
     player, _ = transport()
     player.seek(1.24)
-    assert player.text() == "0:01.240 / 0:02.000   frame 13 / 20   1x   loop"
+    assert player.text() == "0:01.240 / 0:02.000   frame 12 / 19   1x   loop"
 
 
 @pytest.mark.parametrize(

@@ -197,6 +197,19 @@ def test_heads_and_bodies_in_a_row_are_all_in_the_picture() -> None:
     assert across[-1] + shoulders < 1
 
 
+@pytest.mark.parametrize("preset", [None, "front", "body", "profile"])
+def test_bodies_that_were_recorded_anywhere_stand_beside_each_other(preset: str | None) -> None:
+    """The second one, at BAPs 182 and 183: 3 m aside, and 2 m back."""
+    away = Animation(Fraction(25), np.arange(2), body=body_track([{182: 3000, 183: -2000}] * 2), name="away")
+    scene = CompareScene([Scene(walk([0, 0])), Scene(away), Scene(walk([0, 0]))])
+    matrix = scene.camera(preset, 16 / 9).view_matrix()
+    across, _, depth, _ = np.array([matrix @ eye.matrix[:, 3] for eye in scene.view_at(0.0).eyes[::2]]).T
+    apart = np.diff(across)
+    assert apart == pytest.approx(apart[0], abs=0.02)
+    assert apart[0] > 0.4
+    assert depth == pytest.approx(depth[0], abs=0.02)
+
+
 def test_nothing_or_too_few_names_is_refused(pair: CompareScene) -> None:
     with pytest.raises(ValueError, match="no scene"):
         CompareScene([])

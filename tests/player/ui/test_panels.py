@@ -207,7 +207,7 @@ def test_bare_shows_the_picture_alone(studio: Studio) -> None:
 
 def test_a_word_comes_and_goes(studio: Studio, clock: Clock) -> None:
     before = studio.draw(1).astype(int)
-    studio.session.say("Saved as talk-0001.png")
+    studio.session.say("Saved as talk-0000.png")
     during = studio.draw(1).astype(int)
     assert (np.abs(during - before).sum(axis=2) > 30).sum() > 2000
     clock.now += 10

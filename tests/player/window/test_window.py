@@ -159,7 +159,7 @@ def test_a_lost_context_ends_with_a_word(window: Window, monkeypatch: pytest.Mon
 @pytest.mark.parametrize(
     ("failure", "said"),
     [
-        ("No module named 'imgui_bundle'", "pip install imgui-bundle"),
+        ("No module named 'imgui_bundle'", r'"mpeg4-fba\[player\]"'),
         ("libX11.so.6: cannot open shared object file", "apt-get install libx11-6"),
     ],
     ids=["package", "library"],

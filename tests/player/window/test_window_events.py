@@ -190,12 +190,12 @@ def test_the_mouse_turns_and_nears_the_view(window: Window, hand: Hand) -> None:
 def test_pictures_and_films_are_kept(window: Window, hand: Hand, tmp_path: Path) -> None:
     from PIL import Image
 
-    hand.key("F12", (tmp_path / "long-0001.png").exists)
-    with Image.open(tmp_path / "long-0001.png") as picture:
+    hand.key("F12", (tmp_path / "long-0000.png").exists)
+    with Image.open(tmp_path / "long-0000.png") as picture:
         assert picture.size == (900, 600)
         assert picture.mode == "RGB"
-    hand.key("shift+F12", (tmp_path / "long-0001-2.png").exists)
-    with Image.open(tmp_path / "long-0001-2.png") as picture:
+    hand.key("shift+F12", (tmp_path / "long-0000-2.png").exists)
+    with Image.open(tmp_path / "long-0000-2.png") as picture:
         alpha = np.asarray(picture)[..., 3]
     assert alpha[5, 5] == 0
     assert alpha[250, 450] == 255  # the head

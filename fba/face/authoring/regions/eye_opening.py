@@ -29,10 +29,15 @@ class Opening:
 
 
 def measure_opening(marks: Landmarks, eye: Eye) -> Opening | None:
-    """The columns of an eye's opening, or None where its lids are not one above the other."""
+    """The columns of an eye's opening, or None where its lids are not one above the other.
+
+    Nor are there any where a margin is not on the skin, as where a feature point of it is missing.
+    """
     lines = []
     for lid in ("upper", "lower"):
         walk = marks.surface.vertices[marks.contour(f"{eye.side} {lid} lid")]
+        if not len(walk):
+            return None
         lines.append(walk[np.argsort(walk[:, 0], kind="stable")])
     left = max(line[0, 0] for line in lines)
     right = min(line[-1, 0] for line in lines)
