@@ -136,16 +136,16 @@ def _program(option: str, text: str, places: Sequence[str], timeout: float) -> P
         program = parse_program(text, seconds=timeout)
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint=option) from error
-    if shutil.which(program.words[0]) is None:
-        raise click.BadParameter(
-            f"there is no program {program.words[0]!r} here; give its path, or a name on PATH",
-            param_hint=option,
-        )
     unknown = unknown_places(program, places)
     if unknown:
         known = ", ".join(f"{{{name}}}" for name in places)
         raise click.BadParameter(
             f"nothing is put in place of {unknown[0]}; there are {known}", param_hint=option
+        )
+    if shutil.which(program.words[0]) is None:
+        raise click.BadParameter(
+            f"there is no program {program.words[0]!r} here; give its path, or a name on PATH",
+            param_hint=option,
         )
     return program
 

@@ -156,8 +156,7 @@ def _choose_encoder(av: Any) -> str:
         if name in av.codec.codecs_available:
             return name
     raise DisplayError(
-        "this build of PyAV has no H.264 encoder; install av from its own wheels: "
-        "pip install --only-binary=:all: av"
+        "this build of PyAV has no H.264 encoder; install the wheel of av from the package index"
     )
 
 
