@@ -7,6 +7,7 @@ from fba.planning.body_tolerance import BodyErrors, body_errors
 from fba.planning.live_encoder import LiveEncoder
 from fba.planning.near_lossless import FaceErrors, NearLossless, encode_within_tolerance
 from fba.planning.plan import PRESETS, Plan, encode_planned, plan_compact, plan_exact
+from fba.planning.stillness import hold_still
 from fba.planning.tolerance import Tolerance
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "body_errors",
     "encode_planned",
     "encode_within_tolerance",
+    "hold_still",
     "plan_compact",
     "plan_exact",
 ]

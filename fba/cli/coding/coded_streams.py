@@ -100,6 +100,10 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
 
     options: with quantisers as `size` says. inputs: where the animation comes from.
     """
+    from fba.planning import hold_still
+
+    if _is_held_still(size, inputs):
+        animation = hold_still(animation, options)
     if size.fit is not None:
         made = encode_for_head(animation, options, size.fit)
         counts = made.statistics
@@ -126,6 +130,14 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
     return _encode_as_preset(animation, options, size, inputs)
 
 
+def _is_held_still(size: Size, inputs: Inputs) -> bool:
+    """Whether levels of BAPs are those of `hold_still`."""
+    if size.tolerance is not None or size.body_tolerance is not None or size.bitrate is not None:
+        return False  # these choose levels of their own
+    captured = "body" in inputs.formats and inputs.formats["body"].is_capture
+    return captured if size.still is None else size.still
+
+
 def _encode_as_preset(
     animation: Animation, options: EncoderOptions, size: Size, inputs: Inputs
 ) -> CodedStream:
@@ -139,7 +151,7 @@ def _encode_as_preset(
     rounded: dict[str, int] = {}
     if preset == "exact":
         given = {"face": size.fap_quant, "body": size.bap_quant}
-        to_keep = [part for part in kept if given[part] is None]
+        to_keep = [part for part in kept if given[part] is None and not (part == "body" and size.still)]
         options = exact_quantisers(animation, options, to_keep)
         rounded = {part: n for part, n in count_rounded(animation, options).items() if part in to_keep}
     if preset == "reference":

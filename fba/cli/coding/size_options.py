@@ -26,7 +26,8 @@ class Size:
     preset: what is sent. model: the face that all receivers have; fit: one that computes FAPs to within 3 mm.
     fap_quant, bap_quant: how finely. tolerance: metres by which vertices may move; body_tolerance: by which
     points beside joints may; every_frame: whether no frame is left out for that. bitrate:
-    bits a second; buffer: seconds that the stream may be ahead of them.
+    bits a second; buffer: seconds that the stream may be ahead of them. still: whether what rests is held
+    still (`fba.planning.hold_still`); None: in bodies of motion capture.
     """
 
     preset: str | None = None
@@ -39,6 +40,7 @@ class Size:
     buffer: float | None = None
     fap_quant: int | None = None
     bap_quant: int | None = None
+    still: bool | None = None
 
     @classmethod
     def take(cls, settings: dict[str, Any]) -> Size:
@@ -105,13 +107,19 @@ def size_options(command: Decorated) -> Decorated:
                 type=click.IntRange(0, 31),
                 help="Quantiser of BAPs (bap_quant); default as for FAPs.",
             ),
+            click.option(
+                "--still/--no-still",
+                default=None,
+                help="Hold joints and feet of a body still where they rest, within a step of the quantiser; "
+                "default: for motion capture only.",
+            ),
         )
     ):
         command = option(command)
     return command
 
 
-QUANTISERS = ("fap_quant", "bap_quant")
+LEVELS = ("fap_quant", "bap_quant", "still")
 PLANES = ("intra_period", "start_codes", "time_codes", "unsent", "gender", "clamp")
 """Options of single planes."""
 CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
@@ -124,21 +132,21 @@ CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
             "body_tolerance",
             "every_frame",
             "bitrate",
-            *QUANTISERS,
+            *LEVELS,
             *PLANES,
         ),
         "the EPF file says how planes are coded",
     ),
     "tolerance": (
-        ("preset", "fit", "bitrate", *QUANTISERS, "unsent"),
+        ("preset", "fit", "bitrate", *LEVELS, "unsent"),
         "the tolerance decides what is sent, and how finely",
     ),
     "body_tolerance": (
-        ("preset", "fit", "bitrate", *QUANTISERS, "unsent"),
+        ("preset", "fit", "bitrate", *LEVELS, "unsent"),
         "the tolerance decides what is sent, and how finely",
     ),
     "bitrate": (
-        ("preset", "fit", "model", *QUANTISERS, "unsent", "intra_period"),
+        ("preset", "fit", "model", *LEVELS, "unsent", "intra_period"),
         "the bit rate decides what is sent, how finely, and where I planes come",
     ),
     "fit": (("preset", "model", "unsent"), "the table of the head decides what is sent"),
