@@ -24,13 +24,13 @@ from fba.planning.body_rows import blocks
 from fba.planning.body_tolerance import held_angles
 from fba.tracks import BodyTrack, hold
 
-CHANGE = 0.015
-"""What a change of level costs, and a second: so many seconds in which a BAP is off by a step."""
+CHANGE = 1.0
+"""What a change of level costs: as much as a BAP that is off by a step in one frame."""
 STANDING, SWINGING = 5e5, 5e4
 """What the square of a sole's error counts, per square metre, where that of a BAP counts per square step:
 of soles that rest, and of others."""
-STIR = 1e5
-"""The same, and for a second, of a change of that error from frame to frame while a sole rests."""
+STIR = 6e6
+"""The same for a change of that error from one frame to the next, while a sole rests."""
 REST_SPEED, REST_SECONDS = 0.06, 0.2
 """Metres per second, over so many seconds, below which the point of a foot that stands rests."""
 SMOOTHED = 0.25
@@ -64,8 +64,7 @@ def hold_still(animation: Animation, options: EncoderOptions | None = None) -> A
         start = max(block.start - 1, 0)  # the last frame of the block before stays as it is
         frames = slice(start, block.stop)
         levels[frames] = _Block(wanted[frames], levels[start] if start else None, steps, animation).levels()
-    values = np.where(body.mask, levels * steps, body.values).astype(np.int32)
-    return replace(animation, body=BodyTrack(values, body.mask))
+    return replace(animation, body=BodyTrack((levels * steps).astype(np.int32), body.mask))
 
 
 class _Block:
@@ -104,10 +103,8 @@ class _Block:
 
     def _search(self, column: int, errors: Float64, slopes: Float64, rests: Bool) -> None:
         step, first = float(self.steps[column]), float(self.first[column])
-        change, stir = CHANGE * self.rate, STIR * self.rate
-        self.result[:, column] = _find_path(
-            self.wanted[:, column] / step, first, errors, slopes * step, rests, change, stir
-        )
+        wanted = self.wanted[:, column] / step
+        self.result[:, column] = _find_path(wanted, first, errors, slopes * step, rests)
 
     def _place_soles(self, solver: BapSolver) -> None:
         """Find where the soles are, when they rest, and what moves them."""
@@ -173,14 +170,11 @@ def _smoothed(points: Float64, rests: Bool, half: int) -> Float64:
 
 
 @compiled
-def _find_path(
-    wanted: Float64, first: float, errors: Float64, slopes: Float64, rests: Bool, change: float, stir: float
-) -> Float64:
+def _find_path(wanted: Float64, first: float, errors: Float64, slopes: Float64, rests: Bool) -> Float64:
     """Return the cheapest levels of one BAP, float64 (T,): at each frame, one of the two nearest.
 
     wanted: (T,), in steps. first: the first level; NaN if it is free. errors: (T, P, 3), metres by which the
-    other BAPs leave points off; slopes: (T, P, 3), metres for a step of this one. rests: bool (T, P). change:
-    what a change of level costs; stir: what the square of a change of an error counts.
+    other BAPs leave points off; slopes: (T, P, 3), metres for a step of this one. rests: bool (T, P).
     """
     count, points = errors.shape[0], errors.shape[1]
     costs = np.zeros((count, 2))
@@ -205,14 +199,14 @@ def _find_path(
                 if way == np.inf:
                     continue
                 if before != level:
-                    way += change
+                    way += CHANGE
                 for point in range(points):
                     if rests[frame, point] and rests[frame - 1, point]:
                         for axis in range(3):
                             moved = errors[frame, point, axis] + slopes[frame, point, axis] * off
                             moved -= errors[frame - 1, point, axis]
                             moved -= slopes[frame - 1, point, axis] * (before - wanted[frame - 1])
-                            way += stir * moved * moved
+                            way += STIR * moved * moved
                 if way < least:
                     least = way
                     came_from[frame, one] = other

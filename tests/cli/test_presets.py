@@ -13,9 +13,11 @@ import pytest
 import fba
 import stored_models
 from fba import Animation, BodyTrack, FaceTrack
+from fba.codec import quantise
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.interpolation.terms import Function, Link, Term
 from fba.face.resolve import resolve
+from fba.planning import hold_still
 
 Run = Callable[..., Any]
 SAMPLES = Path(fba.__file__).parent / "samples"
@@ -197,3 +199,32 @@ def test_no_frames_and_one(run: Run, tmp_path: Path, archive: Animation, suffix:
     done = run("convert", empty, out)
     assert done.code == 1
     assert f"{empty}: the file holds no frames" in done.err
+
+
+def test_captures_are_held_still_and_files_of_baps_are_not(run: Run, tmp_path: Path) -> None:
+    """`--no-still` rounds, as for BAPs that are given as such; `--still` holds those, too."""
+    capture, given = SAMPLES / "hello.bvh", tmp_path / "hello.bap"
+    animation = fba.read(capture)
+    options = fba.EncoderOptions(bap_steps="visage", clamp=True)
+    assert run("convert", capture, given).code == 0
+    rounded, still = (quantise(one, options).body for one in (animation, hold_still(animation, options)))
+    sizes = []
+    for source, arguments, expected in (
+        (capture, (), still),
+        (capture, ("--no-still",), rounded),
+        (given, ("--bap-quant", "1", "--bap-steps", "visage", "--clamp"), rounded),
+        (given, ("--still", "--bap-steps", "visage", "--clamp"), still),
+    ):
+        target = tmp_path / "a.fba"
+        assert run("encode", source, "-o", target, *arguments).code == 0
+        decoded = fba.read(target).body
+        assert decoded is not None
+        assert expected is not None
+        apart = np.abs(decoded.values - expected.values)
+        assert apart.max() <= (0 if expected is still else 256)  # rounding goes on from the frame before
+        sizes.append(target.stat().st_size)
+    assert sizes[0] < 0.99 * sizes[1]
+    assert run("convert", capture, tmp_path / "b.fba").code == 0
+    assert (tmp_path / "b.fba").stat().st_size == sizes[0]
+    done = run("encode", capture, "-o", target, "--tolerance", "1cm", "--still")
+    assert (done.code, "contradict each other" in done.err) == (2, True)
