@@ -1,7 +1,8 @@
 """Walking: synthesis from four characteristic poses, and detection of these in captured motion.
 
-Digest faces-and-emotions.md, chapter 2. `walk` makes an `Animation`, `characters` lists the characters,
-`detect` finds cycles and poses in any body animation, `reduce` keeps only these poses.
+The source: K. Karpouzis, Adaptive parametric models of human faces and bodies (thesis, National Technical
+University of Athens), chapter 5. `walk` makes an `Animation`, `characters` lists the characters, `detect`
+finds cycles and poses in any body animation, `reduce` keeps only these poses.
 """
 
 from fba.body.gait._characters import POSES, Character, Pose, characters

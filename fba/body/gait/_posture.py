@@ -1,6 +1,6 @@
 """The upper body of a walk: spine, head, shoulders, arms, fingers.
 
-Inverse kinematics bring the palms to their positions in the poses: digest 2.5.
+Inverse kinematics bring the palms to their positions in the poses, as in the source.
 """
 
 from __future__ import annotations
