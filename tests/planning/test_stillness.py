@@ -147,7 +147,7 @@ def test_what_is_not_sent_does_not_matter() -> None:
 
 @pytest.mark.parametrize("name", REAL)
 def test_feet_of_captures_that_stand_do_not_tremble(shared: Path, name: str) -> None:
-    """They stir less than half as much as with rounding, hardly more than in the capture, and in fewer bits."""
+    """They stir half as much as with rounding at most, little more than in the capture, in fewer bits."""
     path = shared / "data" / name
     if not path.exists():
         pytest.skip(f"{path} is missing")

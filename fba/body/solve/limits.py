@@ -2,8 +2,9 @@
 
 The standard sets no limits to joints. `Limits.human()` is the table of typical limits in K. Karpouzis,
 Adaptive parametric models of human faces and bodies, table 4-1: there X is the subject's left, Z the long
-axis of the segment and Y = Z x X, so that a hanging limb flexes about -X, abducts about Y, forward, and twists
-about Z, down. limits.csv has it in BAPs, for the left side; `Limits.iso()` are the ranges of the standard's BAP table.
+axis of the segment and Y = Z x X, so that a hanging limb flexes about -X, abducts about Y, forward, and
+twists about Z, down. limits.csv has it in BAPs, for the left side; `Limits.iso()` are the ranges of the
+standard's BAP table.
 """
 
 from __future__ import annotations
