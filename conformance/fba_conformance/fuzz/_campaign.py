@@ -12,9 +12,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from fba_conformance.fuzz._engine import Finding, Report, mutated
@@ -34,7 +35,11 @@ MOST_DEATHS = 20
 
 @dataclass(frozen=True)
 class Campaign:
-    """What to run. count: inputs for each target; without it, minutes divided by the targets' shares."""
+    """What to run. count: inputs for each target; without it, minutes divided by the targets' shares.
+
+    counts: inputs by the names of targets, instead of `count`. at: the number of the input that each target is
+    at, kept up to date while it runs.
+    """
 
     targets: Sequence[Target]
     seed: int = 0
@@ -44,6 +49,12 @@ class Campaign:
     jobs: int = 1
     corpus: Path | None = None
     findings: Path = Path("fuzz-findings")
+    counts: Mapping[str, int] = field(default_factory=dict)
+    at: dict[str, int] = field(default_factory=dict)
+
+    def count_of(self, target: Target) -> int | None:
+        """Return how many inputs a target gets; None where its time decides."""
+        return self.counts.get(target.name, self.count)
 
 
 def run_campaign(campaign: Campaign, say: Callable[[str], None]) -> list[Report]:
@@ -52,7 +63,7 @@ def run_campaign(campaign: Campaign, say: Callable[[str], None]) -> list[Report]
 
     def one(target: Target) -> Report:
         seconds = None
-        if campaign.count is None:
+        if campaign.count_of(target) is None:
             whole = 60 * (campaign.minutes or 0) * min(campaign.jobs, len(campaign.targets))
             seconds = whole * target.share / total
         report = _run_target(campaign, target, seconds)
@@ -86,7 +97,7 @@ def save(finding: Finding, folder: Path) -> str:
 def _run_target(campaign: Campaign, target: Target, seconds: float | None) -> Report:
     """Run a target until its inputs or its time are used up, with a new process behind each that died."""
     whole = Report(target.name)
-    first, count = campaign.first, campaign.count
+    first, count = campaign.first, campaign.count_of(target)
     end = None if seconds is None else time.monotonic() + seconds
     for _ in range(MOST_DEATHS):
         left = None if end is None else max(0.0, end - time.monotonic())
@@ -126,7 +137,7 @@ def _run_worker(
                 worker_command(target, *arguments), stdout=out, stderr=err, env=environment(target)
             )
             try:
-                hung = _watch(process, progress)
+                hung = _watch(process, progress, partial(campaign.at.__setitem__, target.name))
             finally:
                 process.kill()
                 process.wait()
@@ -146,8 +157,11 @@ def _run_worker(
         return None, number, f"{words}\n{how}"
 
 
-def _watch(process: subprocess.Popen[bytes], progress: Path) -> bool:
-    """Wait for a process to end; kill it, with a traceback, and return True if it hangs."""
+def _watch(process: subprocess.Popen[bytes], progress: Path, tell: Callable[[int], None]) -> bool:
+    """Wait for a process to end; kill it, with a traceback, and return True if it hangs.
+
+    tell: called with the number of the input that it is at, about once a second.
+    """
     before, since = None, time.monotonic()
     while True:
         try:
@@ -155,6 +169,7 @@ def _watch(process: subprocess.Popen[bytes], progress: Path) -> bool:
             return False
         except subprocess.TimeoutExpired:
             number = NUMBER.unpack(progress.read_bytes())[0]
+            tell(number)
         if number != before:
             before, since = number, time.monotonic()
         elif time.monotonic() - since > (HANGING if number >= 0 else COMPILING):
@@ -197,12 +212,8 @@ def worker_command(target: Target, *arguments: str) -> list[str]:
 
 
 def environment(target: Target) -> dict[str, str]:
-    """Return the variables of a worker's process. Code with other checks in it needs a cache of its own."""
-    result = {**os.environ, **target.environment}
-    if "NUMBA_BOUNDSCHECK" in target.environment:
-        usual = os.environ.get("NUMBA_CACHE_DIR") or str(Path.home() / ".cache" / "fba-fuzz")
-        result["NUMBA_CACHE_DIR"] = f"{usual}-bounds"
-    return result
+    """Return the variables of a worker's process."""
+    return {**os.environ, **target.environment}
 
 
 def _report(content: dict[str, object], folder: Path) -> Report:
