@@ -25,9 +25,11 @@ from fba_conformance.fuzz.targets import Target
 from fba_conformance.fuzz.worker import NUMBER, file_name
 
 HANGING = 120.0
-"""Seconds without progress after which a process hangs: much, as other programs may keep the machine busy."""
+"""Seconds of processor time without progress after which a process hangs."""
 COMPILING = 600.0
 """The same for the files of the corpus, the first of which compile the loops."""
+WAITING = 5.0
+"""How many times as long by the clock: other programs may keep the machine busy, and sleep takes no work."""
 MINIMISED_SECONDS = 60.0
 MOST_DEATHS = 20
 """Processes of one target that may die before the run gives up on it."""
@@ -37,8 +39,8 @@ MOST_DEATHS = 20
 class Campaign:
     """What to run. count: inputs for each target; without it, minutes divided by the targets' shares.
 
-    counts: inputs by the names of targets, instead of `count`. at: the number of the input that each target is
-    at, kept up to date while it runs.
+    counts: inputs by the names of targets, instead of `count`. at: the number of the input that each target
+    is at, kept up to date while it runs.
     """
 
     targets: Sequence[Target]
@@ -162,7 +164,7 @@ def _watch(process: subprocess.Popen[bytes], progress: Path, tell: Callable[[int
 
     tell: called with the number of the input that it is at, about once a second.
     """
-    before, since = None, time.monotonic()
+    before, since, began = None, time.monotonic(), 0.0
     while True:
         try:
             process.wait(timeout=1)
@@ -170,12 +172,24 @@ def _watch(process: subprocess.Popen[bytes], progress: Path, tell: Callable[[int
         except subprocess.TimeoutExpired:
             number = NUMBER.unpack(progress.read_bytes())[0]
             tell(number)
+        now, worked = time.monotonic(), _processor_time(process.pid)
+        most = HANGING if number >= 0 else COMPILING
         if number != before:
-            before, since = number, time.monotonic()
-        elif time.monotonic() - since > (HANGING if number >= 0 else COMPILING):
+            before, since, began = number, now, worked
+        elif worked - began > most or now - since > WAITING * most:
             process.send_signal(signal.SIGABRT)  # faulthandler prints where it is
             process.wait(timeout=30)
             return True
+
+
+def _processor_time(process: int) -> float:
+    """Return the seconds of processor time that a process has taken; 0 where the system does not say."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
+        user, system = fields.rpartition(")")[2].split()[11:13]
+    except (OSError, ValueError):
+        return 0.0
+    return (int(user) + int(system)) / float(os.sysconf("SC_CLK_TCK"))
 
 
 def _death(campaign: Campaign, target: Target, number: int, kind: str, words: str) -> Finding:

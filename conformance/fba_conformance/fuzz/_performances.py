@@ -26,7 +26,7 @@ from fba.tracks import BodyTrack, FaceTrack
 from fba_conformance.fuzz._outcome import ContractError, Outcome
 
 AMPLITUDES = 1, 30, 300, 1860, 20_000, 2_000_000_000
-"""Most that values differ from 0: within one step, in speech, at the limits of ranges, beyond all of them, and
+"""Most that values differ from 0: within a step, in speech, at the limits of ranges, beyond all of them, and
 near those of an int32.
 """
 MOST_FRAMES = 60
@@ -126,7 +126,9 @@ def _exact(animation: Animation, options: EncoderOptions, rng: np.random.Generat
 
 def _compact(animation: Animation, options: EncoderOptions, rng: np.random.Generator) -> None:
     kept = {part for part in ("face", "body") if rng.random() < 0.3}
-    _decoded(encode_planned(animation, options, preset="compact", keep_masks=kept)[0], options, len(animation))
+    _decoded(
+        encode_planned(animation, options, preset="compact", keep_masks=kept)[0], options, len(animation)
+    )
 
 
 def _at_rate(animation: Animation, options: EncoderOptions, rng: np.random.Generator) -> None:
@@ -159,7 +161,9 @@ def _within_tolerance(animation: Animation, options: EncoderOptions, rng: np.ran
 
 
 def _at_best(animation: Animation, options: EncoderOptions, rng: np.random.Generator) -> None:
-    data = encode_at_rate(animation, float(rng.uniform(1000, 50_000)), float(rng.uniform(0.5, 2)), options).data
+    data = encode_at_rate(
+        animation, float(rng.uniform(1000, 50_000)), float(rng.uniform(0.5, 2)), options
+    ).data
     _decoded(data, options)
 
 
@@ -196,7 +200,9 @@ def _compare(source: Animation, decoded: Animation, options: EncoderOptions, cla
             continue
         if (off[:, first:] * 2 > np.broadcast_to(step, off.shape)[:, first:] + 1).any():
             frame, column = np.argwhere(off * 2 > np.broadcast_to(step, off.shape) + 1)[0].tolist()
-            raise ContractError(f"{name}: frame {frame}, parameter {column + 1} is off by more than half a step")
+            raise ContractError(
+                f"{name}: frame {frame}, parameter {column + 1} is off by more than half a step"
+            )
 
 
 def _options(rng: np.random.Generator) -> EncoderOptions:
@@ -225,7 +231,10 @@ def _animation(rng: np.random.Generator, count: int, face: bool, body: bool) -> 
     gaps = rng.integers(1, rng.choice([2, 2, 5, 200]), count)
     rate = Fraction(int(rng.choice([25, 25, 30, 120])))
     return Animation(
-        rate, np.cumsum(gaps) - gaps[0], _face(rng, count) if face else None, _body(rng, count) if body else None
+        rate,
+        np.cumsum(gaps) - gaps[0],
+        _face(rng, count) if face else None,
+        _body(rng, count) if body else None,
     )
 
 
@@ -253,7 +262,9 @@ def _body(rng: np.random.Generator, count: int) -> BodyTrack:
 
 def _values(rng: np.random.Generator, count: int, columns: int) -> Int32:
     """Return values of one amplitude, or of one for each parameter, that rest, swing, jump or are noise."""
-    amplitude = rng.choice(AMPLITUDES, columns if rng.random() < 0.2 else 1, p=(0.05, 0.25, 0.35, 0.25, 0.05, 0.05))
+    amplitude = rng.choice(
+        AMPLITUDES, columns if rng.random() < 0.2 else 1, p=(0.05, 0.25, 0.35, 0.25, 0.05, 0.05)
+    )
     shape = (count, columns)
     kind = rng.integers(5)
     if kind == 0:

@@ -1,7 +1,8 @@
 """`python -m fba_conformance.fuzz.bounds`: run all that is compiled with the bounds of every access checked.
 
 Three parts: the test suite, random performances encoded in every manner, and mutated files. All run with
-`NUMBA_BOUNDSCHECK=1`, under which compiled code raises IndexError where it would read or write beside an array.
+`NUMBA_BOUNDSCHECK=1`, under which compiled code raises IndexError where it would read or write beside an
+array.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from pathlib import Path
 from fba.compiled import is_compiled
 from fba_conformance.fuzz._campaign import Campaign, run_campaign
 from fba_conformance.fuzz._engine import Report
-from fba_conformance.fuzz.targets import Target, targets
+from fba_conformance.fuzz.targets import targets
 
 CHECKED = "NUMBA_BOUNDSCHECK"
 PERFORMANCES, MUTANTS = 20_000, 500_000
@@ -33,9 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return 1 if there were findings, 2 for wrong arguments."""
     parser = argparse.ArgumentParser(
         prog="./dev bounds",
-        description="Run the test suite, random performances through every preset of the encoder, and mutated "
-        "files through every reader, with the bounds of every array access checked in compiled code. Hours for "
-        "all of it; --performances, --mutants and --tests make it shorter.",
+        description="Run the test suite, random performances through every preset of the encoder, and "
+        "mutated files through every reader, with the bounds of every array access checked in compiled "
+        "code. All of it takes hours; --performances, --mutants and --tests make it shorter.",
     )
     parser.add_argument(
         "--performances", type=int, default=PERFORMANCES, metavar="N",
@@ -46,7 +47,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help=f"mutated files, of all targets of ./dev fuzz together (default {MUTANTS:,})",
     )  # fmt: skip
     parser.add_argument(
-        "--tests", nargs="*", default=["tests"], metavar="PATH", help="tests to run (default: all); none without PATH"
+        "--tests",
+        nargs="*",
+        default=["tests"],
+        metavar="PATH",
+        help="tests to run (default: all); none without PATH",
     )
     parser.add_argument("--seed", type=int, default=0, help="of performances and mutations (default 0)")
     parser.add_argument("--first", type=int, default=0, metavar="NUMBER", help="number of the first of each")
@@ -65,7 +70,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.tests:
             _say(f"tests with bounds checked: {' '.join(options.tests)}")
             status = _run_tests(options.tests, options.jobs)
-            summary.append(("tests", status == 0, "passed" if status == 0 else f"failed: status {status} of pytest"))
+            summary.append(
+                ("tests", status == 0, "passed" if status == 0 else f"failed: status {status} of pytest")
+            )
         plan = _counts(options.performances, options.mutants)
         campaign = Campaign(
             [replace(target, environment={CHECKED: "1"}) for target in targets() if plan.get(target.name)],

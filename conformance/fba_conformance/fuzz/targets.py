@@ -107,7 +107,7 @@ def targets() -> tuple[Target, ...]:
         _reader("cache", "files of the cache of slow results"),
         *(
             Target(
-                f"encode-{part}", f"random performances of {whose}, encoded in every manner and decoded again",
+                f"encode-{part}", f"random performances of {whose}, encoded in every manner and decoded",
                 f"fba_conformance.fuzz._performances:check_{part}", random=True,
             )
             for part, whose in (("face", "faces"), ("body", "bodies"), ("both", "faces with bodies"))
