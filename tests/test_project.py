@@ -404,7 +404,7 @@ def dev(checkout: Path, *arguments: str, **environment: str) -> subprocess.Compl
 def test_dev_lists_its_commands(checkout: Path) -> None:
     done = dev(checkout)
     assert done.returncode == 0
-    for command in (
+    for command in [
         "demo",
         "test",
         "lint",
@@ -416,7 +416,7 @@ def test_dev_lists_its_commands(checkout: Path) -> None:
         "docs",
         "setup",
         "clean",
-    ):
+    ]:
         assert f"  {command} " in done.stdout
 
 

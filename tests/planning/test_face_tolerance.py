@@ -20,7 +20,7 @@ from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.parameters import faps
 from fba.planning import Tolerance, encode_planned, encode_within_tolerance
 from fba.planning.mesh_error import ErrorBasis
-from tests.helpers.figures.small_face import small_face
+from small_face import small_face
 
 STEPS = np.array([1, 1, *(one.step for one in faps()[2:])])
 
