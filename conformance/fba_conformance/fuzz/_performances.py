@@ -76,7 +76,8 @@ def _check(data: bytes, *, face: bool, body: bool) -> Outcome:
     searched = rng.random() < SEARCHED
     count = int(rng.integers(1, (FEW_FRAMES if searched else MOST_FRAMES) + 1))
     animation = _animation(rng, count, face, body)
-    manner = rng.choice([_within_tolerance, _at_best] if searched else _MANNERS)
+    manners = (_within_tolerance, _at_best) if searched else _MANNERS
+    manner = manners[int(rng.integers(len(manners)))]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
         accepted = [_encoded(one, animation, options, rng) for one in (_whole, manner)]
@@ -278,7 +279,8 @@ def _values(rng: np.random.Generator, count: int, columns: int) -> Int32:
     else:
         motion = np.clip(np.cumsum(rng.normal(0, 0.05, shape), axis=0), -1, 1)
     still = rng.random(columns) < rng.choice([0, 0.5, 0.95])
-    return np.rint(np.where(still, 0, motion) * amplitude).astype(np.int32)
+    values: Int32 = np.rint(np.where(still, 0, motion) * amplitude).astype(np.int32)
+    return values
 
 
 def _mask(rng: np.random.Generator, count: int, columns: int) -> Bool:
