@@ -92,10 +92,8 @@ class CodeFiles:
             file.write(self._digest(content) + content)
 
     def _path(self, key: Any) -> Path:
-        return (
-            self._folder
-            / f"{self._name}.{hashlib.blake2b(repr(key).encode(), digest_size=12).hexdigest()}.fbc"
-        )
+        digest = hashlib.blake2b(f"{key!r} {_variant()}".encode(), digest_size=12)
+        return self._folder / f"{self._name}.{digest.hexdigest()}.fbc"
 
     def _digest(self, content: bytes) -> bytes:
         return hashlib.blake2b(content, digest_size=DIGEST, key=self._stamp).digest()
@@ -103,7 +101,8 @@ class CodeFiles:
     @cached_property
     def _stamp(self) -> bytes:
         """Digest of everything that the machine code depends on, apart from the key."""
-        digest = hashlib.blake2b(f"{numba.__version__} {__version__}".encode(), digest_size=DIGEST)
+        versions = f"{numba.__version__} {__version__} {_variant()}"
+        digest = hashlib.blake2b(versions.encode(), digest_size=DIGEST)
         for function in _called_functions(self._function):
             digest.update(_source(function.__code__.co_filename))
             for name in function.__code__.co_names:
@@ -111,6 +110,14 @@ class CodeFiles:
                 if isinstance(value, int | float | tuple):  # compiled into the code, wherever they come from
                     digest.update(f"{name}={value!r}".encode())
         return digest.digest()
+
+
+def _variant() -> str:
+    """Return the settings of numba that other machine code is made with, which its key leaves out.
+
+    With `NUMBA_BOUNDSCHECK=1`, code checks the bounds of every access; code that does not must not stand in.
+    """
+    return f"bounds={int(numba.config.BOUNDSCHECK or 0)} optimise={int(numba.config.OPT)}"
 
 
 def _called_functions(function: FunctionType) -> Iterator[FunctionType]:

@@ -63,6 +63,7 @@ ILLUSTRATIONS = {
     ("docs/capture-live.md", "fba capture livelink -o - | fba play -"): WINDOW,
     ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
     ("docs/develop.md", "./dev test"): CHECKOUT,
+    ("docs/develop.md", "./dev bounds"): "takes hours; .ci/run runs a part, tests/fuzz the command",
     ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",
     (
         "docs/develop.md",

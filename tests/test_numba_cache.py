@@ -102,6 +102,42 @@ def test_another_constant_or_helper_is_compiled_anew(program: Callable[..., Modu
     assert compiled_and_called(program(sign="-"))[0] == 3.0
 
 
+READS_BEYOND = """
+import sys
+import numpy as np
+from fba.compiled import compilation_listener
+from {name} import beyond
+with compilation_listener(lambda: print("compiles")):
+    print(beyond(np.arange(8.0)[:4], 6))
+"""
+
+
+@pytest.mark.parametrize("order", [("", "1"), ("1", "")])
+def test_code_that_checks_bounds_and_code_that_does_not_are_kept_apart(
+    tmp_path: Path, order: tuple[str, str]
+) -> None:
+    source = (
+        "from fba.compiled import compiled\n\n@compiled\ndef beyond(values, at):\n    return values[at]\n"
+    )
+    (tmp_path / "reads_beyond.py").write_text(source)
+
+    def run(checked: str) -> tuple[bool, bool]:
+        """Whether the function was compiled, and whether it refused a place behind the end."""
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}
+        environment.pop("NUMBA_BOUNDSCHECK", None)
+        environment |= {"NUMBA_BOUNDSCHECK": checked} if checked else {}
+        done = subprocess.run(
+            [sys.executable, "-c", READS_BEYOND.format(name="reads_beyond")],
+            env=environment, capture_output=True, text=True, timeout=300, check=False,
+        )  # fmt: skip
+        assert ("IndexError" in done.stderr) == (done.returncode != 0), done.stderr
+        return "compiles" in done.stdout, "IndexError" in done.stderr
+
+    assert [run(checked) for checked in (*order, *order)] == [
+        (True, order[0] == "1"), (True, order[1] == "1"), (False, order[0] == "1"), (False, order[1] == "1"),
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize("fault", ["cut", "empty", "garbage", "flipped", "folder", "unreadable", "other"])
 def test_a_faulty_file_is_made_anew(program: Callable[..., ModuleType], tmp_path: Path, fault: str) -> None:
     assert compiled_and_called(program()) == (15.0, 2)

@@ -404,7 +404,19 @@ def dev(checkout: Path, *arguments: str, **environment: str) -> subprocess.Compl
 def test_dev_lists_its_commands(checkout: Path) -> None:
     done = dev(checkout)
     assert done.returncode == 0
-    for command in ("demo", "test", "lint", "types", "coverage", "bench", "fuzz", "docs", "setup", "clean"):
+    for command in [
+        "demo",
+        "test",
+        "lint",
+        "types",
+        "coverage",
+        "bench",
+        "fuzz",
+        "bounds",
+        "docs",
+        "setup",
+        "clean",
+    ]:
         assert f"  {command} " in done.stdout
 
 

@@ -3,6 +3,9 @@
 Witten, Neal and Cleary's adaptive coder with cumulative counts in plain arrays: finding a symbol is a linear
 search, and raising a count raises every cumulative count above it. It makes the same bits as
 `fba.codec._plane.arithmetic`, which has its counts in trees, with the same guard against start codes.
+
+Bounds: for streams that the benchmark makes itself. It passes models of `size` symbols, and checks in
+`encode` that its data have room; `decode` reads what `encode` wrote.
 """
 
 from __future__ import annotations
@@ -39,6 +42,8 @@ def _learn(cumulative: Int64, model: int, symbol: int, size: int) -> None:
 @compiled
 def encode(data: UInt8, symbols: Int64, size: int, cumulative: Int64) -> int:
     """Encode symbols (T, models), one segment for each row, into zeroed `data`; return the bits written."""
+    if 16 * symbols.shape[0] * (symbols.shape[1] + 1) > 8 * len(data):
+        raise IndexError("no room for the symbols")
     bit = 0
     for row in range(symbols.shape[0]):
         low, high, pending, zeros = 0, 65535, 0, 0

@@ -138,6 +138,8 @@ def _extremes(
     turn: int64 (columns,), the full turn by which P planes may change a value, or 0.
     last_values: int64 (columns,), as a decoder has them before the first frame, if that before it was `sent`,
     bool (columns,). Both are set to those of the last frame.
+
+    Bounds: all are as wide as values, since `fitting_ranges` makes them for the columns of one part.
     """
     for column in range(values.shape[1]):
         one_step, one_turn = int(step[column]), int(turn[column])

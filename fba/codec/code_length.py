@@ -32,8 +32,10 @@ def code_lengths(track: FaceTrack | BodyTrack, cuts: Int64, options: EncoderOpti
     length by the adaptive model follows from how often each comes, in whatever order. 0 for a parameter that
     is 0 throughout, and where b <= a. FAPs 1 and 2 count nothing.
 
-    cuts: int64 (C,), increasing, from 0 to the number of frames.
+    cuts: int64 (C,), increasing, from 0 to the number of frames; ValueError for others.
     """
+    if len(cuts) and not (cuts[0] >= 0 and cuts[-1] <= len(track) and (np.diff(cuts) > 0).all()):
+        raise ValueError(f"cuts must increase from 0 to {len(track)} frames, not {cuts.tolist()}")
     part = slots.BODY_BIT if isinstance(track, BodyTrack) else slots.FACE_BIT
     scale = quantiser.scale(part, options.quant(part))
     values = levels(track, options)
@@ -85,6 +87,10 @@ def _add_lengths(
     """Fill in result (C, C) for one parameter. values: int64 (T,), levels.
 
     logarithms, factorials: log2(n) and log2(n!) for n from 0 on.
+
+    Bounds: cuts are places in values, as `code_lengths` checks and `level_bits` makes them. Changes are
+    counted up to `largest` either way, and neither they nor limits of ranges exceed what `_logarithms` has
+    room for.
     """
     largest = RANGE_CODE_MAX * RANGE_UNIT // scale
     counts = np.zeros(2 * largest + 1, dtype=np.int64)

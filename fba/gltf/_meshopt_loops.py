@@ -1,4 +1,10 @@
-"""The loops of the meshopt decoder, compiled. They check every index, and return -1 for damaged data."""
+"""The loops of the meshopt decoder, compiled. They check every index, and return -1 for damaged data.
+
+Bounds: results have the counts that `unpack_view` was given: rows and columns run over their own shape. The
+decoder's memory of FIFO entries is reached by remainders, which Python and numba keep from 0 up; `state` and
+`last` have two numbers. Bytes are read before `tail` or `end` only, which leave room for the 16 to 256 bytes
+behind.
+"""
 
 from __future__ import annotations
 

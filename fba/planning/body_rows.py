@@ -3,6 +3,10 @@
 An error of a BAP moves the points below its joint along a slope: about an axis, or along one. Errors of all
 BAPs add up at every point. Points that always move as one body are as far apart as their outermost ones, so
 that some dozens stand for all.
+
+Bounds of the compiled loops: joints and rows of points come from `BodyRows`, of the skeleton whose matrices
+and points are given; `BodyRows.points` and `BodyTarget` make the results, with a frame for each of theirs.
+What a loop makes itself is as long as the rows that it goes through.
 """
 
 from __future__ import annotations

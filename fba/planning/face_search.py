@@ -248,6 +248,8 @@ def _choose_keys(values: Float64, gaps: Bool, most: int) -> Int64:
     """Return frames between which values (T, F) are straight lines, but for less than 1: int64 (K,).
 
     gaps: bool (T,), frames that may be left out, at most `most` in a row.
+
+    Bounds: keys increase from 0 to T - 1, so there are no more than T.
     """
     count = len(values)
     keys = np.zeros(count, dtype=np.int64)
@@ -277,7 +279,11 @@ def _choose_keys(values: Float64, gaps: Bool, most: int) -> Int64:
 
 @compiled
 def _add_error(errors: Float32, rows: Int64, table: Float32, which: Int64, change: Float64) -> None:
-    """Add to errors (T, R, 3) what a change (T,) of a FAP moves; rows, table, which: as in `Slopes`."""
+    """Add to errors (T, R, 3) what a change (T,) of a FAP moves; rows, table, which: as in `Slopes`.
+
+    Bounds: rows are those of errors, and entries of `which` those of the table: `ErrorBasis` makes all of
+    them for the frames of one segment.
+    """
     for frame in range(len(change)):
         if change[frame] == 0.0:
             continue
@@ -295,7 +301,7 @@ def _free_room(errors: Float32, rows: Int64, table: Float32, which: Int64, limit
     """Return how far a FAP may move down and up at each frame: float64 (2, T), the first one 0 or less.
 
     So far no row of errors (T, R, 3) becomes longer than limit (T,). One that is longer already must become
-    nearly as short as this FAP alone can make it.
+    nearly as short as this FAP alone can make it. Bounds: as in `_add_error`; room is made for len(which).
     """
     room = np.zeros((2, len(which)))
     for frame in range(len(which)):

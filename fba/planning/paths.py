@@ -147,7 +147,7 @@ def _search(bounds: Bounds, band: tuple[Int64, Int64], before: Int64, narrower: 
 
 @compiled
 def _hold(lowest: Int64, highest: Int64) -> Int64:
-    """Return levels (K,) that change as late as can be."""
+    """Return levels (K,) that change as late as can be. Bounds: all arrays have the length of lowest."""
     result = np.zeros(len(lowest), dtype=np.int64)
     level = 0
     if len(lowest):
@@ -180,6 +180,10 @@ def _shortest(
     lower, upper: (T,), in levels, for the frames between keys, where values are interpolated. band: lowest
     and highest levels (K,). calm: least and largest changes (K - 1,) that are no jerk. cost: of changes from
     -low on. choices: int32 (K, most levels), working array.
+
+    Bounds: j and i are levels within the band, of which choices has a column each (`_search` makes it for the
+    widest). j_first and j_last keep changes within -low..len(cost) - 1 - low. Keys are places in lower and
+    upper, those between two keys as well.
     """
     first, last = band
     width = choices.shape[1]

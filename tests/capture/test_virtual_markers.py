@@ -98,6 +98,15 @@ def test_what_is_no_centre_or_no_size_is_refused() -> None:
             find_influence(places, triangles, 4, radius, depth)
 
 
+@pytest.mark.parametrize("vertex", [-1, 9])
+def test_triangles_of_vertices_that_are_not_there_are_refused(vertex: int) -> None:
+    places, triangles = grid(2, 2)
+    triangles = triangles.copy()
+    triangles[-1, 2] = vertex
+    with pytest.raises(ModelError, match="triangles name vertices that there are not: the mesh has 9"):
+        find_influence(places, triangles, 4, 1.0)
+
+
 def test_influences_beyond_the_memory_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fba.capture.virtual_markers.influence.MOST_SHARES", 100)
     with pytest.raises(ModelError, match="the first 2 virtual markers move 162 vertices together"):

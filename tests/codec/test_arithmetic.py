@@ -223,3 +223,63 @@ def test_random_bits_as_the_textbook_reads_them() -> None:
             if text[status] in message:
                 assert after == place
     assert all(count > 50 for count in seen.values()), seen
+
+
+@pytest.mark.parametrize("adaptive", [True, False])
+@pytest.mark.parametrize(
+    ("slots", "symbols", "room", "message"),
+    [
+        ([4], [7], 16, "a symbol beyond its model"),
+        ([0, 4], [0, 3721], 16, "a symbol beyond its model"),
+        ([3], [-1], 16, "a symbol beyond its model"),
+        ([0, 1, 2], [0, 0], 16, "a segment beyond its arrays"),
+        ([8] * 8, [5] * 8, 16, "a segment beyond its arrays"),
+        ([], [], 1, "a segment beyond its arrays"),
+    ],
+)
+def test_what_would_be_written_past_an_end_is_refused(
+    slots: list[int], symbols: list[int], room: int, message: str, adaptive: bool
+) -> None:
+    models, data = Coder(SIZES).models, np.zeros(64, dtype=np.uint8)
+    arrays = np.array(slots, dtype=np.int64), np.array(symbols, dtype=np.int64)
+    with pytest.raises(IndexError, match=message):
+        encode_segment(data[:room], 0, arrays[0], models, adaptive, arrays[1])
+    assert not data[room:].any()
+    assert encode_segment(data, 0, arrays[0][:0], models, adaptive, arrays[1]) == 2
+
+
+@pytest.mark.parametrize(("slots", "symbols"), [([4], [7]), ([3], [-1]), ([0, 1], [0])])
+def test_nothing_is_learnt_of_symbols_beyond_their_models(slots: list[int], symbols: list[int]) -> None:
+    models = Coder(SIZES).models
+    with pytest.raises(IndexError, match="beyond"):
+        learn(np.array(slots, dtype=np.int64), np.array(symbols, dtype=np.int64), models)
+    assert not models.added[slots[0], 1:].any()
+
+
+def test_a_segment_is_not_decoded_beyond_its_arrays() -> None:
+    models, data, slots = Coder(SIZES).models, np.zeros(4, dtype=np.uint8), np.arange(2)
+    for end, count in ((33, 2), (32, 1)):
+        with pytest.raises(IndexError, match="a segment beyond its arrays"):
+            decode_segment(data, 0, end, slots, models, True, np.zeros(count, dtype=np.int64))
+
+
+@pytest.mark.parametrize("adaptive", [True, False])
+def test_the_longest_segments_fit_the_room_that_is_asked_for(adaptive: bool) -> None:
+    """16 bits for each symbol and 16 more: rare symbols of the largest models, and zeros that are guarded."""
+    coder = Coder((3721, 3721, 2), (0, 3720, 0))
+    for _ in range(TOTAL_MAX - 3722):
+        coder.learn([0, 1, 2], [0, 3720, 0])
+    random = Random(3)
+    for count in (1, 2, 50, 400):
+        slots = [random.randrange(3) for _ in range(count)]
+        symbols = [(3720, 0, 1)[slot] if random.random() < 0.9 else 1 for slot in slots]
+        data = np.zeros(2 * (count + 1), dtype=np.uint8)
+        end = encode_segment(
+            data,
+            0,
+            np.array(slots, dtype=np.int64),
+            coder.models,
+            adaptive,
+            np.array(symbols, dtype=np.int64),
+        )
+        assert end < 16 * count + 4

@@ -148,3 +148,10 @@ def test_a_segment_begins_with_an_i_plane_and_ranges_of_its_own() -> None:
     ranges = [planes[number].settings.face.ranges for number in (0, 30)]
     assert [int(one.p_max[13]) for one in ranges] == [15, 1]
     assert fba.decode(data) == animation
+
+
+@pytest.mark.parametrize("cuts", [[0, 4], [-1, 3], [0, 2, 2], [3, 0]])
+def test_cuts_that_are_no_frames_are_refused(cuts: list[int]) -> None:
+    track = BodyTrack(np.ones((3, 296), dtype=np.int32), np.ones((3, 296), dtype=bool))
+    with pytest.raises(ValueError, match="cuts must increase from 0 to 3 frames"):
+        code_lengths(track, np.array(cuts), EncoderOptions())

@@ -15,6 +15,7 @@ from random import Random
 import numpy as np
 import pytest
 
+from fba.codec._plane.pricing import NextPlane
 from fba.errors import FbaError, OptionError
 from fba_conformance.fuzz import __main__ as program
 from fba_conformance.fuzz import _campaign as campaign
@@ -29,7 +30,8 @@ from fba_conformance.fuzz.targets import Target, find_target, targets
 from fba_conformance.small_streams import small_streams
 
 SEED = 20_000
-READERS = [target.name for target in targets() if not target.name.startswith("stream")]
+READERS = [target.name for target in targets() if not (target.random or target.name.startswith("stream"))]
+PERFORMANCES = [target.name for target in targets() if target.random]
 OWN = "fuzzed_functions"
 """Module with the functions below, for processes that the fuzzer starts."""
 FUNCTIONS = """
@@ -66,11 +68,32 @@ def test_mutated_files(name: str) -> None:
     assert report.refused > 5
 
 
-@pytest.mark.parametrize("name", [target.name for target in targets() if target.name != "any"])
+@pytest.mark.parametrize("name", [*(name for name in READERS if name != "any"), "stream"])
 def test_mutations_start_from_files_that_are_read(name: str) -> None:
     target = find_target(name)
     report = engine.run_files(target, read_corpus(target))
     assert (report.refused, report.findings) == (0, [])
+
+
+@pytest.mark.parametrize("name", PERFORMANCES)
+def test_random_performances(name: str) -> None:
+    target = find_target(name)
+    report = engine.run(target, read_corpus(target), count=12, seed=SEED)
+    assert not report.findings, report.findings[0].reason
+    assert report.count == 13
+    assert report.accepted > 6
+    assert engine.mutated(target, [], SEED, 5) != engine.mutated(target, [], SEED, 6)
+
+
+def test_a_trial_that_counts_other_bits_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    true_bits = NextPlane.bits
+    monkeypatch.setattr(NextPlane, "bits", lambda *arguments: true_bits(*arguments) + 2)
+    kinds = set()
+    for name in PERFORMANCES:
+        report = engine.run(find_target(name), [], count=20, seed=SEED)
+        kinds |= {finding.kind for finding in report.findings}
+    assert kinds
+    assert all(kind.startswith("ContractError: the planes take") for kind in kinds)
 
 
 def test_mutations_are_made_from_their_numbers() -> None:

@@ -16,9 +16,11 @@ from fba.errors import RangeError
 from fba.face import Deformer, FaceModel
 from fba.face.deform.displacements import DisplacementMeter
 from fba.face.resolve import resolve
+from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.parameters import faps
 from fba.planning import Tolerance, encode_planned, encode_within_tolerance
 from fba.planning.mesh_error import ErrorBasis
+from small_face import small_face
 
 STEPS = np.array([1, 1, *(one.step for one in faps()[2:])])
 
@@ -250,6 +252,22 @@ def test_displacements_are_those_of_the_deformer() -> None:
     assert np.take_along_axis(distances, off.worst[:, None], 1)[:, 0] == pytest.approx(off.largest, abs=1e-7)
     movable = (deformer.local(one) != deformer.local(np.zeros(68))).any(axis=(0, 2))
     assert off.percentile(99) == pytest.approx(np.percentile(distances[:, movable], 99), rel=0.02)
+
+
+def test_vertices_too_far_apart_for_their_squares_are_counted_as_the_furthest() -> None:
+    """2e20 m squared is no 32-bit float: the number of the distance was that of no count."""
+    head = small_face()
+    (table,) = (one for one in head.tables if one.fap == 3)
+    (mesh,) = table.meshes
+    far = FaceDefMesh(mesh.part, mesh.borders, mesh.vertices, mesh.displacements * 1e20)
+    others = tuple(one for one in head.tables if one.fap != 3)
+    model = FaceModel(head.parts, head.points, head.bound, (*others, FaceDefTables(3, (far,))), name="far")
+    one, other = np.zeros((3, 68)), np.zeros((3, 68))
+    other[:, 2] = 0, 1, 500
+    off = DisplacementMeter(model).measure(one, other)
+    assert off.largest[0] == 0
+    assert off.largest[2] > 1e18
+    assert off.counts[-1] == 2 * len(mesh.vertices)
 
 
 def real_faces(shared: Path) -> Iterator[Animation]:

@@ -12,9 +12,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from fba_conformance.fuzz._engine import Finding, Report, mutated
@@ -24,9 +25,11 @@ from fba_conformance.fuzz.targets import Target
 from fba_conformance.fuzz.worker import NUMBER, file_name
 
 HANGING = 120.0
-"""Seconds without progress after which a process hangs: much, as other programs may keep the machine busy."""
+"""Seconds of processor time without progress after which a process hangs."""
 COMPILING = 600.0
 """The same for the files of the corpus, the first of which compile the loops."""
+WAITING = 5.0
+"""How many times as long by the clock: other programs may keep the machine busy, and sleep takes no work."""
 MINIMISED_SECONDS = 60.0
 MOST_DEATHS = 20
 """Processes of one target that may die before the run gives up on it."""
@@ -34,7 +37,11 @@ MOST_DEATHS = 20
 
 @dataclass(frozen=True)
 class Campaign:
-    """What to run. count: inputs for each target; without it, minutes divided by the targets' shares."""
+    """What to run. count: inputs for each target; without it, minutes divided by the targets' shares.
+
+    counts: inputs by the names of targets, instead of `count`. at: the number of the input that each target
+    is at, kept up to date while it runs.
+    """
 
     targets: Sequence[Target]
     seed: int = 0
@@ -44,6 +51,12 @@ class Campaign:
     jobs: int = 1
     corpus: Path | None = None
     findings: Path = Path("fuzz-findings")
+    counts: Mapping[str, int] = field(default_factory=dict)
+    at: dict[str, int] = field(default_factory=dict)
+
+    def count_of(self, target: Target) -> int | None:
+        """Return how many inputs a target gets; None where its time decides."""
+        return self.counts.get(target.name, self.count)
 
 
 def run_campaign(campaign: Campaign, say: Callable[[str], None]) -> list[Report]:
@@ -52,7 +65,7 @@ def run_campaign(campaign: Campaign, say: Callable[[str], None]) -> list[Report]
 
     def one(target: Target) -> Report:
         seconds = None
-        if campaign.count is None:
+        if campaign.count_of(target) is None:
             whole = 60 * (campaign.minutes or 0) * min(campaign.jobs, len(campaign.targets))
             seconds = whole * target.share / total
         report = _run_target(campaign, target, seconds)
@@ -86,7 +99,7 @@ def save(finding: Finding, folder: Path) -> str:
 def _run_target(campaign: Campaign, target: Target, seconds: float | None) -> Report:
     """Run a target until its inputs or its time are used up, with a new process behind each that died."""
     whole = Report(target.name)
-    first, count = campaign.first, campaign.count
+    first, count = campaign.first, campaign.count_of(target)
     end = None if seconds is None else time.monotonic() + seconds
     for _ in range(MOST_DEATHS):
         left = None if end is None else max(0.0, end - time.monotonic())
@@ -126,7 +139,7 @@ def _run_worker(
                 worker_command(target, *arguments), stdout=out, stderr=err, env=environment(target)
             )
             try:
-                hung = _watch(process, progress)
+                hung = _watch(process, progress, partial(campaign.at.__setitem__, target.name))
             finally:
                 process.kill()
                 process.wait()
@@ -146,21 +159,37 @@ def _run_worker(
         return None, number, f"{words}\n{how}"
 
 
-def _watch(process: subprocess.Popen[bytes], progress: Path) -> bool:
-    """Wait for a process to end; kill it, with a traceback, and return True if it hangs."""
-    before, since = None, time.monotonic()
+def _watch(process: subprocess.Popen[bytes], progress: Path, tell: Callable[[int], None]) -> bool:
+    """Wait for a process to end; kill it, with a traceback, and return True if it hangs.
+
+    tell: called with the number of the input that it is at, about once a second.
+    """
+    before, since, began = None, time.monotonic(), 0.0
     while True:
         try:
             process.wait(timeout=1)
             return False
         except subprocess.TimeoutExpired:
             number = NUMBER.unpack(progress.read_bytes())[0]
+            tell(number)
+        now, worked = time.monotonic(), _processor_time(process.pid)
+        most = HANGING if number >= 0 else COMPILING
         if number != before:
-            before, since = number, time.monotonic()
-        elif time.monotonic() - since > (HANGING if number >= 0 else COMPILING):
+            before, since, began = number, now, worked
+        elif worked - began > most or now - since > WAITING * most:
             process.send_signal(signal.SIGABRT)  # faulthandler prints where it is
             process.wait(timeout=30)
             return True
+
+
+def _processor_time(process: int) -> float:
+    """Return the seconds of processor time that a process has taken; 0 where the system does not say."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
+        user, system = fields.rpartition(")")[2].split()[11:13]
+    except (OSError, ValueError):
+        return 0.0
+    return (int(user) + int(system)) / float(os.sysconf("SC_CLK_TCK"))
 
 
 def _death(campaign: Campaign, target: Target, number: int, kind: str, words: str) -> Finding:
@@ -197,12 +226,8 @@ def worker_command(target: Target, *arguments: str) -> list[str]:
 
 
 def environment(target: Target) -> dict[str, str]:
-    """Return the variables of a worker's process. Code with other checks in it needs a cache of its own."""
-    result = {**os.environ, **target.environment}
-    if "NUMBA_BOUNDSCHECK" in target.environment:
-        usual = os.environ.get("NUMBA_CACHE_DIR") or str(Path.home() / ".cache" / "fba-fuzz")
-        result["NUMBA_CACHE_DIR"] = f"{usual}-bounds"
-    return result
+    """Return the variables of a worker's process."""
+    return {**os.environ, **target.environment}
 
 
 def _report(content: dict[str, object], folder: Path) -> Report:

@@ -23,6 +23,8 @@ MOST_SECONDS, MOST_SECONDS_PER_BYTE = 3.0, 0.002
 MOST_MEMORY, MOST_MEMORY_PER_BYTE = 200_000_000, 20
 """Memory that one input may take beyond what the process had before it, in bytes."""
 MINIMISED_SECONDS = 15.0
+RANDOM_BYTES = 8
+"""Size of the inputs of targets whose inputs are random."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,8 @@ def mutated(target: Target, corpus: Sequence[bytes], seed: int, number: int) -> 
     """Return the input of this number, and the file that it was made from."""
     if number < 0:
         return corpus[number], corpus[number]
+    if target.random:
+        return Random(f"{seed} {number}").randbytes(RANDOM_BYTES), b""
     return mutate(corpus, Random(f"{seed} {number}"), target.words)
 
 

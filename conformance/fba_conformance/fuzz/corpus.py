@@ -18,8 +18,10 @@ def read_corpus(target: Target, folder: Path | None = None) -> list[bytes]:
     """Return the files of a target in the order of their names; those of all targets for "any".
 
     folder: with one folder for each target; by default that of the checkout. Raises OptionError if there are
-    no files.
+    no files. A target of random inputs has one, of zeros.
     """
+    if target.random:
+        return [bytes(8)]
     folder = CHECKOUT if folder is None else folder
     pattern = "*/*" if target.folder == "any" else f"{target.folder}/*"
     files = [path.read_bytes() for path in sorted(folder.glob(pattern)) if path.is_file()]

@@ -19,6 +19,7 @@ class Target:
     check: "module:function"; the function takes the bytes and a folder for files, raises for a finding, and
     returns an `Outcome` otherwise. words: what a mutation inserts. share: of the time, relative to others.
     environment: variables that the process needs. corpus: its folder in the corpus, if that is not `name`.
+    random: inputs are some random bytes, which the check makes something of; there are no files to mutate.
     """
 
     name: str
@@ -28,6 +29,7 @@ class Target:
     share: int = 1
     environment: Mapping[str, str] = field(default_factory=dict)
     corpus: str = ""
+    random: bool = False
 
     @property
     def folder(self) -> str:
@@ -103,6 +105,13 @@ def targets() -> tuple[Target, ...]:
         _reader("import", "faces of any kind, imported", *_TEXT),
         _reader("any", "files of any kind, recognised", *_TEXT),
         _reader("cache", "files of the cache of slow results"),
+        *(
+            Target(
+                f"encode-{part}", f"random performances of {whose}, encoded in every manner and decoded",
+                f"fba_conformance.fuzz._performances:check_{part}", random=True,
+            )
+            for part, whose in (("face", "faces"), ("body", "bodies"), ("both", "faces with bodies"))
+        ),
     )  # fmt: skip
 
 

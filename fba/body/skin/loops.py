@@ -1,6 +1,11 @@
 """The compiled loops that move vertices with joints: plain functions over NumPy arrays.
 
 Vertices are float32 relative to the root joint, so that a body far from the origin loses no precision.
+
+Bounds: `Skinner` passes arrays of one mesh and skeleton, which `BodyModel` checks: joints of vertices,
+parents and neighbours are numbers of these, with at most four joints a vertex. It checks the shape of
+vertices, normals and matrices that are given, and `result_array` that of results; scratch is made for its
+joints.
 """
 
 from __future__ import annotations

@@ -2,6 +2,12 @@
 
 A rotation has two decompositions into turns about three axes, and at gimbal lock infinitely many; the one
 closest to the frame before is taken, so that a smooth motion has smooth angles.
+
+Bounds: `BapSolver.solve` checks the shape of matrices, and passes tables of its own joints: three axes of
+0..2 and as many columns, below 296, as a joint has freedoms, of which there are at most three; parents come
+first. It makes `values` with a row for each frame. Frames are taken in blocks of BLOCK, for which all else is
+made here. `joint_angles` makes all arrays that it does not get; angles have a column for each frame of
+`local`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The loop that finds weights of shapes, compiled (see `fba.compiled`)."""
+"""The loop that finds weights of shapes, compiled (see `fba.compiled`).
+
+Bounds: it goes by the shape of goals, in which it writes; products are read, and checked to be as many.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,8 @@ def find_weights(products: Float64, goals: Float64, sweeps: int, settled: float)
     `settled`. A frame starts from the weights of the one before it.
     """
     frames, shapes = goals.shape
+    if products.shape[0] < shapes or products.shape[1] < shapes:
+        raise IndexError("fewer products than shapes")
     for frame in range(frames):
         row = goals[frame].copy()
         weights = goals[frame]

@@ -11,9 +11,11 @@ def chain(own: Float64, bonds: Float64, pull: Float64, course: Float64) -> None:
     """Fill course (T,) with x, minimising sum own[t] x[t]^2 + bonds[t] (x[t+1] - x[t])^2 -2 pull[t] x[t].
 
     own: (T,), positive. bonds: (T - 1,), not negative. pull: (T,). own and pull are overwritten. Thomas's
-    algorithm.
+    algorithm. IndexError for arrays of other lengths.
     """
     count = own.shape[0]
+    if min(bonds.shape[0] + 1, pull.shape[0], course.shape[0]) < count:
+        raise IndexError("paths of different lengths")
     for t in range(count - 1):
         own[t] += bonds[t]
         own[t + 1] += bonds[t]

@@ -61,7 +61,13 @@ def follow(
     sideways, natural: (T, 3), a of a . (1, cos turn, sin turn), which is how far the target direction is off
     the hinge's plane, and how far on the side that the hinge bends to. ease: (T,), 1 or less, factor of the
     cost of turning since the frame before. usual: the turn without any other cost. period: seconds per frame.
+    IndexError for arrays of other lengths.
+
+    Bounds of the loops: with these lengths, frames are places in all arrays; states are below STATES, and
+    shifts as well, so that their sum is below 2 STATES.
     """
+    if not len(sideways) == len(natural) == len(ease) == len(path):
+        raise IndexError("a hinge's arrays have different lengths")
     _search(sideways, natural, ease, usual, period, path)
     centre = usual + TURN * math.floor((float(np.median(path)) - usual) / TURN + 0.5)
     _refine(sideways, natural, ease, centre, period, path)
@@ -71,7 +77,7 @@ def follow(
 def _search(
     sideways: Float64, natural: Float64, ease: Float64, usual: float, period: float, path: Float64
 ) -> None:
-    """Fill path with the best one over the grid: dynamic programming."""
+    """Fill path with the best one over the grid: dynamic programming. Bounds: see `follow`."""
     count = path.shape[0]
     step = TURN / STATES
     sines = np.zeros(STATES)
@@ -120,7 +126,8 @@ def _refine(
 ) -> None:
     """Improve path by Newton's method, whose equations couple each frame with its neighbours only.
 
-    centre: the usual turn plus the number of full turns that brings it closest to the path.
+    centre: the usual turn plus the number of full turns that brings it closest to the path. Bounds: see
+    `follow`.
     """
     count = path.shape[0]
     stiff = 2.0 / (SPEED * SPEED * period)

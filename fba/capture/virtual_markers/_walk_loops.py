@@ -13,6 +13,8 @@ def list_triangles(triangles: Int64, starts: Int64, listed: Int64) -> None:
     """List the triangles of each vertex, in their order.
 
     triangles: (F, 3). starts: (V + 1,), zeros, becomes where each vertex begins in `listed`: (3 F,).
+
+    Bounds: `WalkedMesh` checks that corners are below V; `listed` has a place for each of them.
     """
     count = len(starts) - 1
     for triangle in range(len(triangles)):
@@ -48,6 +50,9 @@ def walk_from(
     number: differs in each call with the same `tested`, (V,), which notes the vertices met. found, away,
     levels: (V,), the vertices inside in the order in which they are met, their distances from the centre, and
     the steps to them, 1 for the centre itself.
+
+    Bounds: the centre and corners are below V, as `WalkedMesh` checks. A vertex is found once, as it is
+    tested first: no more than V are.
     """
     x, y, z = vertices[centre, 0], vertices[centre, 1], vertices[centre, 2]
     tested[centre] = number

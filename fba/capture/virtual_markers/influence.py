@@ -44,11 +44,19 @@ class Influence:
 
 
 class WalkedMesh:
-    """A mesh that is prepared for walks. vertices: float64 (V, 3). triangles: (F, 3), within it."""
+    """A mesh that is prepared for walks. vertices: float64 (V, 3). triangles: (F, 3).
+
+    Raises ModelError for triangles of vertices that it does not have.
+    """
 
     def __init__(self, vertices: Float64, triangles: Integer) -> None:
         self.vertices = np.ascontiguousarray(vertices, dtype=np.float64)
         self.triangles: Int64 = np.ascontiguousarray(triangles, dtype=np.int64)
+        count = len(self.vertices)
+        if self.triangles.size and not 0 <= self.triangles.min() <= self.triangles.max() < count:
+            raise ModelError(
+                f"triangles name vertices that there are not: the mesh has {count}, counted from 0"
+            )
 
     def walk(self, centres: Sequence[tuple[int, float, float]]) -> list[Influence]:
         """Return the influence of each (centre vertex, radius, depth).

@@ -15,7 +15,12 @@ the most frequent one in a predictive codec.
 The models of all slots are rows of arrays (slots, STRIDE). Coding a plane only reads them; `learn` updates
 them afterwards: a model is used at most once in a plane, so an incomplete or damaged plane changes nothing.
 
-All functions work on NumPy arrays and plain integers, check every bound, and also run uncompiled.
+All functions work on NumPy arrays and plain integers, and also run uncompiled.
+
+Bounds: slots are rows of `Counts` (`coder_state.Models` makes room for a part before its first plane). In
+each row sizes are at most ALPHABET_MAX, which `header_loops.begin_models` checks, so that symbols and nodes
+of trees up to the size lie within STRIDE. That symbols are below the size, and arrays long enough, is checked
+here. IndexError for what is not so: a fault of the caller, never of a stream.
 """
 
 from __future__ import annotations
@@ -78,8 +83,13 @@ def decode_segment(
 
     data: the stream, valid up to bit `end`; zeros are assumed beyond. adaptive: P planes; in I planes all
     counts are 1. Returns OK and the bit after the segment, OUT_OF_DATA if it needs bits beyond `end`, or the
-    kind of damage and its bit.
+    kind of damage and its bit. IndexError where `end` is beyond the data, or symbols are fewer than slots.
+
+    Bounds: bits are read before `end` only. A symbol is that whose share of the counts contains the target,
+    which is below their total, since the code stays within the interval: it is below the model's size.
     """
+    if len(symbols) < len(slots) or end > 8 * len(data) or bit < 0:
+        raise IndexError("a segment beyond its arrays")
     low = high = code = 0  # so that renormalising reads the first 16 bits
     zeros = 0  # in a row, up to `bit`
     taken = 0  # logical bits: those read, without the inserted ones
@@ -163,8 +173,16 @@ def encode_segment(
 ) -> int:
     """Encode symbols[k] for slot slots[k] into one segment that starts at `bit`; return the bit after it.
 
-    data: zeroed from `bit` on, with room for 16 bits for each symbol and 16 more.
+    data: zeroed from `bit` on, with room for 16 bits for each symbol and 16 more; IndexError without. The
+    same for a symbol that its model does not have, or fewer symbols than slots.
+
+    Bounds: a symbol narrows the interval to no less than 1 / TOTAL_MAX of its size, which is more than
+    QUARTER; to grow beyond that again takes at most 15 doublings, each of which writes a bit at once or
+    later. So n symbols and the end write at most 15 n + 2 bits, and the guard one more after each 22: fewer
+    than 16 n + 4.
     """
+    if len(symbols) < len(slots) or bit < 0 or bit + 16 * (len(slots) + 1) > 8 * len(data):
+        raise IndexError("a segment beyond its arrays")
     low = 0
     high = TOP
     pending = 0  # bits whose value the next one decides
@@ -174,6 +192,8 @@ def encode_segment(
         if position < count:
             slot = int(slots[position])
             symbol = int(symbols[position])
+            if symbol < 0 or symbol >= models.size[slot]:
+                raise IndexError("a symbol beyond its model")
             span = high - low + 1
             if adaptive:
                 total = int(models.total[slot])
@@ -229,7 +249,12 @@ def encode_segment(
 
 @compiled
 def learn(slots: Int64, symbols: Int64, models: Counts) -> None:
-    """Raise the count of symbols[k] in the model of slots[k], halving the counts of full models."""
+    """Raise the count of symbols[k] in the model of slots[k], halving the counts of full models.
+
+    IndexError for fewer symbols than slots, or a symbol that its model does not have.
+    """
+    if len(symbols) < len(slots):
+        raise IndexError("symbols beyond their array")
     for position in range(len(slots)):
         slot = int(slots[position])
         if models.total[slot] == TOTAL_MAX:
@@ -237,6 +262,8 @@ def learn(slots: Int64, symbols: Int64, models: Counts) -> None:
                 models.added, models.tree, slot, int(models.size[slot]), int(models.usual[slot])
             )
         symbol = int(symbols[position])
+        if symbol < 0 or symbol >= models.size[slot]:
+            raise IndexError("a symbol beyond its model")
         models.added[slot, symbol] += np.uint16(1)
         models.total[slot] += 1
         if symbol != models.usual[slot]:

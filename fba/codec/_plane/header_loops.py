@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.arrays import Bool, Int64, UInt8
 from fba.codec._plane import slots
-from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
+from fba.codec._plane.arithmetic import ALPHABET_MAX, OK, OUT_OF_DATA
 from fba.codec._plane.loops import State, coding_of
 from fba.compiled import compiled, inlined
 from fba.parameters import BAP_COUNT, FAP_COUNT, bap_groups, fap_groups
@@ -94,7 +94,12 @@ def read_part_header(data: UInt8, bit: int, end: int, part: Groups, header: Head
 
     header: zeroed; filled. bit: after the header, or of the damage. place: with BAD_MASK_MARKER and
     BAD_MASK_TYPE the number of the group, from 1 on; with BAD_RANGE_MARKER that of the list, from 0 on.
+
+    Bounds: groups and header are those of the same part (`groups`, `empty_header`), so that members are
+    columns of its arrays. Bits are read before `end`, which IndexError is raised for beyond the data.
     """
+    if end > 8 * len(data) or bit < 0:
+        raise IndexError("a header beyond its data")
     types, mask, ranges, fields = header.types, header.mask, header.ranges, header.fields
     if bit + 5 > end:
         return OUT_OF_DATA, end, 0
@@ -167,8 +172,12 @@ def begin_models(
     """Set the ranges of the slots in a span to limits divided by scale, and all counts of their models to 1.
 
     limits: int64 (4, slots), magnitudes of I max, I min, P max, P min. high_level: limits of the slots before
-    the first FAP with ranges: those of visemes and expressions, which are 0..limit in I planes.
+    the first FAP with ranges: those of visemes and expressions, which are 0..limit in I planes. IndexError
+    for slots that the state has no models for, and for an alphabet larger than ALPHABET_MAX: that of no
+    range.
     """
+    if span[0] < 0 or span[1] > len(state.added) or span[1] > limits.shape[1]:
+        raise IndexError("slots without models")
     intra, predicted = coding_of(state, False), coding_of(state, True)
     models = predicted.models
     for slot in range(span[0], span[1]):
@@ -182,6 +191,8 @@ def begin_models(
         else:
             i_max, i_min = max(int(limits[0, slot]), 0) // scale, max(int(limits[1, slot]), 0) // scale
             p_max, p_min = max(int(limits[2, slot]), 0) // scale, max(int(limits[3, slot]), 0) // scale
+        if max(i_max + i_min, p_max + p_min) >= ALPHABET_MAX:
+            raise IndexError("an alphabet beyond its model")
         intra.minimum[slot] = -i_min
         intra.models.size[slot] = i_max + i_min + 1
         predicted.minimum[slot] = -p_min

@@ -3,6 +3,10 @@
 P planes have a header of a few bits and use the settings of the I plane before them, so that runs of them are
 coded without returning to Python. I planes have new settings: `fba.codec._plane.syntax` codes their headers,
 `decode_values` and `encode_values` here their values.
+
+Bounds: a layout's segments are consecutive parts of its order, whose slots are rows of the state
+(`slots.coding_order`); segments have at most two flags. The length of everything else is checked by the
+functions that are called from Python, or by those of `arithmetic`: IndexError for a fault of the caller.
 """
 
 from __future__ import annotations
@@ -32,6 +36,9 @@ SKIP_MAX = 15 << 20
 """Most frames that a plane may skip: a week at 25 frames/s. More is damage."""
 
 FIRST_FLAG = slots.FLAGS.start
+
+START_CODE_ROOM = 40
+"""Bits of a start code and of the alignment before it, at most."""
 
 AFTER_CODE = -2
 """Instead of the first bit of the plane before: a start code ends here, and no reader looks for another."""
@@ -198,8 +205,10 @@ def hides_plane(data: UInt8, start: int, stop: int) -> bool:
 def insert_start_code(data: UInt8, start: int, stop: int) -> int:
     """Put alignment and fba_object_plane_start_code before the bits start..stop; return their new stop.
 
-    data: zeroed from `stop` on, with room for 40 bits more.
+    data: zeroed from `stop` on, with room for 40 bits more; IndexError without.
     """
+    if start < 0 or stop + START_CODE_ROOM > 8 * len(data):
+        raise IndexError("no room for a start code")
     aligned = (start >> 3) + 1
     shift = 8 * (aligned + 4) - start
     for bit in range(stop - 1, start - 1, -1):
@@ -225,7 +234,7 @@ def guard_plane(data: UInt8, before: int, start: int, stop: int) -> tuple[int, i
     only, not in headers. before: first bit of the plane before, or -1 if a start code stands before it.
     Returns stop, and the first bit of this plane, or -1 with a start code before it.
 
-    data: zeroed from `stop` on, with room for 80 bits more.
+    data: zeroed from `stop` on, with room for 80 bits more: `insert_start_code` checks that.
     """
     zeros = _zeros_ahead(data, start, stop)
     if zeros < 0:
@@ -255,8 +264,10 @@ def decode_values(
 
     adaptive: a P plane, else an I plane. Writes symbols[k] and values[k] for slot layout.order[k], and
     flags[0:3] (viseme_def, init_face, expression_def); changes neither models nor last values.
-    OUT_OF_RANGE returns the slot instead of a bit.
+    OUT_OF_RANGE returns the slot instead of a bit. IndexError for arrays that are shorter than the layout.
     """
+    if len(values) < len(layout.order) or len(flags) < 3:
+        raise IndexError("values beyond their array")
     flags[:] = 0
     flag = 0
     order = layout.order
@@ -328,8 +339,13 @@ def decode_run(
 
     planes: how many were decoded. status: OK if rows are full, else why the run ended. carried: the parts,
     added up, that planes carry. place: the bit, or slot, at which the next plane failed. A plane that fails
-    does not change models and `last`.
+    does not change models and `last`. IndexError for results that are shorter than rows, or rows that are
+    narrower than a plane.
     """
+    if min(len(parts), len(skips), len(borders) - 1) < len(rows):
+        raise IndexError("results of a run beyond their arrays")
+    if not len(layouts.order) <= rows.shape[1] <= len(layouts.order) + 3:
+        raise IndexError("rows that are not those of a plane")
     coding = coding_of(state, True)
     both = Layout(layouts.order, layouts.segments)
     face = Layout(layouts.order[: layouts.face_slots], layouts.segments[: layouts.face_segments])
@@ -430,7 +446,8 @@ def encode_values(
     """Encode the segments of one plane at `bit`; return the bit after them.
 
     symbols: symbols[k] for slot layout.order[k]. flags: as decoded. data: zeroed from `bit` on, with room for
-    16 bits for each symbol and 20 for each segment.
+    16 bits for each symbol and 20 for each segment: `encode_segment` checks all but the last 4 of these for
+    each, and writes at most 4 of the 16 that are left, so that two flags have room.
     """
     for segment in range(len(layout.segments)):
         first = int(layout.segments[segment, 0])
@@ -507,8 +524,11 @@ def encode_run(
     before: first bit of the last plane written, AFTER_CODE if a start code ends at `bit`, or -1 if one stands
     before that plane. A start code is written before a plane that a reader may take for one, see
     `guard_plane`. OUT_OF_RANGE: the difference of `slot` in the next plane does not fit its range; nothing of
-    that plane was written. OUT_OF_DATA: `data` has no room for another plane.
+    that plane was written. OUT_OF_DATA: `data` has no room for another plane. IndexError for fewer skips than
+    rows, or rows that are narrower than the flags.
     """
+    if len(skips) < len(rows) or rows.shape[1] < FIRST_FLAG + 3 or bit < 0:
+        raise IndexError("rows of a run beyond their arrays")
     coding = coding_of(state, True)
     order, minimum, step, last = layout.order, coding.minimum, coding.step, coding.last
     symbols = np.zeros(len(order), np.int64)
@@ -554,8 +574,11 @@ def measure_plane(
 ) -> int:
     """Return the bit after one P plane, written to `data` at `bit` as `encode_run` does; no model learns.
 
-    levels: int64, of the differences, by layout.order. data: a copy, with room for the plane.
+    levels: int64, of the differences, by layout.order. data: a copy, with room for the plane (`room_for`).
+    IndexError for another number of levels, and without that room.
     """
+    if len(levels) != len(layout.order) or bit < 0 or bit + room_for(skip, layout) > 8 * len(data):
+        raise IndexError("a plane beyond its arrays")
     coding = coding_of(state, True)
     symbols = np.zeros(len(levels), np.int64)
     for position in range(len(levels)):

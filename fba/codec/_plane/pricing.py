@@ -55,7 +55,11 @@ class NextPlane:
 
 @compiled
 def choose_levels(layout: Layout, state: State, row: Int32, weights: Float64, price: float) -> Int64:
-    """Return the level of the difference of each slot that a plane codes: int64 (slots coded,)."""
+    """Return the level of the difference of each slot that a plane codes: int64 (slots coded,).
+
+    Bounds: a level is between 0 and the nearest one that the range holds; every range of P planes holds 0, so
+    each level that is priced has a symbol.
+    """
     coding = coding_of(state, True)
     result = np.zeros(len(layout.order), np.int64)
     for position in range(len(layout.order)):

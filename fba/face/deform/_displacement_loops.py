@@ -1,4 +1,7 @@
-"""Loops over the vertices that two sets of FAPs put in different places, compiled (see `fba.compiled`)."""
+"""Loops over the vertices that two sets of FAPs put in different places, compiled (see `fba.compiled`).
+
+Bounds: as in `fba.face.deform._loops`; the number of a distance is limited before it becomes an integer.
+"""
 
 from __future__ import annotations
 
@@ -153,7 +156,8 @@ def measure_frames(
                 squared = x * x + y * y + z * z
                 if squared > 0:
                     distance = np.sqrt(np.float64(squared))
-                    counts[min(int(distance / unit) + 1, len(counts) - 1)] += 1
+                    units = distance / unit  # infinite where vertices are too far apart for their squares
+                    counts[int(units) + 1 if units < len(counts) - 2 else len(counts) - 1] += 1
                     if distance > most:
                         most, place = distance, start + v
         largest[frame], worst[frame] = most, place

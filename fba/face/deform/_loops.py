@@ -2,6 +2,11 @@
 
 For each frame the neutral face is copied, every FAP that is not 0 adds its shifts, normals are summed over
 the triangles of the parts that changed, and the transforms of each part and of the head are applied.
+
+Bounds: tables and scratch are those of one model (`Deformer`), whose rows, corners, columns and parts lie
+within it (`FaceModel` checks that, `flat_tables` and `build_surface` number them); `frame_values` makes sure
+of 68 values a frame, `result_array` of room for every vertex. No index comes from a value of a FAP but the
+interval, which stops at the last one of its track.
 """
 
 from __future__ import annotations

@@ -113,6 +113,8 @@ def _fit_motion(before: Float64, after: Float64, centre: Float64) -> tuple[Float
     """The rotation (3, 3) that takes points (N, 3) best to others, and the image (3,) of `centre`.
 
     The orthogonal factor of their covariance by Newton's iteration (Higham 1986); NaN if that fails.
+
+    Bounds: an eyeball takes both for the same rows of its part; all that is written is made here.
     """
     start, middle = np.zeros(3), np.zeros(3)
     for i in range(len(before)):

@@ -1,4 +1,8 @@
-"""Compiled loops of `fba_player.figure.face_light`: light at vertices from their precomputed visibility."""
+"""Compiled loops of `fba_player.figure.face_light`: light at vertices from their precomputed visibility.
+
+Bounds: tables are those of one part (`face_light._table`), with a column for each of its vertices or of those
+near the mouth, which are numbers of the former. Light has a row for each vertex: checked here.
+"""
 
 from __future__ import annotations
 
@@ -38,6 +42,8 @@ def light_vertices(table: Table, basis: Float32, share: float, more: float, ligh
     more: the share of the missing light that is added.
     """
     count = len(table.open)
+    if len(light) < count:
+        raise IndexError("light for fewer vertices than the table's")
     share, more = np.float32(share), np.float32(more)  # type: ignore[assignment]
     key, rim, back = _products(table.light, table.through, basis, count)
     for i in range(count):

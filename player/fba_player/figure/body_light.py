@@ -67,6 +67,8 @@ class BodyLight:
         positions, normals: (V, 3) of the body in the world. joints: (J, 4, 4), its joint matrices. Without
         numba, nothing is in the light's way.
         """
+        if not len(positions) == len(normals) == len(self.body.vertices):
+            raise ValueError(f"{len(positions)} positions for a body of {len(self.body.vertices)} vertices")
         light = np.empty((len(positions), len(REACH)), dtype=np.float32)
         if not is_compiled() or not len(self.ends):
             light[:] = REACH
@@ -169,7 +171,11 @@ def _shade_by_capsules(
 ) -> None:
     """Write past (N, 2): the shares of the key light and of the sky that come past the capsules to rows (N,).
 
-    One capsule after another and without branches, so that the loops over vertices are vectorised."""
+    One capsule after another and without branches, so that the loops over vertices are vectorised.
+
+    Bounds: rows are vertices of the body, whose positions and normals `shade` checks; past has a row for
+    each.
+    """
     one, zero = np.float32(1.0), np.float32(0.0)
     kx, ky, kz = np.float32(KEY[0]), np.float32(KEY[1]), np.float32(KEY[2])
     count = len(rows)
@@ -216,7 +222,11 @@ def _shade_by_capsules(
 
 @compiled
 def _interpolate(past: Float32, near: Int32, shares: Float32, folds: Float32, light: Float32) -> None:
-    """Write light (V, 4): what comes past capsules and folds."""
+    """Write light (V, 4): what comes past capsules and folds.
+
+    Bounds: `near` are rows of past (`_nearest_samples` checks those of the cache), for each vertex of the
+    body, whose number `shade` checks.
+    """
     lit, open_ = np.float32(REACH[0]), np.float32(REACH[1])
     through, rim = np.float32(REACH[2]), np.float32(REACH[3])
     for i in range(len(light)):

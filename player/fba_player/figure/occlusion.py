@@ -95,6 +95,7 @@ def harmonics(directions: Float64) -> Float64:
 
 @compiled
 def _harmonics(directions: Float64, values: Float64) -> None:
+    """Write `harmonics`. Bounds: values are made for directions, with HARMONICS columns."""
     for i in range(len(directions)):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
         values[i, 0] = 0.282095
@@ -141,7 +142,8 @@ def _frame(direction: Float64) -> Float64:
 def _mirror(visible: Float32, normals: Float32, directions: Float32) -> None:
     """Replace visibility below each vertex's horizon by that of the direction mirrored at the horizon.
 
-    There the surface hides itself, which shading by the normal accounts for already.
+    There the surface hides itself, which shading by the normal accounts for already. Bounds: visible has a
+    row for each normal and a column for each direction, see `bake`.
     """
     count = len(directions)
     for i in range(len(visible)):
@@ -163,7 +165,11 @@ def _mirror(visible: Float32, normals: Float32, directions: Float32) -> None:
 
 @compiled
 def _draw_depths(seen: Float32, triangles: Int32, depth: Float32) -> None:
-    """Draw the depths of front-facing triangles. seen: (V, 3), x and y in -1..1, z towards the viewer."""
+    """Draw the depths of front-facing triangles. seen: (V, 3), x and y in -1..1, z towards the viewer.
+
+    Bounds: pixels are limited to the square of depths after they have become integers, whatever they were;
+    corners are vertices of the mesh, which `bake` is given for a model that is checked.
+    """
     size = depth.shape[0]
     depth[:] = -10.0
     half = 0.5 * size
@@ -203,7 +209,11 @@ def _read_depths(
     visible: Float32,
     through: Float32,
 ) -> None:
-    """Write for vertices `rows` their visibility in a depth map, and the light that comes through to them."""
+    """Write for vertices `rows` their visibility in a depth map, and the light that comes through to them.
+
+    Bounds: rows are vertices, of which all arrays have one each. Pixels are limited as in `_draw_depths`, and
+    the next ones are there: a map has 16 or more.
+    """
     size = depth.shape[0]
     half = 0.5 * size
     pixel = 2.0 * reach / size

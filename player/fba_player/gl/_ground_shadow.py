@@ -155,12 +155,17 @@ def _place_points(
 ) -> int:
     """Write points from row `count` on: column, height (m), row; normal, as long as the area in cells.
 
-    Returns the number of rows written so far.
+    Returns the number of rows written so far. IndexError where rows have no room for all points, or a point
+    is on a vertex that is not there.
     """
+    if count + len(points.corners) > len(rows):
+        raise IndexError("no room for the points of a shadow")
     corners, shares, area = points
     p = np.empty((3, 3))
     for i in range(len(corners)):
         for k in range(3):
+            if corners[i, k] >= len(positions):
+                raise IndexError("a point on a vertex that is not there")
             x, y, z = positions[corners[i, k], 0], positions[corners[i, k], 1], positions[corners[i, k], 2]
             for axis in range(3):
                 p[k, axis] = matrix[axis, 0] * x + matrix[axis, 1] * y + matrix[axis, 2] * z + matrix[axis, 3]
@@ -182,7 +187,10 @@ def _place_points(
 
 @compiled
 def _cast_shadow(rows: Float32, rays: Float64, darkness: UInt8) -> tuple[int, int, int, int]:
-    """Write the darkness of each cell; return the bounds of the shadow: left, bottom, right, top."""
+    """Write the darkness of each cell; return the bounds of the shadow: left, bottom, right, top.
+
+    Bounds: darkness and all layers, made here, are squares of as many cells.
+    """
     cells = len(darkness)
     key, sky = np.zeros((cells, cells), dtype=np.float32), np.zeros((cells, cells), dtype=np.float32)
     layer = np.empty((cells, cells), dtype=np.float32)  # one ray at a time: it stays in the cache
@@ -200,7 +208,11 @@ def _cast_shadow(rows: Float32, rays: Float64, darkness: UInt8) -> tuple[int, in
 
 @compiled
 def _cover(rows: Float32, rx: float, ry: float, rz: float, layer: Float32) -> None:
-    """Add to a layer the share of each cell that the points cover along a ray."""
+    """Add to a layer the share of each cell that the points cover along a ray.
+
+    Bounds: only points from 1 up and below cells - 2, which numbers that are not finite never are, so that
+    the three cells about them are within the layer.
+    """
     cells = len(layer)
     limit, half, quarters = np.float32(cells - 2), np.float32(0.5), np.float32(0.75)
     longer = 1.0 / ry
@@ -236,7 +248,10 @@ def _cover(rows: Float32, rx: float, ry: float, rz: float, layer: Float32) -> No
 
 @compiled
 def _blur(grid: Float32, reach: int, room: Float32) -> None:
-    """Blur by the mean over 2 reach + 1 cells along rows and columns, twice."""
+    """Blur by the mean over 2 reach + 1 cells along rows and columns, twice.
+
+    Bounds: grid and room are squares of as many cells; what is beyond them is left out.
+    """
     cells = len(grid)
     per = np.float32(1.0 / (2 * reach + 1))
     for _ in range(2):
@@ -265,7 +280,10 @@ def _blur(grid: Float32, reach: int, room: Float32) -> None:
 
 @compiled
 def _darken(key: Float32, sky: Float32, darkness: UInt8) -> tuple[int, int, int, int]:
-    """Write the darkness of each cell from the hidden rays of both lights; returns as `_cast_shadow`."""
+    """Write the darkness of each cell from the hidden rays of both lights; returns as `_cast_shadow`.
+
+    Bounds: three squares of as many cells.
+    """
     cells = len(darkness)
     left, bottom, right, top = cells, cells, 0, 0
     for row in range(cells):

@@ -85,6 +85,10 @@ class Outliner:
         """Mark the outlines of a mesh. matrix: (4, 4), world to clip space."""
         if not len(mesh.positions):
             return
+        if len(mesh.positions) != len(mesh.shape.sway):  # which the loops go by
+            raise ValueError(
+                f"{len(mesh.positions)} positions for a shape of {len(mesh.shape.sway)} vertices"
+            )
         edges = self._edges.get(mesh.shape, lambda: find_edges(mesh.shape.triangles))
         clip = np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64)
         if edges.sway is None or edges.sway[0] is not mesh.shape.sway:
@@ -128,7 +132,12 @@ def _add(
     facing: Int8,
     marked: UInt8,
 ) -> None:
-    """Project and mark in one call, as each call from Python costs more than the loops."""
+    """Project and mark in one call, as each call from Python costs more than the loops.
+
+    Bounds: `Outliner.add` makes `seen` and checks `sway` for as many vertices as there are positions; edges
+    and triangles are numbers in them, and of each other (`find_edges`). `marked` has a tile for each TILE
+    pixels begun, as `begin` makes it.
+    """
     _project(positions, sway, turn, centre, clip, size, seen)
     _outline(seen, triangles, ends, sides, size, facing, marked)
 
@@ -143,7 +152,10 @@ def _project(
     size: tuple[int, int],
     seen: Float32,
 ) -> None:
-    """Write pixels x, y of vertices (V, 3), turned as in face.vert, and a number below 0 if behind it."""
+    """Write pixels x, y of vertices (V, 3), turned as in face.vert, and a number below 0 if behind it.
+
+    Bounds: see `_add`.
+    """
     angle = np.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
     axis = turn / max(angle, 1e-12)
     half_wide, half_high = 0.5 * size[0], 0.5 * size[1]
@@ -183,7 +195,11 @@ def _outline(
     facing: Int8,
     marked: UInt8,
 ) -> None:
-    """Mark the tiles along borders and along edges between a front-facing and a back-facing triangle."""
+    """Mark the tiles along borders and along edges between a front-facing and a back-facing triangle.
+
+    Bounds: see `_add`. Pixels are limited to 0..size - 1 before they become tiles; those that are no finite
+    numbers end the edge before: no sum of them is below a limit.
+    """
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = seen[a, 0], seen[a, 1]
@@ -206,7 +222,8 @@ def _outline(
             or min(ay, by) > high + BESIDE
         )
         length = max(abs(bx - ax), abs(by - ay))
-        if outside or not length < 4.0 * (wide + high):
+        near = abs(bx - ax) + abs(by - ay) < 8.0 * (wide + high)
+        if outside or not (near and length < 4.0 * (wide + high)):
             continue
         left, right = int(max(min(ax, bx) - BESIDE, 0.0)), int(min(max(ax, bx) + BESIDE, wide - 1.0))
         low, top = int(max(min(ay, by) - BESIDE, 0.0)), int(min(max(ay, by) + BESIDE, high - 1.0))
@@ -227,7 +244,10 @@ def _outline(
 
 @compiled
 def _runs(marked: UInt8, size: tuple[int, int], corners: Float32) -> int:
-    """Write two triangles for each run of marked tiles if there is room; return the number of runs."""
+    """Write two triangles for each run of marked tiles if there is room; return the number of runs.
+
+    Bounds: checked for each run; corners have 6 rows for each.
+    """
     count = 0
     for row in range(marked.shape[0]):
         column = 0
@@ -238,7 +258,7 @@ def _runs(marked: UInt8, size: tuple[int, int], corners: Float32) -> int:
             first = column
             while column < marked.shape[1] and marked[row, column] != 0:
                 column += 1
-            if len(corners):
+            if 6 * count + 6 <= len(corners):
                 left, right = 2.0 * first * TILE / size[0] - 1.0, 2.0 * column * TILE / size[0] - 1.0
                 low, top = 2.0 * row * TILE / size[1] - 1.0, 2.0 * (row + 1) * TILE / size[1] - 1.0
                 at = 6 * count

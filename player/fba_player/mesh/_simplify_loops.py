@@ -3,6 +3,10 @@
 Garland and Heckbert's quadrics, "Simplifying Surfaces with Color and Texture using Quadric Error Metrics"
 (1998), for points of any dimension. One end of each collapsed edge stays where it is, so the vertices that
 remain are some of the original ones.
+
+Bounds: `simplify` checks that corners are vertices, of which there are V points, and makes every array for V
+vertices and 3 F corners. `start` and `owners` list the triangles as they are; those that collapse name goals,
+which are corners of others. Poses have three coordinates each in points.
 """
 
 from __future__ import annotations
@@ -197,7 +201,10 @@ def candidates(
     cost: Float64,
 ) -> int:
     """Write the neighbour that each vertex is best collapsed onto, or -1, and the squared error; return how
-    many vertices have one."""
+    many vertices have one.
+
+    Bounds: at most MOST_AROUND triangles with two corners each besides the vertex are near it.
+    """
     n = points.shape[1]
     near = np.empty(2 * MOST_AROUND, dtype=np.int32)
     shared = np.empty(2 * MOST_AROUND, dtype=np.int32)

@@ -56,3 +56,11 @@ def test_an_arm_before_the_chest_takes_its_key_light(standing: npt.NDArray[np.fl
     assert len(near) > 2
     assert shaded[near, 0].max() < 0.35
     assert light[near, 0].min() > 0.8
+
+
+def test_positions_of_another_body_are_refused(standing: npt.NDArray[np.float64]) -> None:
+    body = BodyModel.default()
+    light = build_body_light(body, dict.fromkeys(part.name for part in body.parts))
+    more = np.zeros((len(body.vertices) + 1, 3), dtype=np.float32)
+    with pytest.raises(ValueError, match=f"{len(more)} positions for a body of {len(more) - 1} vertices"):
+        light.shade(more, more, standing)

@@ -160,3 +160,18 @@ def test_views_of_one_array_are_known_as_the_same() -> None:
     assert share_memory(light[2:5], light[2:5])
     assert not share_memory(light[2:5], light[3:6])
     assert not share_memory(light[2:5], light.copy()[2:5])
+
+
+@pytest.mark.parametrize(
+    ("poses", "vertex", "message"),
+    [
+        (2, 0, "have no 2 poses"),
+        (1, -1, "vertices that there are not"),
+        (1, 8, "vertices that there are not"),
+    ],
+)
+def test_meshes_that_do_not_agree_are_refused(poses: int, vertex: int, message: str) -> None:
+    points = np.random.default_rng(0).random((8, 3))
+    triangles = np.array([[0, 1, 2], [2, 3, vertex]], dtype=np.int32)
+    with pytest.raises(ValueError, match=message):
+        simplify(points, poses, triangles)

@@ -141,6 +141,12 @@ def test_the_outline_of_a_ball_is_a_circle() -> None:
     assert ((high - low).prod(axis=1)).sum() < 2 * np.pi * radius * TILE * 2
     outliner.begin(size)
     assert len(outliner.tiles()) == 0
+    for wrong in (np.nan, np.inf, -np.inf, 1e38):  # edges that end nowhere are left out
+        positions = mesh.positions.copy()
+        positions[::7, 0], positions[1::7, 1], positions[2::7, 2] = wrong, -wrong, wrong
+        outliner.add(replace(mesh, positions=positions), matrix)
+    with pytest.raises(ValueError, match="1 positions for a shape of"):
+        outliner.add(replace(mesh, positions=mesh.positions[:1]), matrix)
 
 
 def test_the_neck_bends_between_shoulders_and_head() -> None:
