@@ -1,8 +1,8 @@
 """Body definition parameters: the joint centres of the body that a sender's BAPs are for.
 
-Three behaviours of a decoder (digest faces-and-emotions.md, 1.4): "simple" ignores the definition and moves
-its own generic body; "calibration" scales the generic body's segments to the joint centres that were sent;
-and "predictable" replaces it with the body that was sent.
+Three behaviours of a decoder (chapter 4 of the thesis that `fba.body.gait` names): "simple" ignores the
+definition and moves its own generic body; "calibration" scales the generic body's segments to the joint
+centres that were sent; and "predictable" replaces it with the body that was sent.
 """
 
 from __future__ import annotations

@@ -133,7 +133,7 @@ def test_visemes_differ_from_each_other() -> None:
 # ---- expressions
 
 MEASURED = [
-    # measured means and deviations over pictures and recordings (digest faces-and-emotions, 8.4, with the
+    # measured means and deviations over pictures and recordings (Karpouzis, Table 8-4, with the
     # signs of 8.5): squeezes and eye openings are changes of distances, so the FAPs have the other sign
     (ANGER, {"squeeze_l_eyebrow": 1}, 57, 28),
     (ANGER, {"squeeze_l_eyebrow": 1, "squeeze_r_eyebrow": 1}, 69, 51),

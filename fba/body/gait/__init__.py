@@ -1,7 +1,10 @@
 """Walking: synthesis from four characteristic poses, and detection of these in captured motion.
 
-Digest faces-and-emotions.md, chapter 2. `walk` makes an `Animation`, `characters` lists the characters,
-`detect` finds cycles and poses in any body animation, `reduce` keeps only these poses.
+`walk` makes an `Animation`, `characters` lists the characters, `detect` finds cycles and poses in any body
+animation, `reduce` keeps only these poses.
+
+After chapter 5 of Kostas Karpouzis, *Adaptive parametric models of human faces and bodies and applications in
+human-machine communication* (thesis, National Technical University of Athens), below "the thesis".
 """
 
 from fba.body.gait._characters import POSES, Character, Pose, characters

@@ -3,9 +3,9 @@
 corrections.csv has what is added to the curves through the poses; `tools/fit_gait.py` fits that of `normal`
 to measured people.
 
-Digest faces-and-emotions.md, 2.3 and 2.6. The poses describe half a cycle: `stance` is the leg that carries
-the body, `swing` the other one (in the extended pose the rear one, which swings next). In the other half the
-sides are exchanged. A cell that a character leaves empty is as in `normal`.
+Chapter 5 and Table 5-2 of the thesis that `fba.body.gait` names. The poses describe half a cycle: `stance` is
+the leg that carries the body, `swing` the other one (in the extended pose the rear one, which swings next).
+In the other half the sides are exchanged. A cell that a character leaves empty is as in `normal`.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from fba.errors import ModelError
 POSES = ("extended", "recoil", "passing", "anticipation")
 LEGS = ("stance", "swing")
 CYCLE = 32
-"""Frames of the digest's cycle; its poses are 4 frames apart."""
+"""Frames of the thesis's cycle; its poses are 4 frames apart."""
 PHASES = tuple(4 * number / CYCLE for number in range(len(POSES)))
-"""Times of the poses, as fractions of the cycle: 0, 12, 25 and 37 % in the digest's rounding."""
+"""Times of the poses, as fractions of the cycle: 0, 12, 25 and 37 % in the thesis's rounding."""
 _FIELDS = ("thigh", "knee", "foot", "out", "down", "forward")
 _MAX_DEGREES = 170.0
 
@@ -38,7 +38,7 @@ class Pose:
     """One leg in one pose, and the palm on its side. Degrees.
 
     thigh: forward angle from the vertical; used only where the leg swings freely, as elsewhere the stride
-    determines it. knee: bend. foot: pitch of the sole, toes up (+) or down (-); 0 is the digest's
+    determines it. knee: bend. foot: pitch of the sole, toes up (+) or down (-); 0 is the thesis's
     hip + knee = ankle. out, down, forward: position of the palm from the shoulder, in lengths of the arm.
     """
 
@@ -54,8 +54,8 @@ class Pose:
 class Pelvis:
     """Motion of the pelvis.
 
-    turn: degrees about y by which the side of the front leg is ahead in the extended pose (the digest's Z).
-    list: degrees about z by which the swinging side drops in the passing pose (the digest's Y).
+    turn: degrees about y by which the side of the front leg is ahead in the extended pose (the thesis's Z).
+    list: degrees about z by which the swinging side drops in the passing pose (the thesis's Y).
     tilt: degrees by which the whole body leans forward from the hips.
     sway: metres to the side of the leg that carries the body. surge: share by which the speed rises and falls
     twice a cycle.

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from fba.arrays import Float64
 
 Interpolation = Literal["linear", "smooth"]
-"""Between two values: "linear", as in the digest, or "smooth", by cubic curves."""
+"""Between two values: "linear", as in the thesis, or "smooth", by cubic curves."""
 
 
 def check_interpolation(interpolation: Interpolation) -> Interpolation:

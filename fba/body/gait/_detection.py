@@ -1,9 +1,9 @@
 """Detection of walking in captured motion: contacts, cycles, the four characteristic poses.
 
-Digest faces-and-emotions.md, 2.4. A foot touches the ground where its heel is furthest ahead of the pelvis,
-and leaves it where its toes are furthest behind (Zeni, Richards, Higginson 2008). "Ahead" is where the
-pelvis faces, so this holds on any ground, on a treadmill, and on curves. Recoil, passing and anticipation
-are extrema of the knees and of the swinging thigh.
+Cycle and poses are those of chapter 5 of the thesis that `fba.body.gait` names. A foot touches the ground
+where its heel is furthest ahead of the pelvis, and leaves it where its toes are furthest behind (Zeni,
+Richards, Higginson 2008). "Ahead" is where the pelvis faces, so this holds on any ground, on a treadmill, and
+on curves. Recoil, passing and anticipation are extrema of the knees and of the swinging thigh.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Positions of standing feet, and the legs that reach them.
 
 A foot lands on its heel, lies flat, and rises over the metatarsal joint while the toes stay flat: what
-touches the ground does not move. The digest corrects for ground and slip by moving the root (2.5, steps 3
-and 4); so does `_plan`. That is not enough while both feet are on the ground: the legs make up the rest here.
+touches the ground does not move. The thesis that `fba.body.gait` names moves the root where feet sink or
+slip; so does `_plan`. That is not enough while both feet are on the ground: the legs make up the rest here.
 """
 
 from __future__ import annotations

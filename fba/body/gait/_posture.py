@@ -1,6 +1,7 @@
 """The upper body of a walk: spine, head, shoulders, arms, fingers.
 
-Inverse kinematics bring the palms to their positions in the poses: digest 2.5.
+Inverse kinematics bring the palms to their positions in the poses, as in the synthesis of
+chapter 5 of the thesis that `fba.body.gait` names.
 """
 
 from __future__ import annotations

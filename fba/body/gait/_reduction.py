@@ -1,6 +1,7 @@
 """A walk reduced to its characteristic poses, and restored by interpolation.
 
-Digest faces-and-emotions.md, 2.5: "from all joint angles at each frame to four sets at symmetric times".
+After the thesis that `fba.body.gait` names, chapter 5:
+"from all joint angles at each frame to four sets at symmetric times".
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class Reduced:
     def restore(self, interpolation: Interpolation = "smooth") -> Animation:
         """Return every frame from the first key to the last, interpolated between the keys.
 
-        interpolation: "linear", as in the digest, or "smooth": cubic curves that rise and fall only where the
+        interpolation: "linear", as in the thesis, or "smooth": cubic curves that rise and fall only where the
         keys do. ValueError for another.
         """
         index, values = self.keys.index, _unwrap(_values(self.keys))

@@ -43,7 +43,7 @@ def walk(
     cycles: how many, 4 where seconds is None, too; the last frame is the first pose again, one stride on.
     seconds: how long, in place of cycles, and without that last frame.
     rate: frames a second; a cycle has a whole number of frames, 32 of the normal character at 30.
-    interpolation: between the poses "smooth", by cubic curves, or "linear", as in the digest.
+    interpolation: between the poses "smooth", by cubic curves, or "linear", as in the thesis.
     in_place: walk on the spot, as on a treadmill.
     skeleton: the default body where None.
 

@@ -1,7 +1,7 @@
 """Joint limits: the ranges of normal human motion, to report or clamp excesses. Off by default.
 
-The standard sets no limits to joints. `Limits.human()` is the table of typical limits of the digest
-bodies-and-gait.md, 5.7 (Table 4-1): there X is the subject's left, Z the long axis of the segment and
+The standard sets no limits to joints. `Limits.human()` is Table 4-1, typical limits, of the thesis that
+`fba.body.gait` names: there X is the subject's left, Z the long axis of the segment and
 Y = Z x X, so that a hanging limb flexes about -X, abducts about Y, forward, and twists about Z, down.
 limits.csv has it in BAPs, for the left side; `Limits.iso()` are the ranges of the standard's BAP table.
 """

@@ -2,9 +2,9 @@
 
 Gaze along +z, lids tangent to the iris, the pupil a third of it, lips touching on a line through the
 corners of the mouth, teeth touching, the tongue flat with its tip where they meet; feature points where
-the standard puts them, and sizes of a human being (ISO/IEC 14496-2, neutral face; digest
-faces-and-emotions.md, 4.3). Tolerances are shares of the face's own units: 1 mm on an adult is 0.016 of
-the distance between the pupils or 0.02 of the mouth's width.
+the standard puts them, and sizes of a human being (ISO/IEC 14496-2, neutral face). Tolerances are shares of
+the face's own units: 1 mm on an adult is 0.016 of the distance between the pupils or 0.02 of the mouth's
+width.
 """
 
 from __future__ import annotations

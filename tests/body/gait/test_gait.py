@@ -104,7 +104,7 @@ def test_the_cycle_closes_one_stride_on(character: str, stride: float | None) ->
 
 @pytest.mark.parametrize("character", CHARACTERS)
 def test_halves_are_mirror_images(character: str) -> None:
-    """Digest 2.2: the second half of the cycle is the first with the legs exchanged, the pelvis negated."""
+    """The second half of the cycle is the first with the legs exchanged, the pelvis negated."""
     seconds = Fraction(gait.Character.named(character).seconds)
     walk = gait.walk(character=character, cycles=1, rate=64 / seconds)
     frames = len(walk) - 1
@@ -121,7 +121,7 @@ def test_halves_are_mirror_images(character: str) -> None:
 
 
 def test_poses_have_the_extrema_of_the_table() -> None:
-    """Digest Table 5-2, of the right leg in a 32-frame cycle: poses at 0, 4, 8, 12, and 16 frames on."""
+    """Karpouzis, Table 5-2, of the right leg in a 32-frame cycle: poses at 0, 4, 8, 12, and 16 frames on."""
     walk = gait.walk(cycles=2)
     assert period(walk, 2) == 32
     # BAPs: a bent knee is negative
@@ -155,7 +155,7 @@ def test_thighs_keep_their_direction_as_the_pelvis_turns() -> None:
 
 
 def test_flat_feet_keep_the_coupling() -> None:
-    """Digest 2.6: hip + knee = ankle while the foot is flat, here under a level pelvis."""
+    """Karpouzis, chapter 5: hip + knee = ankle while the foot is flat, here under a level pelvis."""
     for name in ("normal", "bored", "proud"):
         character = gait.Character.named(name)
         walk = gait.walk(character=name, cycles=1)
