@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from fba import player as player
     from fba import study as study
     from fba.animation import Animation, BodyTrack, FaceTrack, Frame
-    from fba.codec import Decoder, Encoder, EncoderOptions, StreamInfo, decode, encode
+    from fba.codec import Decoder, Encoder, EncoderOptions, StreamInfo, decode
     from fba.errors import (
         BitstreamError,
         DisplayError,
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     )
     from fba.formats import probe, read, write
     from fba.limits import Limits
+    from fba.planning import encode
 
 __version__ = "0.1.0"
 
@@ -63,7 +64,7 @@ _MODULE_OF = {
     "EncoderOptions": "fba.codec",
     "StreamInfo": "fba.codec",
     "decode": "fba.codec",
-    "encode": "fba.codec",
+    "encode": "fba.planning",
     "Limits": "fba.limits",
     "probe": "fba.formats",
     "read": "fba.formats",

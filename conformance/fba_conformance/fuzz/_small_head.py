@@ -62,7 +62,8 @@ def small_head_vrml() -> bytes:
 
 def small_head_wfm() -> bytes:
     """Return the head as a wire frame of Candide's kind."""
-    vertices, triangles = [], []
+    vertices: list[str] = []
+    triangles: list[str] = []
     for part_vertices, part_triangles in small_head().values():
         triangles += [" ".join(str(len(vertices) + n) for n in triangle) for triangle in part_triangles]
         vertices += [f"{x:.4f} {y:.4f} {z:.4f}" for x, y, z in part_vertices]
