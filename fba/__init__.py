@@ -16,8 +16,16 @@ if TYPE_CHECKING:
     from typing import Any
 
     from fba import body, capture, emotion, face
+    from fba import codec as codec
+    from fba import formats as formats
+    from fba import live as live
+    from fba import parameters as parameters
+    from fba import persona as persona
+    from fba import planning as planning
+    from fba import player as player
+    from fba import study as study
     from fba.animation import Animation, BodyTrack, FaceTrack, Frame
-    from fba.codec import Decoder, Encoder, EncoderOptions, StreamInfo, decode, encode
+    from fba.codec import Decoder, Encoder, EncoderOptions, StreamInfo, decode
     from fba.errors import (
         BitstreamError,
         DisplayError,
@@ -32,6 +40,7 @@ if TYPE_CHECKING:
     )
     from fba.formats import probe, read, write
     from fba.limits import Limits
+    from fba.planning import encode
 
 __version__ = "0.1.0"
 
@@ -55,13 +64,16 @@ _MODULE_OF = {
     "EncoderOptions": "fba.codec",
     "StreamInfo": "fba.codec",
     "decode": "fba.codec",
-    "encode": "fba.codec",
+    "encode": "fba.planning",
     "Limits": "fba.limits",
     "probe": "fba.formats",
     "read": "fba.formats",
     "write": "fba.formats",
 }
-_MODULES = ("body", "capture", "codec", "emotion", "face", "formats", "parameters", "player")
+_MODULES = (
+    "body", "capture", "codec", "emotion", "face", "formats", "live", "parameters", "persona", "planning",
+    "player", "study",
+)  # fmt: skip
 
 __all__ = [
     "Animation",
@@ -109,4 +121,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, *_MODULES})

@@ -1,4 +1,7 @@
-"""Type aliases for NumPy arrays by their dtype: `Float32` is an array of float32, of any shape."""
+"""Type aliases for NumPy arrays by their dtype: `Float32` is an array of float32, of any shape.
+
+`to_float64` converts the numbers of a file.
+"""
 
 from __future__ import annotations
 
@@ -22,3 +25,9 @@ Intp = npt.NDArray[np.intp]
 UInt8 = npt.NDArray[np.uint8]
 UInt16 = npt.NDArray[np.uint16]
 UInt32 = npt.NDArray[np.uint32]
+
+
+def to_float64(numbers: npt.ArrayLike) -> Float64:
+    """Return the numbers of a file as float64, without a warning of NaNs that signal, as in damaged files."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(numbers, dtype=np.float64)

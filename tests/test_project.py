@@ -127,6 +127,29 @@ def test_public_name_can_be_imported(name: str) -> None:
     assert getattr(fba, name).__name__.rpartition(".")[2] == name
 
 
+def test_rooms_are_imported_where_they_are_first_used() -> None:
+    """As docstrings have it: `import fba`, and then `fba.persona.learn`, each in a process of its own."""
+    code = "import fba; print(*(fba.__getattr__(name).__name__ for name in fba._MODULES))"
+    for use in (
+        "persona.learn",
+        "planning.encode_planned",
+        "live.Capture",
+        "study.__doc__",
+        "body.BodyModel",
+    ):
+        subprocess.run([sys.executable, "-c", f"import fba; fba.{use}"], cwd=ROOT, check=True)
+    listed = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    rooms = {path.parent.name for path in (ROOT / "fba").glob("*/__init__.py")}
+    assert rooms - {name.removeprefix("fba.") for name in listed.stdout.split()} == {"cli", "gltf", "mesh"}
+
+
+def test_all_packages_say_that_they_are_typed() -> None:
+    """So that a user's type checker reads their hints."""
+    assert {name for name, folder in PACKAGES.items() if not (ROOT / folder / "py.typed").is_file()} == set()
+
+
 def test_importing_the_package_loads_nothing_heavy() -> None:
     code = "import fba, sys; print(*{name.partition('.')[0] for name in sys.modules})"
     command = [sys.executable, "-c", code]
@@ -185,6 +208,7 @@ def test_wheel_holds_every_file_of_the_packages_and_no_other(wheel: Path) -> Non
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert len(expected) > 300
+    assert {f"{package}/py.typed" for package in PACKAGES} <= held
     assert expected - held == set()
     assert {name for name in held if not name.startswith(tuple(f"{p}/" for p in PACKAGES))} == set()
     assert {name for name in held if "__pycache__" in name} == set()

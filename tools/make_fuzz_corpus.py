@@ -6,22 +6,28 @@ python tools/make_fuzz_corpus.py [FOLDER]
 from __future__ import annotations
 
 import base64
+import io
 import json
 import sys
+import zipfile
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 ROOT = Path(__file__).parents[1]
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files", "figures")]
 
+from fba.arrays import Float64  # noqa: E402
 from fba.cache import load_or_make  # noqa: E402
 from fba.capture import MarkerMotion  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.live import KINDS  # noqa: E402
+from fba.persona import learn, save_persona  # noqa: E402
+from fba.persona.evaluation.actors import act  # noqa: E402
 from fba_conformance.captures import marker_files, point_files  # noqa: E402
 from fba_conformance.captures.face_files import (  # noqa: E402
     beat,
@@ -35,12 +41,19 @@ from fba_conformance.captures.face_files import (  # noqa: E402
     pyfeat_csv,
 )
 from fba_conformance.captures.tracked_actor import film  # noqa: E402
-from fba_conformance.fuzz._small_head import small_head, small_head_fdp, small_head_obj, small_head_xface  # noqa: E402
+from fba_conformance.fuzz._small_head import (  # noqa: E402
+    small_head,
+    small_head_fdp,
+    small_head_obj,
+    small_head_wfm,
+    small_head_xface,
+)
 from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
 from mesh_files import ply  # noqa: E402
 from small_bodies import rod  # noqa: E402
+from small_people import write_person  # noqa: E402
 from stored_models import face  # noqa: E402
 
 
@@ -277,6 +290,53 @@ def small_heads() -> dict[str, bytes]:
     return {f"ply_{name}": ply(np.array(vertices), triangles, form) for name, form in forms.items()}
 
 
+def looking(folder: Path) -> bytes:
+    """Return a VRM animation: a head that nods, and a gaze that goes aside."""
+    path = folder / "look.vrma"
+    turns = [Rotation.from_euler("X", [angle], degrees=True) for angle in (0.0, 10.0, 0.0)]
+    gaze = [Rotation.from_euler("Y", [angle], degrees=True) for angle in (0.0, 20.0, -20.0)]
+    write_person(path, clips={"look": {"head": turns}}, extension="VRMC_vrm_animation", gaze=gaze)
+    return path.read_bytes()
+
+
+def persona(folder: Path) -> bytes:
+    """Return a Persona of an actor who smiles, its members stored, so that mutations reach what they hold.
+
+    All is rounded to eighths of a millimetre, so that every machine makes the same.
+    """
+    path = folder / "a.persona"
+    learnt = learn([act([("E_HAPPY", 0.9)], seed=1, name="actor").face])
+    parts = {
+        name: replace(part, moved=_rounded(part.moved),
+                      curves=replace(part.curves, moved=_rounded(part.curves.moved)))
+        for name, part in learnt.parts.items()
+    }  # fmt: skip
+    save_persona(replace(learnt, neutral=_rounded(learnt.neutral), parts=parts), path)
+    data = io.BytesIO()
+    with zipfile.ZipFile(path) as packed, zipfile.ZipFile(data, "w", zipfile.ZIP_STORED) as archive:
+        for member in packed.infolist():
+            info = zipfile.ZipInfo(member.filename, member.date_time)
+            info.create_system = 3  # Unix, everywhere
+            archive.writestr(info, packed.read(member))
+    return data.getvalue()
+
+
+def _rounded(values: Float64) -> Float64:
+    return (8 * values).round() / 8
+
+
+def pyfeat_2() -> bytes:
+    """Return a table as py-feat 2 writes it: a box, a pose, blendshapes and the time of each frame."""
+    weights = {name: rows[:3] for name, rows in face_weights(3).items() if name != "tongueOut"}
+    columns = {
+        "FaceRectX": [200.0] * 3, "FaceScore": [0.9] * 3, "Pitch": [0.0, 0.1, 0.2], "Yaw": [0.1, 0.0, -0.1],
+        "Roll": [0.0] * 3, "AU12": [0.5] * 3, "_neutral": [0.0] * 3, **weights, "frame": [0.0, 1.0, 2.0],
+    }  # fmt: skip
+    lines = [",".join(columns) + ",approx_time"]
+    lines += [",".join(f"{values[row]:g}" for values in columns.values()) + ",00:00" for row in range(3)]
+    return "\n".join([*lines, ""]).encode()
+
+
 def small_head_gltf() -> bytes:
     """Return the small head as a glTF document, a node for each part."""
     sheet = Sheet()
@@ -322,6 +382,7 @@ def faces() -> dict[str, bytes]:
             {12: np.arange(4.0), 26: np.ones(4)}, np.zeros((4, 3)), np.ones((4, 6))
         ).encode(),
         "pyfeat": pyfeat_csv({one: np.ones(3) / 2 for one in range(1, 7)}, frames=np.arange(3.0)).encode(),
+        "pyfeat_2": pyfeat_2(),
         "beat": json.dumps(beat(few)).encode(),
         **tracked(),
     }
@@ -400,10 +461,12 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
             "skeleton_text": as_text(skeleton()), "skeleton_binary": skeleton().glb(),
             "mesh_text": as_text(textured()),
             "mesh_binary": textured().glb(),
+            "looking": looking(folder),
         },
         "capture": {**faces(), **markers()},
         "live": live(),
         "smpl": smpl(),
+        "persona": {"actor": persona(folder)},
         "obj": {"triangles": OBJ.encode()},
         "mtl": {"two": MTL.encode()},
         "mapping": {"all": MAPPING.encode()},
@@ -419,6 +482,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
         "gltf": small_head_gltf(),
         "xface": small_head_xface(),
         "fdp": small_head_fdp(),
+        "wfm": small_head_wfm(),
     }
     return files
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fba.body._definition import BodyDefinition
+    from fba.body.model import BodyModel
     from fba.body.skeleton import Skeleton
     from fba.body.solve.conventions import convention_names
     from fba.body.solve.limits import Excess, Limit, Limits
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 _MODULE_OF = {
     "BapSolver": "fba.body.solve.solver",
     "BodyDefinition": "fba.body._definition",
+    "BodyModel": "fba.body.model",
     "Excess": "fba.body.solve.limits",
     "Limit": "fba.body.solve.limits",
     "Limits": "fba.body.solve.limits",
@@ -26,6 +28,7 @@ _MODULE_OF = {
 __all__ = [
     "BapSolver",
     "BodyDefinition",
+    "BodyModel",
     "Excess",
     "Limit",
     "Limits",

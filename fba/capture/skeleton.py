@@ -89,6 +89,15 @@ def from_skeleton(
     (FbaWarning) of missing joints of a limb: they stay in the default posture.
     `fba.capture.retarget_report` measures how close the result comes.
     """
+    if origin not in ORIGINS:
+        raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {origin!r}")
+    if ground not in GROUNDS:
+        raise ValueError(f"ground must be one of {', '.join(GROUNDS)}, not {ground!r}")
+    groups = SPINES.get(spine, spine) if isinstance(spine, str) else spine
+    if not isinstance(groups, int) or not 0 <= groups <= spines.GROUPS:
+        raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {spine!r}")
+    if scale is not None and not (np.isfinite(scale) and scale > 0):
+        raise ValueError(f"scale must be a positive number, not {scale}")
     solver = solver if solver is not None else BapSolver()
     rate = motion.rate if rate is None else Fraction(rate)
     if not len(motion):
@@ -115,15 +124,6 @@ def from_skeleton(
         ready = prepare(motion, solver.skeleton, joints=joints, rest=rest, up=up)
         motion, mapped = ready.motion, ready.mapped
     motion = motion.resample(rate, limits=limits)
-    if origin not in ORIGINS:
-        raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {origin!r}")
-    if ground not in GROUNDS:
-        raise ValueError(f"ground must be one of {', '.join(GROUNDS)}, not {ground!r}")
-    groups = SPINES.get(spine, spine) if isinstance(spine, str) else spine
-    if not isinstance(groups, int) or not 0 <= groups <= spines.GROUPS:
-        raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {spine!r}")
-    if scale is not None and not (np.isfinite(scale) and scale > 0):
-        raise ValueError(f"scale must be a positive number, not {scale}")
     missing = [
         joint for limb in LIMBS for joint in limb if any(j in mapped for j in limb) and joint not in mapped
     ]

@@ -10,6 +10,7 @@ from fba.codec._encoder import (
     EncoderStatistics,
     encode,
     encode_with_statistics,
+    warn_of_clamped,
 )
 from fba.codec._options import EncoderOptions
 from fba.codec._plane.pricing import NextPlane
@@ -64,6 +65,7 @@ __all__ = [
     "range_limit",
     "step_scale",
     "verify_stream",
+    "warn_of_clamped",
     "weights_of_slots",
     "write_mark",
 ]

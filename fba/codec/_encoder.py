@@ -20,8 +20,9 @@ from fba.codec._ranges import CLAMP, Ranges, fitting_ranges
 from fba.codec._runs import Run, find_runs
 from fba.codec._stream.mark import write_mark
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
-from fba.errors import FbaWarning, RangeError
+from fba.errors import FbaWarning, OptionError, RangeError
 from fba.parameters import INTENSITY_MAX
+from fba.presets import REFERENCE
 
 _CHUNK = 4096
 """Frames that `encode` passes to the encoder at once, which limits its memory."""
@@ -84,6 +85,11 @@ class Encoder:
         self, options: EncoderOptions | None = None, *, ranges: dict[int, Ranges] | None = None
     ) -> None:
         self.options = options or EncoderOptions()
+        if self.options.preset != REFERENCE:
+            raise OptionError(
+                f"the preset {self.options.preset!r} plans with all frames, and here they come one by one: "
+                "use fba.encode, or fba.planning.LiveEncoder"
+            )
         self.statistics = EncoderStatistics()
         self._writer = PlaneWriter(self.options.bap_steps)
         self._ranges = dict(ranges or {})
@@ -434,6 +440,12 @@ def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes
     animation without frames. Gives an FbaWarning that names what was clamped.
     """
     data, statistics = encode_with_statistics(animation, options)
+    warn_of_clamped(statistics)
+    return data
+
+
+def warn_of_clamped(statistics: EncoderStatistics) -> None:
+    """Give an FbaWarning that names what was clamped, if anything was; to the caller's caller."""
     if statistics.clamped:
         most = sorted(statistics.clamped_parameters.items(), key=lambda pair: -pair[1].count)[:3]
         names = [
@@ -444,9 +456,8 @@ def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes
             f"values limited to what their ranges carry: {statistics.clamped}, of {', '.join(names)}"
             f"{f' and {more} parameters more' if more else ''}; a larger quantiser may carry them",
             FbaWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
-    return data
 
 
 def encode_with_statistics(

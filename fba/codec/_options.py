@@ -11,8 +11,7 @@ import numpy as np
 from fba.codec._plane import slots
 from fba.codec.settings import QUANT_MAX
 from fba.parameters import BAP_STEP_TABLES
-
-PRESETS = ("reference",)
+from fba.presets import PRESETS, REFERENCE
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,8 @@ class EncoderOptions:
         whole seconds where the intra period allows it, and carry a time code there. Takes 18 bits each.
     bap_steps: "iso" or "visage", the table of BAP steps. mark: say behind the end of a stream with BAPs which
         it is, where other decoders do not read (see `fba.codec.write_mark`); else a decoder must be told.
-    preset: "reference", ranges that fit the data.
+    preset: what is sent, of `fba.presets.PRESETS`. "reference": all that the animation sends. "exact" and
+        "compact", which `fba.encode` and `fba.write` know: see `fba.planning`.
     unsent: what a decoder does with an unsent FAP, unless the animation says so itself
         (`FaceTrack.interpolated`): "keep" its last value (mask type 1) or "interpolate" it from others
         (mask type 2).
@@ -47,7 +47,7 @@ class EncoderOptions:
     time_codes: bool = True
     bap_steps: str = "iso"
     mark: bool = False
-    preset: str = "reference"
+    preset: str = REFERENCE
     unsent: str = "keep"
     gender: int = 0
     clamp: bool = False

@@ -102,7 +102,12 @@ class MoodCurve:
 def check_spans(moods: Sequence[Mood | MoodCurve], length: float) -> None:
     """Raise OptionError for a mood that a performance of `length` seconds does not reach."""
     for mood in moods:
-        if not isinstance(mood, Mood):
+        if isinstance(mood, MoodCurve):
+            if mood.times[0] > length or mood.times[-1] < 0:
+                raise OptionError(
+                    f"the keys of {mood.name!r} are at {mood.times[0]:g} to {mood.times[-1]:g} s, outside "
+                    f"the performance, which lasts from 0 to {length:g} s: give times in it"
+                )
             continue
         if mood.start is not None and mood.start > length:
             raise OptionError(

@@ -18,10 +18,11 @@ UNIT = 1e5
 """Units of the FAPs that turn eyeballs, a radian."""
 
 
-def limit_gaze(values: Float64) -> None:
+def limit_gaze(values: Float64, *, warn: bool = True) -> None:
     """Bring eyes in FAPs (T, 68) that turn too far back to the limit, in the same direction, in place.
 
-    Warns (FbaWarning). What lies beyond is lost: the head turns as its own source says.
+    warn: whether to warn (FbaWarning) of eyes that turn further. What lies beyond is lost: the head turns as
+    its own source says.
     """
     found = False
     for yaw, pitch in zip(YAW_EYE, PITCH_EYE, strict=True):
@@ -29,7 +30,7 @@ def limit_gaze(values: Float64) -> None:
         angles = np.hypot(values[:, yaw - 1], values[:, pitch - 1]) / UNIT
         values[:, columns] *= (LARGEST_GAZE / np.maximum(angles, LARGEST_GAZE))[:, None]
         found |= bool((angles > 1.01 * LARGEST_GAZE).any())
-    if found:
+    if found and warn:
         warnings.warn(
             f"eyes that turn further than {np.degrees(LARGEST_GAZE):.0f} degrees from straight ahead are "
             "shown at that angle; what lies beyond is for the head, whose turns stay as they are",

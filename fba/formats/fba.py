@@ -11,6 +11,7 @@ from fba.atomic import atomic
 from fba.errors import OptionError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
+from fba.presets import PRESETS, REFERENCE
 from fba.source import Path, naming_file, read_whole
 
 if TYPE_CHECKING:
@@ -69,34 +70,24 @@ def write_fba(
     """Encode an animation into an FBA file.
 
     options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Unless they say otherwise, a
-    file whose BAP steps are not the standard's is marked (see `fba.codec.write_mark`). With either, preset:
-    "reference" sends all that the animation does; "exact" and "compact" leave out what a player shows without
-    it (see `fba.planning`). Raises OptionError if options and fields are given, or for an unknown preset,
-    RangeError for values that no stream can carry, FormatError if the file cannot be written.
+    file whose BAP steps are not the standard's is marked (see `fba.codec.write_mark`). Raises OptionError if
+    options and fields are given, or for an unknown preset, RangeError for values that no stream can carry,
+    FormatError if the file cannot be written.
     """
-    from fba.codec import EncoderOptions, encode
+    from fba.codec import EncoderOptions
+    from fba.planning import encode
 
-    preset = settings.pop("preset", "reference")
     if settings:
         if options is not None:
             raise OptionError(f"give either options or {', '.join(settings)}, not both")
+        if settings.get("preset", REFERENCE) not in PRESETS:
+            raise OptionError(f"preset must be one of {', '.join(PRESETS)}, not {settings['preset']!r}")
         mark = settings.get("bap_steps", BAP_STEPS_DEFAULT) != BAP_STEPS_DEFAULT
         options = EncoderOptions(**{"mark": mark, **settings})
     with naming_file(path):
-        if preset == "reference":
-            data = encode(animation, options)
-        else:
-            data = _encode_planned(animation, options, preset)
+        data = encode(animation, options)
     with atomic(path) as file:
         file.write(data)
-
-
-def _encode_planned(animation: Animation, options: EncoderOptions | None, preset: str) -> bytes:
-    from fba.planning import PRESETS, encode_planned
-
-    if preset not in PRESETS:
-        raise OptionError(f"preset must be one of reference, {', '.join(PRESETS)}, not {preset!r}")
-    return encode_planned(animation, options, preset=preset)[0]
 
 
 def _encoder_settings() -> tuple[str, ...]:

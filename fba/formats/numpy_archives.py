@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fba.arrays import to_float64
 from fba.errors import FbaError, FormatError
 from fba.limits import Limits
 from fba.source import Path, read_whole
@@ -71,4 +72,4 @@ def _read_array(data: bytes, path: Path, limits: Limits, objects: bool) -> Any:
         raise FormatError("is cut off: the array says that it has more numbers than there are", path=path)
     limits.check_bytes(8 * count, f"{path}: an array", source=len(data))
     file.seek(0)
-    return np.asarray(np.load(file, allow_pickle=False), dtype=np.float64)
+    return to_float64(np.load(file, allow_pickle=False))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fba.arrays import Float32, Float64, Int64
+from fba.arrays import Float32, Float64, Int64, to_float64
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons, strip_triangles
 from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, read_bytes
@@ -191,7 +191,7 @@ class _Reader:
                 raise self._short(element)
             table = np.frombuffer(self.data, row, element.count, self.at)
             self.at += need
-            return {name: table[str(i)].astype(np.float64) for i, name in enumerate(names)}, {}
+            return {name: to_float64(table[str(i)]) for i, name in enumerate(names)}, {}
         need = len(names) * element.count
         if len(self.words) - self.word < need:
             raise self._short(element)
@@ -260,7 +260,7 @@ class _Reader:
             return None
         self.at += dtype.itemsize * element.count
         starts = np.arange(element.count + 1, dtype=np.int64) * values.shape[1]
-        flat = np.nan_to_num(values.reshape(-1).astype(np.float64))
+        flat = np.nan_to_num(to_float64(values.reshape(-1)))
         return {lengths[0][0]: (starts, np.clip(flat, -1, 2**53).astype(np.int64))}
 
     def _take(self, kind: str, count: int, element: _Element, number: int) -> Float64:
@@ -270,7 +270,7 @@ class _Reader:
                 raise self._short(element, number)
             taken = np.frombuffer(self.data, row, count, self.at)
             self.at += row.itemsize * count
-            return taken.astype(np.float64)
+            return to_float64(taken)
         if len(self.words) - self.word < count:
             raise self._short(element, number)
         taken_words = self._floats(self.word, count, element)

@@ -6,12 +6,11 @@ May use: the codec; faces and bodies, for what they show and by how much it move
 from fba.planning.body_tolerance import BodyErrors, body_errors
 from fba.planning.live_encoder import LiveEncoder
 from fba.planning.near_lossless import FaceErrors, NearLossless, encode_within_tolerance
-from fba.planning.plan import PRESETS, Plan, encode_planned, plan_compact, plan_exact
+from fba.planning.plan import Plan, encode, encode_planned, plan_compact, plan_exact
 from fba.planning.stillness import hold_still
 from fba.planning.tolerance import Tolerance
 
 __all__ = [
-    "PRESETS",
     "BodyErrors",
     "FaceErrors",
     "LiveEncoder",
@@ -19,6 +18,7 @@ __all__ = [
     "Plan",
     "Tolerance",
     "body_errors",
+    "encode",
     "encode_planned",
     "encode_within_tolerance",
     "hold_still",

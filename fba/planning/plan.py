@@ -21,7 +21,9 @@ from fba.codec import (
     decode,
     encode_with_statistics,
     quantise,
+    warn_of_clamped,
 )
+from fba.codec import encode as encode_all
 from fba.errors import FbaWarning
 from fba.face.resolve import FaceSettings, known_faps, resolve
 from fba.limits import Limits
@@ -29,9 +31,9 @@ from fba.parameters import FAP_COUNT, fap_steps
 from fba.planning.derived_faps import Choice, choose_faps, interpolated_faps, related_faps
 from fba.planning.fit_faps import find_fit_faps, table_columns
 from fba.planning.segments import Cuts, cheapest_segments, find_cuts
+from fba.presets import PLANNED, REFERENCE
 from fba.tracks import BodyTrack, FaceTrack
 
-PRESETS = ("exact", "compact")
 _NO_LIMITS = Limits(frames=1 << 62, bytes=1 << 62)
 
 
@@ -55,6 +57,20 @@ class Plan:
         return b"".join(chunks), encoder.statistics
 
 
+def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes:
+    """Encode an animation as one FBA object, with ranges fitted to all of it.
+
+    `options.preset` says what is sent. Raises RangeError for what the syntax cannot carry (see
+    `EncoderOptions.clamp`), ValueError for an animation without frames. Gives an FbaWarning that names what
+    was clamped.
+    """
+    if options is None or options.preset == REFERENCE:
+        return encode_all(animation, options)
+    data, statistics = encode_planned(animation, options, preset=options.preset)
+    warn_of_clamped(statistics)
+    return data
+
+
 def encode_planned(
     animation: Animation,
     options: EncoderOptions | None = None,
@@ -70,9 +86,9 @@ def encode_planned(
     keep_masks, model: see `plan_exact` and `plan_compact`. Raises as `fba.codec.encode` does, ValueError for
     another preset.
     """
-    if preset not in PRESETS:
-        raise ValueError(f"preset must be one of {', '.join(PRESETS)}, not {preset!r}")
-    options = options or EncoderOptions()
+    if preset not in PLANNED:
+        raise ValueError(f"preset must be one of {', '.join(PLANNED)}, not {preset!r}")
+    options = replace(options or EncoderOptions(), preset=REFERENCE)
     unplanned = encode_with_statistics(animation, options)
     given = _as_coded(animation, options, *unplanned)
     if preset == "exact":

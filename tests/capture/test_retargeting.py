@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from capture_bodies import motion
 from fba.animation import Animation, FaceTrack
 from fba.body import BapSolver, Skeleton
-from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
+from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report, skeleton
 from fba.errors import ModelError
 from fba.parameters import bap_numbers, baps, joints
 
@@ -92,6 +93,16 @@ def test_wrong_groups() -> None:
             from_skeleton(motion("standing"), spine=bad)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="ground must be"):
         from_skeleton(motion("standing"), ground="sea")
+
+
+@pytest.mark.parametrize("wrong", [{"spine": 9}, {"ground": "sea"}, {"origin": "home"}, {"scale": -1.0}])
+def test_options_are_checked_before_any_work(wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("the work has begun")
+
+    monkeypatch.setattr(skeleton, "prepare", work)
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be"):
+        from_skeleton(motion("T", 2), **wrong)
 
 
 def test_both_clavicle_joints_raise_the_shoulder() -> None:

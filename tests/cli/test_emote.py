@@ -124,6 +124,16 @@ def test_tables_that_are_none(run: Run, still: Path, tmp_path: Path, table: str,
     assert not out.exists()
 
 
+@pytest.mark.parametrize("times", [(50, 60), (-9, -5)])
+def test_keys_outside_the_performance(run: Run, still: Path, tmp_path: Path, times: tuple[int, int]) -> None:
+    keys, out = tmp_path / "keys.csv", tmp_path / "out.fba"
+    keys.write_text("seconds,emotion,intensity\n" + "".join(f"{time},joy,80\n" for time in times))
+    done = run("emote", still, "-o", out, "--keys", keys)
+    assert done.code == 2
+    assert f"the keys of 'joy' are at {times[0]} to {times[1]} s, outside" in " ".join(done.err.split())
+    assert not out.exists()
+
+
 def test_a_body_has_no_mood(run: Run, tmp_path: Path) -> None:
     body = fba.BodyTrack(np.zeros((1, 296), dtype=np.int32), np.ones((1, 296), dtype=bool))
     path = tmp_path / "body.bap"

@@ -133,8 +133,8 @@ def test_visemes_differ_from_each_other() -> None:
 # ---- expressions
 
 MEASURED = [
-    # measured means and deviations over pictures and recordings (K. Karpouzis' thesis, table 8-4):
-    # squeezes and eye openings are changes of distances there, so the FAPs have the other sign
+    # measured means and deviations over pictures and recordings (Karpouzis, Table 8-4, with the
+    # signs of 8.5): squeezes and eye openings are changes of distances, so the FAPs have the other sign
     (ANGER, {"squeeze_l_eyebrow": 1}, 57, 28),
     (ANGER, {"squeeze_l_eyebrow": 1, "squeeze_r_eyebrow": 1}, 69, 51),
     (ANGER, {"raise_l_i_eyebrow": 1}, -83, 48),

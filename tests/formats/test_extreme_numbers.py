@@ -14,10 +14,13 @@ import fba
 from fba.errors import FbaError, FormatError, LimitError, ModelError
 from fba.face.importers.points.points_file import read_points
 from fba.formats.bvh.reader import read_motion
+from fba.formats.c3d.reader import read_markers
+from fba.formats.face_tables.points_arrays import read_points as read_film
 from fba.mesh.ply import read_ply
 from fba.mesh.vrml import read_vrml
 from fba.mesh.wfm import read_wfm
 
+CORPUS = Path(__file__).parents[1] / "fuzz/corpus"
 BVH = """HIERARCHY
 ROOT Hips
 {
@@ -140,3 +143,24 @@ def test_more_channels_than_can_be_mixed(tmp_path: Path, channels: int) -> None:
         file.writeframes(struct.pack("<h", 1000) * channels * 100)
     with pytest.warns(UserWarning, match="left out"), pytest.raises(FormatError, match="no sound"):
         SoundFile(path).read(0, np.iinfo(np.int16).max)
+
+
+SIGNALS = {"<": b"\1\0\x80\x7f", ">": b"\x7f\x80\0\1", "vax": b"\x80\x7f\1\0"}
+"""A NaN that signals, of 32 bits. NumPy warns when it is converted."""
+
+
+@pytest.mark.parametrize(("name", "signal"), [("float", "<"), ("dec", "vax")])
+def test_markers_whose_places_signal_are_missing(name: str, signal: str, tmp_path: Path) -> None:
+    data = bytearray((CORPUS / f"capture/markers_{name}_c3d.bin").read_bytes())
+    start = 512 * (int.from_bytes(data[16:18], "little") - 1)
+    data[start : start + 4] = SIGNALS[signal]
+    path = tmp_path / "a.c3d"
+    path.write_bytes(data)
+    assert np.isnan(read_markers(path).positions[0, 0, 0])
+
+
+def test_points_that_signal_are_not_seen(tmp_path: Path) -> None:
+    points = np.load(CORPUS / "capture/points-points.npy.bin").astype(np.float32)
+    points.ravel()[:1] = np.frombuffer(SIGNALS["<"], np.float32)
+    np.save(tmp_path / "a.npy", points)
+    assert np.isnan(read_film(tmp_path / "a.npy", fps=25).positions[0, 0]).all()

@@ -5,10 +5,13 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
 import runpy
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from random import Random
 
@@ -17,6 +20,10 @@ import pytest
 
 from fba.codec._plane.pricing import NextPlane
 from fba.errors import FbaError, OptionError
+from fba.face.importers import KINDS as HEADS
+from fba.face.importers import sniff
+from fba.formats.registry import format_of, formats
+from fba.live import KINDS
 from fba_conformance.fuzz import __main__ as program
 from fba_conformance.fuzz import _campaign as campaign
 from fba_conformance.fuzz import _engine as engine
@@ -94,6 +101,96 @@ def test_a_trial_that_counts_other_bits_is_a_finding(monkeypatch: pytest.MonkeyP
         kinds |= {finding.kind for finding in report.findings}
     assert kinds
     assert all(kind.startswith("ContractError: the planes take") for kind in kinds)
+
+
+IN_CORPUS = [(target, data) for target in targets() if target.name != "any" for data in read_corpus(target)]
+
+
+def test_every_format_has_a_file_in_the_corpus(tmp_path: Path) -> None:
+    """Each format that is read, each kind of head that is imported, and each kind of live capture."""
+    seen = set()
+    for target, data in IN_CORPUS:
+        path = tmp_path / ("a.wfm" if data.startswith(b"# VERTEX") else "a")
+        path.write_bytes(data)
+        with suppress(FbaError):
+            seen.add(format_of(path).name)
+        if target.name == "import":
+            seen.add(f"head: {sniff(path)}")
+        if target.name == "live":
+            seen.add(f"live: {KINDS[data[0]].name}")
+    wanted = {one.name for one in formats() if one.name != "vrma"}  # it is read as glTF
+    wanted |= {f"head: {kind}" for kind in HEADS if kind != "makehuman"}  # a folder of many files
+    wanted |= {f"live: {kind.name}" for kind in KINDS}
+    assert seen >= wanted
+    assert any(b"VRMC_vrm_animation" in data for _, data in IN_CORPUS)
+
+
+READING = {
+    "fap": ("fba.formats.text.fap", "fba.formats.text._frame_reader"),
+    "bap": ("fba.formats.text.bap", "fba.formats.text._frame_reader"),
+    "epf": ("fba.formats.epf._reader",),
+    "bvh": ("fba.formats.bvh.reader",),
+    "gltf": ("fba.gltf.reader", "fba.gltf.nodes", "fba.formats.gltf.reader", "fba.formats.gltf.face_motion"),
+    "capture": (
+        "fba.formats.c3d.reader", "fba.formats.c3d._parameters", "fba.formats.markers.motive",
+        "fba.formats.markers.nexus", "fba.formats.markers.qualisys", "fba.formats.markers.table",
+        "fba.formats.markers.trc", "fba.formats.face_tables.livelink_csv",
+        "fba.formats.face_tables.livelink_udp", "fba.formats.face_tables.ifacialmocap",
+        "fba.formats.face_tables.openface", "fba.formats.face_tables.pyfeat",
+        "fba.formats.face_tables.shapes_json", "fba.formats.face_tables.points_arrays",
+        "fba.formats.face_tables.points_csv", "fba.formats.face_tables.points_json",
+    ),
+    "smpl": ("fba.formats.smpl.reader", "fba.formats.numpy_archives"),
+    "persona": ("fba.persona.storage", "fba.persona.recognition.archive"),
+    "live": (
+        "fba.live.protocols.livelink", "fba.live.protocols.ifacialmocap", "fba.live.protocols.vtube",
+        "fba.live.protocols.vmc", "fba.live.protocols._osc",
+    ),
+    "face": ("fba.face.gltf._reading",),
+    "body": ("fba.body.storage",),
+    "obj": ("fba.mesh.obj",),
+    "mtl": ("fba.mesh.mtl",),
+    "ply": ("fba.mesh.ply",),
+    "vrml": ("fba.mesh.vrml",),
+    "wfm": ("fba.mesh.wfm",),
+    "points": (
+        "fba.face.importers.points.points_file", "fba.face.importers.points.fdp",
+        "fba.face.importers.points.xface",
+    ),
+    "mapping": ("fba.capture.virtual_markers.mapping_files",),
+    "import": ("fba.face.importers.mesh", "fba.face.importers._gltf", "fba.face.importers._fdp"),
+    "cache": ("fba.cache",),
+}  # fmt: skip
+"""Modules that read what each target is fed with."""
+LEAST_REACHED = 0.4
+"""Share of the lines in functions of each: what writes is among them, and what refuses damage."""
+
+
+@pytest.mark.parametrize("name", READING)
+def test_files_of_the_corpus_reach_past_the_header(name: str) -> None:
+    """They and 24 mutants run lines throughout what reads them."""
+    coverage = pytest.importorskip("coverage")
+    target = find_target(name)
+    modules = [import_module(module) for module in READING[name]]
+    paths = [str(module.__file__) for module in modules]
+    watch = coverage.Coverage(data_file=None, include=paths, config_file=False)
+    watch.start()
+    try:
+        engine.run(target, read_corpus(target), count=24, seed=SEED)
+    finally:
+        watch.stop()
+    shares = {}
+    for module, path in zip(READING[name], paths, strict=True):
+        _, lines, _, missing, _ = watch.analysis2(path)
+        inside = _lines_of_functions(Path(path)).intersection(lines)
+        shares[module] = round(1 - len(inside.intersection(missing)) / len(inside), 2)
+    assert {module: share for module, share in shares.items() if share < LEAST_REACHED} == {}
+
+
+def _lines_of_functions(path: Path) -> set[int]:
+    """Return the lines of a module that are in bodies of functions, which do not run on import."""
+    functions = (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef))
+    return {line for one in functions for line in range(one.body[0].lineno, (one.end_lineno or 0) + 1)}
 
 
 def test_mutations_are_made_from_their_numbers() -> None:

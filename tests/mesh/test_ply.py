@@ -39,6 +39,10 @@ def damaged(old: bytes, new: bytes, order: str = "ascii") -> bytes:
     return whole.replace(old, new, 1)
 
 
+SIGNALLING = ply(VERTICES, MIXED[:2], "<").replace(b"end_header\n" + bytes(4), b"end_header\n\1\0\x80\x7f")
+"""Its first coordinate is a signalling NaN, of which NumPy warns on conversion."""
+
+
 @pytest.mark.parametrize(
     ("data", "words"),
     [
@@ -69,6 +73,8 @@ def damaged(old: bytes, new: bytes, order: str = "ascii") -> bytes:
         (ply(VERTICES, MIXED, "<")[:-3], "is it whole?"),
         (ply(VERTICES, MIXED[:2], ">")[:-3], "is it whole?"),
         (b"", "empty"),
+        (SIGNALLING, "vertex 0 is at [nan, 0.0, 0.0], which is not finite"),
+        (SIGNALLING.replace(b"\nend_header", b"\nproperty list uchar float w\nend_header"), "is it whole?"),
     ],
 )
 def test_damage_is_named(tmp_path: Path, data: bytes, words: str) -> None:

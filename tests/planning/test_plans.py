@@ -12,11 +12,13 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
-from fba.codec import Encoder, coarsest_quantisers, count_rounded, exact_quantisers, quantise
+from fba.codec import Encoder, coarsest_quantisers, count_rounded, encode, exact_quantisers, quantise
+from fba.errors import FbaWarning, OptionError
 from fba.face.resolve import resolve, shown_faps
 from fba.parameters import faps
 from fba.planning import encode_planned, plan_compact, plan_exact
 from fba.planning.segments import Cuts, cheapest_segments, find_cuts
+from fba.presets import PRESETS
 from made_motion import LENGTH, MATES, made_animation, made_face, made_options
 
 
@@ -193,6 +195,30 @@ def test_no_frames_and_one(make) -> None:  # type: ignore[no-untyped-def]
         make(empty)
     one = Animation(25, np.arange(1), FaceTrack.empty(1))
     assert len(fba.decode(make(one).encode()[0])) == 1
+
+
+def test_presets_of_options_are_those_of_plans() -> None:
+    animation = made_animation(1)
+    sizes = []
+    for preset in PRESETS:
+        options = EncoderOptions(preset=preset)
+        data = fba.encode(animation, options)
+        if preset != "reference":
+            assert data == encode_planned(animation, preset=preset)[0]
+        sizes.append(len(data))
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[2] < sizes[0]
+    assert fba.encode(animation) == encode(animation)
+    with pytest.raises(OptionError, match=r"the preset 'compact' plans with all frames.*fba\.encode"):
+        Encoder(EncoderOptions(preset="compact"))
+
+
+def test_what_a_plan_clamps_is_said() -> None:
+    values = np.zeros((3, 68), dtype=np.int32)
+    values[1, 2] = 1 << 24
+    animation = Animation(25, np.arange(3), FaceTrack(values, np.ones_like(values, dtype=bool)))
+    with pytest.warns(FbaWarning, match="values limited to what their ranges carry"):
+        fba.encode(animation, EncoderOptions(preset="exact", clamp=True))
 
 
 def test_unknown_preset() -> None:

@@ -6,6 +6,7 @@ What was read must also stand what is done with it next: writing, reading again,
 from __future__ import annotations
 
 import os
+import struct
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -37,6 +38,7 @@ from fba.mesh.obj import read_obj
 from fba.mesh.ply import read_ply
 from fba.mesh.vrml import read_vrml
 from fba.mesh.wfm import read_wfm
+from fba.persona.storage import load_persona
 from fba_conformance.fuzz._outcome import ContractError, Outcome
 from fba_conformance.fuzz._small_head import small_head_obj, small_head_points, small_head_vrml
 
@@ -108,9 +110,38 @@ def check_capture(data: bytes, folder: Path) -> Outcome:
 
 def check_smpl(data: bytes, folder: Path) -> Outcome:
     """Read the motion of an SMPL body; of every fourth one, make BAPs."""
-    return _check_file(
-        data, folder / "input.npz", _read_with_rate if crc32(data) % 4 == 0 else smpl.read_motion
-    )
+    read = _read_with_rate if crc32(data) % 4 == 0 else smpl.read_motion
+    return _check_file(_with_checksums(data), folder / "input.npz", read)
+
+
+def check_persona(data: bytes, folder: Path) -> Outcome:
+    """Load a Persona."""
+    return _check_file(_with_checksums(data), folder / "input.persona", load_persona)
+
+
+_MEMBER, _DIRECTORY = b"PK\3\4", b"PK\1\2"
+
+
+def _with_checksums(data: bytes) -> bytes:
+    """Return an archive with the checksums of its stored members: else damage is seen before it is read.
+
+    Of every eighth file they stay as they are.
+    """
+    if crc32(data) % 8 == 0:
+        return data
+    archive = bytearray(data)
+    at = archive.find(_DIRECTORY)
+    while 0 <= at <= len(archive) - 46:
+        size, _, name, extra, note = struct.unpack_from("<IIHHH", archive, at + 20)
+        start = int.from_bytes(archive[at + 42 : at + 46], "little")
+        if archive[start : start + 4] == _MEMBER and start + 30 <= len(archive):
+            first = start + 30 + sum(struct.unpack_from("<HH", archive, start + 26))
+            archive[start + 14 : start + 18] = archive[at + 16 : at + 20] = struct.pack(
+                "<I", crc32(archive[first : first + size])
+            )
+        following = at + 46 + name + extra + note
+        at = following if archive[following : following + 4] == _DIRECTORY else -1
+    return bytes(archive)
 
 
 def _read_with_rate(path: Path) -> object:
@@ -208,7 +239,8 @@ def check_import(data: bytes, folder: Path) -> Outcome:
     (folder / "head.wrl").write_bytes(small_head_vrml())
     (folder / "input.points.csv").write_bytes(small_head_points())
     (folder / "input.obj").write_bytes(small_head_obj())
-    return _check_file(data, folder / "input", import_model)
+    suffix = ".wfm" if data.startswith(b"# VERTEX") else ""  # nothing else tells wire frames
+    return _check_file(data, folder / f"input{suffix}", import_model)
 
 
 def check_any(data: bytes, folder: Path) -> Outcome:

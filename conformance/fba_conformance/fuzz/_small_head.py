@@ -60,6 +60,17 @@ def small_head_vrml() -> bytes:
     return "\n".join(["#VRML V2.0 utf8", *shapes, ""]).encode()
 
 
+def small_head_wfm() -> bytes:
+    """Return the head as a wire frame of Candide's kind."""
+    vertices: list[str] = []
+    triangles: list[str] = []
+    for part_vertices, part_triangles in small_head().values():
+        triangles += [" ".join(str(len(vertices) + n) for n in triangle) for triangle in part_triangles]
+        vertices += [f"{x:.4f} {y:.4f} {z:.4f}" for x, y, z in part_vertices]
+    lists = ["# VERTEX LIST:", str(len(vertices)), *vertices, "# FACE LIST:", str(len(triangles)), *triangles]
+    return "\n".join([*lists, "# END OF FILE", ""]).encode()
+
+
 def small_head_fdp() -> bytes:
     """Return its feature points as a text FDP file."""
     return ("1.0 head\n" + small_head_points().decode().replace(",", " ")).encode()

@@ -72,6 +72,7 @@ def targets() -> tuple[Target, ...]:
             b"NO_OF_FRAMES\t", b"MARKER_NAMES\t", b"marker,x,y,z", b"\x02\x50", *_TEXT,
         ),
         _reader("smpl", "motion of SMPL bodies, retargeted", b"PK\x03\x04", b"'shape': (3, 156)", *_TEXT),
+        _reader("persona", "Personas", b"PK\x03\x04", b'"kind"', b"NEUTRAL", b"'shape': (4, 9)", *_TEXT),
         _reader(
             "live", "live captures, a datagram in each part", b"\0\0\0\0", b"\xff\xff", b"\x06", b"#bundle\0",
             b"/VMC/Ext/T\0\0,f\0\0", b",sfffffff\0\0\0", b"NaN", b"1e999", b'"FaceFound":true', b"jawOpen&1|",

@@ -26,6 +26,7 @@ from fba.capture.markers.targets import PUPILS, RIGID
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel, Fapu
 from fba.face.feature_points import row_of
+from fba.face.gaze import limit_gaze
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, PITCH_EYE, YAW_EYE
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.name_maps import list_names
@@ -42,8 +43,6 @@ FRAME_BYTES, MARKER_BYTES = 6000, 400
 """Memory for each frame, and for each marker in it."""
 LIDS = {"3.1": "3.3", "3.2": "3.4"}
 """Upper lids, and the lower lid of the same eye."""
-LARGEST_GAZE = 0.6
-"""Radians that an eye turns at most."""
 
 
 @dataclass(frozen=True)
@@ -269,12 +268,12 @@ def find_face(
         sent = (*sent, *YAW_EYE, *PITCH_EYE)
         values[:, [fap - 1 for fap in YAW_EYE]] = eyes[:, :1] / fapu.AU
         values[:, [fap - 1 for fap in PITCH_EYE]] = eyes[:, 1:] / fapu.AU
+        limit_gaze(values)
     if gaze == "camera":
         sent = (*sent, *YAW_EYE, *PITCH_EYE)
         values[:, [fap - 1 for fap in YAW_EYE]] = -values[:, [HEAD_YAW - 1]]
         values[:, [fap - 1 for fap in PITCH_EYE]] = -values[:, [HEAD_PITCH - 1]]
-        turned = [fap - 1 for fap in (*YAW_EYE, *PITCH_EYE)]
-        values[:, turned] = np.clip(values[:, turned], -LARGEST_GAZE / fapu.AU, LARGEST_GAZE / fapu.AU)
+        limit_gaze(values, warn=False)  # a head that turns away leaves the camera
     spine = points[rows["7.1"]]
     path = np.einsum("tcd,d->tc", rotation, spine) + shift - spine
     return MarkerFace(

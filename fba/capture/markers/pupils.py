@@ -9,11 +9,10 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture.markers.targets import PUPILS
 from fba.face.feature_points import row_of
+from fba.face.gaze import LARGEST_GAZE
 
 RADIUS = 0.01205
 """Metres from the middle of an adult's eyeball to its front, hardly different between them."""
-LARGEST = 0.6
-"""Radians that an eye turns at most."""
 SHUT = 0.3
 """Share of its neutral opening from which an eye is too shut to see the pupil."""
 LIDS = {"3.5": ("3.1", "3.3"), "3.6": ("3.2", "3.4")}
@@ -34,7 +33,7 @@ def find_gaze(moved: Float64, points: Float64, places: Collection[str], size: fl
     total, weight = np.zeros((len(moved), 2)), np.zeros(len(moved))
     for name in known:
         shift = moved[:, row_of()[name]] / (RADIUS * size)
-        most = np.sin(LARGEST)
+        most = np.sin(LARGEST_GAZE)
         pitch = -np.arcsin(np.clip(shift[:, 1], -most, most))
         yaw = np.arcsin(np.clip(shift[:, 0] / np.cos(pitch), -most, most))
         counts = _open(moved, points, name, places)

@@ -16,6 +16,7 @@ from fba.capture.virtual_markers.heads import MarkedHead
 from fba.capture.virtual_markers.influence import Influence
 from fba.errors import ModelError
 from fba.face.feature_points import row_of
+from fba.face.gaze import LARGEST_GAZE
 
 UPPER_ROWS, LOWER_ROWS = (1.0, 0.9, 0.7), (1.0, 0.9)
 """By how much rows of a lid go with its marker, from the margin on, in equal steps to the height of the lid,
@@ -28,8 +29,6 @@ HEIGHT = 0.55
 skin nearest to where FAP 19 takes it: 38 % of its motion off, 63 % at half the height."""
 UPPER_SHARE = 0.7
 """Share of the upper lid where eyes narrow."""
-LARGEST_TURN = 0.6
-"""Radians that an eye turns to either side, up or down at most: as for `fba.capture.from_markers`."""
 EYES = (("left", "3.1", "3.3"), ("right", "3.2", "3.4"))
 """Side, middles of the margins of the upper and the lower lid."""
 
@@ -163,7 +162,8 @@ def turn_to_camera(rotation: Float64) -> Float64:
     front = rotation[:, 2, :]  # where the camera is, in the head's axes: the inverse times +z
     yaw = np.arctan2(front[:, 0], front[:, 2])
     pitch = -np.arcsin(np.clip(front[:, 1], -1.0, 1.0))
-    yaw, pitch = (np.clip(one, -LARGEST_TURN, LARGEST_TURN) for one in (yaw, pitch))
+    share = LARGEST_GAZE / np.maximum(np.hypot(yaw, pitch), LARGEST_GAZE)
+    yaw, pitch = share * yaw, share * pitch
     turned = np.zeros_like(rotation)
     turned[:, 0, 0], turned[:, 0, 2] = np.cos(yaw), np.sin(yaw) * np.cos(pitch)
     turned[:, 0, 1] = np.sin(yaw) * np.sin(pitch)

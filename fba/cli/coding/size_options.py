@@ -15,8 +15,7 @@ from fba.cli.coding.rate_options import check_buffer, rate_options
 from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Decorated
 from fba.cli.inputs import ExistingPath
-
-PRESETS = ("reference", "exact", "compact")
+from fba.presets import PRESETS
 
 
 @dataclass(frozen=True)

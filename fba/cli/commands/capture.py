@@ -21,13 +21,14 @@ from fba.cli.inputs import ExistingPath
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import rate_text, seconds_text
 from fba.errors import FbaError
+from fba.presets import PRESETS as ALL_PRESETS
 
 if TYPE_CHECKING:
     from fba.live import Capture, Receiver, StreamRecorder, Summary
     from fba.live.recording import Target
 
 KINDS = ("livelink", "ifacialmocap", "vtube", "vmc")
-PRESETS = ("reference", "compact")
+PRESETS = tuple(name for name in ALL_PRESETS if name != "exact")  # who knows what will never move?
 LONGEST_NEUTRAL = 60.0
 
 

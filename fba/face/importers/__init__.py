@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from fba.errors import OptionError
+from fba.errors import ModelError, OptionError
 from fba.face.importers._sniffing import KINDS, sniff
 from fba.face.model import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -42,6 +42,26 @@ def import_model(
     form = sniff(path) if kind is None else kind
     if form not in KINDS:
         raise OptionError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
+    try:
+        return _import(form, path, points=points, unit=unit, up=up, kinds=kinds, name=name, limits=limits)
+    except ModelError as error:
+        if Path(path).name in error.finding:
+            raise
+        raise ModelError(f"{os.fspath(path)}: {error.finding}").with_remedies(*error.remedies) from error
+
+
+def _import(
+    form: str,
+    path: str | os.PathLike[str],
+    *,
+    points: object,
+    unit: float | None,
+    up: str,
+    kinds: Mapping[str, str] | None,
+    name: str | None,
+    limits: Limits,
+) -> FaceModel:
+    """Return the face of a file of a known kind; arguments as of `import_model`."""
     if form == "makehuman":
         from fba.face.importers.makehuman.makehuman import import_makehuman
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Array, Float64
+from fba.arrays import Array, Float64, to_float64
 from fba.errors import FormatError
 from fba.source import Path
 
@@ -40,7 +40,9 @@ class Numbers:
             return np.frombuffer(data, f"{self.order}f4", count, start)
         halves = np.frombuffer(data, "<u2", 2 * count, start).reshape(-1, 2)
         # the word with sign and exponent comes first, and the exponent counts from 2 more
-        return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel() / np.float32(4)
+        floats: Array = np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel()
+        with np.errstate(invalid="ignore"):  # as in `to_float64`
+            return floats / np.float32(4)
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Parameters:
     def unsigned(self, name: str) -> Float64:
         """Return the numbers of a parameter; those of 16 bits without a sign: float64."""
         array = self.arrays.get(name, np.zeros(0))
-        return (array.view(np.uint16) if array.dtype == np.int16 else array).astype(np.float64)
+        return to_float64(array.view(np.uint16) if array.dtype == np.int16 else array)
 
     def numbered_texts(self, name: str) -> tuple[str, ...]:
         """Return the texts of NAME, NAME2, NAME3 ..., in one: a parameter holds 255 at most."""

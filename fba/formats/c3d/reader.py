@@ -13,7 +13,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from fba.arrays import Array, Float64
+from fba.arrays import Array, Float64, to_float64
 from fba.capture.markers.motion import METRES, MOST_MARKERS, MarkerMotion, regular_times
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.c3d._parameters import BLOCK, KEY, Parameters, read_parameters
@@ -123,7 +123,7 @@ def _positions(
     read = numbers.floats if scale < 0 else numbers.words
     table: Array = read(data, frames * columns, start).reshape(frames, columns)[:, : 4 * points]
     quads = table.reshape(frames, points, 4)
-    positions = quads[..., :3].astype(np.float64)
+    positions = to_float64(quads[..., :3])
     if scale > 0:
         positions *= scale
     with np.errstate(invalid="ignore"):

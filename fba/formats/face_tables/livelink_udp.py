@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float64, Int64
+from fba.arrays import Float64, Int64, to_float64
 from fba.capture.blendshapes import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import FormatError, Remedy, UnsupportedError
@@ -149,8 +149,7 @@ def read_packet(data: bytes, start: int, path: Path) -> tuple[Packet | None, int
     rate = Fraction(over, under)
     values = np.full(VALUES, np.nan)
     if with_face:
-        with np.errstate(invalid="ignore"):  # NaNs that signal
-            sent = np.frombuffer(data, ">f4", VALUES, end + 1).astype(np.float64)
+        sent = to_float64(np.frombuffer(data, ">f4", VALUES, end + 1))
         values = sent if np.isfinite(sent).all() else values
     return Packet((texts[0], texts[1]), (frame + part) / float(rate), rate, values), stop
 

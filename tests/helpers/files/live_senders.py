@@ -105,15 +105,16 @@ def vmc_frames(
 ) -> list[Sent]:  # fmt: skip
     """Return datagrams of a VMC performer.
 
-    turns: Unity's quaternions (T, 4), x y z w, of bones; others do not turn. path: (T, 3), of the hips.
-    lengths: whether positions of bones are sent. timed: whether `/VMC/Ext/T` is. split: messages in a
-    datagram.
+    turns: Unity's quaternions (T, 4), x y z w, of bones, such as eyes; others do not turn. path: (T, 3),
+    of the hips. lengths: whether positions of bones are sent. timed: whether `/VMC/Ext/T` is. split: messages
+    in a datagram.
     """
     result = []
     for row in range(count):
         messages = [osc("/VMC/Ext/OK", 1.0), *([osc("/VMC/Ext/T", row / rate)] if timed else [])]
         messages.append(osc("/VMC/Ext/Root/Pos", "root", *(0.0,) * 6, 1.0))
-        for name, place in UNITY_BONES.items():
+        bones = {**UNITY_BONES, **dict.fromkeys(turns.keys() - UNITY_BONES.keys(), (0, 0.06, 0.08))}
+        for name, place in bones.items():
             at = path[row] if name == "Hips" and path is not None else place if lengths else (0.0, 0.0, 0.0)
             turn = turns[name][row] if name in turns else (0.0, 0.0, 0.0, 1.0)
             messages.append(osc("/VMC/Ext/Bone/Pos", name, *map(float, (*at, *turn))))

@@ -1,6 +1,6 @@
 """FDP files: the positions of the feature points of a face, as text or as the XML of Xface.
 
-A text FDP file has a line `<group.index> x y z <mesh.vertex>` a point; an Xface
+A text FDP file has a line `<group.index> x y z <mesh.vertex>` a point, as docs/formats.md says; an Xface
 file names vertices of mesh files, and for each FAP the vertices around a point that follow it.
 """
 
