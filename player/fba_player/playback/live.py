@@ -54,7 +54,8 @@ class LiveAnimation:
     After damage, decoding goes on at the next I plane behind a start code. `message` says in a few words what
     is wrong, `details` gives the full error; both are "" where nothing is. `doubt` is set once
     `CHECK_BAP_STEPS_AFTER` seconds of a body have arrived, if it looks wrong with these BAP steps and right
-    with others; never if the stream has said by then that these are its steps. Whether there is a face or a body is fixed when `wait` returns.
+    with others; never if the stream has said by then that these are its steps. Whether there is a face or a
+    body is fixed when `wait` returns.
     """
 
     def __init__(

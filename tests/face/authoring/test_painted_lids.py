@@ -82,7 +82,8 @@ def follows(model: FaceModel, distance: np.ndarray) -> float:
 
 
 def errors(model: FaceModel) -> set[str]:
-    return {f"{each.subject}: {each.rule}" for each in check_faps(model, [19, 20]) if each.severity == "error"}
+    found = check_faps(model, [19, 20])
+    return {f"{each.subject}: {each.rule}" for each in found if each.severity == "error"}
 
 
 @pytest.mark.parametrize(
