@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/body-models.md: `python docs/make_body_pictures.py`.
+"""Pictures of docs/body-models.md.
 
 The clips are real recordings, read from the shared material (FBA_SHARED, else ../shared beside the checkout).
 """
@@ -15,7 +15,6 @@ import fba
 from fba import Animation, BodyTrack, player
 from fba.parameters import baps
 
-IMAGES = Path(__file__).with_name("images")
 SHARED = Path(os.environ.get("FBA_SHARED") or Path(__file__).parents[2] / "shared")
 CLIPS = (
     ("greta/Dance.bvh", 25.0, (0.12, 0.23, 0.45, 0.66, 0.77)),
@@ -101,14 +100,3 @@ def twists() -> Image.Image:
             picture = Image.fromarray(view.frame(float(frame))).convert("RGB")
             sheet.paste(picture, (0, 170 * frame))
     return sheet
-
-
-def main() -> None:
-    IMAGES.mkdir(exist_ok=True)
-    clips().save(IMAGES / "clips.jpg", quality=88)
-    postures().save(IMAGES / "postures.jpg", quality=88)
-    twists().save(IMAGES / "twists.jpg", quality=88)
-
-
-if __name__ == "__main__":
-    main()
