@@ -51,7 +51,7 @@ def test_only_the_named_picture_is_made(
     monkeypatch.setattr(sys, "argv", ["make_pictures.py", "angri"])
     with pytest.raises(SystemExit):
         script.main()
-    assert "there is no picture 'angri' (did you mean 'angry.jpg'?)" in capsys.readouterr().err
+    assert "there is no picture 'angri' (did you mean 'angry'?)" in capsys.readouterr().err
 
 
 def test_what_cannot_be_made_is_said(
