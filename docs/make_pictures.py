@@ -76,7 +76,9 @@ def main() -> int:
     for given in parser.parse_args().names or PICTURES:
         found = [name for name in PICTURES if given in (name, Path(name).stem)]
         if not found:
-            parser.error(f"there is no picture {given!r}{did_you_mean(given, [Path(name).stem for name in PICTURES])}")
+            parser.error(
+                f"there is no picture {given!r}{did_you_mean(given, [Path(name).stem for name in PICTURES])}"
+            )
         chosen.update(found)
     failed = 0
     for function in dict.fromkeys(PICTURES[name] for name in sorted(chosen)):
