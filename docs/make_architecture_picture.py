@@ -1,4 +1,4 @@
-"""Draws the rooms of docs/architecture.md and what they import: `python docs/make_architecture_picture.py`.
+"""Draws the rooms of docs/architecture.md and what they import.
 
 The rooms and their imports are those that tests/test_architecture.py finds. A room stands one row above the
 highest room that it imports; an arrow that others imply is left out.
@@ -126,5 +126,5 @@ def draw() -> str:
     return "\n".join([*parts, "</svg>", ""])
 
 
-if __name__ == "__main__":
+def main() -> None:
     (DOCS / "images" / "architecture.svg").write_text(draw(), encoding="utf-8")

@@ -26,10 +26,15 @@ TEMPLATE = RESULTS / "page.md"
 
 def main() -> None:
     """Write the page and its pictures."""
+    pictures()
+    PAGE.write_text(make_page(), encoding="utf-8")
+
+
+def pictures() -> None:
+    """Write the pictures of the page."""
     recordings = [one for name in RECORDINGS for one in read_results(RESULTS / name)]
     for name, data in make_pictures(recordings).items():
         (IMAGES / name).write_bytes(data)
-    PAGE.write_text(make_page(), encoding="utf-8")
 
 
 def make_page() -> str:

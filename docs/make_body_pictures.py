@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/body-models.md: `python docs/make_body_pictures.py`.
+"""Pictures of docs/body-models.md.
 
 The clips are real recordings, read from the shared material (FBA_SHARED, else ../shared beside the checkout).
 """
@@ -15,12 +15,11 @@ import fba
 from fba import Animation, BodyTrack, player
 from fba.parameters import baps
 
-IMAGES = Path(__file__).with_name("images")
 SHARED = Path(os.environ.get("FBA_SHARED") or Path(__file__).parents[2] / "shared")
 CLIPS = (
     ("greta/Dance.bvh", 25.0, (0.12, 0.23, 0.45, 0.66, 0.77)),
-    ("greta/sad_walk_rd.bvh", 35.0, (0.02, 0.23, 0.34, 0.45, 0.98)),
-    ("greta/c-ladder.bvh", 50.0, (0.23, 0.34, 0.45, 0.77, 0.88)),
+    ("greta/c-Walkaround.bvh", 30.0, (0.35, 0.45, 0.55, 0.75, 0.85)),
+    ("greta/c-ladder.bvh", 50.0, (0.23, 0.28, 0.34, 0.77, 0.88)),
     ("vreng/clap.bap", 25.0, (0.40, 0.56, 0.66, 0.77, 0.98)),
 )
 """Clip, the camera's yaw, and the moments shown, as shares of the clip."""
@@ -45,7 +44,7 @@ TWISTS = ({}, {"l_elbow_twisting": 90}, {"l_elbow_twisting": -150}, {"l_wrist_tw
 
 
 def clips() -> Image.Image:
-    """Somebody dancing, walking sadly, climbing and clapping."""
+    """Somebody dancing, walking about, climbing and clapping."""
     sheet = Image.new("RGB", (SIZE[0] * 5, SIZE[1] * len(CLIPS)))
     for row, (name, yaw, moments) in enumerate(CLIPS):
         scene = player.Scene(fba.read(SHARED / "data" / name))
@@ -56,7 +55,7 @@ def clips() -> Image.Image:
                 middle = (places.min(axis=0) + places.max(axis=0)) / 2
                 gone = np.array(scene.travel(time))  # the camera adds this
                 target = tuple(float(v) for v in (middle[0], max(middle[1], 0.9), middle[2]) - gone)
-                view.camera = player.Camera(target, yaw=yaw, pitch=8.0, distance=5.0)
+                view.camera = player.Camera(target, yaw=yaw, pitch=8.0, distance=5.4)
                 picture = Image.fromarray(view.frame(time)).convert("RGB")
                 sheet.paste(picture, (column * SIZE[0], row * SIZE[1]))
     return sheet
@@ -101,14 +100,3 @@ def twists() -> Image.Image:
             picture = Image.fromarray(view.frame(float(frame))).convert("RGB")
             sheet.paste(picture, (0, 170 * frame))
     return sheet
-
-
-def main() -> None:
-    IMAGES.mkdir(exist_ok=True)
-    clips().save(IMAGES / "clips.jpg", quality=88)
-    postures().save(IMAGES / "postures.jpg", quality=88)
-    twists().save(IMAGES / "twists.jpg", quality=88)
-
-
-if __name__ == "__main__":
-    main()

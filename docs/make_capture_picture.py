@@ -1,4 +1,4 @@
-"""Makes the picture of docs/motion-capture.md: `python docs/make_capture_picture.py`.
+"""Picture of docs/motion-capture.md.
 
 It shows the sample capture beside a result that was spoiled on purpose: the right hand is turned over, and
 the left shoulder drawn up.
@@ -52,7 +52,3 @@ def main() -> None:
     picture = Image.fromarray(draw_sights(report, 2))
     size = (WIDTH, round(picture.height * WIDTH / picture.width))
     picture.resize(size, Image.Resampling.LANCZOS).save(TARGET, quality=84, optimize=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,9 +1,8 @@
-"""Makes the pictures of docs/emotion.md: `python docs/make_emotion_picture.py`."""
+"""Pictures of docs/emotion.md."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -11,13 +10,11 @@ from PIL import Image, ImageDraw
 from fba import Animation, FaceTrack, emotion
 from fba.arrays import Float32
 from fba_player.export.contact_sheet import FAINT, PAPER, SPACE, TEXT, close_up
-from fba_player.export.image_files import write_picture
 from fba_player.export.offscreen import Offscreen
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera
 from fba_player.view.font import label_font
 
-IMAGES = Path(__file__).with_name("images")
 YAW = 10.0
 """Degrees: a head turned a little shows brows and cheeks better, and what is one-sided."""
 COLUMNS, TILE = 7, 240
@@ -69,14 +66,3 @@ def mixtures() -> Image.Image:
     point = emotion.expression_at(5.0, 4.4)
     tiles.append(("--at 5.0,4.4", str(point).replace("_", " "), point.faps))
     return sheet(tiles, len(tiles))
-
-
-def main() -> None:
-    IMAGES.mkdir(exist_ok=True)
-    write_picture(IMAGES / "emotion-named.jpg", np.asarray(named()))
-    write_picture(IMAGES / "emotion-measured.jpg", np.asarray(measured()))
-    write_picture(IMAGES / "emotion-mixtures.jpg", np.asarray(mixtures()))
-
-
-if __name__ == "__main__":
-    main()

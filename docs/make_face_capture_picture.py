@@ -1,4 +1,4 @@
-"""Makes the picture of docs/capture-faces.md: `python docs/make_face_capture_picture.py`."""
+"""Picture of docs/capture-faces.md."""
 
 from __future__ import annotations
 
@@ -48,7 +48,3 @@ def main() -> None:
             draw.text((place[0] + 6, place[1] + 4), names, fill=(20, 20, 20))
     TARGET.parent.mkdir(exist_ok=True)
     sheet.save(TARGET, quality=88, optimize=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Makes the curves of docs/gait.md: `python docs/make_gait_curves.py`.
+"""Curves of docs/gait.md.
 
 Hip, knee and ankle of the normal walk beside the means and deviations that Winter measured, and the height of
 the pelvis.
@@ -109,7 +109,3 @@ def main() -> None:
         + "\n".join([*panels, legend]) + "\n</svg>\n",
         encoding="utf-8", newline="\n",
     )  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Makes the picture of docs/gait.md: `python docs/make_gait_pictures.py`."""
+"""Picture of docs/gait.md."""
 
 from __future__ import annotations
 
@@ -29,7 +29,3 @@ def main() -> None:
     TARGET.parent.mkdir(exist_ok=True)
     rows = np.vstack([row(character) for character in gait.characters()])
     Image.fromarray(rows).save(TARGET, quality=88, optimize=True)
-
-
-if __name__ == "__main__":
-    main()

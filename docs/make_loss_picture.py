@@ -1,4 +1,4 @@
-"""Makes the picture of docs/robustness.md: `python docs/make_loss_picture.py`; needs matplotlib."""
+"""Picture of docs/robustness.md; needs matplotlib."""
 
 from __future__ import annotations
 
@@ -57,7 +57,3 @@ def main() -> None:
     steady.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     steady.minorticks_off()
     figure.savefig(TARGET, metadata={"Date": None})
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Makes the picture of docs/capture-markers.md: `python docs/make_marker_capture_picture.py`.
+"""Picture of docs/capture-markers.md.
 
 Above, the head that performs talk.c3d; below it, the built-in head as the stream of its markers moves it;
 then curves of some FAPs, as performed (grey) and as they come from the markers.
@@ -70,7 +70,3 @@ def draw_curves(sheet: Image.Image, top: int, performed: np.ndarray, found: np.n
             y = top + (row + 1) * HEIGHT - 6 - (values - low) / max(high - low, 1.0) * (HEIGHT - 18)
             draw.line(list(zip(across.tolist(), y.tolist(), strict=True)), fill=colour, width=thick)
         draw.text((4, top + row * HEIGHT + 1), f"{fap} {name}", fill=INK)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Makes the picture of docs/virtual-markers.md: `python docs/make_marker_picture.py`.
+"""Picture of docs/virtual-markers.md.
 
 A sample capture on the built-in head: above by FAPs, below by virtual markers, which know nothing of FAPs.
 """
@@ -50,7 +50,3 @@ def main() -> None:
     for number, row in enumerate(rows):
         picture.paste(row, (0, number * (row.height + 6)))
     picture.save(TARGET, quality=84, optimize=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Makes docs/images/moods.jpg, one performance in six moods: `python docs/make_mood_picture.py`."""
+"""One performance in six moods, for docs/emotion.md."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 
 import fba
+from fba.arrays import UInt8
 from fba.emotion import Mood, emote
-from fba_player.export.image_files import write_picture
 from fba_player.export.offscreen import Offscreen
 from fba_player.scene.scene import Scene
 
-IMAGES = Path(__file__).with_name("images")
 SAMPLE = Path(fba.__file__).with_name("samples") / "hello.fap"
 MOODS = {"neutral": 0, "angry": 90, "surprised": 80, "sad": 90, "sleepy": 90, "happy": 80}
 MOMENTS = (1.0, 2.8, 4.0, 7.6)
@@ -20,15 +19,11 @@ MOMENTS = (1.0, 2.8, 4.0, 7.6)
 TILE = 210
 
 
-def main() -> None:
+def moods() -> UInt8:
     animation = fba.read(SAMPLE)
     columns = []
     for name, intensity in MOODS.items():
         scene = Scene(emote(animation, [Mood(name, intensity)]))
         with Offscreen(scene, (TILE, TILE), samples=4) as view:
             columns.append(np.concatenate([view.frame(time)[..., :3] for time in MOMENTS]))
-    write_picture(IMAGES / "moods.jpg", np.concatenate(columns, axis=1))
-
-
-if __name__ == "__main__":
-    main()
+    return np.concatenate(columns, axis=1)

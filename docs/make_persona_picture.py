@@ -1,4 +1,4 @@
-"""Makes the picture of docs/persona.md: `python docs/make_persona_picture.py`."""
+"""Picture of docs/persona.md."""
 
 from __future__ import annotations
 
@@ -71,7 +71,3 @@ def place(points: Float64) -> Float64:
     """Return where points of the mask, millimetres, are in a picture."""
     middle = (standard_mask()[:, :2].min(axis=0) + standard_mask()[:, :2].max(axis=0)) / 2
     return np.asarray((points - middle) * (SCALE * 0.85, -SCALE * 0.85) + np.array(SIZE) / 2)
-
-
-if __name__ == "__main__":
-    main()

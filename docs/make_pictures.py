@@ -1,131 +1,97 @@
-"""Makes the pictures of the documentation: `python docs/make_pictures.py`."""
+"""Makes the pictures of the documentation: `python docs/make_pictures.py [NAME...]`, without names all.
+
+The files are in docs/images. Recordings are read from the shared material (FBA_SHARED, else ../shared beside
+the checkout); plots need matplotlib. What is missing is said, and the other pictures are made.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import argparse
+import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image
 
-import fba
-from fba import Animation, FaceTrack, player
-from fba.face import FaceModel, feature_point_names
-from fba.face.calibration import fit
-from fba.formats import merge
-from fba_player.export.render import write_picture
+from fba.errors import FbaError, did_you_mean
 
-UInt8 = npt.NDArray[np.uint8]
-
-IMAGES = Path(__file__).with_name("images")
-SAMPLES = Path(fba.__file__).with_name("samples")
-MOMENTS = (1.9, 2.6, 4.4, 6.6)
-"""Seconds of the sample performance that the first picture shows."""
-SWITCHED = 2.6
-"""Seconds of it that the picture of switches shows."""
-FACES = (
-    # yaw and pitch of the camera, degrees; expression with its intensity, or 0; FAPs on top
-    (-28.0, 2.0, 0, 0, {}),
-    (10.0, 0.0, 1, 55, {3: 150, 48: -4000, 49: 6000, 50: 5000}),
-    (32.0, 4.0, 6, 40, {49: -12000, 23: 8000, 24: 8000}),
-)
-"""The built-in head at the top of the documentation."""
-
-
-def performance() -> Animation:
-    """The sample, after a trip through the codec."""
-    face, body = fba.read(SAMPLES / "hello.fap"), fba.read(SAMPLES / "hello.bvh")
-    data = fba.encode(merge(face, body.resample(face.rate)), fba.EncoderOptions(bap_steps="visage"))
-    return fba.decode(data, bap_steps="visage")
-
-
-def strip(pictures: Sequence[UInt8]) -> UInt8:
-    """Pictures of one size, side by side."""
-    return np.concatenate(pictures, axis=1)[..., :3]
-
-
-def hello() -> UInt8:
-    scene = player.Scene(performance())
-    with player.Offscreen(scene, (320, 400), samples=4) as view:
-        return strip([view.frame(time) for time in MOMENTS])
-
-
-def faces() -> UInt8:
-    scene = player.Scene(Animation(25, np.arange(1), FaceTrack.empty(1)))
-    definitions = scene.model.definitions
-    found = []
-    with player.Offscreen(scene, (420, 460), samples=4) as view:
-        for yaw, pitch, expression, intensity, extra in FACES:
-            faps = definitions.expressions[expression] * (intensity / 63)
-            for number, value in extra.items():
-                faps[number - 1] += value
-            view.camera = player.Camera(yaw=yaw, pitch=pitch).fit(scene.face_subject, 420 / 460).zoom(0.86)
-            found.append(view.still(faps))
-    return strip(found)
+IMAGES = Path(__file__).resolve().with_name("images")
+QUALITY = 85
+"""Of JPEG."""
+PICTURES = {
+    "allexps.jpg": "make_recording_pictures.expressions_sheet",
+    "angry.jpg": "make_recording_pictures.angry_sheet",
+    "architecture.svg": "make_architecture_picture.main",
+    "capture-faces.jpg": "make_face_capture_picture.main",
+    "capture-markers.jpg": "make_marker_capture_picture.main",
+    "capture-points.jpg": "make_points_picture.main",
+    "capture-report.jpg": "make_capture_picture.main",
+    "clips.jpg": "make_body_pictures.clips",
+    "compare.jpg": "make_player_pictures.compare",
+    "dance.jpg": "make_recording_pictures.dance_sheet",
+    "emotion-measured.jpg": "make_emotion_picture.measured",
+    "emotion-mixtures.jpg": "make_emotion_picture.mixtures",
+    "emotion-named.jpg": "make_emotion_picture.named",
+    "expressions.jpg": "make_head_pictures.expressions",
+    "faces.jpg": "make_head_pictures.faces",
+    "faps.jpg": "make_head_pictures.faps",
+    "fitted.jpg": "make_head_pictures.fitted",
+    "gait.jpg": "make_gait_pictures.main",
+    "gait_curves.svg": "make_gait_curves.main",
+    "hello.png": "make_head_pictures.hello",
+    "loss.svg": "make_loss_picture.main",
+    "markers-page.jpg": "make_player_pictures.markers",
+    "moods.jpg": "make_mood_picture.moods",
+    "panels.jpg": "make_player_pictures.panels",
+    "persona.jpg": "make_persona_picture.main",
+    "points.jpg": "make_player_pictures.points",
+    "postures.jpg": "make_body_pictures.postures",
+    "real-recordings-bodies-bars.svg": "make_bitrate_page.pictures",
+    "real-recordings-bodies.svg": "make_bitrate_page.pictures",
+    "real-recordings-faces-bars.svg": "make_bitrate_page.pictures",
+    "real-recordings-faces.svg": "make_bitrate_page.pictures",
+    "switches.jpg": "make_head_pictures.switches",
+    "twists.jpg": "make_body_pictures.twists",
+    "virtual-markers.jpg": "make_marker_picture.main",
+    "visemes.jpg": "make_head_pictures.visemes",
+    "window.jpg": "make_player_pictures.window",
+}
+"""What makes each picture: a function of a module beside this one, which returns it or writes it itself."""
 
 
-def fitted() -> Image.Image:
-    """The built-in head, fitted to a broad person, to a child, and to the points of docs/calibrate.md."""
-    head = FaceModel.default()
-    row = {name: number for number, name in enumerate(feature_point_names())}
-    child = head.points * 0.82
-    down = np.clip(-child[:, 1] / 0.06, 0, 2)
-    child *= 1 - 0.06 * down[:, None] * (1, 2, 0)
-    child[:, 2] -= 0.003 * down
-    for pupil, lids in (("3.5", "3.1 3.3 3.7 3.9 3.11 3.13"), ("3.6", "3.2 3.4 3.8 3.10 3.12 3.14")):
-        rows = [row[name] for name in lids.split()]
-        child[rows] += (child[rows] - child[row[pupil]]) * (0.1, 0.16, 0.1)
-    page = IMAGES.with_name("calibrate.md").read_text(encoding="utf-8")
-    given = np.full((len(row), 3), np.nan)
-    for name, *place in filter(None, map(str.split, page.split("\nEND\n")[0].splitlines())):
-        if name in row and len(place) == 3:
-            given[row[name]] = [float(number) for number in place]
-    people = [
-        head,
-        *(fit(head, points, tables="carry") for points in (head.points * (1.12, 0.96, 1.0), child, given)),
-    ]
-    pictures = []
-    for camera in ("front", "three-quarter"):
-        for person in people:
-            scene = player.Scene(Animation(25, np.arange(1), FaceTrack.empty(1)), person)
-            with player.Offscreen(scene, (300, 360), scene.camera(camera, 300 / 360), samples=4) as view:
-                pictures.append(view.frame(0.0).copy())
-    columns = len(people)
-    return Image.fromarray(np.concatenate([strip(pictures[:columns]), strip(pictures[columns:])]))
+def make(function: str, names: list[str]) -> None:
+    """Make the pictures of one function, one of `PICTURES`."""
+    module, _, what = function.partition(".")
+    picture = getattr(import_module(module), what)()
+    if picture is not None:
+        image = Image.fromarray(picture[..., :3]) if isinstance(picture, np.ndarray) else picture
+        image.save(IMAGES / names[0], quality=QUALITY, optimize=True)
 
 
-def switches() -> UInt8:
-    """Six switches of the player, two rows."""
-    animation = performance()
-    face = player.Scene(Animation(animation.rate, animation.index, animation.face))
-    whole = player.Scene(animation)
-    shown: list[UInt8] = []
-    for scene, name, value, size in (
-        (face, "wireframe", True, (400, 440)),
-        (face, "points", True, (400, 440)),
-        (face, "influence", "open_jaw", (400, 440)),
-        (whole, "skeleton", "through", (400, 440)),
-        (whole, "grid", True, (400, 440)),
-        (face, "normals", True, (400, 440)),
-    ):
-        scene.show(name, value)
-        with player.Offscreen(scene, size, "body" if scene is whole else "three-quarter", samples=4) as view:
-            shown.append(view.frame(SWITCHED))
-        scene.show(name, False)
-    return np.concatenate([strip(shown[:3]), strip(shown[3:])])
-
-
-def main() -> None:
-    IMAGES.mkdir(exist_ok=True)
-    fitted().save(IMAGES / "fitted.jpg", quality=88)
-    Image.fromarray(hello()).save(IMAGES / "hello.png", optimize=True)
-    write_picture(IMAGES / "faces.jpg", faces())
-    write_picture(IMAGES / "switches.jpg", switches())
-    write_picture(IMAGES / "expressions.jpg", player.contact_sheet("expressions", tile=(320, 320)))
-    write_picture(IMAGES / "visemes.jpg", player.contact_sheet("visemes", tile=(200, 200)))
-    write_picture(IMAGES / "faps.jpg", player.contact_sheet("faps", tile=(150, 150)))
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(PICTURES)}")
+    chosen = set()
+    for given in parser.parse_args().names or PICTURES:
+        found = [name for name in PICTURES if given in (name, Path(name).stem)]
+        if not found:
+            parser.error(
+                f"there is no picture {given!r}{did_you_mean(given, [Path(name).stem for name in PICTURES])}"
+            )
+        chosen.update(found)
+    failed = 0
+    for function in dict.fromkeys(PICTURES[name] for name in sorted(chosen)):
+        names = [name for name in PICTURES if PICTURES[name] == function]
+        try:
+            make(function, names)
+        except (FbaError, ImportError, OSError) as error:
+            failed += 1
+            print(f"{', '.join(names)}: not made: {error}", file=sys.stderr)
+        else:
+            print(*names, sep="\n")
+    return min(failed, 1)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,4 +1,4 @@
-"""Makes the pictures of the player's window: `python docs/make_player_pictures.py`."""
+"""Pictures of the player's window."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from make_marker_picture import edit
 
 import fba
 from fba.animation import Animation
+from fba.arrays import UInt8
 from fba.face import FaceModel, feature_point_names
 from fba.face.importers.head_surface import read_head_surface
 from fba.formats import merge
 from fba.formats.c3d.reader import read_markers
-from fba_player.export.image_files import write_picture
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.markers_scene import MarkersScene
 from fba_player.scene.placement_scene import PlacementScene
@@ -27,7 +27,6 @@ from fba_player.session.source import Source
 from fba_player.ui.panels.puppet_panel import PuppetPanel
 from fba_player.ui.window_picture import SETTLES, Studio, picture
 
-IMAGES = Path(__file__).resolve().with_name("images")
 SAMPLES = Path(fba.__file__).resolve().with_name("samples")
 SIZE = (1280, 720)
 MOMENT, MARKS = 4.4, (2.0, 6.6)
@@ -39,15 +38,15 @@ MOVED = {3: 420.0, 15: -120.0}
 """FAPs whose curves are shown, and those moved by hand."""
 
 
-def window() -> None:
+def window() -> UInt8:
     """A face and a body: what the stream holds, curves, marks."""
     face, body = fba.read(SAMPLES / "hello.fap"), fba.read(SAMPLES / "hello.bvh")
     with _played(merge(face, body.resample(face.rate))) as session:
         session.transport.mark_in, session.transport.mark_out = MARKS
-        write_picture(IMAGES / "window.jpg", picture(session, ("file", "curves")))
+        return picture(session, ("file", "curves"))
 
 
-def panels() -> None:
+def panels() -> UInt8:
     """Curves, bit rate, and a face moved by hand."""
     with _played(fba.read(SAMPLES / "hello.fap")) as session:
         session.source.probe(wait=True)
@@ -61,10 +60,10 @@ def panels() -> None:
             for number, value in MOVED.items():
                 puppet.move_fap(number, value)
             studio.draw(1)
-            write_picture(IMAGES / "panels.jpg", studio.draw(SETTLES))
+            return studio.draw(SETTLES)
 
 
-def compare() -> None:
+def compare() -> UInt8:
     """Two performances over each other, and the panel of their differences."""
     original = fba.read(SAMPLES / "hello.fap")
     coarse = fba.decode(fba.encode(original, fba.EncoderOptions(fap_quant=COARSE)))
@@ -74,10 +73,10 @@ def compare() -> None:
     session.open.add("differences")
     session.transport.seek(MOMENT)
     with Studio(session) as studio:
-        write_picture(IMAGES / "compare.jpg", studio.draw(2 * SETTLES))
+        return studio.draw(2 * SETTLES)
 
 
-def points() -> None:
+def points() -> UInt8:
     """The built-in head as if only its eyes were known."""
     head = FaceModel.default()
     known = {
@@ -91,15 +90,15 @@ def points() -> None:
         placement = PointPlacement(read_head_surface(path, points=known), "scan.points.csv")
     placement.choose("9.3")
     session = Session(PlacementScene(placement), size=SIZE)
-    write_picture(IMAGES / "points.jpg", picture(session, ("points",)))
+    return picture(session, ("points",))
 
 
-def markers() -> None:
+def markers() -> UInt8:
     """Markers beside the built-in head, and the reach of one of them."""
     editing = edit(read_markers(SAMPLES / "talk.c3d"))
     editing.choose("LPB")
     session = Session(MarkersScene(editing, "talk.c3d"), size=SIZE)
-    write_picture(IMAGES / "markers-page.jpg", picture(session, ("markers",)))
+    return picture(session, ("markers",))
 
 
 @contextlib.contextmanager
@@ -112,11 +111,3 @@ def _played(animation: Animation) -> Iterator[Session]:
         session = Session(scene, source=Source(scene, path, bap_steps="visage"), size=SIZE)
         session.transport.seek(MOMENT)
         yield session
-
-
-if __name__ == "__main__":
-    window()
-    panels()
-    compare()
-    points()
-    markers()

@@ -1,4 +1,4 @@
-"""Makes the picture of docs/capture-points.md: `python docs/make_points_picture.py`."""
+"""Picture of docs/capture-points.md."""
 
 from __future__ import annotations
 
@@ -62,7 +62,3 @@ def draw(points: Float64, scale: float) -> Image.Image:
         x, y = at[number].tolist()
         pen.ellipse((x - 6, y - 6, x + 6, y + 6), fill=(110, 180, 250))
     return picture.resize(SIZE, Image.Resampling.LANCZOS)
-
-
-if __name__ == "__main__":
-    main()

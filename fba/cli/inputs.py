@@ -137,8 +137,8 @@ def read_input(
 ) -> Animation:
     """Return the animation of a file of any format, or of the one that `format` names.
 
-    bap_steps: "auto" prints which table a stream is decoded with, and why; otherwise warns if its BAPs look
-    wrong with these steps.
+    bap_steps: "auto" prints which table a stream is decoded with, and why; otherwise warns if the stream says
+    another one or, where it says nothing, if its BAPs look wrong with these steps.
 
     fps resamples the animation, and motion capture before it is retargeted. It, or header_fps, and name
     replace a header that a file lacks. capture: options for the readers of motion capture. doubts: that
@@ -147,22 +147,28 @@ def read_input(
     readers: the format is appended to it, which of standard input nothing else says. rates: the rate before
     it was resampled is appended to it.
     """
+    from fba.codec import marked_table
     from fba.formats import read
 
     options: dict[str, object] = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name}
     options |= {"salvage": salvage or None, "rate": fps, "limits": limits, "clip": clip}
     options |= capture or {}
+    marked = None
     with input_file(path) as file:
         reader = _find_format(file, format)
         if reader.name == "fba":
-            options["bap_steps"] = step_tables.table_to_read(path, read_whole(file), bap_steps, limits)
+            data = read_whole(file)
+            marked = marked_table(data)
+            options["bap_steps"] = step_tables.table_to_read(path, data, bap_steps, limits)
         animation = read(file, format=reader.name, **_taken(reader, options))
     if readers is not None:
         readers.append(reader)
     if reader.name == "fba" and animation.body is not None:
         (tables if tables is not None else []).append(str(options["bap_steps"]))
-        if bap_steps != BAP_STEPS_AUTO and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
-            (doubts if doubts is not None else []).append(doubt)
+        if bap_steps != BAP_STEPS_AUTO:
+            doubt = step_tables.warn_of_doubt(path, animation, bap_steps, marked)
+            if doubt is not None and doubts is not None:
+                doubts.append(doubt)
     if rates is not None:
         rates.append(animation.rate)
     if fps is not None and animation.rate != fps:

@@ -90,13 +90,28 @@ def warn_of_coarse_steps(animation: Animation, table: str, quant: int = 1, *, ca
         )
 
 
-def warn_of_doubt(name: str | Path, animation: Animation, table: str) -> str | None:
-    """Warn if a decoded body looks wrong under the table and right under the other; return the warning."""
+def warn_of_doubt(
+    name: str | Path, animation: Animation, table: str, marked: str | None = None
+) -> str | None:
+    """Warn if a decoded body was read with the wrong table; return the warning.
+
+    marked: the table that the stream names, which is right beyond doubt. Without one, the wrong table is the
+    one under which the body looks wrong while it looks right under the other.
+    """
     from fba.body.plausibility import find_doubt
 
-    if animation.body is None:
+    if animation.body is None or marked == table:
         return None
-    doubt = find_doubt(animation.body, animation.index, animation.rate, table)
+    doubt: object
+    if marked is None:
+        doubt = find_doubt(animation.body, animation.index, animation.rate, table)
+    elif any((batch.values % bap_steps(table)).any() for batch in batches(animation.body)):
+        doubt = None  # BAPs that are not quantised are the same with every table
+    else:
+        doubt = (
+            f"the stream says that its BAP steps are {marked!r}, but it is read with {table!r}, as given; "
+            "without --bap-steps it is read rightly"
+        )
     if doubt is None:
         return None
     text = f"{_display_name(name)}: {doubt}"
@@ -106,11 +121,12 @@ def warn_of_doubt(name: str | Path, animation: Animation, table: str) -> str | N
 
 def warn_of_doubtful_stream(name: str | Path, data: bytes, table: str) -> None:
     """Do the same for a stream, of which the first frames with a body are decoded."""
+    from fba.codec import marked_table
     from fba.formats.step_choice import first_frames
 
     moving = first_frames(data, table)
     if moving is not None:
-        warn_of_doubt(name, moving, table)
+        warn_of_doubt(name, moving, table, marked_table(data))
 
 
 def _display_name(name: str | Path) -> str:

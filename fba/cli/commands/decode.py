@@ -241,6 +241,7 @@ def _decode(
 
     settings: for the writer of `--output`. shows: what a face shows, to write that.
     """
+    from fba.codec import marked_table
     from fba.formats import write
     from fba.formats.epf.epf import write_epf
 
@@ -252,7 +253,7 @@ def _decode(
         data, _name(path), any(t.writing is None for t in targets), table, salvage, limits
     )
     if bap_steps != BAP_STEPS_AUTO:
-        step_tables.warn_of_doubt(path, animation, table)
+        step_tables.warn_of_doubt(path, animation, table, marked_table(data))
     if shows is not None and animation.face is not None:
         animation = replace(animation, face=shows(animation.face))
     parts = {"face": "FAPs", "body": "BAPs"}

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Int64
-from fba.codec import Decoder, FrameBuffer, StreamInfo
+from fba.codec import Decoder, FrameBuffer, StreamInfo, marked_table
 from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaError, FbaWarning
 from fba.formats.step_choice import choose_steps
@@ -54,7 +54,8 @@ class LiveAnimation:
     After damage, decoding goes on at the next I plane behind a start code. `message` says in a few words what
     is wrong, `details` gives the full error; both are "" where nothing is. `doubt` is set once
     `CHECK_BAP_STEPS_AFTER` seconds of a body have arrived, if it looks wrong with these BAP steps and right
-    with others. Whether there is a face or a body is fixed when `wait` returns.
+    with others; never if the stream has said by then that these are its steps. Whether there is a face or a
+    body is fixed when `wait` returns.
     """
 
     def __init__(
@@ -207,6 +208,7 @@ class LiveAnimation:
         """Add what a chunk brings, or hold it back while the BAP steps are not chosen."""
         with self._changed:
             blocks = self._decoder.push_blocks(chunk)
+            self._checked_bap_steps |= marked_table(chunk) == self.bap_steps
             if self._held is None:
                 self._add_blocks(blocks)
                 return

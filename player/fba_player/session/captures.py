@@ -40,6 +40,7 @@ class Captures:
         self._recorder: Recorder | None = None
         self._sound: FilmSound | None = None
         self._begun = 0.0
+        self._read: tuple[float, Callable[[], UInt8]] | None = None
 
     @property
     def recording(self) -> bool:
@@ -76,26 +77,27 @@ class Captures:
         self.session.recording = 0.0
 
     def begin_picture(self) -> None:
-        """Update the length of the film and mix its sound up to now; call before each picture is drawn."""
+        """Add the last picture to the film, mix its sound up to now; call before each picture is drawn."""
+        self._add_read()
         if self._recorder is None:
             return
         self.session.recording = self.session.clock() - self._begun
         if self._sound is not None:
             self._sound.advance(self.session.recording)
 
-    def add_picture(self, read: Callable[[], UInt8]) -> None:
-        """Add the picture drawn since `begin_picture` to the film. read: returns it, uint8 (H, W, 4)."""
+    def add_picture(self, start: Callable[[], Callable[[], UInt8]]) -> None:
+        """Have the picture drawn since `begin_picture` in the film.
+
+        start: begins to read it, and returns what gives it, uint8 (H, W, 4). That is called when the next
+        picture begins, so that none is waited for. Not called where the film needs no frame.
+        """
         seconds = self.session.recording
-        if self._recorder is None or seconds is None or not self._recorder.wants(seconds):
-            return
-        try:
-            self._recorder.add(read(), seconds, wait=False)
-        except (OSError, FbaError) as error:
-            self._recorder = self._sound = self.session.recording = None
-            self.session.say(f"Recording stopped: {error}", "error", 8.0)
+        if self._recorder is not None and seconds is not None and self._recorder.wants(seconds):
+            self._read = seconds, start()
 
     def close(self) -> Path | None:
         """Finish the film; returns its path, None if none is being recorded. Raises FbaError, OSError."""
+        self._add_read()
         if self._recorder is None:
             return None
         recorder, sound = self._recorder, self._sound
@@ -104,6 +106,18 @@ class Captures:
             sound.advance(self.session.clock() - self._begun)
             sound.end()
         return recorder.close()
+
+    def _add_read(self) -> None:
+        """Add the picture that is being read to the film, if there is one."""
+        read, self._read = self._read, None
+        if self._recorder is None or read is None:
+            return
+        seconds, fetch = read
+        try:
+            self._recorder.add(fetch(), seconds, wait=False)
+        except (OSError, FbaError) as error:
+            self._recorder = self._sound = self.session.recording = None
+            self.session.say(f"Recording stopped: {error}", "error", 8.0)
 
     def _open_sound(self) -> FilmSound | None:
         """The sound for a new film; None without sound, with a notice if the file cannot be used."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import time as wall
 import warnings
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from fba.arrays import UInt8
 from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaWarning
 from fba_player.gl.context import (
@@ -17,16 +19,18 @@ from fba_player.gl.context import (
     missing_text,
 )
 from fba_player.gl.framebuffer import Target
+from fba_player.gl.readback import Readback
 from fba_player.gl.renderer import Renderer
 from fba_player.playback.live import LiveTimeline
 from fba_player.playback.transport import Transport
-from fba_player.session.captures import Captures, draw_screenshot, read_pixels
+from fba_player.session.captures import Captures, draw_screenshot
 from fba_player.session.controls import Controls
 from fba_player.session.pages import page_of
 from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.view.camera import Camera
 from fba_player.window._glfw_input import GlfwInput
+from fba_player.window._opening import draw_opening
 from fba_player.window._plain_overlay import Overlay
 from fba_player.window.display import HOW_WITHOUT, FullScreen, start_glfw
 
@@ -77,6 +81,7 @@ class Window:
         self._shown_title = ""
         self._target: Target | None = None
         self._renderer: Renderer | None = None
+        self._readback: Readback | None = None
         self._overlay: Overlay | None = None
         self._gui: Any = None
         self._gl: Any = None
@@ -153,10 +158,10 @@ class Window:
         try:
             self.captures.close()
         finally:
-            for part in (self._gui, self._overlay, self._renderer, self._target):
+            for part in (self._gui, self._overlay, self._renderer, self._target, self._readback):
                 if part is not None:
                     part.close()
-            self._gui = self._overlay = self._renderer = self._target = None
+            self._gui = self._overlay = self._renderer = self._target = self._readback = None
             if self._gl is not None:
                 self._gl.release()
                 self._gl = None
@@ -201,7 +206,15 @@ class Window:
                 f"OpenGL 3.3 cannot be used in the window: {error}. {how_to_install(OPENGL)}, or update the "
                 "graphics driver"
             ) from error
+        self._show_opening()
         self._renderer = Renderer(self._gl)
+
+    def _show_opening(self) -> None:
+        """Show something at once: until the first picture, shaders are compiled and meshes prepared."""
+        size = self._framebuffer()
+        if size[0] > 0 and size[1] > 0:
+            draw_opening(self._gl, size, f"Opening {self._title} ...", self._scale())
+            self._glfw.swap_buffers(self._window)
 
     def _make_panels(self, panels: bool) -> None:
         """Make the panels, or the plain timeline in their place, and connect the input."""
@@ -265,7 +278,7 @@ class Window:
         self._target.begin()
         within = self._renderer.draw(session.view(time), session.camera(time), size)
         self._target.finish(self._gl.screen, within)
-        self.captures.add_picture(lambda: read_pixels(self._gl.screen, size))
+        self.captures.add_picture(lambda: self._start_reading(size))
         self._handle_requests()
         self._gl.screen.use()
         self._gl.viewport = (0, 0, *size)
@@ -277,6 +290,12 @@ class Window:
         self._last = now
         self.input.set_cursor(hidden=self._full_screen.active and session.hides_mouse)
         self._show_title()
+
+    def _start_reading(self, size: tuple[int, int]) -> Callable[[], UInt8]:
+        """Begin to read the window's picture for a film."""
+        if self._readback is None:
+            self._readback = Readback(self._gl)
+        return self._readback.start(self._gl.screen, size)
 
     def _handle_requests(self) -> None:
         """Do what the user requested: screenshots, films, full screen."""

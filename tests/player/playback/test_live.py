@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import threading
 import time
@@ -15,7 +16,15 @@ import pytest
 import fba
 from fba.animation import Animation
 from fba.body import gait
-from fba.codec import Decoder, EncoderOptions, FrameBuffer, FrameRate, PlaneSettings, encode_planes
+from fba.codec import (
+    Decoder,
+    EncoderOptions,
+    FrameBuffer,
+    FrameRate,
+    PlaneSettings,
+    encode_planes,
+    write_mark,
+)
 from fba.errors import FbaError
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.playback.timeline import Timeline
@@ -384,3 +393,14 @@ def test_the_steps_of_a_body_are_doubted_after_four_seconds(wire: Wire) -> None:
     until(lambda: live.doubt)
     assert "made with --bap-steps visage?" in live.doubt
     live.close()
+
+
+def test_a_stream_that_says_its_steps_is_not_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever its motion looks like."""
+    monkeypatch.setattr("fba.body.plausibility.find_doubt", lambda *_: "looks wrong")
+    data, _ = stream(gait.walk(rate=25, seconds=3), bap_steps="visage")
+    for said, doubt in ((b"", "looks wrong"), (write_mark("visage"), "")):
+        live = LiveAnimation(io.BytesIO(data + said), bap_steps="visage")
+        assert live.wait_end(10)
+        assert live.doubt == doubt
+        live.close()

@@ -51,7 +51,7 @@ class Filmed:
         for _ in range(round(seconds * RATE)):
             self.clock.now += 1 / RATE
             self.captures.begin_picture()
-            self.captures.add_picture(lambda: pixels)
+            self.captures.add_picture(lambda: lambda: pixels)
 
     def film(self) -> Path:
         path = self.captures.close()

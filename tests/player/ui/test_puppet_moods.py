@@ -23,6 +23,7 @@ from studio_hand import StudioHand, panel_of
 
 graphics.imported("imgui_bundle")
 
+from fba_player.ui.panels._puppet_emotion import DOT, LABEL, place_labels  # noqa: E402 - needs imgui
 from fba_player.ui.window_picture import Studio  # noqa: E402 - needs imgui
 
 BROW = 30
@@ -131,3 +132,40 @@ def test_a_path_over_the_plane_is_a_take(studio: Studio, clock: Clock) -> None:
     assert brow[0] == 0
     assert brow[-1] == pytest.approx(expression("surprise").faps[BROW], rel=0.05)
     assert 0 < brow[5] < brow[-1]
+
+
+def overlap(one: tuple[float, ...], other: tuple[float, ...]) -> float:
+    wide = min(one[2], other[2]) - max(one[0], other[0])
+    return max(wide, 0.0) * max(min(one[3], other[3]) - max(one[1], other[1]), 0.0)
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (900, 700), (1920, 1080)])
+def test_the_whole_tab_is_seen_and_no_label_covers_another(studio: Studio, size: tuple[int, int]) -> None:
+    studio.session.size = size
+    panel_of(studio, "puppet").performer(studio.session).puppet.mood.move_point(5.0, 4.4)
+    studio.draw(6)
+    tab = panel_of(studio, "puppet").emotion
+    assert tab.hidden == 0
+    assert set(tab.sliders) == set(COMMON)
+    labels = list(tab.labels.items())
+    for number, (name, box) in enumerate(labels):
+        assert box[3] - box[1] == LABEL
+        assert tab.plane[0] - 10 <= box[0] < box[2] <= tab.plane[2] + 10, name
+        for other in known_points():
+            x, y = place(studio, other)
+            assert not overlap(box, (x - DOT, y - DOT, x + DOT, y + DOT)), (name, other)
+        for other, area in labels[number + 1 :]:
+            assert not overlap(box, area), (name, other)
+
+
+def test_labels_of_dots_side_by_side() -> None:
+    """Above and below where there is no room beside; inside the box, even where something must be covered."""
+    dots = {name: (50.0 + 12 * number, 50.0) for number, name in enumerate("abcd")}
+    within = (0.0, 0.0, 120.0, 100.0)
+    boxes = place_labels(dots, dict.fromkeys(dots, (30.0, 12.0)), within)
+    for name, box in boxes.items():
+        assert overlap(box, within) == 30 * 12
+        assert not any(overlap(box, other) for key, other in boxes.items() if key != name)
+        assert not any(box[0] < x < box[2] and box[1] < y < box[3] for x, y in dots.values())
+    crowded = place_labels(dict.fromkeys("ab", (5.0, 5.0)), dict.fromkeys("ab", (30.0, 12.0)), (0, 0, 40, 14))
+    assert set(crowded) == {"a", "b"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ import pytest
 import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
+from fba_player.gl.context import import_moderngl
+from fba_player.gl.renderer import Renderer
 from fba_player.scene.scene import Scene
 from fba_player.window._window import Window
 from fba_player.window.play import play
@@ -50,6 +53,38 @@ def test_it_shows_the_face_and_the_timeline(window: Window) -> None:
     assert (picture[150:240, 290:350, 0] - picture[150:240, 290:350, 2]).mean() > 25  # skin
     assert picture[370:].mean() < picture[:120, :100].mean() - 40  # the bar is darker than the studio
     assert (picture[370:].min(axis=2) > 200).sum() > 60  # text, signs
+
+
+def test_something_is_shown_before_anything_is_prepared(
+    on_display: str, talking: Animation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Compiling shaders takes a second, in which the window was black."""
+    done: list[np.ndarray | str] = []
+    made: list[Any] = []
+    swap = glfw.swap_buffers
+
+    class Late(Renderer):
+        def __init__(self, context: Any) -> None:
+            done.append("prepared")
+            super().__init__(context)
+
+    def swapped(window: Any) -> None:
+        data = made[-1].screen.read((0, 0, 640, 480), components=3)
+        done.append(np.frombuffer(data, np.uint8).reshape(480, 640, 3))
+        swap(window)
+
+    monkeypatch.setattr(glfw, "swap_buffers", swapped)
+    monkeypatch.setattr("fba_player.window._window.Renderer", Late)
+    moderngl = import_moderngl()
+    create = moderngl.create_context
+    monkeypatch.setattr(moderngl, "create_context", lambda **how: made.append(create(**how)) or made[-1])
+    with opened(talking, tmp_path, panels=False):
+        first, then = done[:2]
+    assert then == "prepared"
+    assert isinstance(first, np.ndarray)
+    assert 100 < np.median(first) < 150  # the grey of the studio
+    assert (first[220:260].min(axis=2) > 200).sum() > 60  # letters in the middle
+    assert not (first[:200].min(axis=2) > 200).any()
 
 
 def test_the_plain_one_shows_the_face_and_the_timeline(plain: Window) -> None:

@@ -19,6 +19,7 @@ from fba.face.authoring.regions._lid_clearance import (
     push_edges_outside,
     push_vertices_outside,
 )
+from fba.face.authoring.regions._painted_lids import painted_width
 from fba.face.authoring.regions.eye_opening import CLOSED, LIDS, Opening, measure_opening, slide_lid
 from fba.face.authoring.regions.eyes import Eye
 from fba.face.authoring.surface.attached_parts import hair_roots
@@ -49,7 +50,9 @@ AT_CREASE = 0.25
 ENDS = 3.5
 """Multiple of the crease's distance beyond which the skin does not move."""
 EDGE = 0.4
-"""Share of the distance to the crease up to which the lid's edge moves as one."""
+"""Share of the distance to the crease up to which the lid's edge moves as one..."""
+MOST_EDGE = 0.8
+"""... and up to which it does at most where lashes or a liner are painted on it: only bare skin stretches."""
 FURTHER = 0.2
 """Share by which the front edge of a lid may move further than the margin."""
 OWN_SIDE = 0.6
@@ -103,7 +106,7 @@ def lid_motion(
     if sculpted is not None and follows:
         sculptors = limiter.without(_folded_vertices(limiter, sculpted))
     if share is None:
-        share = _share(marks, opening, eye, lid, own, other)
+        share = _share(marks, opening, eye, lid, own, other, parts)
     vertices = np.flatnonzero(share > 0)
     points = marks.surface.vertices[vertices]
     values = lid_values(fap)
@@ -191,11 +194,20 @@ def _other(lid: str) -> str:
     return "lower" if lid == "upper" else "upper"
 
 
-def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, other: Intp) -> Float64:
+def _share(
+    marks: Landmarks,
+    opening: Opening,
+    eye: Eye,
+    lid: str,
+    own: Intp,
+    other: Intp,
+    parts: Sequence[Part],
+) -> Float64:
     """(N,) share of the margin's motion at each vertex of a column.
 
     1 on the lid's edge, a quarter at the crease, 0 well before the brow; towards the corners, where the
-    crease is closer, within a shorter distance.
+    crease is closer, within a shorter distance. parts: of the face; what is painted on their skin widens the
+    edge, as it would be drawn out over the eye otherwise.
     """
     surface, es, side = marks.surface, marks.fapu.ES * 1024, eye.side
     stays = np.setdiff1d(other, own)
@@ -207,7 +219,12 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, ot
     gap = np.maximum(opening.upper[:, 0] - opening.lower[:, 0], 0.0)
     high = np.interp(surface.vertices[:, 0], opening.x, gap / gap.max())
     end = max(min(ENDS, 0.85 * float(away[still].min(initial=np.inf)) / crease), EDGE + 0.3)
-    folds = away / (crease * (NARROW + (1 - NARROW) * high))
+    painted = painted_width(marks, opening, eye, lid, parts, crease)
+    near = np.maximum(crease * (NARROW + (1 - NARROW) * high), painted / MOST_EDGE)
+    edge = np.maximum(painted / near, EDGE)
+    folds = away / near
+    inner = np.where(folds < edge, folds * EDGE / edge, EDGE + (folds - edge) * (1 - EDGE) / (1 - edge))
+    folds = np.where(folds < 1, inner, folds)
     power = np.log(AT_CREASE) / np.log(1 - (1 - EDGE) / (end - EDGE)) if end > 1 + EDGE else 2.0
     share = np.clip((end - np.maximum(folds, EDGE)) / (end - EDGE), 0.0, 1.0) ** power
     overhang = _overhang(surface.vertices, opening, eye, lid, gap.max())
@@ -219,6 +236,7 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, ot
     pinned = surface.mask(np.concatenate([own, stays]))
     share[own] = 1.0
     share[stays] = 0.0
+    pinned |= (away < painted) & (opposite > away)
     share = np.where(pinned, share, average_with_neighbours(surface, share, SMOOTHINGS))
     return trim_small(share, HEM)
 

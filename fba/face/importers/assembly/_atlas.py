@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, UInt8
 from fba.face.model import Part
-from fba.limits import DEFAULT_LIMITS
+from fba.mesh.pictures import read_pixels
 
 LARGEST = 4096
 """Pixels, each way, of the largest picture that is made."""
@@ -93,7 +93,7 @@ def _tile(texture: bytes, texcoords: Sequence[Float32], most: int) -> _Tile | No
         return None
     low = np.min([each.min(axis=0) for each in texcoords], axis=0).astype(np.float64)
     high = np.max([each.max(axis=0) for each in texcoords], axis=0).astype(np.float64)
-    pixels = _pixels(texture, most / max(float((high - low).max()), 1e-3))
+    pixels = read_pixels(texture, most / max(float((high - low).max()), 1e-3))
     if pixels is None or ((high - low) > REPEATS).any():
         return None
     height, width = pixels.shape[:2]
@@ -102,24 +102,6 @@ def _tile(texture: bytes, texcoords: Sequence[Float32], most: int) -> _Tile | No
     last = np.maximum(np.ceil(high * scale).astype(np.int64), first + 1)
     rows, columns = np.arange(first[1], last[1]) % height, np.arange(first[0], last[0]) % width
     return _Tile(first / scale, (last - first) / scale, pixels[rows[:, None], columns])
-
-
-def _pixels(texture: bytes, most: float) -> UInt8 | None:
-    """uint8 (H, W, 4) of a picture, at most so many each way; None where it cannot be read."""
-    from PIL import Image
-
-    try:
-        with Image.open(io.BytesIO(texture), formats=("PNG", "JPEG", "WEBP")) as image:
-            if image.width * image.height > DEFAULT_LIMITS.pixels:
-                return None
-            factor = min(most / max(image.size), 1.0)
-            whole: Image.Image = image.convert("RGBA")
-            if factor < 1:
-                size = max(int(image.width * factor), 1), max(int(image.height * factor), 1)
-                whole = whole.resize(size, Image.Resampling.LANCZOS)
-            return np.asarray(whole)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
-        return None
 
 
 def _encode(pixels: UInt8) -> bytes:

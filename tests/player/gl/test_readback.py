@@ -1,0 +1,41 @@
+"""Pictures read back while the card goes on drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import graphics
+from fba_player.gl.context import offscreen_context
+from fba_player.gl.readback import Readback
+from fba_player.session.captures import read_pixels
+
+
+@pytest.fixture
+def context() -> Iterator[Any]:
+    if (reason := graphics.missing_opengl()) is not None:
+        graphics.skip(reason)
+    made = offscreen_context()
+    with made:
+        yield made
+    made.release()
+
+
+def test_what_is_fetched_is_what_was_there_when_reading_began(context: Any) -> None:
+    readback = Readback(context)
+    for size in ((6, 4), (6, 4), (3, 5)):
+        screen = context.framebuffer([context.renderbuffer(size, 4)])
+        screen.clear(0.2, 0.4, 0.6, 1.0)
+        screen.clear(1.0, 0.0, 0.0, 1.0, viewport=(0, 0, 2, 1))  # at the bottom
+        expected = read_pixels(screen, size).copy()
+        fetch = readback.start(screen, size)
+        screen.clear(0.0, 0.0, 0.0, 0.0)  # the next picture
+        pixels = fetch()
+        np.testing.assert_array_equal(pixels, expected)
+        assert pixels.shape == (size[1], size[0], 4)
+        assert pixels[-1, 0, 0] == 255
+    readback.close()
+    readback.close()
