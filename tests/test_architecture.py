@@ -61,7 +61,6 @@ fba.body.gait
 fba.body.importers
 fba.planning
 fba.planning.rate
-fba.study
 fba.capture.markers
 fba.capture.virtual_markers
 fba.capture.motion
