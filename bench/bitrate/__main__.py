@@ -25,7 +25,6 @@ from bench.bitrate.page import picture_names
 from bench.bitrate.rivals import missing_packages
 from fba.cli import options
 from fba.cli.clamped_values import bring_near
-from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, read_input
 from fba.cli.outputs import Output, Outputs
 from fba.errors import FbaError
@@ -42,12 +41,8 @@ PAGE = "bitrate.md"
 
 @click.command(
     "bitrate",
-    cls=Command,
-    epilog=examples(
-        "./dev bitrate --summary",
-        "./dev bitrate talk.fba walk.bvh -o study",
-        "./dev bitrate --results study/results.csv --summary",
-    ),
+    epilog="Examples: ./dev bitrate --summary; ./dev bitrate talk.fba walk.bvh -o study; "
+    "./dev bitrate --results study/results.csv --summary",
 )
 @click.argument("files", metavar="[FILE...]", nargs=-1, type=EXISTING)
 @click.option(
@@ -126,11 +121,8 @@ def _measure(
         click.echo(f"fba: {package} is not installed, so its rows are left out: {EXTRA}", err=True)
     subjects: list[Subject] = []
     paths = list(files) or [Path(str(package_files("fba") / "samples" / name)) for name in SAMPLES]
-    each = EachFile(paths)
     for path in paths:
-        with each.file(path):
-            subjects += _subjects_of(path, only, bap_steps, limits)
-    each.finish()
+        subjects += _subjects_of(path, only, bap_steps, limits)
     return measure(title, subjects, lambda line: click.echo(f"fba: {line}", err=True))
 
 
