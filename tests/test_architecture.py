@@ -27,6 +27,7 @@ MOST_FILES = 20
 
 _FLOORS = """
 fba.arrays
+fba.geometry
 fba.parameters
 fba
 fba.mesh
