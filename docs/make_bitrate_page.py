@@ -1,18 +1,18 @@
 """Makes docs/bitrate.md and its pictures from bench/results: `python docs/make_bitrate_page.py`.
 
-Needs matplotlib. `fba bench bitrate` measured the results; the words are in bench/results/page.md.
+Needs matplotlib. `./dev bitrate` measured the results; the words are in bench/results/page.md.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from fba.study import Result, make_pictures, read_results, summary_lines
-from fba.study.choices import OWN, best_within, compare, group_results, rivals_of, smallest_live, together
-from fba.study.page import make_section, method_text
-from fba.study.points import KNOWN, UNPLANNED
-from fba.study.summary import LIMITS, subjects_text
-from fba.study.tables import comparison_table, error_text, published_table, rate_text, settings_table
+from bench.bitrate import Result, make_pictures, read_results, summary_lines
+from bench.bitrate.choices import OWN, best_within, compare, group_results, rivals_of, smallest_live, together
+from bench.bitrate.page import make_section, method_text
+from bench.bitrate.points import KNOWN, UNPLANNED
+from bench.bitrate.summary import LIMITS, subjects_text
+from bench.bitrate.tables import comparison_table, error_text, published_table, rate_text, settings_table
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "bench" / "results"

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from fba import persona as persona
     from fba import planning as planning
     from fba import player as player
-    from fba import study as study
     from fba.animation import Animation, BodyTrack, FaceTrack, Frame
     from fba.codec import Decoder, Encoder, EncoderOptions, StreamInfo, decode
     from fba.errors import (
@@ -72,7 +71,7 @@ _MODULE_OF = {
 }
 _MODULES = (
     "body", "capture", "codec", "emotion", "face", "formats", "live", "parameters", "persona", "planning",
-    "player", "study",
+    "player",
 )  # fmt: skip
 
 __all__ = [

@@ -27,6 +27,7 @@ MOST_FILES = 20
 
 _FLOORS = """
 fba.arrays
+fba.geometry
 fba.parameters
 fba
 fba.mesh
@@ -61,7 +62,6 @@ fba.body.gait
 fba.body.importers
 fba.planning
 fba.planning.rate
-fba.study
 fba.capture.markers
 fba.capture.virtual_markers
 fba.capture.motion

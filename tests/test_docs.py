@@ -56,7 +56,7 @@ ILLUSTRATIONS = {
         'pip install ".[player]"',
     ): "makes an environment, as .ci/run does",
     ("CONTRIBUTING.md", "./dev setup"): CHECKOUT,
-    ("docs/bitrate.md", "pip install '.[study]'"): "installs packages, and measures for a minute",
+    ("docs/bitrate.md", "./dev bitrate -o study"): "measures for a minute; tests/bitrate runs the command",
     ("docs/capture-live.md", "fba capture livelink --play -o face.fba"): WINDOW,
     ("docs/capture-live.md", "fba capture livelink -o face.fba"): SENT,
     ("docs/capture-live.md", "fba capture livelink -o face.fba --bitrate 3000 --buffer 1s"): SENT,

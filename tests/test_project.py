@@ -60,7 +60,16 @@ def test_no_two_test_files_have_the_same_name() -> None:
     assert sorted(name for name in set(names) if names.count(name) > 1) == []
 
 
-@pytest.mark.parametrize(("script", "shell"), [("dev", "sh"), (".ci/run", "bash")])
+STAGES = [
+    f".ci/stages/{path.name}"
+    for path in sorted((ROOT / ".ci" / "stages").iterdir())
+    if not path.suffix and path.name != "common"
+]
+
+
+@pytest.mark.parametrize(
+    ("script", "shell"), [("dev", "sh"), (".ci/run", "bash"), *((name, "bash") for name in STAGES)]
+)
 def test_script_runs_as_it_is(script: str, shell: str) -> None:
     path = ROOT / script
     assert os.access(path, os.X_OK)
@@ -79,11 +88,13 @@ def test_ci_leaves_to_the_coverage_what_that_runs() -> None:
     assert all((ROOT / "tests" / room).is_dir() for room in left_out)
 
 
-@pytest.mark.parametrize("script", ["dev", ".ci/run"])
+@pytest.mark.parametrize("script", ["dev", ".ci/run", *STAGES])
 def test_shellcheck_is_content(script: str) -> None:
     if shutil.which("shellcheck") is None:
         pytest.skip("no shellcheck here")
-    done = subprocess.run(["shellcheck", ROOT / script], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["shellcheck", "-x", "-P", ROOT, ROOT / script], capture_output=True, text=True, check=False
+    )
     assert done.stdout == ""
 
 
@@ -134,7 +145,6 @@ def test_rooms_are_imported_where_they_are_first_used() -> None:
         "persona.learn",
         "planning.encode_planned",
         "live.Capture",
-        "study.__doc__",
         "body.BodyModel",
     ):
         subprocess.run([sys.executable, "-c", f"import fba; fba.{use}"], cwd=ROOT, check=True)

@@ -21,6 +21,7 @@ from fba.capture import _standing as standing
 from fba.capture._rest_alignment import bones
 from fba.capture._spine import joints as spine_joints
 from fba.capture.motion import SkeletonMotion
+from fba.geometry import nearest_rotation
 
 FRAMES = 400
 """Frames that are looked at."""
@@ -400,6 +401,4 @@ def _other_axes(axes: Float64, direction: Float64, others: Float64) -> Float64 |
 def mean_turn(turned: Float64, above: int, joint: int, rows: Intp) -> Float64:
     """Return the mean (3, 3) of a joint's rotation relative to another."""
     relative = np.swapaxes(turned[rows, above], 1, 2) @ turned[rows, joint]
-    u, _, vt = np.linalg.svd(relative.sum(axis=0))
-    result: Float64 = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
-    return result
+    return nearest_rotation(relative.sum(axis=0))

@@ -32,7 +32,7 @@ _COMMANDS = {
     "verify": "Check FBA streams for damage, and compute digests of their values.",
     "stats": "Show where the bits of FBA streams go.",
     "conformance": "Check this codec, or another program, against test vectors.",
-    "bench": "Measure the speed of this codec on a stream, and what bit rates others need.",
+    "bench": "Measure the speed of this codec on a stream.",
     "gait": "Generate a walk by stride and character, or find the steps in one.",
     "express": "Show expressions: named ones, mixtures, points of the plane of emotions.",
     "emote": "Play a performance in a mood: angry, surprised, sad, sleepy, happy and others.",

@@ -10,6 +10,7 @@ import numpy as np
 from fba.arrays import Float64, Floating
 from fba.face.feature_points import row_of
 from fba.face.points import EYEBALL_PER_IRIS
+from fba.geometry import principal_axes
 
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
@@ -78,8 +79,7 @@ def flat_width(part: Part) -> float | None:
     vertices = np.unique(part.vertices.astype(np.float64), axis=0)
     if len(vertices) < FEWEST_VERTICES:
         return None
-    arms = vertices - vertices.mean(axis=0)
-    extents = np.ptp(arms @ np.linalg.svd(arms, full_matrices=False)[2].T, axis=0)
+    extents = np.ptp(vertices @ principal_axes(vertices)[0].T, axis=0)
     return float(extents.max()) if extents[2] < FLAT * extents.max() else None
 
 

@@ -1,4 +1,4 @@
-"""Decision constants and rules of the codec: each has a test here that dies with it (see tools/mutate.py)."""
+"""Decision constants and rules of the codec: each has a test here that dies with it."""
 
 from __future__ import annotations
 

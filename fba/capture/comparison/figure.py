@@ -12,6 +12,7 @@ from fba.arrays import Array, Float64
 from fba.body import BapSolver
 from fba.body.skeleton import ROOT
 from fba.capture.motion import SkeletonMotion, read_axis
+from fba.geometry import nearest_rotation
 
 SIDES = ("l", "r")
 FINGERS = ("index", "middle", "ring", "pinky")
@@ -160,9 +161,7 @@ def degrees_turned(turns: Float64) -> Float64:
 
 def mean_rotation(turns: Float64) -> Float64:
     """Return the rotation (3, 3) nearest to the mean of rotations (T, 3, 3)."""
-    u, _, v = np.linalg.svd(turns.mean(axis=0))
-    result: Float64 = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
-    return result
+    return nearest_rotation(turns.mean(axis=0))
 
 
 def _ends(motion: SkeletonMotion, joint: int, frames: Float64, metres: float) -> list[Float64]:

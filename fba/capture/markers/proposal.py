@@ -6,6 +6,8 @@ marker is, and markers near a feature point get it.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fba.arrays import Float64
@@ -14,6 +16,7 @@ from fba.capture.markers.registration import FACTORS, GIVE_MAP, SIZES
 from fba.capture.markers.targets import HEAD, PUPILS, target_points
 from fba.errors import ModelError
 from fba.face import FaceModel
+from fba.geometry import fit_similarity
 from fba.rotations import axis_matrices
 
 FEWEST = 12
@@ -146,16 +149,10 @@ def _fit(
     for _ in range(rounds):
         distance, nearest = tree.query(laid)
         weight = 1 / (1 + (distance / (2 * max(float(np.median(distance)), 1e-4))) ** 2)
-        total = weight.sum()
-        there = skin[nearest]
-        a, b = weight @ laid / total, weight @ there / total
-        left, values, right = np.linalg.svd((weight[:, None] * (there - b)).T @ (laid - a))
-        sign = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right)) or 1.0])
-        rotation = (left * sign) @ right
-        scale = float((values * sign).sum() / (weight @ ((laid - a) ** 2).sum(axis=1)))
-        scale = float(np.clip(scale, SIZES[0] / size, SIZES[1] / size))
-        size *= scale
-        laid = scale * (laid - a) @ rotation.T + b
+        fit = fit_similarity(laid, skin[nearest], weight)
+        scale = np.clip(fit.scale, SIZES[0] / size, SIZES[1] / size)
+        size *= float(scale)
+        laid = replace(fit, scale=scale).apply(laid)
     distance, _ = tree.query(laid)
     back, _ = cKDTree(laid).query(key)
     # features of the face must have markers near them: a smooth surface alone fits in many places

@@ -11,6 +11,7 @@ from fba.arrays import Bool, Float64
 from fba.capture.markers.targets import target_points
 from fba.errors import ModelError, Remedy
 from fba.face.feature_points import MIRRORED, row_of
+from fba.geometry import fit_similarity, principal_axes
 
 SIZES = (0.6, 1.6)
 """Sizes of a face that are believed, relative to the adult's whose points are known."""
@@ -78,7 +79,7 @@ def register(
     found = neutral[rows]
     there = np.array([places[markers[names[n]]] for n in rows])
     labels = [names[n] for n in rows]
-    spread = np.linalg.svd(found - found.mean(axis=0), compute_uv=False)
+    _, spread = principal_axes(found)
     if not spread[1] > LEAST_SPREAD * spread[0]:
         raise ModelError("the markers of the face are all on one line, or in one place")
     mirrored = False
@@ -101,14 +102,8 @@ def register(
 
 def _align(found: Float64, there: Float64) -> tuple[Float64, float, float]:
     """Return rotation (3, 3), root mean square error in the template's metres, and scale of the best fit."""
-    a, b = found - found.mean(axis=0), there - there.mean(axis=0)
-    left, singular, right = np.linalg.svd(b.T @ a)
-    sign = np.sign(np.linalg.det(left @ right)) or 1.0
-    fixed = np.array([1.0, 1.0, sign])
-    rotation = (left * fixed) @ right
-    scale = float((singular * fixed).sum() / (a**2).sum())
-    error = float(np.sqrt(((scale * a @ rotation.T - b) ** 2).sum(axis=1).mean()))
-    return rotation, error, scale
+    fit = fit_similarity(found, there)
+    return fit.rotation, float(fit.error), float(fit.scale)
 
 
 def _find_swaps(labels: list[str], found: Float64, there: Float64) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Bool, Float64
 from fba.errors import ModelError
+from fba.geometry import nearest_rotation, principal_axes
 
 PASSES = 4
 """Fits, each with less weight for markers that the one before left far off."""
@@ -40,10 +41,7 @@ def fit_poses(reference: Float64, positions: Float64) -> tuple[Float64, Float64,
         there = np.einsum("tk,tkc->tc", weights, known) / total[:, None]
         spread = np.einsum("tk,tkc,kd->tcd", weights, known, body)
         spread -= total[:, None, None] * there[:, :, None] * own[:, None, :]
-        left_axes, _, right_axes = np.linalg.svd(spread)
-        mirrored = np.linalg.det(left_axes @ right_axes) < 0
-        left_axes[mirrored, :, 2] *= -1
-        rotation = left_axes @ right_axes
+        rotation = nearest_rotation(spread)
         shift = there - np.einsum("tcd,td->tc", rotation, own)
         off = known - np.einsum("tcd,kd->tkc", rotation, body) - shift[:, None]
         left = np.where(seen, np.sqrt((off**2).sum(axis=2)), np.nan)
@@ -98,9 +96,7 @@ def fill_poses(rotation: Float64, shift: Float64, times: Float64) -> tuple[Float
 
 def relate_poses(rotation: Float64, shift: Float64, rest: slice) -> tuple[Float64, Float64]:
     """Return poses relative to that of the neutral face, the mean over its frames."""
-    near = rotation[rest].sum(axis=0)
-    left, _, right = np.linalg.svd(near)
-    base = left @ right
+    base = nearest_rotation(rotation[rest].sum(axis=0))
     centre = shift[rest].mean(axis=0)
     turned = rotation @ base.T
     moved = shift - np.einsum("tcd,d->tc", turned, centre)
@@ -128,7 +124,7 @@ def _has_spread(points: Float64) -> bool:
     """Whether there are three points at least that are not on a line."""
     if len(points) < 3:
         return False
-    return bool(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1] > SPREAD)
+    return bool(principal_axes(points)[1][1] > SPREAD)
 
 
 def _median(values: Float64, seen: Bool) -> Float64:

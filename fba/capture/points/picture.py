@@ -10,6 +10,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture.points.poses import fit_poses
 from fba.errors import FbaWarning, ModelError, Remedy
+from fba.geometry import fit_similarity
 
 ASPECTS = {"16:9": 16 / 9, "4:3": 4 / 3, "1:1": 1.0, "3:4": 3 / 4, "9:16": 9 / 16}
 """Pictures that cameras take, width / height."""
@@ -80,13 +81,7 @@ def face_misfit(points: Float64, shape: Float64) -> float:
         poses = fit_poses(shape, points)
         off = (poses.project(shape) - points) / poses.scale[:, None, None]
         return float(np.median(np.linalg.norm(off, axis=2)))
-    middle, own = points.mean(axis=1, keepdims=True), shape - shape.mean(axis=0)
-    left, sizes, right = np.linalg.svd(np.einsum("tkc,kd->tcd", points - middle, own))
-    flip = np.ones_like(sizes)
-    flip[:, 2] = np.sign(np.linalg.det(left @ right))
-    back = np.einsum("tcd,tkc->tkd", (left * flip[:, None]) @ right, points - middle)
-    factor = (sizes * flip).sum(axis=1) / (back**2).sum(axis=(1, 2))
-    return float(np.median(np.linalg.norm(factor[:, None, None] * back - own, axis=2)))
+    return float(np.median(np.linalg.norm(fit_similarity(points, shape).apply(points) - shape, axis=2)))
 
 
 def _find_aspect(points: Float64, template: Float64) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64
+from fba.geometry import nearest_orthonormal
 
 PASSES = 8
 """Steps of the fit, each with less weight for points that the one before left far off."""
@@ -47,10 +48,10 @@ def fit_poses(shape: Float64, picture: Float64, trust: Float64 | None = None) ->
     centre = np.einsum("k,tkc->tc", own, picture) / own.sum()
     seen = (picture - centre[:, None]) * own[:, None]
     first, second = np.swapaxes(np.linalg.pinv(own[:, None] * body) @ seen, 1, 2).swapaxes(0, 1)
-    left, sizes, right = np.linalg.svd(np.stack([first, second], axis=1), full_matrices=False)
-    rows = left @ right
+    both = np.stack([first, second], axis=1)
+    rows = nearest_orthonormal(both)
     rotation = np.concatenate([rows, np.cross(rows[:, 0], rows[:, 1])[:, None]], axis=1)
-    scale = sizes.mean(axis=1)
+    scale = np.einsum("tij,tij->t", rows, both) / 2
     weights = np.broadcast_to(own, picture.shape[:2])
     shift = centre
     for _ in range(PASSES):

@@ -8,6 +8,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.errors import ModelError
+from fba.geometry import principal_axes
 
 FEWEST = 3
 SPREAD = 0.02
@@ -53,7 +54,7 @@ def align(points: Float64, places: Float64) -> Alignment:
             f"{len(points)} markers with a vertex cannot be laid onto a head: {FEWEST} at least are needed"
         )
     for what, cloud in (("markers", points), ("vertices of the virtual markers", places)):
-        spread = np.linalg.svd(cloud - cloud.mean(axis=0), compute_uv=False)
+        _, spread = principal_axes(cloud)
         if not spread[1] > SPREAD * spread[0]:
             raise ModelError(f"the {what} are all on one line, or in one place")
     plain = _fit(points, places, np.ones(3))

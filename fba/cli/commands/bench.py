@@ -1,4 +1,4 @@
-"""`fba bench`: measures the speed of this codec on a stream; `fba bench bitrate`, the bit rates of files."""
+"""`fba bench`: measures the speed of this codec on a stream."""
 
 from __future__ import annotations
 
@@ -10,68 +10,19 @@ from typing import Any
 import click
 
 from fba.cli import options, step_tables
-from fba.cli.command import EachFile, Group, examples
+from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, input_file
 from fba.cli.printing import print_json
-from fba.cli.subcommands import bench_bitrate
 from fba.limits import Limits
 
-SPEED = "speed"
 
-
-class _Bench(Group):
-    """Subcommands, of which the one that measures speed needs no name: `fba bench talk.fba`."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        if not args or (args[0].startswith("-") and args[0] not in ctx.help_option_names):
-            args = [SPEED, *args]
-        return super().parse_args(ctx, args)
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        return super().resolve_command(ctx, args if args[0] in self.commands else [SPEED, *args])
-
-    def format_usage(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        formatter.write_usage(ctx.command_path, "[OPTIONS] FILE.fba...")
-        formatter.write_usage(
-            f"{ctx.command_path} {bench_bitrate.command.name}", "[OPTIONS] [FILE...]", "       "
-        )
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Show the options of the command that needs no name, and the other one."""
-        _speed.format_options(ctx, formatter)
-        with formatter.section("Commands"):
-            formatter.write_dl(
-                [(str(one.name), one.get_short_help_str(100)) for one in self.commands.values()]
-            )
-
-
-@click.group(
-    cls=_Bench,
-    epilog=examples(
-        "fba bench talk.fba",
-        "fba bench talk.fba --rounds 20 --json",
-        "fba bench bitrate talk.fba walk.bvh -o study",
-    ),
-)
-def command() -> None:
-    """Measure decoding and encoding of streams on one core: medians over several rounds.
-
-    `fba bench bitrate` measures bit rates and errors instead, beside those of other ways to send the same.
-    """
-
-
-command.add_command(bench_bitrate.command)
-
-
-@command.command(SPEED, epilog=examples("fba bench talk.fba", "fba bench talk.fba --rounds 20 --json"))
+@click.command(cls=Command, epilog=examples("fba bench talk.fba", "fba bench talk.fba --rounds 20 --json"))
 @click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=EXISTING)
 @click.option("--rounds", type=click.IntRange(1, 1000), default=9, show_default=True)
 @options.bap_steps_option
 @options.json_option
 @options.limit_option
-def _speed(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool, limit: Limits) -> None:
+def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool, limit: Limits) -> None:
     """Measure decoding and encoding of streams on one core: medians over several rounds.
 
     A symbol is one coded value of one plane. The source's bench/ folder compares the codec with a textbook's.

@@ -1,1 +1,1 @@
-"""Commands below a command, such as `fba bench bitrate`; the commands themselves import them."""
+"""Commands below a command, such as `fba model learn-fit`; the commands themselves import them."""

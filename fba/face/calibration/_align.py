@@ -10,6 +10,7 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
+from fba.geometry import nearest_rotation, principal_axes
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of length of files, in metres."""
@@ -53,7 +54,7 @@ def align(given: Float64, reference: Float64, *, unit: str | float | None = None
     known = known_rows(given, reference)
     _check(given, known)
     here, there = given[known], reference[known]
-    flatness = [spread[2] / spread[0] for spread in (_spread(here), _spread(there))]
+    flatness = [spread[2] / spread[0] for _, spread in (principal_axes(here), principal_axes(there))]
     flat = bool(flatness[0] < FLAT and flatness[1] > 2 * FLAT)
     if flat:
         rotation, mirrored = _find_flat_pose(here, there), False
@@ -87,18 +88,13 @@ def _check(given: Float64, known: Bool) -> None:
             f"only {int(known.sum())} feature points are known to both the person and the face "
             f"({', '.join(np.array(names())[known]) or 'none'}); at least {FEWEST_POINTS} are needed"
         )
-    spread = _spread(given[known])
+    _, spread = principal_axes(given[known])
     if not spread[0] > 0 or not np.isfinite(spread).all() or spread[1] < 1e-4 * spread[0]:
         fault = "lie on one line" if spread[0] > 0 else "coincide"
         raise ModelError(
             f"the {int(known.sum())} feature points {', '.join(np.array(names())[known][:6])} ... "
             f"{fault}: these are not the points of a face"
         )
-
-
-def _spread(points: Float64) -> Float64:
-    """(3,) extent of points (N, 3) along their principal axes, the largest first."""
-    return np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
 
 
 def _find_pose(here: Float64, there: Float64) -> tuple[Float64, bool]:
@@ -120,9 +116,7 @@ def _rotation(here: Float64, there: Float64, handed: float) -> tuple[Float64, fl
     for _ in range(30):
         share = weight / weight.sum()
         a, b = here - share @ here, there - share @ there
-        u, _, vt = np.linalg.svd((b * share[:, None]).T @ a)
-        flip = np.diag([1.0, 1.0, handed * np.sign(np.linalg.det(u @ vt)) or 1.0])
-        matrix = u @ flip @ vt
+        matrix = nearest_rotation((b * share[:, None]).T @ a, handed=handed)
         turned = a @ matrix.T
         size = float((share @ (turned * b).sum(axis=1)) / (share @ (a**2).sum(axis=1)))
         away = np.linalg.norm(turned * size - b, axis=1)
@@ -140,7 +134,7 @@ def _robust_weights(errors: Float64, points: Float64) -> Float64:
 
 def _find_flat_pose(here: Float64, there: Float64) -> Float64:
     """(3, 3) rotation of points in a plane onto the model seen from the front, the better side forward."""
-    _, _, axes = np.linalg.svd(here - here.mean(axis=0), full_matrices=True)
+    axes, _ = principal_axes(here)
     axes[2] = np.cross(axes[0], axes[1])
     flat = (here - here.mean(axis=0)) @ axes.T
     poses = []

@@ -9,6 +9,7 @@ import numpy as np
 
 from fba.arrays import Float64, Floating, Integer, Intp
 from fba.face.feature_points import names
+from fba.geometry import nearest_orthonormal
 from fba.mesh.meshes import vertex_normals
 
 WELL_KNOWN = 0.02
@@ -47,9 +48,7 @@ class Field:
 
     def rotations(self, points: Floating) -> Float64:
         """(N, 3, 3) rotation of the deformation at each point, without its stretch."""
-        u, _, vt = np.linalg.svd(self.jacobians(points))
-        rotations: Float64 = u @ vt
-        return rotations
+        return nearest_orthonormal(self.jacobians(points))
 
     def jacobians(self, points: Floating) -> Float64:
         """(N, 3, 3) Jacobian of the deformation at each point, by central differences."""

@@ -11,6 +11,7 @@ from fba.face.checks._findings import Finding
 from fba.face.checks.posing import Poser
 from fba.face.model import Part
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, OPEN_JAW, TONGUE_ROLL
+from fba.geometry import nearest_rotation
 from fba.parameters import faps
 from fba.rotations import cross, dot, lengths
 
@@ -132,6 +133,4 @@ def _facing(normals: Float64, triangles: Integer, count: int) -> Float64:
 def _moved_rigidly(before: Float64, after: Float64) -> bool:
     """Whether the vertices moved as a rigid body, which harms no triangle."""
     a, b = before - before.mean(axis=0), after - after.mean(axis=0)
-    left, _, right = np.linalg.svd(a.T @ b)
-    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    return bool(np.abs(a @ left @ flip @ right - b).max() < 1e-4 * max(float(np.ptp(a)), 1e-9))
+    return bool(np.abs(a @ nearest_rotation(a.T @ b) - b).max() < 1e-4 * max(float(np.ptp(a)), 1e-9))

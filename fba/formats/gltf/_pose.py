@@ -9,7 +9,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from fba import rotations
+from fba import geometry, rotations
 from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.gltf import Channel, Gltf
@@ -182,13 +182,9 @@ def sample(channel: Channel, times: Float64) -> Float64:
 
 def nearest_rotation(matrices: Float64) -> Float64:
     """Return the rotations (..., 3, 3) closest to matrices that also scale; ModelError for singular ones."""
-    u, s, v = np.linalg.svd(matrices)
-    if (s[..., -1] <= 1e-9 * np.maximum(s[..., 0], 1e-300)).any():
+    if (np.linalg.cond(matrices) >= 1e9).any():
         raise ModelError("a joint has a scale of 0, so its rotation is unknown")
-    sign = np.sign(np.linalg.det(u @ v))
-    u[..., :, -1] *= sign[..., None]
-    result: Float64 = u @ v
-    return result
+    return geometry.nearest_rotation(matrices)
 
 
 def _normalize(values: Float64) -> Float64:

@@ -11,6 +11,7 @@ from fba.arrays import Float32, Float64, Intp
 from fba.compiled import compiled
 from fba.face.eyeball import flat_width
 from fba.face.model import FaceModel, Part, point_row
+from fba.geometry import fit_similarity
 from fba_player.view.view import Eye
 
 ROUND = 0.03
@@ -47,7 +48,7 @@ class Eyeball:
         moved = part.take(self.rows, axis=0).astype(np.float64)
         turn, centre = _fit_motion(self.neutral, moved, self.centre)
         if not np.isfinite(turn).all():  # the samples lie in a plane
-            turn = _fit_rotation(self.neutral - self.neutral.mean(axis=0), moved - moved.mean(axis=0))
+            turn = fit_similarity(self.neutral, moved).rotation
             centre = moved.mean(axis=0) + turn @ (self.centre - self.neutral.mean(axis=0))
         frame = np.eye(4)
         frame[:3, :3] = turn * self.radius
@@ -152,11 +153,3 @@ def _fit_motion(before: Float64, after: Float64, centre: Float64) -> tuple[Float
         for k in range(3):
             image[j] += x[j, k] * (centre[k] - start[k])
     return x, image
-
-
-def _fit_rotation(before: Float64, after: Float64) -> Float64:
-    """The rotation (3, 3) that takes centred points (N, 3) best to others, by singular values."""
-    u, _, vt = np.linalg.svd(after.T @ before)
-    flip = np.diag([1.0, 1.0, np.linalg.det(u @ vt)])
-    rotation: Float64 = u @ flip @ vt
-    return rotation

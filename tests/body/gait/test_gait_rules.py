@@ -1,4 +1,4 @@
-"""Decision constants of the detection of steps: each has a test here that dies with it (tools/mutate.py)."""
+"""Decision constants of the detection of steps: each has a test here that dies with it."""
 
 from __future__ import annotations
 

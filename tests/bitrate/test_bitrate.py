@@ -13,11 +13,7 @@ import numpy as np
 import pytest
 
 import fba
-from fba import Animation, FaceTrack
-from fba.cli.main import main
-from fba.errors import FormatError, OptionError
-from fba.planning import LiveEncoder
-from fba.study import (
+from bench.bitrate import (
     Result,
     make_page,
     make_pictures,
@@ -27,7 +23,11 @@ from fba.study import (
     split_subjects,
     summary_lines,
 )
-from fba.study.points import UNPLANNED, Point, encode_live_at_rate, operating_points
+from bench.bitrate.__main__ import main
+from bench.bitrate.points import UNPLANNED, Point, encode_live_at_rate, operating_points
+from fba import Animation, FaceTrack
+from fba.errors import FormatError, OptionError
+from fba.planning import LiveEncoder
 
 SAMPLES = files("fba") / "samples"
 
@@ -115,7 +115,7 @@ def test_results_are_read_as_they_were_written(results: list[Result], tmp_path: 
         replace(one, max_mm=0, p99_mm=0, under=0, degrees=0) for one in results
     ]
     path.write_text("a,b\n1,2\n", encoding="utf-8")
-    with pytest.raises(FormatError, match="no results of `fba bench bitrate`"):
+    with pytest.raises(FormatError, match=r"no results of `\./dev bitrate`"):
         read_results(path)
     path.write_text(results_csv(results).replace(",12,", ",twelve,", 1), encoding="utf-8")
     with pytest.raises(FormatError, match=r"results.csv:2: "):
@@ -128,7 +128,7 @@ def test_the_command_writes_page_pictures_and_numbers(
     pytest.importorskip("matplotlib")
     path = tmp_path / "before.csv"
     path.write_text(results_csv(results), encoding="utf-8")
-    code, out, _ = run("bench", "bitrate", "--results", path, "-o", tmp_path / "study", "--summary")
+    code, out, _ = run("--results", path, "-o", tmp_path / "study", "--summary")
     assert code == 0
     assert out.splitlines() == summary_lines(read_results(path))
     made = {one.name: one.read_text(encoding="utf-8") for one in (tmp_path / "study").iterdir()}
@@ -138,7 +138,7 @@ def test_the_command_writes_page_pictures_and_numbers(
     assert (
         made["a-test-faces.svg"].encode() == make_pictures(read_results(path))["a-test-faces.svg"]
     )  # the same every time
-    code, _, err = run("bench", "bitrate", "--results", path, "-o", tmp_path / "study", "--no-clobber")
+    code, _, err = run("--results", path, "-o", tmp_path / "study", "--no-clobber")
     assert code == 1
     assert "results.csv" in err
 
@@ -147,20 +147,20 @@ def test_what_cannot_be_measured_is_said(
     tmp_path: Path, run: Callable[..., tuple[int, str, str]], short_face: Animation
 ) -> None:
     (tmp_path / "notes.txt").write_text("shopping list")
-    code, out, err = run("bench", "bitrate", tmp_path / "notes.txt")
+    code, out, err = run(tmp_path / "notes.txt")
     assert (code, out) == (1, "")
     assert "notes.txt" in err
     still = Animation(25, np.arange(3), FaceTrack.empty(3))
     fba.write(tmp_path / "still.fap", still)
-    code, out, err = run("bench", "bitrate", tmp_path / "still.fap")
+    code, out, err = run(tmp_path / "still.fap")
     assert (code, out) == (1, "")
     assert "still.fap: nothing moves; left out" in err
     assert "there is no face and no body to measure" in err
-    code, _, err = run("bench", "bitrate", tmp_path / "still.fap", "--results", tmp_path / "notes.txt")
+    code, _, err = run(tmp_path / "still.fap", "--results", tmp_path / "notes.txt")
     assert code == 2
     assert "not both" in err
     (tmp_path / "taken").write_text("a file")
-    code, _, err = run("bench", "bitrate", SAMPLES / "hello.fap", "-o", tmp_path / "taken")
+    code, _, err = run(SAMPLES / "hello.fap", "-o", tmp_path / "taken")
     assert code == 2
     with pytest.raises(OptionError, match="nothing moves"):
         measure("nothing", [])
@@ -173,26 +173,11 @@ def test_without_its_packages_the_study_says_how_to_get_them(
 ) -> None:
     for name in ("matplotlib", "zstandard", "brotli"):
         monkeypatch.setitem(sys.modules, name, None)  # as if it were not installed
-    with pytest.raises(OptionError, match=r"needs the package matplotlib.*\[study\]"):
+    with pytest.raises(OptionError, match=r"needs the package matplotlib.*\[bench\]"):
         make_pictures(results)
-    from fba.study.rivals import installed_rivals, missing_packages
+    from bench.bitrate.rivals import installed_rivals, missing_packages
 
     assert missing_packages() == ("zstandard", "brotli")
     assert {one.name.partition(",")[0] for one in installed_rivals()} == {
         "int16", "varints of differences", "deflate", "xz",
     }  # fmt: skip
-
-
-def test_bench_without_the_name_of_a_subcommand_measures_speed(
-    tmp_path: Path, run: Callable[..., tuple[int, str, str]], short_face: Animation
-) -> None:
-    (tmp_path / "bitrate").write_bytes(fba.encode(short_face))
-    code, out, _ = run("bench", "--rounds", 1, tmp_path / "bitrate")
-    assert code == 0
-    assert "12 frames" in out
-    code, out, _ = run("bench", tmp_path / "bitrate", "--rounds", 1)
-    assert code == 0
-    assert "12 frames" in out
-    code, _, err = run("bench")
-    assert code == 2
-    assert "Missing argument" in err

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fba.study.choices import Comparison, compare, own_points, rivals_of, together
-from fba.study.errors import THRESHOLDS
-from fba.study.published import published_rates
-from fba.study.results import ALL, EVERYTHING, SENT, Result
-from fba.study.subjects import FACE
+from bench.bitrate.choices import Comparison, compare, own_points, rivals_of, together
+from bench.bitrate.errors import THRESHOLDS
+from bench.bitrate.published import published_rates
+from bench.bitrate.results import ALL, EVERYTHING, SENT, Result
+from bench.bitrate.subjects import FACE
 
 ABSENT = "–"
 

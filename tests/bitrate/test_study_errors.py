@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.bitrate.errors import measure_errors
 from fba.face import FaceModel
-from fba.study.errors import measure_errors
 
 
 def test_a_root_that_is_elsewhere_moves_every_point_by_as_much() -> None:

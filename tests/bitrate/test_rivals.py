@@ -7,8 +7,8 @@ import zlib
 import numpy as np
 import pytest
 
-from fba.study import rivals
-from fba.study.rivals import RIVALS, encode_varints
+from bench.bitrate import rivals
+from bench.bitrate.rivals import RIVALS, encode_varints
 
 NUMBERS = np.array([[0, 5, -300], [1, 5, -300], [1, 5, 20000], [0, 4, 20000]], dtype=np.int64)
 

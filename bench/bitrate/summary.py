@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fba.study.choices import Comparison, best_within, compare, group_results
-from fba.study.results import Result
-from fba.study.subjects import BODY, FACE
-from fba.study.tables import error_text, rate_text
+from bench.bitrate.choices import Comparison, best_within, compare, group_results
+from bench.bitrate.results import Result
+from bench.bitrate.subjects import BODY, FACE
+from bench.bitrate.tables import error_text, rate_text
 
 HEADER = ("what", "error", "FBA live", "smallest other, live", "FBA file", "smallest other, file")
 LIMITS = {FACE: 0.5, BODY: 10.0}

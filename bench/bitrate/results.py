@@ -95,7 +95,7 @@ def read_results(path: Path) -> list[Result]:
     """Return the results of a CSV file; FormatError for one that `results_csv` did not write."""
     rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
     if not rows or tuple(rows[0]) != (*_NAMES, *_RATES):
-        raise FormatError("no results of `fba bench bitrate`: the header is another", path=path, line=1)
+        raise FormatError("no results of `./dev bitrate`: the header is another", path=path, line=1)
     return [_parse(dict(zip(_NAMES, row, strict=False)), path, line) for line, row in enumerate(rows[1:], 2)]
 
 

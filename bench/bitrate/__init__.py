@@ -3,11 +3,11 @@
 May use: planning, face, body, the codec; zstandard, brotli, meshopt and matplotlib where they are installed.
 """
 
-from fba.study.measurement import measure
-from fba.study.page import make_page, make_pictures
-from fba.study.results import Result, read_results, results_csv
-from fba.study.subjects import Subject, split_subjects
-from fba.study.summary import summary_lines
+from bench.bitrate.measurement import measure
+from bench.bitrate.page import make_page, make_pictures
+from bench.bitrate.results import Result, read_results, results_csv
+from bench.bitrate.subjects import Subject, split_subjects
+from bench.bitrate.summary import summary_lines
 
 __all__ = [
     "Result",

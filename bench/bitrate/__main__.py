@@ -1,24 +1,35 @@
-"""`fba bench bitrate`: what faces and bodies take as FBA, and in other ways, at the same error."""
+"""`./dev bitrate`: what faces and bodies take as FBA, and in other ways, at the same error."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from importlib.resources import files as package_files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from bench.bitrate import (
+    Result,
+    Subject,
+    make_page,
+    make_pictures,
+    read_results,
+    results_csv,
+    split_subjects,
+    summary_lines,
+)
+from bench.bitrate.measurement import measure
+from bench.bitrate.packages import EXTRA
+from bench.bitrate.page import picture_names
+from bench.bitrate.rivals import missing_packages
 from fba.cli import options
 from fba.cli.clamped_values import bring_near
-from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, read_input
 from fba.cli.outputs import Output, Outputs
+from fba.errors import FbaError
 from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO
-
-if TYPE_CHECKING:
-    from fba.study import Result, Subject
 
 SAMPLES = ("hello.fap", "talk.c3d", "hello.bvh")
 """What is measured where no file is given: it comes with fba."""
@@ -30,12 +41,8 @@ PAGE = "bitrate.md"
 
 @click.command(
     "bitrate",
-    cls=Command,
-    epilog=examples(
-        "fba bench bitrate --summary",
-        "fba bench bitrate talk.fba walk.bvh -o study",
-        "fba bench bitrate --results study/results.csv --summary",
-    ),
+    epilog="Examples: ./dev bitrate --summary; ./dev bitrate talk.fba walk.bvh -o study; "
+    "./dev bitrate --results study/results.csv --summary",
 )
 @click.argument("files", metavar="[FILE...]", nargs=-1, type=EXISTING)
 @click.option(
@@ -76,11 +83,8 @@ def command(
 
     FILE: streams, captures, any file with an animation; without one, the samples that come with fba. Each
     is coded by fba at many settings, and the same values by general-purpose compressors, as a file and live.
-    Takes about a second for each second of animation; needs the packages of the extra `study`.
+    Takes about a second for each second of animation; needs the packages of the extra `bench`.
     """
-    from fba.study import make_page, make_pictures, results_csv, summary_lines
-    from fba.study.page import picture_names
-
     if tables and files:
         raise click.UsageError("give files to measure or --results, not both")
     if not title:
@@ -106,8 +110,6 @@ def command(
 
 
 def _read_results(tables: Sequence[Path]) -> list[Result]:
-    from fba.study import read_results
-
     return [result for table in tables for result in read_results(table)]
 
 
@@ -115,26 +117,17 @@ def _measure(
     title: str, files: Sequence[Path], only: str | None, bap_steps: str, limits: Limits
 ) -> list[Result]:
     """Return the results of files, or of the samples. title: what they are."""
-    from fba.study.measurement import measure
-    from fba.study.packages import EXTRA
-    from fba.study.rivals import missing_packages
-
     for package in missing_packages():
         click.echo(f"fba: {package} is not installed, so its rows are left out: {EXTRA}", err=True)
     subjects: list[Subject] = []
     paths = list(files) or [Path(str(package_files("fba") / "samples" / name)) for name in SAMPLES]
-    each = EachFile(paths)
     for path in paths:
-        with each.file(path):
-            subjects += _subjects_of(path, only, bap_steps, limits)
-    each.finish()
+        subjects += _subjects_of(path, only, bap_steps, limits)
     return measure(title, subjects, lambda line: click.echo(f"fba: {line}", err=True))
 
 
 def _subjects_of(path: Path, only: str | None, bap_steps: str, limits: Limits) -> list[Subject]:
     """Return the face and the body of a file, if they move and are asked for."""
-    from fba.study import split_subjects
-
     tables: list[str] = []
     animation = read_input(path, bap_steps=bap_steps, limits=limits, tables=tables)
     steps = tables[0] if tables else FINE if bap_steps == BAP_STEPS_AUTO else bap_steps
@@ -144,3 +137,16 @@ def _subjects_of(path: Path, only: str | None, bap_steps: str, limits: Limits) -
     if not found:
         click.echo(f"fba: {path}: nothing moves; left out", err=True)
     return [one for one in found if only in (None, one.kind)]
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command and exit as `fba` does: 0 done, 1 bad data, 2 bad usage."""
+    try:
+        command.main(arguments, prog_name="./dev bitrate")
+    except FbaError as error:
+        click.echo(f"error: {error}", err=True)
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

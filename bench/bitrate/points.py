@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bench.bitrate.errors import ROOT, TURN
+from bench.bitrate.subjects import BODY, FACE, Subject
 from fba.arrays import Float64, Int64
 from fba.codec import EncoderOptions, decode, encode_with_statistics, probe_stream
 from fba.face.resolve import known_faps, resolve
 from fba.planning import LiveEncoder, Tolerance, encode_planned, encode_within_tolerance, plan_compact
 from fba.planning.rate import RateEncoder
-from fba.study.errors import ROOT, TURN
-from fba.study.subjects import BODY, FACE, Subject
 
 QUANTISERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 31)
 UNPLANNED = "FBA, nothing known"

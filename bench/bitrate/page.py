@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from importlib.resources import files
 
-from fba.study import plots, tables
-from fba.study.choices import best_within, compare, group_results
-from fba.study.results import EVERYTHING, Result
-from fba.study.subjects import BODY, FACE
-from fba.study.summary import LIMITS, subjects_text, summary_lines
+from bench.bitrate import plots, tables
+from bench.bitrate.choices import best_within, compare, group_results
+from bench.bitrate.results import EVERYTHING, Result
+from bench.bitrate.subjects import BODY, FACE
+from bench.bitrate.summary import LIMITS, subjects_text, summary_lines
 
 NAMES = {FACE: "faces", BODY: "bodies"}
 MEASURE = {
@@ -78,7 +78,7 @@ def make_section(group: Sequence[Result], folder: str = "") -> list[str]:
 
 def method_text() -> str:
     """Return the section that says how rates and errors are measured."""
-    return (files("fba.study") / "method.md").read_text(encoding="utf-8")
+    return (files("bench.bitrate") / "method.md").read_text(encoding="utf-8")
 
 
 def _groups(results: Sequence[Result]) -> list[list[Result]]:

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bench.bitrate.packages import find_package, find_zstd
 from fba.arrays import Int64, UInt8
-from fba.study.packages import find_package, find_zstd
 
 FLUSH_END = b"\x00\x00\xff\xff"
 """What ends every flushed block of deflate; WebSockets leave it out (RFC 7692), and so do we."""

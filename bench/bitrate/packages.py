@@ -7,7 +7,7 @@ from types import ModuleType
 
 from fba.errors import OptionError
 
-EXTRA = 'pip install "mpeg4-fba[study]"'
+EXTRA = 'pip install "mpeg4-fba[bench]"'
 
 
 def find_package(name: str) -> ModuleType | None:

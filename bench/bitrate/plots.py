@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fba.study.choices import best_within, compare, own_points, rivals_of, smallest_rates, together
-from fba.study.packages import require_package
-from fba.study.points import UNPLANNED
-from fba.study.published import Published, published_rates
-from fba.study.results import ALL, Result
-from fba.study.subjects import BODY, FACE
+from bench.bitrate.choices import best_within, compare, own_points, rivals_of, smallest_rates, together
+from bench.bitrate.packages import require_package
+from bench.bitrate.points import UNPLANNED
+from bench.bitrate.published import Published, published_rates
+from bench.bitrate.results import ALL, Result
+from bench.bitrate.subjects import BODY, FACE
 
 OURS, LIVE, FILE, QUIET = "#b3401f", "#1f5fb3", "#5b7f3a", "#777777"
 LIGHT = {OURS: "#dfa791", LIVE: "#8fb0dc"}

@@ -29,7 +29,7 @@ class Published(NamedTuple):
 @cache
 def published_rates() -> tuple[Published, ...]:
     """Return all published rates."""
-    text = (files("fba.study") / "published.csv").read_text(encoding="utf-8")
+    text = (files("bench.bitrate") / "published.csv").read_text(encoding="utf-8")
     return tuple(
         Published(
             row["what"],

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from fba.study import Result, read_results, results_csv, summary_lines
-from fba.study.choices import compare, group_results
-from fba.study.points import operating_points
+from bench.bitrate import Result, read_results, results_csv, summary_lines
+from bench.bitrate.choices import compare, group_results
+from bench.bitrate.points import operating_points
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "bench" / "results"
@@ -35,9 +35,7 @@ def test_the_page_is_made_of_the_results() -> None:
 def test_the_readme_shows_the_summary_as_it_is_printed(results: dict[str, list[Result]]) -> None:
     lines = summary_lines([one for name in TABLES for one in results[name]])
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert "\n".join(lines) + "\n" in readme, (
-        "run: fba bench bitrate --summary --results ..., as README.md says"
-    )
+    assert "\n".join(lines) + "\n" in readme, "run: ./dev bitrate --summary --results ..., as README.md says"
     assert len(lines) > 6
 
 

@@ -10,10 +10,10 @@ from functools import cache
 
 import numpy as np
 
+from bench.bitrate.packages import find_package, find_zstd
+from bench.bitrate.subjects import BODY, Subject
 from fba.arrays import Array, Float64, Int64
 from fba.body import BapSolver
-from fba.study.packages import find_package, find_zstd
-from fba.study.subjects import BODY, Subject
 
 SMALLEST_TURN = 1e-7
 """A joint whose quaternion changes by less is not animated."""

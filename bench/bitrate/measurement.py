@@ -13,15 +13,15 @@ from multiprocessing import get_context
 
 import numpy as np
 
+from bench.bitrate.errors import THRESHOLDS, Errors, measure_errors
+from bench.bitrate.gltf_samples import gltf_rates
+from bench.bitrate.points import Coded, Point, decode_subject, operating_points
+from bench.bitrate.results import ALL, EVERYTHING, SENT, Result
+from bench.bitrate.rivals import installed_rivals
+from bench.bitrate.subjects import FACE, Subject
 from fba.arrays import Float32, Float64, Int64
 from fba.errors import FbaWarning, OptionError, RangeError
 from fba.face.resolve import resolve
-from fba.study.errors import THRESHOLDS, Errors, measure_errors
-from fba.study.gltf_samples import gltf_rates
-from fba.study.points import Coded, Point, decode_subject, operating_points
-from fba.study.results import ALL, EVERYTHING, SENT, Result
-from fba.study.rivals import installed_rivals
-from fba.study.subjects import FACE, Subject
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from fba.study.results import EVERYTHING, Result
+from bench.bitrate.results import EVERYTHING, Result
 
 OWN = ""
 """What the column `numbers` says of this codec."""

@@ -1,0 +1,14 @@
+"""Fits of points to points, used by every room that lays one face or body onto another.
+
+May use: arrays alone.
+"""
+
+from fba.geometry.fits import (
+    Similarity,
+    fit_similarity,
+    nearest_orthonormal,
+    nearest_rotation,
+    principal_axes,
+)
+
+__all__ = ["Similarity", "fit_similarity", "nearest_orthonormal", "nearest_rotation", "principal_axes"]
