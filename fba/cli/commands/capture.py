@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options
+from fba.cli._sigint import raise_delayed
 from fba.cli.clamped_values import clamped_lines
 from fba.cli.coding import rate_options
 from fba.cli.command import Command, examples
@@ -155,6 +156,7 @@ def command(
     if ask is not None and not found.asked_port:
         raise click.UsageError(f"--ask: {found.description} sends by itself; enter our address in the app")
     warm_up(bodies=found.bodies, rated=bitrate is not None, compact=compact)
+    raise_delayed()  # from here on, Ctrl-C ends the capture and not the command
     targets, stream = _targets(output, play=play)
     recorder = StreamRecorder(
         targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage", mark=True),
