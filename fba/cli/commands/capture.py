@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options
-from fba.cli._sigint import raise_delayed
 from fba.cli.clamped_values import clamped_lines
 from fba.cli.coding import rate_options
 from fba.cli.command import Command, examples
 from fba.cli.inputs import ExistingPath
+from fba.cli.interruptions import raise_delayed
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import rate_text, seconds_text
 from fba.errors import FbaError

@@ -77,9 +77,9 @@ finally:
 
 SWALLOWED = """
 import signal, sys, time
-from fba.cli import _sigint
+from fba.cli import interruptions
 from fba.cli.main import group, main
-_sigint.CHECK_AFTER = 0.1
+interruptions.CHECK_AFTER = 0.1
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 @group.command("long")
@@ -107,7 +107,7 @@ def ran(code: str) -> tuple[int, str, str]:
 
 @pytest.mark.parametrize(
     "module",
-    ["fba.cli.main", "click", "inspect", "fba.cli._sigint", "fba.cli.options", "fba.cli.commands.info"],
+    ["fba.cli.main", "click", "inspect", "fba.cli.interruptions", "fba.cli.options", "fba.cli.commands.info"],
 )
 def test_ctrl_c_while_the_program_is_imported_leaves_no_traceback(module: str) -> None:
     code, out, err = ran(IMPORTING.format(module=module, handler="default_int_handler"))
