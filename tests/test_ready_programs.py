@@ -16,7 +16,7 @@ def sh(programs: Path, command: str, folder: Path) -> tuple[int, str, str]:
     done = subprocess.run(
         ["sh", "-c", command.replace("IN", str(ROOT / "fba" / "samples"))],
         cwd=folder, env={**os.environ, "WORD": "spoken", "PATH": f"{programs}:{os.environ['PATH']}"},
-        input="print('typed')\n", capture_output=True, text=True, check=False, timeout=60,
+        input="print('typed')\n", capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     return done.returncode, done.stdout, done.stderr
 

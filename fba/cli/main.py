@@ -13,8 +13,8 @@ from typing import Any, NoReturn
 import click
 
 from fba import __version__
-from fba.cli._sigint import Interruptions
 from fba.cli.command import Group, describe, examples
+from fba.cli.interruptions import Interruptions
 from fba.cli.program import NAME, program_words, with_program
 from fba.cli.startup import INTERRUPTED, TEXT, collect_less
 from fba.compiled import compilation_listener

@@ -11,7 +11,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 
 from fba.parameters import FIRST_LOW_LEVEL_FAP, faps
@@ -35,6 +35,7 @@ def fap_of(name: str) -> int | None:
     return _faps().get(name.strip().lower())
 
 
+@lru_cache(1024)  # live captures ask for the same names with every datagram
 def arkit_of(name: str) -> str | None:
     """ARKit's name for a shape, or None where it is none of the 52."""
     known = _synonyms()

@@ -6,10 +6,13 @@ import contextlib
 import errno
 import select
 import socket
+import struct
+import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import TracebackType
+from typing import Any
 
 from fba.errors import FbaError
 from fba.live.capture import Capture
@@ -22,6 +25,10 @@ WAIT = 0.1
 """Seconds after which it is checked whether to stop."""
 AT_ONCE = 256
 """Datagrams that are taken before that is checked again."""
+MOST_UNREAD = 1 << 16
+"""Datagrams that are counted at the end: more than a buffer holds, fewer than a flood sends."""
+SO_MEMINFO, DROPS = 55, 8
+"""Linux's option for a socket's counts, 32 bits each, and which of them is that of dropped datagrams."""
 
 
 class Receiver:
@@ -87,13 +94,15 @@ class Receiver:
         while not self._stop.is_set():
             left = WAIT if seconds is None else min(WAIT, begun + seconds - self._clock())
             if left <= 0:
-                return
+                break
             self._ask_sender()
             if self._socket is None:
                 return
             with contextlib.suppress(ValueError):  # closed meanwhile
                 select.select([self._socket], [], [], left)
             self.drain()
+        self.drain()
+        self.capture.summary.unread += sum(1 for _ in self._arrived(MOST_UNREAD))
 
     def drain(self) -> None:
         """Take what has arrived, without waiting; the player does so before each picture."""
@@ -101,17 +110,25 @@ class Receiver:
         self.capture.settle()
 
     def _take_all(self) -> None:
-        opened = self._socket
-        for _ in range(AT_ONCE):
+        for data, address in self._arrived(AT_ONCE):
+            self.capture.receive(data, str(address[0]), self._clock())
+        if self._socket is not None:
+            dropped = _dropped(self._socket)
+            if dropped is not None:
+                self.capture.summary.dropped = dropped
+
+    def _arrived(self, most: int) -> Iterator[tuple[bytes, tuple[Any, ...]]]:
+        """Read so many datagrams at most, with their senders' addresses, as far as there are any."""
+        for _ in range(most):
+            opened = self._socket
+            if opened is None:
+                return
             try:
-                if opened is None:
-                    return
-                data, address = opened.recvfrom(LONGEST)
+                yield opened.recvfrom(LONGEST)
             except ConnectionError:  # what we asked is not there: Windows says so here
                 continue
             except OSError:
                 return
-            self.capture.receive(data, str(address[0]), self._clock())
 
     def stop(self) -> None:
         """End `run`; from any thread, or a signal."""
@@ -131,6 +148,17 @@ class Receiver:
                 f"{self._ask}: cannot be asked for data: {error.strerror or error}; give the address that "
                 "the app shows, such as 192.168.0.20"
             ) from error
+
+
+def _dropped(opened: socket.socket) -> int | None:
+    """Return how many datagrams the system dropped because we were too slow; None where it does not say."""
+    if sys.platform != "linux":
+        return None
+    try:
+        counts = opened.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, 4 * (DROPS + 1))
+    except OSError:  # closed meanwhile, or a Linux before 4.12
+        return None
+    return int(struct.unpack_from("=I", counts, 4 * DROPS)[0]) if len(counts) > 4 * DROPS else None
 
 
 def split_address(text: str, port: int) -> tuple[str, int]:

@@ -15,7 +15,9 @@ OTHERS = "others"
 class Summary:
     """Counts of datagrams, and what was done with them.
 
-    sender: whose datagrams were used; "" for nobody's. received, bytes: of all senders. used: with a face or
+    sender: whose datagrams were used; "" for nobody's. received, bytes: of all senders. dropped: by the
+    system, because they came faster than they were taken; None where it does not say (only Linux does).
+    unread: what had come when the capture ended, but had not been taken yet. used: with a face or
     a body, in order. unseen: without a face. refused: by what was wrong with them. other_senders: by name.
     doubled, late, reordered, strayed, jumps: see `SampleOrder`. gaps: how many, and seconds of the longest.
     seconds: from the first sample to the last, on the sender's clock. frames: of the stream. notes: how the
@@ -25,6 +27,8 @@ class Summary:
     sender: str = ""
     received: int = 0
     bytes: int = 0
+    dropped: int | None = None
+    unread: int = 0
     used: int = 0
     unseen: int = 0
     refused: Counter[str] = field(default_factory=Counter)
@@ -53,6 +57,10 @@ class Summary:
         who = f" from {self.sender}" if self.sender else ""
         parts = [f"{self.used} used", f"{self.unseen} without a face" * (self.unseen > 0)]
         lines = [f"{self.received} datagrams{who}: {', '.join(filter(None, parts))}"]
+        lost = (self.dropped or 0, "dropped by the system"), (self.unread, "unread at the end")
+        if any(count for count, _ in lost):
+            counted = ", ".join(f"{count} {what}" for count, what in lost if count)
+            lines.append(f"lost because they came faster than they could be used: {counted}")
         if any((self.doubled, self.late, self.reordered, self.strayed)):
             counts = (
                 (self.reordered, "out of order, put in order"), (self.doubled, "doubled"),

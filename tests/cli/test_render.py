@@ -20,6 +20,7 @@ import fba
 from fba import Animation
 from fba.body import gait
 from fba.cli.pose_options import still_animation
+from started_programs import started
 
 Run = Callable[..., tuple[int, str, str]]
 SMALL = ("--size", "96x72")
@@ -359,7 +360,7 @@ def test_pictures_and_films_are_the_same_from_run_to_run(run: Run, clip: Path, t
     for number in range(2):
         outputs = [tmp_path / f"{number}{suffix}" for suffix in (".mp4", ".png", ".gif")]
         if number:
-            subprocess.run([sys.executable, "-c", THREE, clip, *outputs], check=True, timeout=100)
+            subprocess.run([sys.executable, "-c", THREE, clip, *outputs], check=True, timeout=300)
         else:
             assert all(run("render", clip, "-o", output, *SMALL).code == 0 for output in outputs)
         with av.open(str(outputs[0])) as film:
@@ -392,13 +393,11 @@ def test_ctrl_c_and_kill_leave_nothing_half_written(
     code += "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"
     code += "from fba.cli.main import main; main()"
     command = [sys.executable, "-c", code, "render", str(clip), "-o", str(output), "--fps", "90"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        for _ in range(3000):
-            if len(list(tmp_path.iterdir())) == 3 or process.poll() is not None:
-                break  # the temporary file is there: it has begun
-            time.sleep(0.01)
+    with started(command) as process:
+        while len(list(tmp_path.iterdir())) < 3 and process.poll() is None:
+            time.sleep(0.01)  # until the temporary file is there: it has begun
         process.send_signal(getattr(signal, name))
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate()
     assert (process.returncode, err.strip()) == end
     assert output.read_bytes() == b"old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["clip.fba", output.name]

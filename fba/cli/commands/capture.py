@@ -18,6 +18,7 @@ from fba.cli.clamped_values import clamped_lines
 from fba.cli.coding import rate_options
 from fba.cli.command import Command, examples
 from fba.cli.inputs import ExistingPath
+from fba.cli.interruptions import raise_delayed
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import rate_text, seconds_text
 from fba.errors import FbaError
@@ -156,6 +157,7 @@ def command(
     if ask is not None and not found.asked_port:
         raise click.UsageError(f"--ask: {found.description} sends by itself; enter our address in the app")
     warm_up(bodies=found.bodies, rated=bitrate is not None, compact=compact)
+    raise_delayed()  # from here on, Ctrl-C ends the capture and not the command
     targets, stream = _targets(output, play=play)
     recorder = StreamRecorder(
         targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage", mark=True),

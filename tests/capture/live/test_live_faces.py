@@ -351,7 +351,7 @@ def test_what_is_sent_again_and_again() -> None:
 
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(5)
+        receiver.settimeout(60)
         animation, _ = captured("livelink", at_rate(SENT[:6]))
         assert animation is not None
         address = ("127.0.0.1", int(receiver.getsockname()[1]))

@@ -7,7 +7,6 @@ import os
 import random
 import signal
 import socket
-import subprocess
 import sys
 import time
 import warnings
@@ -24,6 +23,7 @@ from fba.live import StreamFile, StreamRecorder
 from fba.live.recording import StreamPipe
 from fba.tracks import BodyTrack, FaceTrack
 from fba_conformance.captures.face_files import datagram
+from started_programs import started
 
 FRAMES = 40
 
@@ -84,20 +84,18 @@ def test_a_killed_program_leaves_a_stream_of_all_frames_but_the_last(tmp_path: P
     sent = [datagram([0.01 * (row % 90)] * 61, 100 + row / 64, rate=64) for row in range(SENDS)]
     path, count = tmp_path / "a.fba", random.randint(30, SENDS)
     command = [sys.executable, "-m", "fba", "capture", "livelink", "--port", "0", "--host", "127.0.0.1"]
-    command += ["-o", str(path), "--seconds", "60"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as program:
-        try:
-            assert program.stderr is not None
-            port = next(int(line.split()[-1]) for line in program.stderr if "listening" in line)
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-                for one in sent[:count]:
-                    sender.sendto(one, ("127.0.0.1", port))
-                    time.sleep(0.001)
-            until = time.monotonic() + 20
-            while time.monotonic() < until and not (path.exists() and len(fba.read(path)) == count - 1):
-                time.sleep(0.02)
-        finally:
-            program.send_signal(signal.SIGKILL)
+    command += ["-o", str(path)]
+    with started(command) as program:
+        assert program.stderr is not None
+        port = next((int(line.split()[-1]) for line in program.stderr if "listening" in line), None)
+        assert port is not None
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for one in sent[:count]:
+                sender.sendto(one, ("127.0.0.1", port))
+        while program.poll() is None and not (path.exists() and len(fba.read(path)) == count - 1):
+            time.sleep(0.02)
+        assert program.poll() is None
+        program.send_signal(signal.SIGKILL)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # as for a file that was cut off
         assert len(fba.read(path)) == count - 1

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+from fba.compiled import is_compiled
+from started_programs import started
 
 IN_A_CALLBACK = """
 import ctypes, signal, sys, time
@@ -72,9 +77,9 @@ finally:
 
 SWALLOWED = """
 import signal, sys, time
-from fba.cli import _sigint
+from fba.cli import interruptions
 from fba.cli.main import group, main
-_sigint.CHECK_AFTER = 0.1
+interruptions.CHECK_AFTER = 0.1
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 @group.command("long")
@@ -96,13 +101,13 @@ main(["long"])
 
 def ran(code: str) -> tuple[int, str, str]:
     command = [sys.executable, "-c", code]
-    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
+    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     return result.returncode, result.stdout, result.stderr
 
 
 @pytest.mark.parametrize(
     "module",
-    ["fba.cli.main", "click", "inspect", "fba.cli._sigint", "fba.cli.options", "fba.cli.commands.info"],
+    ["fba.cli.main", "click", "inspect", "fba.cli.interruptions", "fba.cli.options", "fba.cli.commands.info"],
 )
 def test_ctrl_c_while_the_program_is_imported_leaves_no_traceback(module: str) -> None:
     code, out, err = ran(IMPORTING.format(module=module, handler="default_int_handler"))
@@ -122,7 +127,7 @@ def test_ctrl_c_while_the_program_ends_leaves_no_traceback() -> None:
 
 def test_what_must_not_be_left_halfway_is_finished_first() -> None:
     command = [sys.executable, "-c", LOADING]
-    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert (result.returncode, result.stdout.strip(), result.stderr.strip()) == (
         130, "loaded", "fba: interrupted",
     )  # fmt: skip
@@ -148,3 +153,69 @@ def test_ctrl_c_inside_a_callback_of_c_code_is_not_lost(afterwards: str) -> None
 
 def test_ctrl_c_that_a_library_swallows_comes_again_and_disturbs_no_cleaning_up() -> None:
     assert ran(SWALLOWED) == (130, "cleaned up\n", "\nfba: interrupted\n")
+
+
+CAPTURING = """
+import os, signal, sys
+def interrupt(*_):
+    signal.raise_signal(signal.{name})
+def interrupt_llvm():
+    # as where LLVM loads machine code: nothing can be raised there
+    exec("interrupt()", {{"interrupt": interrupt, "__name__": "llvmlite.binding"}})
+class Finder:
+    def find_spec(self, name, path, target=None):
+        if name == "{module}":
+            interrupt()
+sys.meta_path.insert(0, Finder())
+signal.signal(signal.SIGINT, signal.default_int_handler)
+{place}
+sys.argv = ["fba", "capture", "livelink", "--port", "0", "--host", "127.0.0.1", "-o", "out.fba"]
+from fba.__main__ import main
+main()
+"""
+COMPILES = "import fba.compiled; fba.compiled._listeners.append(interrupt)"
+LOADS = """
+import fba._numba_cache
+load = fba._numba_cache.MachineCode.load_overload
+def loaded(*arguments):
+    interrupt_llvm()
+    return load(*arguments)
+fba._numba_cache.MachineCode.load_overload = loaded
+"""
+LAST = """
+import fba.live.recording
+warm_up = fba.live.recording.warm_up
+def warmed(**options):
+    warm_up(**options)
+    interrupt_llvm()
+fba.live.recording.warm_up = warmed
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize(
+    ("module", "place"),
+    [
+        pytest.param("fba.cli.commands.capture", "", id="imports"),
+        pytest.param("fba.live.recording", "", id="later imports"),
+        pytest.param("", COMPILES, id="compiling"),
+        pytest.param("", LOADS, id="loading machine code"),
+        pytest.param("", LAST, id="just before it listens"),
+    ],
+)
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are those of Unix")
+def test_a_capture_ends_however_early_the_signal_comes(
+    tmp_path: Path, name: str, module: str, place: str
+) -> None:
+    if place and not is_compiled():
+        pytest.skip("nothing is compiled here")
+    environment = {**os.environ, "FBA_CACHE": str(tmp_path)}
+    if place == COMPILES:
+        environment["NUMBA_CACHE_DIR"] = str(tmp_path / "numba")  # empty
+    code = CAPTURING.format(name=name, module=module, place=place)
+    with started([sys.executable, "-c", code], cwd=tmp_path, env=environment) as program:
+        _, err = program.communicate()
+    text, status = ("interrupted", 130) if name == "SIGINT" else ("terminated", 143)
+    assert (program.returncode, err.strip().splitlines()[-1]) == (status, f"fba: {text}"), err
+    assert "listening" not in err
+    assert not (tmp_path / "out.fba").exists()

@@ -59,10 +59,18 @@ def test_the_first_use_says_that_it_compiles_the_second_does_not(tmp_path: Path,
     assert first.stdout == second.stdout
 
 
+def until_drawn(terminal: Terminal, text: str) -> None:
+    """Wait until the bar, which another thread draws again and again, shows a text."""
+    end = time.monotonic() + 60
+    while text not in terminal.getvalue():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
 def test_a_bar_without_a_total_only_moves(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = on_terminal(monkeypatch)
     with Progress("fitting", None):
-        time.sleep(0.15)
+        until_drawn(terminal, "0:00:00")
     assert "fitting" in terminal.getvalue()
     assert "/?" not in terminal.getvalue()
     assert "0:00:00" in terminal.getvalue()
@@ -72,8 +80,7 @@ def test_a_bar_counts_as_soon_as_the_total_is_known(monkeypatch: pytest.MonkeyPa
     terminal = on_terminal(monkeypatch)
     with Progress("rendering", None) as step:
         step.show(3, 8)
-        time.sleep(0.15)
-    assert "3/8" in terminal.getvalue()
+        until_drawn(terminal, "3/8")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only X11 and Wayland can be absent")

@@ -27,7 +27,7 @@ def test_the_built_in_head_authored_anew() -> None:
     head = FaceModel.default()
     started = time.process_time()
     again = author(head.parts, head.points, bound=head.bound)
-    assert time.process_time() - started < 60  # some seconds on a machine of its own
+    assert time.process_time() - started < 300  # some seconds of a usual core; a guard against losing orders
     assert not again.lost
     assert [str(finding) for finding in check_faps(again)] == []
     poser = Poser(again)

@@ -46,6 +46,20 @@ _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(si
 """Signals besides Ctrl-C that ask a program to end; Windows has no SIGHUP."""
 
 
+_delayed: list[int] = []
+"""The signal that waits until a fragile moment is over; at most one."""
+
+
+def raise_delayed() -> None:
+    """Raise KeyboardInterrupt where an interruption came in a fragile moment and waits for its end.
+
+    To be called before a signal gets another meaning.
+    """
+    if _delayed:
+        _delayed.clear()
+        raise KeyboardInterrupt
+
+
 class Interruptions:
     """Makes Ctrl-C safe while the `with` statement lasts; for the main thread, which alone gets signals.
 
@@ -60,6 +74,7 @@ class Interruptions:
         self._handlers: dict[int, Any] = {}
 
     def __enter__(self) -> Interruptions:
+        _delayed.clear()
         self._hook = sys.unraisablehook
         sys.unraisablehook = self._unraisable
         with contextlib.suppress(ValueError):  # not the main thread
@@ -84,9 +99,10 @@ class Interruptions:
         self.exit_code = 128 + number
         while frame is not None:
             if str(frame.f_globals.get("__name__", "")).startswith(FRAGILE):
-                _thread.start_new_thread(_interrupt_later, (number,))
+                _delay(number)
                 return
             frame = frame.f_back
+        _delayed.clear()
         if self._checking:
             self._checking = False
             if _is_interruption(sys.exception()):
@@ -110,7 +126,7 @@ class Interruptions:
             self._hook(unraisable)
             return
         self._lost = True
-        _thread.start_new_thread(_interrupt_later, (self.exit_code - 128,))
+        _delay(self.exit_code - 128)
 
 
 def _is_interruption(error: BaseException | None) -> bool:
@@ -122,9 +138,15 @@ def _is_interruption(error: BaseException | None) -> bool:
     return False
 
 
+def _delay(number: int) -> None:
+    _delayed[:] = [number]
+    _thread.start_new_thread(_interrupt_later, (number,))
+
+
 def _interrupt_later(number: int) -> None:
     time.sleep(RETRY_AFTER)
-    _interrupt_main(number)
+    if _delayed:  # not raised meanwhile
+        _interrupt_main(number)
 
 
 def _interrupt_main(number: int) -> None:
