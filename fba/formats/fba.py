@@ -10,7 +10,7 @@ from fba.animation import Animation
 from fba.atomic import atomic
 from fba.errors import OptionError
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
+from fba.parameters import BAP_STEPS_AUTO
 from fba.source import Path, naming_file, read_whole
 
 if TYPE_CHECKING:
@@ -68,9 +68,7 @@ def write_fba(
 ) -> None:
     """Encode an animation into an FBA file.
 
-    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Unless they say otherwise, a
-    file whose BAP steps are not the standard's is marked (see `fba.codec.write_mark`). With either, preset:
-    "reference" sends all that the animation does; "exact" and "compact" leave out what a player shows without
+    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. With either, preset: "reference" sends all that the animation does; "exact" and "compact" leave out what a player shows without
     it (see `fba.planning`). Raises OptionError if options and fields are given, or for an unknown preset,
     RangeError for values that no stream can carry, FormatError if the file cannot be written.
     """
@@ -80,8 +78,7 @@ def write_fba(
     if settings:
         if options is not None:
             raise OptionError(f"give either options or {', '.join(settings)}, not both")
-        mark = settings.get("bap_steps", BAP_STEPS_DEFAULT) != BAP_STEPS_DEFAULT
-        options = EncoderOptions(**{"mark": mark, **settings})
+        options = EncoderOptions(**settings)
     with naming_file(path):
         if preset == "reference":
             data = encode(animation, options)
