@@ -291,6 +291,16 @@ def _text(path: Path) -> bytes:
         return b""  # its reader says why
 
 
+def goes_to_pipe(path: Path) -> bool:
+    """Whether somebody may read an output while it is written: in a pipe or a device, but not in a file."""
+    if path != STANDARD:
+        return path.exists() and not path.is_file()
+    try:
+        return not stat.S_ISREG(os.fstat(sys.stdout.fileno()).st_mode)
+    except (OSError, ValueError):
+        return True
+
+
 def _is_direct(path: Path) -> bool:
     """Whether data must go to what is there already, which no new file can replace."""
     from fba.atomic import check_target

@@ -12,7 +12,7 @@ from fba.codec._plane.reader import PlaneReader, Planes
 from fba.codec._stream.buffer import Buffer
 from fba.codec._stream.checksums import CHECK_BYTES, PeriodChecks, find_wrong
 from fba.codec._stream.damage import Damage, DamageLog
-from fba.codec._stream.mark import LONGEST, USER_DATA, Mark, bytes_needed
+from fba.codec._stream.mark import LONGEST, START, USER_DATA, Mark, bytes_needed
 from fba.codec._stream.object_borders import ObjectBorders
 from fba.codec._stream.plane_times import PlaneTimes
 from fba.codec.block import Block
@@ -238,6 +238,7 @@ class StreamReader:
         )
         self._begin_object(self._buffer.offset + position)
         self._reader.forget_values()
+        self._checks.abandon()
         self._log.add(error, 0, self._buffer.offset + position)
         self._bit = 8 * position
         self._scanned = 0
@@ -320,10 +321,22 @@ class StreamReader:
         self._scanned = max(self._scanned, buffer.length - 3)
         self._bit = 8 * self._scanned
         if final:
-            self._log.end(buffer.offset + buffer.length)
-            ended = buffer.data[max(buffer.length - 4, 0) : buffer.length].tobytes() == _END
-            self._log.resume(*(self._log.estimate() or (None, None)) if ended else (None, None))
+            end = self._find_end()
+            self._log.end(buffer.offset + (buffer.length if end is None else end))
+            self._log.resume(*(self._log.estimate() or (None, None)) if end is not None else (None, None))
+            if end is not None and self.objects.count:
+                self._scanned = end
+                self.objects.end_object(syntax.END_CODE, buffer.offset + end)
+                self._state = StreamReader._find_object
+                return []
         return None
+
+    def _find_end(self) -> int | None:
+        """Return the byte of the buffer behind the end code of the stream, or None where it has none."""
+        data = self._buffer.data[: self._buffer.length].tobytes()
+        end = data.rfind(_END) + len(_END)
+        ended = end >= len(_END) and (end == len(data) or data.startswith(START, end))
+        return end if ended else None
 
     def _block(self, planes: Planes) -> Block:
         """Return planes with their times, and move on past them."""

@@ -157,7 +157,7 @@ def command(
     warm_up(bodies=found.bodies, rated=bitrate is not None, compact=compact)
     targets, stream = _targets(output, play=play)
     recorder = StreamRecorder(
-        targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage", mark=True),
+        targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage"),
         bit_rate=bitrate, buffer=rate_options.DEFAULT_BUFFER if buffer is None else buffer,
         compact=compact,
     )  # fmt: skip

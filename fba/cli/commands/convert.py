@@ -114,7 +114,8 @@ def command(
         encoder = EncoderOptions(bap_steps=table, mark=marked)
         with naming_file(target):
             coded = encode_stream(animation, encoder, Size(), taken)
-        outputs.write(target, coded.data)
+        opening = step_tables.opening_for(target, animation, table, coded.bap_quant, marked=marked)
+        outputs.write(target, opening + coded.data)
     else:
         with outputs.file(target) as file:
             write(file, animation, format=writing.name, **extra)

@@ -208,7 +208,8 @@ def command(
         else:
             coded = encode_stream(animation, EncoderOptions(**settings), size, taken)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
-    outputs.write(output, coded.data)
+    opening = step_tables.opening_for(output, animation, table, coded.bap_quant, marked=mark)
+    outputs.write(output, opening + coded.data)
     if spoken is not None:
         voice.write_voice(outputs, spoken)
     if map_out is not None:
