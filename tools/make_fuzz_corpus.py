@@ -36,7 +36,7 @@ from fba_conformance.captures.face_files import (  # noqa: E402
 )
 from fba_conformance.captures.tracked_actor import film  # noqa: E402
 from fba_conformance.fuzz._small_head import small_head, small_head_fdp, small_head_obj, small_head_xface  # noqa: E402
-from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
+from fba_conformance.small_streams import doubtful_marks, long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
 from mesh_files import ply  # noqa: E402
@@ -391,7 +391,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
     """Return all files: content by name, by target. folder: for files that are read again at once."""
     limb = {name: BODY[name] for name in ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot")}
     files: dict[str, dict[str, bytes]] = {
-        "stream": {**small_streams(), **long_streams()},
+        "stream": {**small_streams(), **doubtful_marks(), **long_streams()},
         "fap": lines(FAPS),
         "bap": lines(BAPS),
         "epf": lines(EPFS),

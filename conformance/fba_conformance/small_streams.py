@@ -47,26 +47,30 @@ def small_streams() -> dict[str, bytes]:
         name: encode(animation, EncoderOptions(mark=False, **options))  # type: ignore[arg-type]
         for name, (animation, options) in made.items()
     }
-    streams |= _marked_streams(make(both, body), EncoderOptions(**every_other))  # type: ignore[arg-type]
+    marked = EncoderOptions(intra_period=Fraction(2, 25), start_codes=True)
+    streams["checked"] = encode(make(both, body), marked)
+    fine = replace(marked, bap_steps="visage", checksums=False)
+    streams["named_before"] = write_opening("visage") + encode(make(None, body), fine)
     streams["two_objects"] = streams["face"] + streams["body"]
     streams["no_end_code"] = streams["face"].removesuffix(_END_CODE)
     streams["old_start_codes"] = b"\0\0\1\x01\0\0\1\x03" + streams["talking"][4:]
     return streams
 
 
-def _marked_streams(animation: Animation, options: EncoderOptions) -> dict[str, bytes]:
-    """Return streams with marks: before the object, behind it, with checks, and some that contradict."""
-    behind = encode(animation, options)
-    named = encode(animation, replace(options, checksums=False))
-    bare = encode(animation, replace(options, mark=False))
+def doubtful_marks() -> dict[str, bytes]:
+    """Return streams whose marks contradict each other or the stream, were cut off, or claim too much."""
+    options = EncoderOptions(intra_period=Fraction(2, 25), start_codes=True, mark=False)
+    bare = encode(motion.animation(None, motion.body(5, baps_sent=(1, 181))), options)
+    named = write_mark("iso")
+    checked = encode(motion.animation(None, motion.body(5, baps_sent=(1, 181))), replace(options, mark=True))
     return {
-        "marked": named,
-        "checked": behind,
-        "opened": write_opening("visage") + encode(animation, replace(options, bap_steps="visage", clamp=True)),
-        "contradicting_marks": write_opening("visage") + named + named[len(bare) :],
+        "contradicting_marks": write_opening("visage") + bare + named,
+        "several_marks": write_opening("iso") + bare + named + write_mark("visage"),
         "wrong_checks": bare + write_mark("iso", bytes(range(1, 13))),
-        "cut_checks": behind[:-5],
+        "few_checks": bare + write_mark("iso", b""),
+        "cut_checks": checked[:-5],
         "many_checks": bare + b"\0\0\1\xb2fba crc32=999999999;" + bytes(range(1, 60)),
+        "unknown_words": bare + b"\0\0\1\xb2fba bap_steps=iso;colour=red;",
     }
 
 
