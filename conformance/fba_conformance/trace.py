@@ -41,8 +41,8 @@ SKIP_MORE = 15
 def trace(data: bytes, *, bap_steps: str | None = None) -> Iterator[Element]:
     """Yield every syntax element of a stream, in order.
 
-    bap_steps: "iso" or "visage", the table of BAP steps that the writer used; it only changes values. None: the
-    one that a mark before the object names, else "iso".
+    bap_steps: "iso" or "visage", the table of BAP steps that the writer used; it only changes values. None:
+    the one that a mark before the object names, else "iso".
 
     Yields the elements before damage, then raises BitstreamError(plane, bit), which names the damaged
     element; UnsupportedError for DCT segments; ValueError for another bap_steps.

@@ -193,7 +193,7 @@ class StreamReader:
         return None
 
     def _user_data_needed(self, code: int, position: int) -> int:
-        """Return how many bytes behind a start code, at a byte of the buffer, must be there to read a mark."""
+        """Return how many bytes must be there behind a start code, at a byte of the buffer, for a mark."""
         if code != USER_DATA:
             return 0
         words = self._buffer.data[position + 4 : min(position + 4 + LONGEST, self._buffer.length)]

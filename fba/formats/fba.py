@@ -68,7 +68,8 @@ def write_fba(
 ) -> None:
     """Encode an animation into an FBA file.
 
-    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. With either, preset: "reference" sends all that the animation does; "exact" and "compact" leave out what a player shows without
+    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. With either, preset:
+    "reference" sends all that the animation does; "exact" and "compact" leave out what a player shows without
     it (see `fba.planning`). Raises OptionError if options and fields are given, or for an unknown preset,
     RangeError for values that no stream can carry, FormatError if the file cannot be written.
     """

@@ -104,9 +104,10 @@ class StreamRecorder:
 
     targets: where it goes. frames, size: written so far. rate: frames per second; 0 before the first.
     options: by default those of captures: values that no plane carries are brought as near as can be, and a
-    body's steps are the finer ones, named behind the end, and before the object in pipes. bit_rate: bits a second that are held, as far as
-    `buffer` seconds of them; None for all that is sent. See `fba.planning.rate.RateEncoder`. compact: whether
-    only those parameters are sent that players do not derive from others; see `fba.planning.LiveEncoder`.
+    body's steps are the finer ones, named behind the end, and before the object in pipes. bit_rate: bits a
+    second that are held, as far as `buffer` seconds of them; None for all that is sent. See
+    `fba.planning.rate.RateEncoder`. compact: whether only those parameters are sent that players do not
+    derive from others; see `fba.planning.LiveEncoder`.
 
     Raises OptionError for both at once.
     """

@@ -1,4 +1,4 @@
-"""The CRC-32 of each I period behind the end of a stream: flipped bits that leave the syntax whole are noticed."""
+"""The CRC-32 of each I period behind the end of a stream: flipped bits are noticed."""
 
 from __future__ import annotations
 
@@ -27,9 +27,7 @@ UNALIGNED = EncoderOptions(intra_period=PERIOD / 25, bap_steps="visage", clamp=T
 
 @cache
 def performance(frames: int = 60) -> Animation:
-    return motion.animation(
-        motion.face(frames, faps_sent=(3, 4, 48)), motion.body(frames, baps_sent=(1, 31))
-    )
+    return motion.animation(motion.face(frames, faps_sent=(3, 4, 48)), motion.body(frames, baps_sent=(1, 31)))
 
 
 @cache
@@ -120,7 +118,8 @@ def test_a_wrong_period_is_named_and_left_out(options: EncoderOptions, period: i
         rescued = fba.decode(data, on_error="salvage")
     kept = np.array([frame not in planes for frame in range(60)])
     assert rescued.index.tolist() == true.index[kept].tolist()
-    assert rescued.body is not None and true.body is not None
+    assert rescued.body is not None
+    assert true.body is not None
     assert (rescued.body.values == true.body.values[kept]).all()
     found = verify_stream(data)
     assert (found.intact, found.ended, found.doubtful, found.frames) == (False, True, PERIOD, 50)
@@ -230,8 +229,7 @@ def test_a_list_that_claims_too_much_is_not_waited_for() -> None:
     decoder = Decoder(bap_steps="visage")
     with pytest.warns(FbaWarning, match="list of 999999999 checks behind the end was cut off"):
         decoder.push(data)
-        frames = decoder.push(bare(SECTIONS))
-        decoder.finish()
+    frames = decoder.push(bare(SECTIONS)) + decoder.finish()
     assert len(frames) == 60
 
 

@@ -188,7 +188,7 @@ def test_streams_in_a_pipe_each_go_by_what_is_before_them() -> None:
     ("data", "said"),
     [
         (OPENING + stream("iso"), "behind its end that it was made with the BAP steps 'iso'"),
-        (OPENING[:30] + MARK.replace(b"visage", b"iso") + OPENING[30:] + stream(), "name the BAP steps 'visage', and then 'iso'"),
+        (OPENING[:30] + MARK.replace(b"visage", b"iso") + OPENING[30:] + stream(), "and then 'iso'"),
         (OPENING.replace(b"visage", b"better") + stream(mark=False), "'better', which are not known"),
         (stream()[:-26] + b"\xb0" + MARK, "the end code before it is damaged"),
         (stream(mark=False) + MARK + b"colour=red;", "cut off or is damaged"),

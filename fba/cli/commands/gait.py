@@ -24,7 +24,6 @@ from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.animation import Animation
-    from fba.formats.registry import Format
 
 DEFAULT_RATE = Fraction(30)
 

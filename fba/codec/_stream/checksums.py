@@ -20,7 +20,7 @@ _MOST = 1 << 18
 
 
 def check_of(crc: int) -> bytes:
-    """Return how a CRC-32 is written: most significant byte first, and ff for 00, which keeps start codes out."""
+    """Return how a CRC-32 is written: most significant byte first, with ff for 00: no start code."""
     return crc.to_bytes(CHECK_BYTES, "big").replace(b"\0", b"\xff")
 
 
@@ -54,7 +54,7 @@ class PeriodChecks:
     def add(self, data: UInt8, offset: int, stop: int) -> None:
         """Take the bytes up to `stop`, which belong to this period."""
         if stop > self._next and (self._open or self._fresh):
-            self._crc = crc32(memoryview(data)[self._next - offset : stop - offset], self._crc)
+            self._crc = crc32(data[self._next - offset : stop - offset].tobytes(), self._crc)
             self._next = stop
 
     def begin_period(self, data: UInt8, offset: int, bit: int, plane: int) -> None:

@@ -47,7 +47,7 @@ LONGEST = 64
 
 @dataclass(frozen=True)
 class Mark:
-    """A mark. table: of the object before it, which begins at the byte `begin`. end: byte behind its words."""
+    """A mark. table: of the object before it, which begins at byte `begin`. end: byte behind its words."""
 
     table: str
     begin: int
@@ -58,8 +58,8 @@ class Mark:
 class MarkContent:
     """What a mark says.
 
-    table: of BAP steps; None if it names none. checks: those of the I periods, four bytes each; None if it has
-    none, or none that can be relied on. problem: what is wrong with it; "" if nothing is.
+    table: of BAP steps; None if it names none. checks: those of the I periods, four bytes each; None if it
+    has none, or none that can be relied on. problem: what is wrong with it; "" if nothing is.
     """
 
     table: str | None = None
@@ -83,7 +83,7 @@ def write_mark(table: str | None, checks: bytes | None = None) -> bytes:
 
 
 def write_opening(table: str) -> bytes:
-    """Return what goes before an object to name its table to those who read it while it comes: 35 or 32 bytes.
+    """Return what goes before an object to name its table to who reads it while it comes: 35 or 32 bytes.
 
     The headers of a visual object sequence and of a visual object, with user data between them (ISO/IEC
     14496-2, 6.2.2). Raises ValueError for an unknown table.
@@ -174,5 +174,6 @@ def marked_table(data: bytes | bytearray | memoryview) -> str | None:
     tables = {mark.table for mark in find_marks(data)}
     for opening in _BEFORE_OBJECT.finditer(bytes(data)):
         table = _words(opening[0][len(_SEQUENCE_HEADER) + len(START) :])[0]
-        tables |= {table} & set(BAP_STEP_TABLES)
+        if table in BAP_STEP_TABLES:
+            tables.add(table)
     return tables.pop() if len(tables) == 1 else None

@@ -31,8 +31,8 @@ a face and a body."""
 CHECK_BAP_STEPS_AFTER = 4
 """Seconds of a body after which it is checked, once, whether they look right with these BAP steps."""
 CHOOSE_BAP_STEPS_AFTER = 1.25
-"""Seconds of a body that are held back until the BAP steps are chosen by the way it moves, unless it comes faster:
-a file in a pipe has come to its end, where its mark is, within `PATIENCE`."""
+"""Seconds of a body that are held back until the BAP steps are chosen by the way it moves, unless it comes
+faster: a file in a pipe has come to its end, where its mark is, within `PATIENCE`."""
 
 
 MARK_BYTES = 64
