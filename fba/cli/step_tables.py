@@ -61,19 +61,6 @@ def table_to_write(asked: str, *, made: bool, marked: bool, read: str | None = N
     return FINE if made and marked else BAP_STEPS_DEFAULT
 
 
-def opening_for(output: Path, animation: Animation, table: str, quant: int, *, marked: bool) -> bytes:
-    """Return what goes before a stream that others may read while it comes; b"" for a file.
-
-    Nothing in streams without a mark, and without BAPs that the table makes a difference to.
-    """
-    from fba.cli.outputs import goes_to_pipe
-    from fba.codec import write_opening
-
-    if not marked or animation.body is None or quant == 0 or not goes_to_pipe(output):
-        return b""
-    return write_opening(table)
-
-
 def remind(output: Path, animation: Animation, table: str, quant: int = 1, *, marked: bool = True) -> None:
     """Print the option that later commands need to read a stream that was just written, if any.
 

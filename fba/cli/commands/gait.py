@@ -18,6 +18,7 @@ from fba.cli.outputs import (
     OutputType,
     display_name,
     find_writer,
+    opening_for,
 )
 from fba.cli.printing import print_json, seconds_text
 from fba.limits import Limits
@@ -140,7 +141,7 @@ def _write_stream(animation: Animation, output: Path, outputs: Outputs, table: s
 
     step_tables.warn_of_coarse_steps(animation, table)
     options = EncoderOptions(bap_steps=table, mark=marked, clamp=True)
-    opening = step_tables.opening_for(output, animation, table, options.bap_quant, marked=marked)
+    opening = opening_for(output, animation, table, options.bap_quant, marked=marked)
     outputs.write(output, opening + encode(animation, options))
 
 
