@@ -846,7 +846,12 @@ MUTANTS = (
     Mutant(ROUND_ANGLES, "(np.gcd.reduce(levels[:, columns], axis=None))", "(1)", STEP_CHOICE_TEST),
     Mutant(MARK, "position = start\n", "position = start + 99\n", MARK_TEST),
     Mutant(OBJECT_BORDERS, "mark.begin <= byte < mark.end", "byte < mark.end", MARK_TEST),
-    Mutant(OBJECT_BORDERS, "        self.mark = None\n", "", MARK_TEST),
+    Mutant(
+        OBJECT_BORDERS,
+        "        self.checks = None\n        self._in_headers",
+        "        self._in_headers",
+        "tests/codec/test_checksums.py",
+    ),
     Mutant(STREAM_READER, "del self._buffer, self._reader ", "pass", f"{CHUNKS_TEST} -k no_bytes"),
     Mutant(
         STREAM_READER,
@@ -854,7 +859,12 @@ MUTANTS = (
         "        self",
         f"{CHUNKS_TEST} -k no_bytes",
     ),
-    Mutant(OBJECT_BORDERS, "code == USER_DATA and directly and self.ended", "code == USER_DATA", MARK_TEST),
+    Mutant(
+        OBJECT_BORDERS,
+        "code != USER_DATA or not (directly or self._in_headers)",
+        "code != USER_DATA",
+        MARK_TEST,
+    ),
     Mutant("fba/body/gait/_plan.py", "_SOFT = 0.85", "_SOFT = 0.7", MEASURED_TEST),
     Mutant("fba/body/gait/_plan.py", 'self._correction("knee", swing)', "0.0", MEASURED_TEST),
     Mutant("fba/body/gait/_plan.py", 'self._correction("thigh", swing)', "0.0", MEASURED_TEST),
