@@ -62,6 +62,7 @@ class StreamReader:
         self.times = PlaneTimes(self._log if self._salvage else None)
         self.objects = ObjectBorders(bap_steps, marks)
         self.wrong: list[range] = []
+        self._was_at_end = False  # whether what stands behind the end was read, behind damage
         self._checks = PeriodChecks()
         self._buffer = Buffer()
         self._bit = 0  # next bit to decode, in the buffer
@@ -324,7 +325,8 @@ class StreamReader:
             end = self._find_end()
             self._log.end(buffer.offset + (buffer.length if end is None else end))
             self._log.resume(*(self._log.estimate() or (None, None)) if end is not None else (None, None))
-            if end is not None and self.objects.count:
+            if end is not None and self.objects.count and not self._was_at_end:
+                self._was_at_end = True
                 self._scanned = end
                 self.objects.end_object(syntax.END_CODE, buffer.offset + end)
                 self._state = StreamReader._find_object

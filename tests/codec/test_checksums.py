@@ -244,3 +244,14 @@ def test_write_mark() -> None:
     assert write_mark(None) == b""
     assert write_mark(None, b"abcd").startswith(b"\0\0\1\xb2fba crc32=1;abcd")
     assert b"\0" not in write_mark("iso", b"\xff" * 400)[4:]
+
+
+def test_a_plane_behind_the_end_of_a_damaged_stream_is_reported_once() -> None:
+    """It was found again and again, until the list of damage exceeded its limit."""
+    data = bare(SECTIONS)
+    at = data.rindex(b"\0\0\1\xbb")
+    bad = data[:at] + b"\x80\xff\0\0\1\xb1\0\0\1\xb2\0\0\1\xbb\x20"
+    decoder = Decoder(on_error="salvage", bap_steps="visage")
+    decoder.push(bad)
+    decoder.finish()
+    assert 0 < len(decoder.damage) < 5
