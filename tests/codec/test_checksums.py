@@ -246,6 +246,7 @@ def test_write_mark() -> None:
     assert b"\0" not in write_mark("iso", b"\xff" * 400)[4:]
 
 
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 def test_a_plane_behind_the_end_of_a_damaged_stream_is_reported_once() -> None:
     """It was found again and again, until the list of damage exceeded its limit."""
     data = bare(SECTIONS)
