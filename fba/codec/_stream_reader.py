@@ -228,6 +228,7 @@ class StreamReader:
         if not self._salvage:
             raise error
         self._log.add(error, byte, doubtful=planes)
+        self.damage.sort(key=lambda damage: damage.start)
         self._check_memory_of_damage()
         if planes:
             self.wrong.append(planes)
