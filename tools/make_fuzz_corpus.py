@@ -48,7 +48,7 @@ from fba_conformance.fuzz._small_head import (  # noqa: E402
     small_head_wfm,
     small_head_xface,
 )
-from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
+from fba_conformance.small_streams import doubtful_marks, long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
 from mesh_files import ply  # noqa: E402
@@ -452,7 +452,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
     """Return all files: content by name, by target. folder: for files that are read again at once."""
     limb = {name: BODY[name] for name in ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot")}
     files: dict[str, dict[str, bytes]] = {
-        "stream": {**small_streams(), **long_streams()},
+        "stream": {**small_streams(), **doubtful_marks(), **long_streams()},
         "fap": lines(FAPS),
         "bap": lines(BAPS),
         "epf": lines(EPFS),

@@ -91,8 +91,10 @@ def decode_subject(subject: Subject, data: bytes) -> Coded:
 
 
 def options_for(subject: Subject, quant: int) -> EncoderOptions:
-    """Return the options of an encoder for a subject, with one quantiser."""
-    return EncoderOptions(fap_quant=quant, bap_quant=quant, bap_steps=subject.bap_steps, clamp=True)
+    """Return the options of an encoder for a subject, with one quantiser, and no mark, which others lack."""
+    return EncoderOptions(
+        fap_quant=quant, bap_quant=quant, bap_steps=subject.bap_steps, clamp=True, mark=False
+    )
 
 
 def encode_with_preset(subject: Subject, preset: str, quant: int) -> bytes:

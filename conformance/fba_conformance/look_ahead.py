@@ -43,6 +43,7 @@ def random_options(random: Random) -> EncoderOptions:
         intra_period=random.choice((None, None, Fraction(1, 25), Fraction(3, 25))),
         start_codes=random.random() < 0.3,
         clamp=True,
+        mark=False,
     )
 
 

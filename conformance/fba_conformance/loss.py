@@ -45,6 +45,7 @@ class Setting:
             start_codes=self.period is not None,
             time_codes=self.time_codes,
             clamp=True,
+            mark=False,
         )
 
 

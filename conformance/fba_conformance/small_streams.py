@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 
 from fba.animation import Animation, FaceTrack
-from fba.codec import EncoderOptions, encode
+from fba.codec import EncoderOptions, encode, write_mark, write_opening
 from fba_conformance import _motion as motion
 
 _END_CODE = b"\0\0\1\xb1"
@@ -43,20 +44,41 @@ def small_streams() -> dict[str, bytes]:
         "zeros": (make(FaceTrack(np.zeros_like(face.values), face.mask)), every_other),
     }
     streams = {
-        name: encode(animation, EncoderOptions(**options))  # type: ignore[arg-type]
+        name: encode(animation, EncoderOptions(mark=False, **options))  # type: ignore[arg-type]
         for name, (animation, options) in made.items()
     }
+    marked = EncoderOptions(intra_period=Fraction(2, 25), start_codes=True)
+    streams["checked"] = encode(make(both, body), marked)
+    fine = replace(marked, bap_steps="visage", checksums=False)
+    streams["named_before"] = write_opening("visage") + encode(make(None, body), fine)
     streams["two_objects"] = streams["face"] + streams["body"]
     streams["no_end_code"] = streams["face"].removesuffix(_END_CODE)
     streams["old_start_codes"] = b"\0\0\1\x01\0\0\1\x03" + streams["talking"][4:]
     return streams
 
 
+def doubtful_marks() -> dict[str, bytes]:
+    """Return streams whose marks contradict each other or the stream, were cut off, or claim too much."""
+    options = EncoderOptions(intra_period=Fraction(2, 25), start_codes=True, mark=False)
+    bare = encode(motion.animation(None, motion.body(5, baps_sent=(1, 181))), options)
+    named = write_mark("iso")
+    checked = encode(motion.animation(None, motion.body(5, baps_sent=(1, 181))), replace(options, mark=True))
+    return {
+        "contradicting_marks": write_opening("visage") + bare + named,
+        "several_marks": write_opening("iso") + bare + named + write_mark("visage"),
+        "wrong_checks": bare + write_mark("iso", bytes(range(1, 13))),
+        "few_checks": bare + write_mark("iso", b""),
+        "cut_checks": checked[:-5],
+        "many_checks": bare + b"\0\0\1\xb2fba crc32=999999999;" + bytes(range(1, 60)),
+        "unknown_words": bare + b"\0\0\1\xb2fba bap_steps=iso;colour=red;",
+    }
+
+
 def long_streams() -> dict[str, bytes]:
     """Return streams of 400 planes and 1 to 2 kB, with a start code every 2 seconds: many planes at once."""
     face = motion.face(400, faps_sent=(3, 48))
     body = motion.body(400, baps_sent=(1, 181))
-    options = EncoderOptions(intra_period=Fraction(2), start_codes=True)
+    options = EncoderOptions(intra_period=Fraction(2), start_codes=True, mark=False)
     return {
         "long_face": encode(motion.animation(face), options),
         "long_body": encode(motion.animation(None, body), options),

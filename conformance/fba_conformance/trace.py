@@ -6,6 +6,7 @@ Implements ISO/IEC 14496-2, FBA object, without code of `fba.codec`, and is hund
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterator
 from fractions import Fraction
@@ -29,14 +30,19 @@ from fba_conformance.listing import element_dict, format_trace
 __all__ = ["Element", "Levels", "Walker", "decode_values", "element_dict", "format_trace", "planes", "trace"]
 
 FAP_BIT, BAP_BIT = 1, 2
+_NAMED_STEPS = re.compile(rb"\x00\x00\x01\xb2fba bap_steps=(iso|visage);")
+"""The mark before an object."""
+_CHECKED = re.compile(rb"fba (?:bap_steps=[a-z]+;)?crc32=[0-9]+;")
+"""The words of a mark behind an object that a list of checks follows."""
 SKIP_MORE = 15
 """Value of a word of number_of_frames_to_skip after which another word follows."""
 
 
-def trace(data: bytes, *, bap_steps: str = "iso") -> Iterator[Element]:
+def trace(data: bytes, *, bap_steps: str | None = None) -> Iterator[Element]:
     """Yield every syntax element of a stream, in order.
 
-    bap_steps: "iso" or "visage", the table of BAP steps that the writer used; it only changes values.
+    bap_steps: "iso" or "visage", the table of BAP steps that the writer used; it only changes values. None:
+    the one that a mark before the object names, else "iso".
 
     Yields the elements before damage, then raises BitstreamError(plane, bit), which names the damaged
     element; UnsupportedError for DCT segments; ValueError for another bap_steps.
@@ -52,7 +58,7 @@ def trace(data: bytes, *, bap_steps: str = "iso") -> Iterator[Element]:
         yield from walker.reader.drain()
 
 
-def planes(data: bytes, *, bap_steps: str = "iso") -> Iterator[dict[str, Any]]:
+def planes(data: bytes, *, bap_steps: str | None = None) -> Iterator[dict[str, Any]]:
     """Yield the content of each plane, in order; raises like `trace`, after the last undamaged plane.
 
     Keys: number; bit and bits (where it starts and its length, start code and stuffing before it
@@ -73,7 +79,7 @@ def planes(data: bytes, *, bap_steps: str = "iso") -> Iterator[dict[str, Any]]:
             yield walker.record
 
 
-def decode_values(data: bytes, *, bap_steps: str = "iso") -> list[dict[str, Any]]:
+def decode_values(data: bytes, *, bap_steps: str | None = None) -> list[dict[str, Any]]:
     """Return `planes` as a list. For untrusted streams use `planes`: a plane may have only six bits."""
     return list(planes(data, bap_steps=bap_steps))
 
@@ -91,7 +97,11 @@ class Walker:
     as the standard's look-ahead can be read. Streams are to be written so that this makes no difference.
     """
 
-    def __init__(self, data: bytes, *, bap_steps: str = "iso", byte_aligned: bool = False) -> None:
+    def __init__(self, data: bytes, *, bap_steps: str | None = None, byte_aligned: bool = False) -> None:
+        if bap_steps is None:
+            before = data[: min(_find_code(data, code, 0) for code in OBJECT_START_CODES)]
+            named = _NAMED_STEPS.search(before)
+            bap_steps = named[1].decode() if named is not None else BAP_STEP_TABLES[0]
         if bap_steps not in BAP_STEP_TABLES:
             raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {bap_steps!r}")
         self.reader = Reader(bytes(data), byte_aligned=byte_aligned)
@@ -166,6 +176,13 @@ class Walker:
             bit, after = reader.bit, reader.data.find(b"\0\0\1", reader.bit // 8)
             reader.bit = 8 * after if after >= 0 else reader.size
             content = reader.data[bit // 8 : reader.bit // 8]
+            checks = _CHECKED.match(content)
+            if checks is not None:
+                reader.bit = bit + 8 * checks.end()
+                reader.record(bit, "user_data", checks[0].decode(), "object")
+                bit, reader.bit = reader.bit, bit + 8 * len(content)
+                reader.record(bit, "checks", content[checks.end() :].hex(), "object")
+                continue
             text = content.decode() if content.isascii() else content[:TRAILING_BYTES_SHOWN].hex()
             reader.record(bit, "user_data", text, "object")
         left = reader.size - reader.bit

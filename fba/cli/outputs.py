@@ -24,6 +24,7 @@ from fba.cli.inputs import renamed
 from fba.errors import FormatError
 
 if TYPE_CHECKING:
+    from fba.animation import Animation
     from fba.formats.registry import Format
 
 STANDARD = Path("-")
@@ -161,6 +162,18 @@ def display_name(path: Path) -> str:
     return "standard output" if path == STANDARD else str(path)
 
 
+def opening_for(output: Path, animation: Animation, table: str, quant: int, *, marked: bool) -> bytes:
+    """Return what goes before a stream that others may read while it comes; b"" for a file.
+
+    Nothing in streams without a mark, and without BAPs that the table makes a difference to.
+    """
+    from fba.codec import write_opening
+
+    if not marked or animation.body is None or quant == 0 or not _goes_to_pipe(output):
+        return b""
+    return write_opening(table)
+
+
 def _check_inputs(output: Output, inputs: list[Path]) -> None:
     for path in inputs:
         if _same(output.path, path, 0):
@@ -289,6 +302,16 @@ def _text(path: Path) -> bytes:
             return file.read(MOST_TEXT)
     except OSError:
         return b""  # its reader says why
+
+
+def _goes_to_pipe(path: Path) -> bool:
+    """Whether somebody may read an output while it is written: in a pipe or a device, but not in a file."""
+    if path != STANDARD:
+        return path.exists() and not path.is_file()
+    try:
+        return not stat.S_ISREG(os.fstat(sys.stdout.fileno()).st_mode)
+    except (OSError, ValueError):
+        return True
 
 
 def _is_direct(path: Path) -> bool:

@@ -17,7 +17,7 @@ from fba.codec._plane.pricing import NextPlane
 from fba.codec._plane.slots import weights_of_slots
 from fba.codec._script import encode_planes
 from fba.codec._stream.damage import Damage
-from fba.codec._stream.mark import marked_table, write_mark
+from fba.codec._stream.mark import marked_table, write_mark, write_opening
 from fba.codec._whole_stream import decode
 from fba.codec.block import Block
 from fba.codec.code_length import INTRA_BITS, code_lengths, level_bits, range_limit, step_scale
@@ -68,4 +68,5 @@ __all__ = [
     "warn_of_clamped",
     "weights_of_slots",
     "write_mark",
+    "write_opening",
 ]

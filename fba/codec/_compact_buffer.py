@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fba.animation import Animation
@@ -57,18 +59,25 @@ class CompactBuffer:
             self._kinds.append(kinds[block.parts], count)
         self.frames += count
 
-    def animation(self) -> Animation:
+    def animation(self, wrong: Sequence[range] = ()) -> Animation:
         """Return all frames. ValueError without frames.
 
         Frames that were decoded before damage, and whose index the frames behind it fall back to, are left
-        out: they were misread.
+        out: they were misread. wrong: planes of I periods that do not match their CRC-32, which are left out
+        where any others are left.
         """
         if not self.frames:
             raise ValueError("there is no frame to make an animation of")
         rows, kinds, index = self._rows.view(), self._kinds.view(), self._times.index()
+        kept = np.ones(len(index), dtype=bool)
         if not (np.diff(index) > 0).all():
             later = np.minimum.accumulate(index[::-1])[::-1]
-            kept = np.append(index[:-1] < later[1:], True)
+            kept[:-1] = index[:-1] < later[1:]
+        right = kept.copy()
+        for planes in wrong:
+            right[planes.start : planes.stop] = False
+        kept = right if right.any() else kept
+        if not kept.all():
             rows, kinds, index = rows[kept], kinds[kept], index[kept]
         face = body = None
         if self._parts & slots.FACE_BIT:

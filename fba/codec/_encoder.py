@@ -18,12 +18,14 @@ from fba.codec._plane.pricing import NextPlane
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec._ranges import CLAMP, Ranges, fitting_ranges
 from fba.codec._runs import Run, find_runs
+from fba.codec._stream.checksums import PeriodChecks
 from fba.codec._stream.mark import write_mark
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
 from fba.errors import FbaWarning, OptionError, RangeError
 from fba.parameters import INTENSITY_MAX
 from fba.presets import REFERENCE
 
+_CODE_BYTES = 4
 _CHUNK = 4096
 """Frames that `encode` passes to the encoder at once, which limits its memory."""
 
@@ -99,6 +101,7 @@ class Encoder:
         self._time_code: TimeCode | None = None  # of the first plane
         self._origin = 0  # index of the frame that is at 0 seconds in the stream
         self._last_intra = 0  # index of the last I plane
+        self._checks = PeriodChecks()
         self._finished = False
 
     def expect(self, animation: Animation) -> None:
@@ -137,7 +140,7 @@ class Encoder:
             self._encode(pending, int(animation.index[0]))
         if len(animation) > 1:
             self._encode(animation[:-1], int(animation.index[-1]))
-        return self._writer.take_bytes()
+        return self._take_bytes()
 
     def push_segment(self, animation: Animation) -> bytes:
         """Add consecutive frames that begin with an I plane, with ranges that fit them.
@@ -183,7 +186,7 @@ class Encoder:
         if self._pending is not None:
             pending, self._pending = self._pending, None
             self._encode(pending, following)
-        return self._writer.take_bytes()
+        return self._take_bytes()
 
     @property
     def bits(self) -> int:
@@ -213,25 +216,35 @@ class Encoder:
             raise ValueError("there is no frame to encode")
         self._encode(self._pending, int(self._pending.index[0]) + 1)
         self._finished = True
-        self._writer.end_object()
-        return self._writer.take_bytes() + self._mark()
+        writer = self._writer
+        writer.end_object()
+        self._checks.end(writer.data, writer.taken, writer.bits // 8 - _CODE_BYTES, writer.planes)
+        checks = bytes(self._checks.checks) if self.options.checksums and not self._checks.full else None
+        return self._take_bytes() + self._mark(checks)
 
     def ending(self) -> bytes:
         """Return what would end the stream behind the bytes returned so far; b"" before the first.
 
-        With it behind them, they are a complete stream of all frames but the last one pushed. The encoder
-        goes on as if it had not been asked.
+        With it behind them, they are a complete stream of all frames but the last one pushed, without checks
+        of its I periods. The encoder goes on as if it had not been asked.
         """
         if self._finished or not self._writer.planes:
             return b""
         return self._writer.ending() + self._mark()
 
-    def _mark(self) -> bytes:
-        """Return the mark behind the end of a stream; b"" where there is none."""
-        marked = (
-            self.options.mark and self.options.bap_quant and self._writer.settings_in_force(slots.BODY_BIT)
-        )
-        return write_mark(self.options.bap_steps) if marked else b""
+    def _mark(self, checks: bytes | None = None) -> bytes:
+        """Return the mark behind the end of a stream, with these checks; b"" where there is none."""
+        if not self.options.mark:
+            return b""
+        body = self.options.bap_quant and self._writer.settings_in_force(slots.BODY_BIT)
+        return write_mark(self.options.bap_steps if body else None, checks)
+
+    def _take_bytes(self) -> bytes:
+        """Return the complete bytes written since the last call."""
+        taken = self._writer.taken
+        data = self._writer.take_bytes()
+        self._checks.add(np.frombuffer(data, dtype=np.uint8), taken, taken + len(data))
+        return data
 
     def _encode(self, frames: Animation, following: int) -> None:
         """Encode frames. following: index of the frame after them, which determines the last skip."""
@@ -405,6 +418,7 @@ class Encoder:
         for slot in self._writer.intra(plane, row, clamp=True):
             label, sent = slots.label(slot), self._writer.last(slot)
             self.statistics.count_clamped(label, frame, int(row[slot]), sent)
+        self._checks.begin_period(self._writer.data, self._writer.taken, self._writer.intra_bit, frame)
         self.statistics.intra_planes += 1
         self._resumable = set(parts) | (set() if self.options.start_codes else self._resumable)
         self._last_intra = int(run.index[position])

@@ -26,8 +26,12 @@ class EncoderOptions:
         that a decoder can start there or resume after damage.
     time_codes: with start codes, also the time at which decoding goes on after damage: I planes come at
         whole seconds where the intra period allows it, and carry a time code there. Takes 18 bits each.
-    bap_steps: "iso" or "visage", the table of BAP steps. mark: say behind the end of a stream with BAPs which
-        it is, where other decoders do not read (see `fba.codec.write_mark`); else a decoder must be told.
+    bap_steps: "iso" or "visage", the table of BAP steps.
+    mark: say behind the end of a stream, where other decoders do not read, which of these tables its BAPs are
+        coded with (see `fba.codec.write_mark`); else a decoder must be told. Without a mark, a stream is the
+        FBA object alone.
+    checksums: with the mark, a CRC-32 of each I period, 4 bytes each and about 20 more, by which a decoder
+        notices flipped bits that leave the syntax whole.
     preset: what is sent, of `fba.presets.PRESETS`. "reference": all that the animation sends. "exact" and
         "compact", which `fba.encode` and `fba.write` know: see `fba.planning`.
     unsent: what a decoder does with an unsent FAP, unless the animation says so itself
@@ -46,7 +50,8 @@ class EncoderOptions:
     start_codes: bool = False
     time_codes: bool = True
     bap_steps: str = "iso"
-    mark: bool = False
+    mark: bool = True
+    checksums: bool = True
     preset: str = REFERENCE
     unsent: str = "keep"
     gender: int = 0

@@ -10,8 +10,9 @@ from fba.codec._plane import loops, syntax
 from fba.codec._plane.bits import OutOfDataError
 from fba.codec._plane.reader import PlaneReader, Planes
 from fba.codec._stream.buffer import Buffer
+from fba.codec._stream.checksums import CHECK_BYTES, PeriodChecks, find_wrong
 from fba.codec._stream.damage import Damage, DamageLog
-from fba.codec._stream.mark import LONGEST, USER_DATA, Mark
+from fba.codec._stream.mark import LONGEST, START, USER_DATA, Mark, bytes_needed
 from fba.codec._stream.object_borders import ObjectBorders
 from fba.codec._stream.plane_times import PlaneTimes
 from fba.codec.block import Block
@@ -36,7 +37,8 @@ class StreamReader:
     marks: those of the whole stream, where they are known beforehand.
 
     error: the one that ended the reading; nothing can be read behind it. planes: how many were read. damage:
-    what was skipped. times: of the planes. objects: where they begin and end.
+    what was skipped. times: of the planes. objects: where they begin and end. wrong: the planes of I periods
+    that do not match their checks, when salvaging.
     """
 
     def __init__(
@@ -59,6 +61,9 @@ class StreamReader:
         self.damage: list[Damage] = self._log.damage
         self.times = PlaneTimes(self._log if self._salvage else None)
         self.objects = ObjectBorders(bap_steps, marks)
+        self.wrong: list[range] = []
+        self._was_at_end = False  # whether what stands behind the end was read, behind damage
+        self._checks = PeriodChecks()
         self._buffer = Buffer()
         self._bit = 0  # next bit to decode, in the buffer
         self._scanned = 0  # byte up to which no start code was found, while looking for one
@@ -87,7 +92,12 @@ class StreamReader:
         """Drop the bytes that neither the next plane needs, nor a look for start codes after damage."""
         doubtful = self._log.first_doubtful_bit
         needed = (doubtful >> 3) - self._buffer.offset if doubtful is not None else self._bit >> 3
-        dropped = self._buffer.drop(min(needed, self._bit >> 3, self._scanned or self._bit >> 3))
+        if self._code_bit is not None:
+            needed = min(needed, (self._code_bit >> 3) - self._buffer.offset)
+        needed = min(needed, self._bit >> 3, self._scanned or self._bit >> 3)
+        if self._buffer.can_drop(needed):
+            self._checks.add(self._buffer.data, self._buffer.offset, self._buffer.offset + needed)
+        dropped = self._buffer.drop(needed)
         self._bit -= 8 * dropped
         self._scanned = max(self._scanned - dropped, 0)
         self._retry_at = max(self._retry_at - dropped, 0)
@@ -153,13 +163,14 @@ class StreamReader:
                 if position + 4 < buffer.length and buffer.data[position + 4] & 0x80:
                     return self._join(position)
                 self._start_error = self._start_error or self._outside(position, code)
-            if code == USER_DATA and position + LONGEST > buffer.length and not final:
+            needed = position + 4 + self._user_data_needed(code, position)
+            if needed > buffer.length and not final:
                 break  # a mark may not be complete
-            content = buffer.data[position + 4 : min(position + LONGEST, buffer.length)].tobytes()
-            problem = self.objects.read_user_data(code, buffer.offset + position, content)
-            if problem:
+            content = buffer.data[position + 4 : min(needed, buffer.length)].tobytes()
+            for problem in self.objects.read_user_data(code, buffer.offset + position, content):
                 self._warn(problem)
             self._scanned = position + 4
+            self._compare_checks()
             if code in syntax.OBJECT_CODES:
                 if self._start_error is not None and self.objects.count == 0:
                     self._log.add(self._start_error, 0, buffer.offset + position)
@@ -182,6 +193,46 @@ class StreamReader:
             self._bit = max(self._bit, 8 * self._scanned)
         return None
 
+    def _user_data_needed(self, code: int, position: int) -> int:
+        """Return how many bytes must be there behind a start code, at a byte of the buffer, for a mark."""
+        if code != USER_DATA:
+            return 0
+        words = self._buffer.data[position + 4 : min(position + 4 + LONGEST, self._buffer.length)]
+        return bytes_needed(words.tobytes(), self.objects.size)
+
+    def _compare_checks(self) -> None:
+        """Compare the I periods of an object with the checks behind it, if any; tell which are wrong."""
+        listed, self.objects.checks = self.objects.checks, None
+        if listed is None:
+            return
+        own = self._checks
+        wrong = find_wrong(bytes(own.checks), listed)
+        for number in wrong:
+            planes = range(own.planes[2 * number], own.planes[2 * number + 1])
+            self._report_wrong(
+                f"the I period of planes {planes.start}..{planes.stop - 1} does not match its CRC-32: "
+                "a part of it is wrong",
+                planes, own.starts[number],
+            )  # fmt: skip
+        missing = len(listed) // CHECK_BYTES - len(own)
+        if missing > 0 and not (own.full or own.left_out or wrong):
+            self._report_wrong(
+                f"{missing} of {len(listed) // CHECK_BYTES} I periods of the object are missing",
+                range(self.planes, self.planes), self.objects.begin,
+            )  # fmt: skip
+        self._checks = PeriodChecks()
+
+    def _report_wrong(self, text: str, planes: range, byte: int) -> None:
+        """Raise, or list as damage, that the planes of an I period, which begins at a byte, are wrong."""
+        error = BitstreamError(text, plane=planes.start, bit=8 * byte)
+        if not self._salvage:
+            raise error
+        self._log.add(error, byte, doubtful=planes)
+        self.damage.sort(key=lambda damage: damage.start)
+        self._check_memory_of_damage()
+        if planes:
+            self.wrong.append(planes)
+
     def _join(self, position: int) -> list[Block]:
         """Start decoding at an I plane of an object whose start is missing or damaged."""
         error = self._start_error or BitstreamError(
@@ -189,6 +240,7 @@ class StreamReader:
         )
         self._begin_object(self._buffer.offset + position)
         self._reader.forget_values()
+        self._checks.abandon()
         self._log.add(error, 0, self._buffer.offset + position)
         self._bit = 8 * position
         self._scanned = 0
@@ -215,6 +267,7 @@ class StreamReader:
             self._log.confirm_planes()
             if code not in syntax.PLANE_CODES:
                 self._code_bit = None
+                self._checks.end(buffer.data, buffer.offset, self._absolute(after) // 8 - 4, self.planes)
             elif self._code_bit is None:
                 self._code_bit = self._absolute(start)
             if code in syntax.OBJECT_CODES:
@@ -270,10 +323,23 @@ class StreamReader:
         self._scanned = max(self._scanned, buffer.length - 3)
         self._bit = 8 * self._scanned
         if final:
-            self._log.end(buffer.offset + buffer.length)
-            ended = buffer.data[max(buffer.length - 4, 0) : buffer.length].tobytes() == _END
-            self._log.resume(*(self._log.estimate() or (None, None)) if ended else (None, None))
+            end = self._find_end()
+            self._log.end(buffer.offset + (buffer.length if end is None else end))
+            self._log.resume(*(self._log.estimate() or (None, None)) if end is not None else (None, None))
+            if end is not None and self.objects.count and not self._was_at_end:
+                self._was_at_end = True
+                self._scanned = end
+                self.objects.end_object(syntax.END_CODE, buffer.offset + end)
+                self._state = StreamReader._find_object
+                return []
         return None
+
+    def _find_end(self) -> int | None:
+        """Return the byte of the buffer behind the end code of the stream, or None where it has none."""
+        data = self._buffer.data[: self._buffer.length].tobytes()
+        end = data.rfind(_END) + len(_END)
+        ended = end >= len(_END) and (end == len(data) or data.startswith(START, end))
+        return end if ended else None
 
     def _block(self, planes: Planes) -> Block:
         """Return planes with their times, and move on past them."""
@@ -283,6 +349,8 @@ class StreamReader:
             bit = int(borders[0])
             for problem in times.begin_intra(settings, self.planes, bit):
                 self._warn(f"plane {self.planes}, bit {bit}: {problem}")
+            begin = bit - 32 * (self._code_bit is not None)
+            self._checks.begin_period(self._buffer.data, self._buffer.offset, begin, self.planes)
         if self._salvage:
             self._log.add_planes(borders, planes.skips)
         if self._code_bit is not None:
@@ -310,6 +378,7 @@ class StreamReader:
     def _begin_object(self, byte: int) -> None:
         """Reset the reader for a new object, which begins at this byte of the stream."""
         self.objects.begin_object(byte)
+        self._checks = PeriodChecks(byte)
         self._reader.begin_object(self.objects.table)
         self.times.begin_object()
         self._code_bit = None
@@ -327,7 +396,9 @@ class StreamReader:
                 raise error
             self._warn(f"{error}; the object ends there")
         self._scanned = self._bit >> 3
-        self.objects.end_object(code, self._buffer.offset + self._scanned)
+        problem = self.objects.end_object(code, self._buffer.offset + self._scanned)
+        if problem:
+            self._warn(problem)
         self._state = StreamReader._find_object
 
     # ---- damage
@@ -352,6 +423,7 @@ class StreamReader:
         doubtful = self._log.first_doubtful_bit
         self._log.begin(error, self._buffer.offset + start, self.planes)
         self._reader.forget_values()
+        self._checks.abandon()
         self._code_bit = None
         if doubtful is not None:
             self._scanned = (doubtful >> 3) - self._buffer.offset
@@ -361,11 +433,15 @@ class StreamReader:
 
     def _check_damage(self) -> None:
         """Stop with a LimitError where the list of damage takes more memory than allowed."""
-        memory, read = len(self.damage) * _DAMAGE_BYTES, self._buffer.offset + self._buffer.length
         try:
-            self._limits.check_bytes(memory, f"a list of {len(self.damage)} damages", source=read)
+            self._check_memory_of_damage()
         except LimitError as error:
             self._stop(error)
+
+    def _check_memory_of_damage(self) -> None:
+        """Raise a LimitError where the list of damage takes more memory than allowed."""
+        memory, read = len(self.damage) * _DAMAGE_BYTES, self._buffer.offset + self._buffer.length
+        self._limits.check_bytes(memory, f"a list of {len(self.damage)} damages", source=read)
 
     def _outside(self, position: int, code: int) -> BitstreamError:
         """Return the error for a plane start code, at a byte of the buffer, outside of an object."""

@@ -46,7 +46,7 @@ def decode(
     if not frames.frames:
         error = reader.damage[0].error if reader.damage else None
         raise BitstreamError("the stream holds no plane that can be decoded", plane=0) from error
-    return frames.animation()
+    return frames.animation(reader.wrong)
 
 
 def reader_for(

@@ -93,7 +93,7 @@ def verify_stream(
         if reader.damage:
             raise reader.damage[0].error
         raise BitstreamError("the object has no plane", plane=0, bit=32)
-    animation = frames.animation()
+    animation = frames.animation(reader.wrong)
     return Verification(
         len(view), len(animation), animation.rate, animation.duration, reader.objects.ended,
         tuple(reader.damage), len(doubtful), tuple(str(one.message) for one in odd), digest(animation),

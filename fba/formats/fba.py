@@ -10,7 +10,7 @@ from fba.animation import Animation
 from fba.atomic import atomic
 from fba.errors import OptionError
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
+from fba.parameters import BAP_STEPS_AUTO
 from fba.presets import PRESETS, REFERENCE
 from fba.source import Path, naming_file, read_whole
 
@@ -69,9 +69,8 @@ def write_fba(
 ) -> None:
     """Encode an animation into an FBA file.
 
-    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Unless they say otherwise, a
-    file whose BAP steps are not the standard's is marked (see `fba.codec.write_mark`). Raises OptionError if
-    options and fields are given, or for an unknown preset, RangeError for values that no stream can carry,
+    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Raises OptionError if options
+    and fields are given, or for an unknown preset, RangeError for values that no stream can carry,
     FormatError if the file cannot be written.
     """
     from fba.codec import EncoderOptions
@@ -82,8 +81,7 @@ def write_fba(
             raise OptionError(f"give either options or {', '.join(settings)}, not both")
         if settings.get("preset", REFERENCE) not in PRESETS:
             raise OptionError(f"preset must be one of {', '.join(PRESETS)}, not {settings['preset']!r}")
-        mark = settings.get("bap_steps", BAP_STEPS_DEFAULT) != BAP_STEPS_DEFAULT
-        options = EncoderOptions(**{"mark": mark, **settings})
+        options = EncoderOptions(**settings)
     with naming_file(path):
         data = encode(animation, options)
     with atomic(path) as file:

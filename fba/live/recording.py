@@ -9,7 +9,7 @@ from typing import BinaryIO, Protocol
 from fba.animation import Animation
 from fba.atomic import PathLike, check_target, write_error
 from fba.capture.live import widest_faces
-from fba.codec import Encoder, EncoderOptions
+from fba.codec import Encoder, EncoderOptions, write_opening
 from fba.codec.settings import FrameRate
 from fba.errors import OptionError
 from fba.planning import LiveEncoder
@@ -21,6 +21,9 @@ RATES = Fraction(1), Fraction(240)
 
 class Target(Protocol):
     """Where a stream goes."""
+
+    def begin(self, opening: bytes) -> None:
+        """Begin the stream. opening: what goes before it where it is read while it comes."""
 
     def write(self, data: bytes, ending: bytes) -> None:
         """Add bytes. ending: what ends the stream behind them, for now; more bytes take its place."""
@@ -42,7 +45,11 @@ class StreamFile:
         self._in_place = not check_target(path).direct
         self._file: BinaryIO | None = None
         self._size = 0  # without the end
-        self._ending = b""
+        self._opening = self._ending = b""
+
+    def begin(self, opening: bytes) -> None:
+        """Keep what goes before the stream, for a pipe or a device; see `Target`."""
+        self._opening = b"" if self._in_place else opening
 
     def write(self, data: bytes, ending: bytes) -> None:
         """Add bytes; see `Target`."""
@@ -57,7 +64,8 @@ class StreamFile:
                 if len(data) + len(ending) < len(self._ending):
                     self._file.truncate()
             else:
-                _write_all(self._file, data)
+                _write_all(self._file, self._opening + data)
+                self._opening = b""
         except OSError as error:
             raise write_error(self.path, error) from error
         self._size += len(data)
@@ -74,11 +82,17 @@ class StreamPipe:
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
+        self._opening = b""
+
+    def begin(self, opening: bytes) -> None:
+        """Keep what goes before the stream; see `Target`."""
+        self._opening = opening
 
     def write(self, data: bytes, ending: bytes) -> None:
         """Add bytes; see `Target`."""
         if data:
-            self._file.write(data)
+            self._file.write(self._opening + data)
+            self._opening = b""
             self._file.flush()
 
     def close(self) -> None:
@@ -90,9 +104,10 @@ class StreamRecorder:
 
     targets: where it goes. frames, size: written so far. rate: frames per second; 0 before the first.
     options: by default those of captures: values that no plane carries are brought as near as can be, and a
-    body's steps are the finer ones, named behind the end. bit_rate: bits a second that are held, as far as
-    `buffer` seconds of them; None for all that is sent. See `fba.planning.rate.RateEncoder`. compact: whether
-    only those parameters are sent that players do not derive from others; see `fba.planning.LiveEncoder`.
+    body's steps are the finer ones, named behind the end, and before the object in pipes. bit_rate: bits a
+    second that are held, as far as `buffer` seconds of them; None for all that is sent. See
+    `fba.planning.rate.RateEncoder`. compact: whether only those parameters are sent that players do not
+    derive from others; see `fba.planning.LiveEncoder`.
 
     Raises OptionError for both at once.
     """
@@ -108,7 +123,7 @@ class StreamRecorder:
     ) -> None:
         if compact and bit_rate is not None:
             raise OptionError("compact and bit_rate contradict each other: the bit rate decides what is sent")
-        self.options = options or EncoderOptions(clamp=True, bap_steps="visage", mark=True)
+        self.options = options or EncoderOptions(clamp=True, bap_steps="visage")
         self.frames = self.size = 0
         self.rate = Fraction(0)
         self.encoder: Encoder | RateEncoder | LiveEncoder
@@ -122,6 +137,9 @@ class StreamRecorder:
 
     def push(self, animation: Animation) -> None:
         """Add frames. Raises FormatError where a target cannot be written."""
+        if not self.frames and animation.body is not None and self.options.mark and self.options.bap_quant:
+            for target in self.targets:
+                target.begin(write_opening(self.options.bap_steps))
         self.frames += len(animation)
         self.rate = animation.rate
         self._write(self.encoder.push_animation(animation), self.encoder.ending())

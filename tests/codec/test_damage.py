@@ -31,11 +31,12 @@ NAMES = ["face", "body", "high level", "both in sections"]
 
 @cache
 def stream(name: str) -> bytes:
-    """Some 50 to 300 bytes each; all but the first with start codes."""
-    sections = EncoderOptions(intra_period=Fraction(3, 25), start_codes=True)
+    """Some 50 to 300 bytes each, without marks; all but the first with start codes."""
+    bare = EncoderOptions(mark=False)
+    sections = EncoderOptions(intra_period=Fraction(3, 25), start_codes=True, mark=False)
     face = motion.face(9, faps_sent=(3, 4, 48))
     if name == "face":
-        return encode(motion.animation(face))
+        return encode(motion.animation(face), bare)
     if name == "body":
         return encode(motion.animation(None, motion.body(9, baps_sent=(1, 2, 124))), sections)
     if name == "high level":
@@ -170,7 +171,7 @@ def test_a_plane_behind_damage_says_where_it_stands() -> None:
 def test_positions_of_errors_count_from_the_start_of_the_stream() -> None:
     """... although the decoder has let go of what was decoded long before."""
     animation = motion.animation(motion.face(400))
-    good = encode(animation)
+    good = encode(animation, EncoderOptions(mark=False))
     good = good[: -4 - 1]
     errors = {}
     for wrong in ("mask", "skip", "marker", "frame rate"):
@@ -306,7 +307,8 @@ def test_many_bytes_of_headers_before_the_object(chunk: int | None) -> None:
 
 def sections(count: int) -> Iterator[bytes]:
     face = motion.face(count, faps_sent=(3,))
-    data = encode(motion.animation(face), EncoderOptions(intra_period=Fraction(1, 25), start_codes=True))
+    options = EncoderOptions(intra_period=Fraction(1, 25), start_codes=True, mark=False)
+    data = encode(motion.animation(face), options)
     borders = [*start_codes(data), len(data)]
     for start, stop in pairwise(borders):
         yield data[start:stop]

@@ -121,7 +121,7 @@ def test_a_part_that_returns_behind_a_start_code() -> None:
     mask = body.mask.copy()
     mask[3:8] = False
     source = Animation(Fraction(25), np.arange(12), face, BodyTrack(body.values, mask))
-    coded = encode(source, EncoderOptions(intra_period=Fraction(5, 25), start_codes=True))
+    coded = encode(source, EncoderOptions(intra_period=Fraction(5, 25), start_codes=True, mark=False))
     at = coded.index(b"\0\0\1\xbb")
     decoder = Decoder()
     joined = decoder.push(coded[:4] + coded[at:]) + decoder.finish()

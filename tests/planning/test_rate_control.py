@@ -19,7 +19,7 @@ from fba.parameters import bap_steps, fap_steps
 from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate, measure_errors
 from fba.planning.rate.visibility import slot_weights
 
-VISAGE = EncoderOptions(bap_steps="visage", clamp=True)
+VISAGE = EncoderOptions(bap_steps="visage", clamp=True, mark=False)
 FACE = [3, 4, 5, 6, 7, 12, 13, 14, 19, 20, 23, 24, 31, 32, 48, 49, 50]
 BODY = [8, 9, 16, 17, 28, 29, 38, 39, 48, 49, 50, 184]
 

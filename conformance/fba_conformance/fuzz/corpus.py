@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fba.errors import OptionError
 from fba_conformance.fuzz.targets import Target
-from fba_conformance.small_streams import long_streams, small_streams
+from fba_conformance.small_streams import doubtful_marks, long_streams, small_streams
 
 CHECKOUT = Path(__file__).parents[3] / "tests" / "fuzz" / "corpus"
 
@@ -26,7 +26,7 @@ def read_corpus(target: Target, folder: Path | None = None) -> list[bytes]:
     pattern = "*/*" if target.folder == "any" else f"{target.folder}/*"
     files = [path.read_bytes() for path in sorted(folder.glob(pattern)) if path.is_file()]
     if not files and target.folder == "stream":
-        files = [*small_streams().values(), *long_streams().values()]
+        files = [*small_streams().values(), *doubtful_marks().values(), *long_streams().values()]
     if not files:
         raise OptionError(
             f"{folder / target.folder}: no files to mutate here; `python tools/make_fuzz_corpus.py` in a "

@@ -128,7 +128,10 @@ def main() -> None:
         arguments.output.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
         return
     options = EncoderOptions(
-        fap_quant=arguments.fap_quant, bap_quant=arguments.bap_quant, bap_steps=arguments.bap_steps
+        fap_quant=arguments.fap_quant,
+        bap_quant=arguments.bap_quant,
+        bap_steps=arguments.bap_steps,
+        mark=False,
     )
     try:
         animation = animation_of(read_values(arguments.input.read_text(encoding="utf-8")), arguments.rate)

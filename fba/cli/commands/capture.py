@@ -160,7 +160,7 @@ def command(
     raise_delayed()  # from here on, Ctrl-C ends the capture and not the command
     targets, stream = _targets(output, play=play)
     recorder = StreamRecorder(
-        targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage", mark=True),
+        targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage"),
         bit_rate=bitrate, buffer=rate_options.DEFAULT_BUFFER if buffer is None else buffer,
         compact=compact,
     )  # fmt: skip

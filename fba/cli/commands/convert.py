@@ -20,6 +20,7 @@ from fba.cli.outputs import (
     OutputType,
     display_name,
     find_writer,
+    opening_for,
 )
 from fba.cli.recordings.inputs import Inputs, formats_by_part
 from fba.errors import FormatError
@@ -114,7 +115,8 @@ def command(
         encoder = EncoderOptions(bap_steps=table, mark=marked)
         with naming_file(target):
             coded = encode_stream(animation, encoder, Size(), taken)
-        outputs.write(target, coded.data)
+        opening = opening_for(target, animation, table, coded.bap_quant, marked=marked)
+        outputs.write(target, opening + coded.data)
     else:
         with outputs.file(target) as file:
             write(file, animation, format=writing.name, **extra)

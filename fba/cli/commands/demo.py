@@ -72,7 +72,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
         f"animation: {seconds_text(animation.duration)}, body at {rate_text(body.rate)} and "
         f"face at {rate_text(face.rate)} frames/s, {source_bytes} bytes of text"
     )
-    data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS, mark=True))
+    data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
     outputs.write(stream, data)
     info = probe_stream(data)
     click.echo(
@@ -98,7 +98,7 @@ def _encode_capture(capture: Path, stream: Path, outputs: Outputs) -> None:
     from fba.formats import read
 
     face = read(capture, rate=25)
-    data = encode(face, EncoderOptions(bap_steps=BAP_STEPS, mark=True))
+    data = encode(face, EncoderOptions(bap_steps=BAP_STEPS))
     outputs.write(stream, data)
     size = capture.stat().st_size
     click.echo(

@@ -16,7 +16,7 @@ from fba.cli.coding import capture_options, size_options
 from fba.cli.coding.coded_streams import encode_as_epf, encode_stream
 from fba.cli.command import Command, examples
 from fba.cli.inputs import EXISTING, check_clip, has_markers, has_skeleton
-from fba.cli.outputs import Output, Outputs, OutputType, display_name
+from fba.cli.outputs import Output, Outputs, OutputType, display_name, opening_for
 from fba.cli.printing import Progress
 from fba.cli.recordings import voice
 from fba.cli.recordings.inputs import (
@@ -208,7 +208,8 @@ def command(
         else:
             coded = encode_stream(animation, EncoderOptions(**settings), size, taken)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
-    outputs.write(output, coded.data)
+    opening = opening_for(output, animation, table, coded.bap_quant, marked=mark)
+    outputs.write(output, opening + coded.data)
     if spoken is not None:
         voice.write_voice(outputs, spoken)
     if map_out is not None:

@@ -193,11 +193,12 @@ def _perform(blend: Blend, seconds: float, ease: float, fps: Fraction | None, se
 
 def _count_bits(blend: Blend, seconds: float, ease: float, fps: Fraction | None) -> dict[str, int | None]:
     """Return the bits of the stream for each way of sending; None where FAP 2 cannot say it."""
-    from fba.codec import encode
+    from fba.codec import EncoderOptions, encode
 
+    bare = EncoderOptions(mark=False)
     ways = {"expression": blend.fields is not None, "faps": True}
     return {
-        way: 8 * len(encode(_perform(blend, seconds, ease, fps, way))) if possible else None
+        way: 8 * len(encode(_perform(blend, seconds, ease, fps, way), bare)) if possible else None
         for way, possible in ways.items()
     }
 

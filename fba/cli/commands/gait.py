@@ -18,13 +18,13 @@ from fba.cli.outputs import (
     OutputType,
     display_name,
     find_writer,
+    opening_for,
 )
 from fba.cli.printing import print_json, seconds_text
 from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.animation import Animation
-    from fba.formats.registry import Format
 
 DEFAULT_RATE = Fraction(30)
 
@@ -124,23 +124,25 @@ def command(
             animation = gait.walk(character=character, rate=fps or DEFAULT_RATE, **made)
         marked = mark is not False
         table = step_tables.table_to_write(bap_steps, made=True, marked=marked)
-        _write(animation, writing, output, outputs, bap_steps=table, mark=marked)
+        from fba.formats import write
+
+        if writing.name == "fba":
+            _write_stream(animation, output, outputs, table, marked=marked)
+        else:
+            with outputs.file(output) as file:
+                write(file, animation, format=writing.name)
         outputs.say(_summary(animation, output, character, in_place=in_place))
         if writing.name == "fba":
             step_tables.remind(output, animation, table, marked=marked)
 
 
-def _write(
-    animation: Animation, writing: Format, output: Path, outputs: Outputs, *, bap_steps: str, mark: bool
-) -> None:
-    from fba.formats import write
+def _write_stream(animation: Animation, output: Path, outputs: Outputs, table: str, *, marked: bool) -> None:
+    from fba.codec import EncoderOptions, encode
 
-    extra: dict[str, Any] = {}
-    if writing.name == "fba":
-        extra = {"bap_steps": bap_steps, "mark": mark, "clamp": True}
-        step_tables.warn_of_coarse_steps(animation, bap_steps)
-    with outputs.file(output) as file:
-        write(file, animation, format=writing.name, **extra)
+    step_tables.warn_of_coarse_steps(animation, table)
+    options = EncoderOptions(bap_steps=table, mark=marked, clamp=True)
+    opening = opening_for(output, animation, table, options.bap_quant, marked=marked)
+    outputs.write(output, opening + encode(animation, options))
 
 
 def _summary(animation: Animation, output: Path, character: str, *, in_place: bool) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fba.arrays import Int32, Int64
+from fba.arrays import Int32, Int64, UInt8
 from fba.codec._plane import loops, quantiser, slots, syntax
 from fba.codec._plane.arithmetic import OUT_OF_DATA
 from fba.codec._plane.bits import BitWriter
@@ -30,12 +30,17 @@ class DoesNotFitError(Exception):
 
 
 class PlaneWriter:
-    """Writes an FBA object. planes: number of planes written."""
+    """Writes an FBA object.
+
+    planes: number of planes written. taken: bytes that `take_bytes` has returned. intra_bit: where the last I
+    plane begins, or the plane start code before it; 0 in the first, where the object begins.
+    """
 
     def __init__(self, bap_table: str = "iso") -> None:
         self.models = Models(bap_table)
         self.planes = 0
-        self._taken = 0  # bytes
+        self.taken = 0
+        self.intra_bit = 0
         self._writer = BitWriter()
         self._settings: dict[int, PartSettings] = {}
         self._layouts: dict[int, Layout] = {}
@@ -47,15 +52,20 @@ class PlaneWriter:
         if self._before >= 0 and not loops.hides_plane(writer.data, self._before, writer.bit):
             self._before = -1
         taken = writer.take_bytes(writer.bit if self._before < 0 else self._before)
-        self._taken += len(taken)
+        self.taken += len(taken)
         if self._before >= 0:
             self._before -= 8 * len(taken)
         return taken
 
     @property
+    def data(self) -> UInt8:
+        """What was written and not taken yet, and room for more."""
+        return self._writer.data
+
+    @property
     def bits(self) -> int:
         """Number of bits written so far."""
-        return 8 * self._taken + self._writer.bit
+        return 8 * self.taken + self._writer.bit
 
     def begin_object(self) -> None:
         """Write the start code of an object."""
@@ -67,11 +77,11 @@ class PlaneWriter:
 
     def ending(self) -> bytes:
         """Return what would end the object behind the bytes taken so far; it goes on as if not asked."""
-        writer, before, count = self._writer, self._before, self._taken
+        writer, before, count = self._writer, self._before, self.taken
         self._writer = writer.copy()
         self.end_object()
         taken = self.take_bytes()
-        self._writer, self._before, self._taken = writer, before, count
+        self._writer, self._before, self.taken = writer, before, count
         return taken
 
     def settings_in_force(self, part: int) -> PartSettings | None:
@@ -142,11 +152,14 @@ class PlaneWriter:
             writer.bit = loops.encode_intra(writer.data, writer.bit, layout, models.state, symbols, flags)
             models.last[order] = levels * models.step[order]
             self._settings[part] = part_settings
+        length = writer.bit - start
         if self._before == loops.AFTER_CODE:
             self._before = -1
         else:
             writer.reserve(_SEGMENT_BITS + 80)
             writer.bit, self._before = loops.guard_plane(writer.data, self._before, start, writer.bit)
+        if self.planes:
+            self.intra_bit = self.bits - length - 32 * (self._before < 0)
         self._layouts.clear()
         self.planes += 1
         return clamped

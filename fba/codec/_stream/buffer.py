@@ -33,9 +33,13 @@ class Buffer:
         self.data[self.length : need] = new
         self.length = need
 
+    def can_drop(self, count: int) -> bool:
+        """Whether `drop` drops so many bytes: not if moving the rest costs too much."""
+        return count >= _SMALLEST and 2 * count >= self.length
+
     def drop(self, count: int) -> int:
-        """Drop `count` bytes at the front, or none if moving the rest costs too much; return how many."""
-        if count < _SMALLEST or 2 * count < self.length:
+        """Drop `count` bytes at the front, or none (see `can_drop`); return how many."""
+        if not self.can_drop(count):
             return 0
         rest = self.data[count : self.length]
         self._allocate(max(2 * len(rest), _SMALLEST))

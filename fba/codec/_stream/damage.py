@@ -28,7 +28,8 @@ class Damage:
     behind it has a time code, else the number is an estimate from the bytes lost. Both are None if nothing
     says how much is missing: at the beginning or end of a stream that was cut there.
 
-    doubtful: numbers of the planes that were returned before the damage was found and may be wrong.
+    doubtful: numbers of the planes that were returned before the damage was found and may be wrong: those
+    shortly before it, or those of an I period that does not match its CRC-32.
     """
 
     error: FbaError
@@ -59,7 +60,7 @@ class Damage:
             frames = f"{self.frames_lost} frame{'s' if self.frames_lost != 1 else ''}"
             about = f"about {frames} (give or take {self.uncertainty})" if self.uncertainty else frames
             text.append(f"{about} lost")
-        if self.doubtful:
+        if self.doubtful and self.doubtful[0] != getattr(self.error, "plane", None):
             text.append(f"planes {self.doubtful[0]}..{self.doubtful[-1]} before it may be wrong")
         return "; ".join(text)
 
@@ -96,15 +97,21 @@ class DamageLog:
         self._recent_skips.clear()
 
     def add(
-        self, error: FbaError, start: int, stop: int | None = None, *, frames_lost: int | None = None
+        self,
+        error: FbaError,
+        start: int,
+        stop: int | None = None,
+        *,
+        frames_lost: int | None = None,
+        doubtful: range = range(0),
     ) -> None:
         """Add damage that planes before and behind it are not lost with. stop: `start` by default.
 
-        frames_lost: exactly how many are missing; None if nothing says so.
+        frames_lost: exactly how many are missing; None if nothing says so. doubtful: planes that are wrong.
         """
         uncertainty = None if frames_lost is None else 0
         stop = start if stop is None else stop
-        self.damage.append(Damage(error, start, stop, frames_lost, uncertainty))
+        self.damage.append(Damage(error, start, stop, frames_lost, uncertainty, doubtful))
 
     def begin(self, error: FbaError, byte: int, planes: int) -> None:
         """Add damage in the plane at a byte. planes: their number before it."""

@@ -1,81 +1,170 @@
-"""The mark behind the end of a stream, which says with which table of BAP steps it was made.
+"""The marks of a stream: which table of BAP steps it was made with, and the checks of its I periods.
 
-No bit of an FBA object says so. The mark is user data (user_data_start_code 00 00 01 b2, ISO/IEC 14496-2,
-6.2.2) directly behind the end code: `00 00 01 b2 "fba bap_steps=visage;"`. It stands there, and not before
-the object, because the decoder of visage|SDK, the only other one whose source is public, exits unless the
-first four bytes are an object start code, and goes on decoding planes at any start code but the end code.
-Behind the end code it reads nothing.
+No bit of an FBA object says so. A mark is user data (user_data_start_code 00 00 01 b2, ISO/IEC 14496-2,
+6.2.2) with fields behind the word "fba": `00 00 01 b2 "fba bap_steps=visage;crc32=2;"` and the checks. It
+stands directly behind the end code, and not before the object, because the decoder of visage|SDK, the only
+other one whose source is public, exits unless the first four bytes are an object start code, and goes on
+decoding planes at any start code but the end code. Behind the end code it reads nothing.
+
+Who reads a stream while it comes needs the table before: in pipes, `opening` stands before the object, the
+headers of a visual object sequence with the same user data.
 """
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import dataclass
+from zlib import crc32
 
 from fba.codec._plane import syntax
+from fba.codec._stream.checksums import CHECK_BYTES, check_of
 from fba.errors import FbaWarning
 from fba.parameters import BAP_STEP_TABLES
 
 USER_DATA = 0xB2
 """Last byte of user_data_start_code."""
+SEQUENCE = 0xB0
+"""Last byte of visual_object_sequence_start_code."""
+_PREFIX = bytes(syntax.START_CODE_PREFIX)
 START = bytes([*syntax.START_CODE_PREFIX, USER_DATA])
+_SEQUENCE_HEADER = bytes([*syntax.START_CODE_PREFIX, SEQUENCE, 0x64])
+"""With profile_and_level_indication Simple FBA, level 2."""
+_OBJECT_HEADER = bytes([*syntax.START_CODE_PREFIX, 0xB5, 0x23])
+"""visual_object_start_code, no identifier, visual_object_type 4 (FBA), stuffing."""
 _END_CODE = bytes([*syntax.START_CODE_PREFIX, syntax.END_CODE])
 _OBJECT_CODES = tuple(bytes([*syntax.START_CODE_PREFIX, code]) for code in syntax.OBJECT_CODES)
-_WORDS = b"fba bap_steps="
-_STOP = b";"
+_NAME = b"fba "
+_FIELD = re.compile(rb"(bap_steps|crc32)=([^;=\0]{1,24});", re.DOTALL)
+_SIMILAR = re.compile(rb"fba |bap_steps=|crc32=")
+"""What is left of a mark in which a bit was flipped."""
+_BEFORE_OBJECT = re.compile(
+    re.escape(_SEQUENCE_HEADER[:4]) + rb"." + re.escape(START + _NAME) + rb"[^\0]{0,48}", re.DOTALL
+)
 LONGEST = 64
-"""Bytes of user data within which a mark is complete."""
+"""Bytes of user data within which the words of a mark are complete."""
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A mark. table: of the object before it, which begins at the byte `begin`. end: byte behind the mark."""
+    """A mark. table: of the object before it, which begins at byte `begin`. end: byte behind its words."""
 
     table: str
     begin: int
     end: int
 
 
-def write_mark(table: str) -> bytes:
-    """Return the mark to be put behind a stream. Raises ValueError for an unknown table."""
-    if table not in BAP_STEP_TABLES:
-        raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {table!r}")
-    return START + _WORDS + table.encode() + _STOP
+@dataclass(frozen=True)
+class MarkContent:
+    """What a mark says.
 
-
-def read_mark(content: bytes) -> str | None:
-    """Return the table that user data name, given what follows their start code; None if they are no mark.
-
-    Gives an FbaWarning where they name a table that is not known here.
+    table: of BAP steps; None if it names none. checks: those of the I periods, four bytes each; None if it
+    has none, or none that can be relied on. problem: what is wrong with it; "" if nothing is.
     """
-    words, stop, _ = content[:LONGEST].partition(_STOP)
-    if not stop or not words.startswith(_WORDS):
+
+    table: str | None = None
+    checks: bytes | None = None
+    problem: str = ""
+
+
+def write_mark(table: str | None, checks: bytes | None = None) -> bytes:
+    """Return the mark to be put behind a stream.
+
+    table: of BAP steps; None to name none. checks: those of its I periods, four bytes each; None for no list.
+    Raises ValueError for an unknown table.
+    """
+    if table is not None and table not in BAP_STEP_TABLES:
+        raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {table!r}")
+    words = b"" if table is None else b"bap_steps=%s;" % table.encode()
+    if checks is not None:
+        words += b"crc32=%d;" % (len(checks) // CHECK_BYTES) + checks
+        words += check_of(crc32(_NAME + words))
+    return START + _NAME + words if words else b""
+
+
+def write_opening(table: str) -> bytes:
+    """Return what goes before an object to name its table to who reads it while it comes: 35 or 32 bytes.
+
+    The headers of a visual object sequence and of a visual object, with user data between them (ISO/IEC
+    14496-2, 6.2.2). Raises ValueError for an unknown table.
+    """
+    return _SEQUENCE_HEADER + write_mark(table) + _OBJECT_HEADER
+
+
+def bytes_needed(content: bytes, most: int) -> int:
+    """Return how many bytes behind a start code of user data a mark takes, given what there is of it.
+
+    most: I periods of the object at most; a list that claims more is not waited for.
+    """
+    words, count = _words(content)[1:]
+    if count is None:
+        return LONGEST
+    return words + CHECK_BYTES * (count + 1) if count <= most else words
+
+
+def read_mark(content: bytes) -> MarkContent | None:
+    """Return what user data say, given what follows their start code; None if they are no mark.
+
+    Gives an FbaWarning where a mark names a table that is not known here.
+    """
+    head = content[:LONGEST].partition(_PREFIX)[0]
+    if not (_NAME.startswith(head[: len(_NAME)]) or _SIMILAR.search(head)):
         return None
-    table = words.removeprefix(_WORDS).decode("latin-1")
-    if table not in BAP_STEP_TABLES:
+    table, end, count = _words(content)
+    problem = ""
+    if not end or (count is None and end < len(head)):
+        problem = "a mark of the stream was cut off or is damaged"
+    if table is not None and table not in BAP_STEP_TABLES:
         warnings.warn(
             f"the stream says that it was made with the BAP steps {table!r}, which are not known here; those "
             f"that are: {', '.join(BAP_STEP_TABLES)}",
             FbaWarning,
             stacklevel=2,
         )
-        return None
-    return table
+        table = None
+    checks = None
+    if count is not None:
+        stop = end + CHECK_BYTES * count
+        if len(content) < stop + CHECK_BYTES:
+            problem = f"the list of {count} checks behind the end was cut off; the stream cannot be checked"
+        elif content[stop : stop + CHECK_BYTES] != check_of(crc32(content[:stop])):
+            problem = "the mark behind the end does not match its own CRC-32; the stream cannot be checked"
+        else:
+            checks = content[end:stop]
+    return MarkContent(table, checks, problem)
+
+
+def _words(content: bytes) -> tuple[str | None, int, int | None]:
+    """Return the table that a mark names, the byte behind its words, and how many checks its list counts.
+
+    None, 0 and None where there is no such thing.
+    """
+    table, position, count = None, 0, None
+    if content.startswith(_NAME):
+        at = len(_NAME)
+        while count is None and (field := _FIELD.match(content, at, LONGEST)) is not None:
+            at = position = field.end()
+            if field[1] == b"bap_steps":
+                table = table or field[2].decode("latin-1")
+            elif field[2].isdigit() and len(field[2]) <= 9:
+                count = int(field[2])
+            else:
+                break
+    return table, position, count
 
 
 def find_marks(data: bytes | bytearray | memoryview) -> tuple[Mark, ...]:
-    """Return the marks in a complete stream, or in several one after another."""
+    """Return the marks behind the objects of a complete stream, or of several one after another."""
     content = bytes(data)
     marks: list[Mark] = []
     position, begin = 0, 0
     while (position := content.find(_END_CODE + START, position)) >= 0:
         start = position + len(_END_CODE) + len(START)
-        table = read_mark(content[start : start + LONGEST])
-        if table is not None:
+        table, words, _ = _words(content[start : start + LONGEST])
+        if table in BAP_STEP_TABLES:
             found = max(content.rfind(code, begin, position) for code in _OBJECT_CODES)
-            end = content.index(_STOP, start) + 1
-            marks.append(Mark(table, max(found, begin), end))
-            begin = end
+            marks.append(Mark(table, max(found, begin), start + words))
+            begin = start + words
         position = start
     return tuple(marks)
 
@@ -83,4 +172,8 @@ def find_marks(data: bytes | bytearray | memoryview) -> tuple[Mark, ...]:
 def marked_table(data: bytes | bytearray | memoryview) -> str | None:
     """Return the table that the marks in a stream name; None without a mark, or where they differ."""
     tables = {mark.table for mark in find_marks(data)}
+    for opening in _BEFORE_OBJECT.finditer(bytes(data)):
+        table = _words(opening[0][len(_SEQUENCE_HEADER) + len(START) :])[0]
+        if table in BAP_STEP_TABLES:
+            tables.add(table)
     return tables.pop() if len(tables) == 1 else None

@@ -1,11 +1,11 @@
-"""Where the objects of a stream begin and end, what stands behind them, and what their marks say."""
+"""Where the objects of a stream begin and end, what stands around them, and what their marks say."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from fba.codec._plane import syntax
-from fba.codec._stream.mark import USER_DATA, Mark, read_mark
+from fba.codec._stream.mark import SEQUENCE, USER_DATA, Mark, read_mark
 from fba.parameters import BAP_STEP_TABLES
 
 _DEFAULT_TABLE = BAP_STEP_TABLES[0]
@@ -14,62 +14,102 @@ _DEFAULT_TABLE = BAP_STEP_TABLES[0]
 class ObjectBorders:
     """What is known of the objects of a stream so far, and of the last one in particular.
 
-    bap_steps: the table that all objects were made with; None: the one that a mark names. marks: those of the
-    whole stream, where they are known beforehand; each holds for the object before it.
+    bap_steps: the table that all objects were made with; None: the one that a mark names, that before the
+    object rather than that behind it. marks: those behind the objects of the whole stream, where they are
+    known beforehand.
 
     count: objects begun. table: of the last one. has_body: whether one of its planes carries BAPs.
     end_code: last byte of the start code that ended it; None before that. end: byte of the stream behind that
-    code, or behind user data that follow it. mark: the table that the mark behind it names, None without one.
+    code, or behind user data that follow it. mark: the table that its marks name, None without one. checks:
+    what the mark behind it lists, see `checksums`; None without a list.
     """
 
     def __init__(self, bap_steps: str | None, marks: Sequence[Mark]) -> None:
         self._bap_steps = bap_steps
         self._marks = marks
         self._in_user_data = False  # whether user data stand at `end`, up to the next start code
+        self._in_headers = False  # whether headers of a sequence have begun, and no object in it
+        self._before: str | None = None  # the table that user data in those headers name
         self.count = 0
         self.table = bap_steps or _DEFAULT_TABLE
         self.has_body = False
         self.end_code: int | None = None
-        self.end = 0
+        self.begin = self.end = 0
         self.mark: str | None = None
+        self.checks: bytes | None = None
 
     @property
     def ended(self) -> bool:
         """Whether an end code closed the last object."""
         return self.end_code == syntax.END_CODE
 
+    @property
+    def size(self) -> int:
+        """Bytes of the last object, with what ended it."""
+        return max(self.end - self.begin, 0)
+
     def begin_object(self, byte: int) -> None:
         """Begin another object, at this byte of the stream."""
         marked = (mark.table for mark in self._marks if mark.begin <= byte < mark.end)
-        self.table = self._bap_steps or next(marked, _DEFAULT_TABLE)
+        self.table = self._bap_steps or self._before or next(marked, _DEFAULT_TABLE)
         self.count += 1
         self.has_body = False
         self.end_code = None
-        self.mark = None
+        self.begin = byte
+        self.mark, self._before = self._before, None
+        self.checks = None
+        self._in_headers = False
 
-    def end_object(self, code: int, byte: int) -> None:
-        """End the object at a start code. byte: of the stream, behind it."""
+    def end_object(self, code: int, byte: int) -> str:
+        """End the object at a start code. byte: of the stream, behind it. Returns what is wrong, or ""."""
         self.end_code = code
         self.end = byte
         self._in_user_data = False
+        self._in_headers = code == SEQUENCE
+        return self._difference("before its planes")
 
-    def read_user_data(self, code: int, byte: int, content: bytes) -> str:
+    def read_user_data(self, code: int, byte: int, content: bytes) -> list[str]:
         """Take a start code outside of an object, and read the mark if it begins one.
 
-        byte: of the stream, at which the start code stands. content: what follows it. Returns what is wrong:
-        planes with BAPs were decoded with other steps than the mark says; "" if nothing is.
+        byte: of the stream, at which the start code stands. content: what follows it. Returns what is wrong,
+        e.g. that planes with BAPs were decoded with other steps than the mark says.
         """
-        directly = byte == self.end
+        directly = byte == self.end and self.count > 0
         if self._in_user_data:
             self.end = byte
-        self._in_user_data = code == USER_DATA and byte == self.end
-        if not (code == USER_DATA and directly and self.ended):
-            return ""
-        self.mark = read_mark(content) or self.mark
+        self._in_user_data = code == USER_DATA and self.count > 0 and byte == self.end
+        if code == SEQUENCE:
+            self._in_headers, self._before = True, None
+        if code != USER_DATA or not (directly or self._in_headers):
+            return []
+        mark = read_mark(content)
+        if mark is None:
+            return []
+        problems = [mark.problem] if mark.problem else []
+        if not directly:
+            return problems + self._read_before(mark.table)
+        if not self.ended:
+            return ["a mark stands behind the object, but the end code before it is damaged; it was not used"]
+        before, self.checks = self.mark, mark.checks
+        if mark.table in (None, before):
+            return problems
+        self.mark = mark.table
+        difference = self._difference("behind its end")
+        return problems + ([difference] if difference else [])
+
+    def _read_before(self, table: str | None) -> list[str]:
+        """Take the table that user data before an object name; the first counts."""
+        if self._before is None or table in (None, self._before):
+            self._before = self._before or table
+            return []
+        return [f"the headers before the object name the BAP steps {self._before!r}, and then {table!r}"]
+
+    def _difference(self, where: str) -> str:
+        """Return that planes with BAPs were decoded with other steps than the mark says; "" if not."""
         if self.mark in (None, self.table) or not self.has_body:
             return ""
         return (
-            f"the stream says behind its end that it was made with the BAP steps {self.mark!r}; it was "
+            f"the stream says {where} that it was made with the BAP steps {self.mark!r}; it was "
             f"decoded with {self.table!r}"
         )
 

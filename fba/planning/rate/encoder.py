@@ -72,7 +72,7 @@ class RateEncoder:
     least stays behind first, by `finest` millimetres even where there is room. Frames are left out where
     planes without a change would take too much of the rate; players move on smoothly from one plane to the
     next. I planes come at the beginning and when something is sent that was not before; frames are left out
-    until the buffer has room for one.
+    until the buffer has room for one. The mark has no checksums, for which bits would have to stay free.
 
     Raises RangeError where the first I plane does not fit the buffer at all, and as `Encoder` does,
     ValueError for a rate or a buffer that is not positive.
@@ -89,7 +89,7 @@ class RateEncoder:
     ) -> None:
         self.bucket = LeakyBucket(bit_rate, bit_rate * buffer)
         self.statistics = RateStatistics()
-        self._encoder = Encoder(options)
+        self._encoder = Encoder(replace(options or EncoderOptions(), checksums=False))
         self._choose = choose_quantisers
         self._finest = finest
         self._spare = SPARE

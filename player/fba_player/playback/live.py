@@ -31,7 +31,12 @@ a face and a body."""
 CHECK_BAP_STEPS_AFTER = 4
 """Seconds of a body after which it is checked, once, whether they look right with these BAP steps."""
 CHOOSE_BAP_STEPS_AFTER = 1.25
-"""Seconds of a body that are held back until the BAP steps are chosen by the way it moves."""
+"""Seconds of a body that are held back until the BAP steps are chosen by the way it moves, unless it comes
+faster: a file in a pipe has come to its end, where its mark is, within `PATIENCE`."""
+
+
+MARK_BYTES = 64
+"""More than a mark and its start code take."""
 
 
 class Readable(Protocol):
@@ -45,7 +50,8 @@ class LiveAnimation:
     """The part of an FBA stream that has arrived; it has the fields of `Animation`, which grow.
 
     source: read by a thread until its end, whatever the player does meanwhile. head: bytes that were already
-    read from it. name: of the stream. bap_steps: "iso" or "visage"; or "auto": they are chosen from the first
+    read from it. name: of the stream. bap_steps: "iso" or "visage"; or "auto": those that a mark before the
+    object names, or behind it if the end comes within `PATIENCE`; else they are chosen from the first
     `CHOOSE_BAP_STEPS_AFTER` seconds of a body, for which nothing is shown. at_end: called when nothing more
     is read, to close the source.
 
@@ -81,7 +87,9 @@ class LiveAnimation:
         # What came until they are chosen:
         self._held: bytearray | None = bytearray() if bap_steps == BAP_STEPS_AUTO else None
         self._held_blocks: list[Block] = []
-        self._decoder = Decoder(bap_steps=self.bap_steps, on_error="salvage")
+        self._held_since: float | None = None  # when the first block came
+        asked = None if bap_steps == BAP_STEPS_AUTO else bap_steps
+        self._decoder = Decoder(bap_steps=asked, on_error="salvage")
         self._buffer = FrameBuffer()
         self._now = self._buffer.decoded()
         self._changed = threading.Condition()
@@ -207,28 +215,43 @@ class LiveAnimation:
     def _decode(self, chunk: bytes) -> None:
         """Add what a chunk brings, or hold it back while the BAP steps are not chosen."""
         with self._changed:
-            blocks = self._decoder.push_blocks(chunk)
             self._checked_bap_steps |= marked_table(chunk) == self.bap_steps
             if self._held is None:
-                self._add_blocks(blocks)
+                self._add_blocks(self._decoder.push_blocks(chunk))
                 return
             self._held += chunk
-            self._held_blocks += blocks
+            if self._is_marked(len(chunk)):
+                self._choose_bap_steps(whole=True)
+                return
+            self._held_blocks += self._decoder.push_blocks(chunk)
             bodies = [block for block in self._held_blocks if block.settings.body is not None]
             seconds = sum(len(block.index) / block.rate for block in bodies)
-            if self._held_blocks and (not bodies or seconds >= CHOOSE_BAP_STEPS_AFTER):
-                self._choose_bap_steps()
+            if self._held_blocks:
+                now = wall.monotonic()
+                self._held_since = now if self._held_since is None else self._held_since
+                waited = seconds >= CHOOSE_BAP_STEPS_AFTER and now - self._held_since >= PATIENCE
+                if not bodies or waited:
+                    self._choose_bap_steps()
             self._changed.notify_all()
 
-    def _choose_bap_steps(self) -> None:
-        """Choose the BAP steps, if they are not chosen yet, and add what was held back."""
+    def _is_marked(self, new: int) -> bool:
+        """Whether a mark is among what is held back. new: bytes at its end that were not searched yet."""
+        assert self._held is not None
+        begin = max(len(self._held) - new - MARK_BYTES, 0)
+        return b"bap_steps=" in self._held[begin:] and marked_table(self._held) is not None
+
+    def _choose_bap_steps(self, *, whole: bool = False) -> None:
+        """Choose the BAP steps, if they are not chosen yet, and add what was held back.
+
+        whole: the decoder has not read all of it.
+        """
         if self._held is None:
             return
         held, blocks = bytes(self._held), self._held_blocks
         self._held, self._held_blocks = None, []
         choice = choose_steps(held)
         self.steps_explanation = choice.explanation
-        if choice.table != self.bap_steps:
+        if whole or choice.table != self.bap_steps:
             self.bap_steps = choice.table
             self._decoder = Decoder(bap_steps=choice.table, on_error="salvage")
             blocks = self._decoder.push_blocks(held)
@@ -239,6 +262,7 @@ class LiveAnimation:
             for block in blocks:
                 self._buffer.add(block)
             self._now = self._buffer.decoded()
+            self._check_mark()
             damage = self._decoder.damage
             if damage:
                 self._failure = damage[0].error if self._failure is None else self._failure
@@ -254,6 +278,17 @@ class LiveAnimation:
                 self.message = f"{self._buffer.left_out} came too late to be shown"
                 self.details = f"{self.message}: the stream brings it, but had none when playing started"
             self._changed.notify_all()
+
+    def _check_mark(self) -> None:
+        """Say if a mark at the end of the stream names other BAP steps than those with which it was shown."""
+        named = self._decoder.mark
+        if named is None or named == self.bap_steps or self._now.body is None:
+            return
+        self.message = f"BAP steps {self.bap_steps} are wrong"
+        self.details = (
+            f"{self.message}: the stream says at its end that it was made with {named}; play it with "
+            f"--bap-steps {named}"
+        )
 
     def _check_bap_steps(self, *, at_end: bool = False) -> None:
         now = self._now

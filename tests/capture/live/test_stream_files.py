@@ -18,6 +18,7 @@ import pytest
 import fba
 from fba.animation import Animation
 from fba.capture.live import widest_faces
+from fba.codec import write_opening
 from fba.errors import FormatError
 from fba.live import StreamFile, StreamRecorder
 from fba.live.recording import StreamPipe
@@ -109,7 +110,26 @@ def test_a_pipe_gets_what_is_complete() -> None:
     recorder.finish()
     at_once = fba.Encoder(recorder.options)
     at_once.expect(widest_faces())
-    assert target.getvalue() == at_once.push_animation(whole) + at_once.finish()
+    stream = at_once.push_animation(whole) + at_once.finish()
+    assert target.getvalue() == write_opening("visage") + stream
+
+
+@pytest.mark.parametrize("size", [1, 1000])
+def test_a_pipe_names_the_steps_before_a_body_and_a_file_does_not(tmp_path: Path, size: int) -> None:
+    body = BodyTrack(np.full((4, 296), 170, np.int32), np.arange(296) == np.full((4, 1), 31))
+    whole, target = Animation(25, np.arange(4), None, body), io.BytesIO()
+    recorder = StreamRecorder([StreamPipe(target), StreamFile(tmp_path / "live.fba")])
+    for frame in range(4):
+        recorder.push(whole[frame : frame + 1])
+    recorder.finish()
+    file = (tmp_path / "live.fba").read_bytes()
+    assert target.getvalue() == write_opening("visage") + file
+    decoder, data = fba.Decoder(), target.getvalue()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        frames = [f for at in range(0, len(data), size) for f in decoder.push(data[at : at + size])]
+        frames += decoder.finish()
+    assert [int(frame.body.values[0, 31]) for frame in frames if frame.body is not None] == [170] * 4
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device")

@@ -6,6 +6,7 @@ import io
 import os
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -24,6 +25,7 @@ from fba.codec import (
     PlaneSettings,
     encode_planes,
     write_mark,
+    write_opening,
 )
 from fba.errors import FbaError
 from fba_player.playback.live import LiveAnimation, LiveTimeline
@@ -74,7 +76,7 @@ def performance(count: int = 600, both: bool = False) -> Animation:
 
 def stream(animation: Animation, **options: object) -> tuple[bytes, list[int]]:
     """Its bytes, and the byte at which each plane ends."""
-    data = fba.encode(animation, EncoderOptions(**options))  # type: ignore[arg-type]
+    data = fba.encode(animation, EncoderOptions(mark=False, **options))  # type: ignore[arg-type]
     decoder = Decoder()
     frames = [*decoder.push(data), *decoder.finish()]
     return data, [(frame.plane.bit + frame.plane.bits + 7) // 8 for frame in frames]
@@ -404,3 +406,42 @@ def test_a_stream_that_says_its_steps_is_not_doubted(monkeypatch: pytest.MonkeyP
         assert live.wait_end(10)
         assert live.doubt == doubt
         live.close()
+
+
+class Pieces(io.BytesIO):
+    """A source that gives so many bytes at once."""
+
+    def __init__(self, data: bytes, size: int) -> None:
+        super().__init__(data)
+        self.size = size
+
+    def read1(self, size: int | None = -1, /) -> bytes:
+        return super().read1(self.size)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1000, 1 << 20])
+@pytest.mark.parametrize("opened", [True, False])
+def test_a_marked_file_that_comes_through_a_pipe_has_the_right_steps(size: int, opened: bool) -> None:
+    """Two seconds of a body, its mark behind the end: it is not judged by its first 1.25 seconds."""
+    values = np.zeros((50, 296), dtype=np.int32)
+    values[:, 31] = 170 * np.arange(50)
+    body = fba.BodyTrack(values, np.broadcast_to(values.any(axis=0), values.shape))
+    data = fba.encode(Animation(25, np.arange(50), None, body), EncoderOptions(bap_steps="visage"))
+    live = LiveAnimation(Pieces(write_opening("visage") * opened + data, size), bap_steps="auto")
+    assert live.wait(20)
+    assert live.wait_end(20)
+    assert (live.bap_steps, live.message) == ("visage", "")
+    assert live.steps_explanation == "visage: the stream says so"
+    assert live.body is not None
+    assert (live.body.values == values).all()
+
+
+def test_what_a_mark_at_the_end_says_otherwise_is_told() -> None:
+    data = fba.encode(performance(both=True), EncoderOptions(bap_steps="visage", clamp=True))
+    with warnings.catch_warnings(record=True):
+        warnings.simplefilter("always")
+        live = LiveAnimation(io.BytesIO(data), bap_steps="iso")
+        live.wait_end(20)
+    assert live.message == "BAP steps iso are wrong"
+    assert live.details.endswith("play it with --bap-steps visage")
