@@ -19,7 +19,7 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.persona import Persona, TrackedFace
 
-MEANS = ("curves", "linear", "masks", "nearest")
+MEANS = ("motion", "curves", "masks")
 REPORTS = (".html",)
 
 
