@@ -6,8 +6,8 @@ stores. Then other persons, who have none of these moods, are played with each P
 that belongs to nobody else, and told in the same way. Chance is a third.
 
 Without options, the performances are made up: three styles of one actor. With --real, they are FAPs of a
-folder, by name: angry_*, genial_* (gnial_*) and thinking_*, of which one take at a time is held out, and yes_*
-for the persons without a mood; their FAPs are filmed on made-up faces.
+folder, by name: angry_*, genial_* (gnial_*) and thinking_*, of which one take at a time is held out, and
+yes_*, four of which follow one another, for the persons without a mood. They are filmed on made-up faces.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ import numpy as np
 
 import fba
 from fba.arrays import Float64
+from fba.parameters import FAP_COUNT
 from fba.persona import Persona, TrackedFace, learn, play
-from fba.persona._restyle import flatten
 from fba.persona.evaluation.actors import INTENSITIES, Style, act, contents, film_faps
-from fba.persona.motion import Motion, measure_motion
+from fba.persona.motion import Motion, flatten, measure_motion
 from fba.persona.observation import Observation, observe
 from fba.persona.points.distances import mask_distance
 from fba.persona.points.layout import PARTS, part_points, part_vertices, standard_mask
@@ -42,6 +42,8 @@ MOODS = {
 ACTOR, USERS, SCREEN = 11, (77, 78), 500
 """Seeds of the actor, of the users, and of the face on which performances are filmed anew."""
 TAKES, LEARNT, USER_TAKES = 10, 5, 6
+JOINED = 4
+"""Files of a person without a mood that make a performance."""
 SHOWN = 24
 """Contents, of 48, that a take has: half of them, so that no two takes have the same."""
 REAL = {"angry": ("angry_",), "genial": ("genial_", "gnial_"), "thinking": ("thinking_",)}
@@ -66,7 +68,9 @@ def main() -> None:
         print(f"| {name} | {number} | {100 * masks:.0f} % | {100 * motion:.0f} % |")
 
 
-def made_up(takes: int = TAKES, learnt: int = LEARNT, user_takes: int = USER_TAKES) -> list[Row]:
+def made_up(
+    takes: int = TAKES, learnt: int = LEARNT, user_takes: int = USER_TAKES, means: Sequence[str] = MEANS
+) -> list[Row]:
     """Return rows of the table for made-up moods."""
     filmed = {
         mood: [
@@ -82,18 +86,13 @@ def made_up(takes: int = TAKES, learnt: int = LEARNT, user_takes: int = USER_TAK
         for seed in USERS
         for take in range(user_takes)
     ]
-    rows = [count("the actor's, held out", held_out, personas)]
-    for means in MEANS:
-        rows.append(
-            count(f"other persons', played by `{means}`", performed(users, personas, means), personas)
-        )
-    return rows
+    return [count("the actor's, held out", held_out, personas), *count_played(users, personas, means)]
 
 
 def real(folder: Path) -> list[Row]:
     """Return rows of the table for FAPs of a folder; one take of each mood is held out at a time."""
     filmed = {
-        mood: [film_file(path, ACTOR) for begin in begins for path in sorted(folder.glob(f"{begin}*.fap"))]
+        mood: [film_files([path], ACTOR) for begin in begins for path in sorted(folder.glob(f"{begin}*.fap"))]
         for mood, begins in REAL.items()
     }
     found = []
@@ -104,12 +103,10 @@ def real(folder: Path) -> list[Row]:
                 for one, some in filmed.items()
             }
             found.append(compare(mood, face, personas))
-    rows = [share("the actor's, one held out at a time", found)]
     personas = {mood: learn(faces, mood) for mood, faces in filmed.items()}
-    users = [film_file(path, USERS[0]) for path in sorted(folder.glob("yes_*.fap"))]
-    for means in MEANS:
-        rows.append(count(f"other films, played by `{means}`", performed(users, personas, means), personas))
-    return rows
+    paths = sorted(folder.glob("yes_*.fap"))
+    users = [film_files(paths[n : n + JOINED], USERS[0]) for n in range(0, len(paths), JOINED)]
+    return [share("the actor's, one held out at a time", found), *count_played(users, personas)]
 
 
 Row = tuple[str, int, float, float]
@@ -122,12 +119,28 @@ def script(seed: Sequence[int]) -> list[tuple[str, float]]:
     return [(names[n], float(random.uniform(*INTENSITIES))) for n in chosen]
 
 
-def film_file(path: Path, seed: int) -> TrackedFace:
-    """Return a film of a made-up person who performs the FAPs of a file."""
-    animation = fba.read(path)
-    assert animation.face is not None
-    number = sum(path.stem.encode())
-    return film_faps(animation.face.values.astype(np.float64), animation.rate, seed=seed, take=number)
+def film_files(paths: Sequence[Path], seed: int) -> TrackedFace:
+    """Return a film of a made-up person who performs the FAPs of files, with half a second between them."""
+    shown, rate = np.zeros((0, FAP_COUNT)), Fraction(1)
+    for path in paths:
+        animation = fba.read(path)
+        assert animation.face is not None
+        values, rate = animation.face.values.astype(np.float64), animation.rate
+        if len(shown):
+            share = np.linspace(0, 1, int(rate / 2))[:, None]
+            shown = np.concatenate([shown, shown[-1] * (1 - share) + values[0] * share])
+        shown = np.concatenate([shown, values])
+    return film_faps(shown, rate, seed=seed, take=sum(paths[0].stem.encode()))
+
+
+def count_played(
+    users: Sequence[TrackedFace], personas: dict[str, Persona], means: Sequence[str] = MEANS
+) -> list[Row]:
+    """Return a row for each of `means`: users in each mood, by its Persona."""
+    return [
+        count(f"other persons', played by `{one}`", performed(users, personas, one), personas)
+        for one in means
+    ]
 
 
 def performed(

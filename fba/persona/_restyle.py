@@ -12,7 +12,7 @@ from fba.arrays import Float64, Intp
 from fba.persona.motion import Motion, Tally, find_gains, find_pace, measure_motion, shift_reference
 from fba.persona.points.layout import standard_points
 
-EASE = 0.1
+EASE = 0.15
 """Seconds (deviation of a Gaussian) over which gains pass from one class to the next."""
 RETIMED = ("mouth", "left_brow", "right_brow")
 """Parts that become slower or faster. Lids do not: a blink that is drawn out does not shut."""
@@ -25,7 +25,7 @@ SHARP, WIDE, REACH = 0.17, 0.1, 0.17
 """Seconds: deviations of the smoothings by which motion is sharpened, and how far away the values are that
 it does not pass."""
 BEYOND, BEND = 1.15, 0.8
-"""Share of the actor's own reach that is the limit, and share of the limit at which motion begins to yield."""
+"""Share of the actor's own reach that is the limit, and share of the limit where motion begins to yield."""
 LIDS = ((14, 11), (18, 16), (20, 12), (23, 13), (25, 24), (26, 22))
 """Points of upper and lower lids that meet."""
 LIPS = ((29, 32), (30, 33), (31, 34))
@@ -37,16 +37,6 @@ LID_SHUT, LIP_SHUT = (0.15, 0.4), (0.4, 1.6)
 millimetres between the lips."""
 UPPER_LID = 0.8
 """Share of a lid's closing that the upper one does."""
-
-
-def flatten(moved: Float64) -> Float64:
-    """Return displacements (S, V, 2) as (S, 2V): all x, then all y."""
-    return np.concatenate([moved[..., 0], moved[..., 1]], axis=1)
-
-
-def unflatten(moved: Float64) -> Float64:
-    """Return displacements (S, 2V) as (S, V, 2)."""
-    return np.stack(np.split(moved, 2, axis=1), axis=2)
 
 
 def restyle(
@@ -72,12 +62,16 @@ def restyle(
     known = shown
     if user is not None:
         known = shift_reference(user, measure_motion(own, classes, frames, rate, count), shown)
+    gains = fill_gaps(find_gains(actor, known)[classes], frames)
+    moved = moved * np.exp(smooth(gains, EASE * rate)[frames - frames[0]])
     if part in RETIMED:
-        moved = retime(moved, rate, float(np.clip(find_pace(actor, known, shown), -MOST_PACE, MOST_PACE)))
-        paced = measure_motion(moved, classes, frames, rate, count)
-        known = shift_reference(known, shown, paced)
-    gains = find_gains(actor, known)[np.where(classes >= 0, classes, count)]
-    return limit_reach(moved * np.exp(smooth(gains, EASE * rate)), own, reach)
+        before = measure_motion(moved, classes, frames, rate, count)
+        goal = shown.speed[-1] + np.clip(find_pace(actor, known), -MOST_PACE, MOST_PACE)
+        every = fill_gaps(moved, frames)
+        moved = retime(every, rate, float(goal - before.speed[-1]))[frames - frames[0]]
+        after = measure_motion(moved, classes, frames, rate, count)
+        moved = moved * np.exp((before.spread[-1] - after.spread[-1]).mean())
+    return limit_reach(moved, own, reach)
 
 
 def mix(own: Float64, mapped: Float64) -> Float64:
@@ -87,6 +81,14 @@ def mix(own: Float64, mapped: Float64) -> Float64:
     exact; each alone comes less near to the actor.
     """
     return (own + mapped) / 2
+
+
+def fill_gaps(values: Float64, frames: Intp) -> Float64:
+    """Return values (S, N) of some frames (S,) for every frame from the first to the last one."""
+    every = np.arange(frames[0], frames[-1] + 1)
+    if len(every) == len(frames):
+        return values
+    return np.stack([np.interp(every, frames, column) for column in values.T], axis=1)
 
 
 def smooth(values: Float64, deviation: float) -> Float64:

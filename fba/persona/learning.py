@@ -9,9 +9,8 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.errors import FbaWarning, ModelError, OptionError
-from fba.persona._restyle import flatten
 from fba.persona.curves import measure_curves
-from fba.persona.motion import Tally
+from fba.persona.motion import Tally, flatten
 from fba.persona.observation import Neutral, Observation, observe
 from fba.persona.persona import SHARE_OF_WIDTH, PartStyle, Persona, part_width
 from fba.persona.points import TrackedFace

@@ -8,7 +8,8 @@ import numpy.typing as npt
 from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.parameters import FAP_COUNT
-from fba.persona._restyle import Follower, flatten, keep_shut, unflatten
+from fba.persona._restyle import Follower, keep_shut
+from fba.persona.motion import flatten, unflatten
 from fba.persona.performance import DEFAULT_MEANS, HEAD, MAPPED, choose_masks, usable_means, user_maps
 from fba.persona.persona import Persona
 from fba.persona.points.layout import PARTS, TRACKED, VERTICES, flat_mask, part_vertices

@@ -6,13 +6,16 @@ moments, do not: the same smile shown widely or narrowly, quickly or slowly, mor
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.persona.points.layout import part_vertices, standard_mask
+
+if TYPE_CHECKING:
+    from fba.persona.persona import Persona
 
 FEWEST = 8
 """Frames of a class that tell how it is moved; a class with fewer has the values of all frames."""
@@ -24,7 +27,7 @@ APART = 1.5
 """Natural logarithm by which the speed of a class differs from that of all frames at most."""
 SPEEDS = (0.05, 50.0)
 """Least and greatest speed for an amplitude, per second."""
-TRUST_ALL, TRUST_CLASS = 3.0, 4.0
+TRUST_ALL, TRUST_CLASS = 1.5, 6.0
 """Seconds of motion that count as much as the assumption that an actor and a user move alike; and, for a
 class, that it differs as all frames do."""
 MOST_GAIN = float(np.log(2.5))
@@ -101,6 +104,16 @@ class Tally:
         return Motion(self._seconds.copy(), np.log(variance) / 2, speed)
 
 
+def flatten(moved: Float64) -> Float64:
+    """Return displacements (S, V, 2) as (S, 2V): all x, then all y."""
+    return np.concatenate([moved[..., 0], moved[..., 1]], axis=1)
+
+
+def unflatten(moved: Float64) -> Float64:
+    """Return displacements (S, 2V) as (S, V, 2)."""
+    return np.stack(np.split(moved, 2, axis=1), axis=2)
+
+
 def measure_motion(moved: Float64, classes: Intp, frames: Intp, rate: float, count: int) -> Motion:
     """Return the statistics of one take; see `Tally.add`. count: of classes."""
     tally = Tally(count, moved.shape[1])
@@ -118,20 +131,13 @@ def find_gains(actor: Motion, user: Motion) -> Float64:
     whole = (actor.spread[-1] - user.spread[-1]) * _trust(seen[-1], TRUST_ALL)
     gains = whole + (actor.spread - user.spread - whole) * _trust(seen, TRUST_CLASS)[:, None]
     gains[-1] = whole
-    return np.clip(gains, -MOST_GAIN, MOST_GAIN)
+    return np.asarray(np.clip(gains, -MOST_GAIN, MOST_GAIN))
 
 
-def find_pace(actor: Motion, user: Motion, shown: Motion) -> float:
-    """Return by how much faster than the user the actor moves for the same amplitude: a natural logarithm.
-
-    shown: what the user shows now; its classes count by how long they are seen.
-    """
-    seen = np.minimum(actor.seconds, user.seconds)
-    whole = float(actor.speed[-1] - user.speed[-1])
-    by_class = whole + (actor.speed - user.speed - whole)[:-1] * _trust(seen, TRUST_CLASS)[:-1]
-    rest = max(float(shown.seconds[-1] - shown.seconds[:-1].sum()), 0.0)
-    total = float(shown.seconds[:-1] @ by_class) + rest * whole
-    return total / max(float(shown.seconds[-1]), 1e-9) * float(_trust(seen[-1], TRUST_ALL))
+def find_pace(actor: Motion, user: Motion) -> float:
+    """Return by how much faster than the user the actor moves for the same amplitude: a natural logarithm."""
+    seen = np.minimum(actor.seconds[-1], user.seconds[-1])
+    return float((actor.speed[-1] - user.speed[-1]) * _trust(seen, TRUST_ALL))
 
 
 def _trust(seconds: Float64, enough: float) -> Float64:
@@ -148,15 +154,29 @@ def shift_reference(user: Motion, before: Motion, after: Motion) -> Motion:
     )
 
 
-def left_over_right(motions: Mapping[str, Motion]) -> dict[str, float]:
-    """Return how many times further the left side moves than the right, of mouth, eyes and brows.
+def describe_motion(persona: Persona) -> dict[str, Any] | None:
+    """Return how an actor moves, in plain numbers; None for a Persona without statistics of motion.
 
-    motions: by part, as in `Persona`.
+    left_over_right: how many times further the left side moves than the right, of mouth, eyes and brows.
+    parts: by name, millimetres on the standard face (root mean square of the deviations), and speed, per
+    second of that amplitude.
     """
+    motions = persona.motions
+    if motions is None:
+        return None
     mouth = motions["mouth"].spread[-1]
     across = np.tile(standard_mask()[part_vertices("mouth"), 0], 2)
-    found = {"mouth": mouth[across > SIDE].mean() - mouth[across < -SIDE].mean()}
+    sides = {"mouth": mouth[across > SIDE].mean() - mouth[across < -SIDE].mean()}
     for name in ("eye", "brow"):
         left, right = (motions[f"{side}_{name}"].spread[-1].mean() for side in ("left", "right"))
-        found[f"{name}s"] = left - right
-    return {name: float(np.exp(value)) for name, value in found.items()}
+        sides[f"{name}s"] = left - right
+    return {
+        "left_over_right": {name: float(np.exp(value)) for name, value in sides.items()},
+        "parts": {
+            part: {
+                "millimetres": float(np.sqrt(np.exp(2 * one.spread[-1]).mean())),
+                "speed": float(np.exp(one.speed[-1])),
+            }
+            for part, one in motions.items()
+        },
+    }

@@ -12,8 +12,9 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64, Intp
 from fba.errors import FbaWarning, OptionError, did_you_mean
 from fba.parameters import FAP_COUNT
-from fba.persona._restyle import flatten, keep_shut, restyle, unflatten
+from fba.persona._restyle import keep_shut, restyle
 from fba.persona.curves import CurveMap, fit_curves, general_curves
+from fba.persona.motion import flatten, unflatten
 from fba.persona.observation import Neutral, Observation, observe
 from fba.persona.persona import MEANS, PartStyle, Persona
 from fba.persona.points import TrackedFace
@@ -129,8 +130,9 @@ def usable_means(persona: Persona, means: str) -> str:
     if means != "motion" or persona.motions is not None:
         return means
     warnings.warn(
-        f"the Persona of {persona.name or 'the actor'} has no statistics of motion, as its file is of version "
-        "1: amplitude, speed and sides stay the user's; learn it again to have them", FbaWarning, stacklevel=3,
+        f"the Persona of {persona.name or 'the actor'} has no statistics of motion, as its file is of "
+        "version 1: amplitude, speed and sides stay the user's; learn it again to have them",
+        FbaWarning, stacklevel=3,
     )  # fmt: skip
     return "curves"
 

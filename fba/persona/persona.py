@@ -58,7 +58,7 @@ class PartStyle:
         the standard face. scale: (2,), the actor's `face_scale`."""
         masks = np.abs(self.moved[..., :2] / scale).max(axis=0, initial=0.0)
         curves = np.abs(self.curves.moved).max(axis=(0, 1), initial=0.0)
-        return np.maximum(np.concatenate([masks[:, 0], masks[:, 1]]), curves)
+        return np.asarray(np.maximum(np.concatenate([masks[:, 0], masks[:, 1]]), curves))
 
     def count(self) -> Counter[str]:
         """Return how many masks each class has."""

@@ -60,8 +60,8 @@ def load_persona(
 ) -> Persona:
     """Return a Persona from a file. recogniser: what is used with it; None for the default.
 
-    A file of version 1 gives one without statistics of motion. Raises FormatError for damage, or a Persona that was learnt with other classes; UnsupportedError for
-    another version; LimitError.
+    A file of version 1 gives one without statistics of motion. Raises FormatError for damage, or a Persona
+    that was learnt with other classes; UnsupportedError for another version; LimitError.
     """
     known = Recogniser.default() if recogniser is None else recogniser
     header, arrays = read_archive(path, KIND, VERSION, limits, oldest=OLDEST)

@@ -63,10 +63,11 @@ class Row:
 class Evaluation:
     """Results, by the names of `WAYS`.
 
-    motion: rows for how masks have moved from their rest, on the standard mask: this is the style. faces: rows
-    for masks as they are, as in the source, in which the faces at rest count for most. agreement: share of parts whose class stays the user's. styles: style -> way -> mean
-    reduction of `motion`, and of `faces`. consecutive: mean distance of an actor's masks in two frames, one
-    after another. classes, masks: of the mouths of Personas, in the mean.
+    motion: rows for how masks have moved from their rest, on the standard mask: this is the style. faces:
+    rows for masks as they are, as in the source, in which faces at rest count for most. agreement: share of
+    parts whose class stays the user's. styles: style -> way -> mean reduction of `motion`, and of `faces`.
+    consecutive: mean distance of an actor's masks in two frames, one after another. classes, masks: of the
+    mouths of Personas, in the mean.
     """
 
     motion: tuple[Row, ...]
