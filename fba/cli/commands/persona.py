@@ -287,7 +287,7 @@ def _describe(persona: Persona) -> dict[str, Any]:
         "turned": persona.turned,
         "untracked": persona.untracked,
         "bytes": persona.size,
-        "motion": describe_motion(persona),
+        "motion": describe_motion(persona.motions),
         "parts": {
             part: {"masks": dict(sorted(style.count().items())), "missing": missing[part]}
             for part, style in persona.parts.items()
@@ -311,7 +311,7 @@ def _lines(persona: Persona) -> list[str]:
         counts = persona.parts[part].count()
         line = f"{part}: {len(counts)} classes, {counts.total()} masks"
         lines.append(line + (f"; missing: {', '.join(missing)}" if missing else ""))
-    motion = describe_motion(persona)
+    motion = describe_motion(persona.motions)
     if motion is None:
         return [*lines, "motion: not known, as the file is of version 1; learn it again"]
     sides = ", ".join(f"{name} {times:.2f}" for name, times in motion["left_over_right"].items())
