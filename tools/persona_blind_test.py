@@ -63,7 +63,7 @@ def main() -> None:
     folder = parser.parse_args().real
     warnings.simplefilter("ignore")
     rows = made_up() if folder is None else real(folder)
-    print("| takes | told by | masks alone | statistics of motion |\n|---|---|---|---|")
+    print("| films | number | masks alone | statistics of motion |\n|---|---|---|---|")
     for name, number, masks, motion in rows:
         print(f"| {name} | {number} | {100 * masks:.0f} % | {100 * motion:.0f} % |")
 
