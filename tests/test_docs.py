@@ -81,6 +81,7 @@ ILLUSTRATIONS = {
     ("docs/motion-capture.md", POOR): "what is said of another file",
     ("docs/motion-capture.md", MISMATCH): "a warning, with figures of another file",
     ("docs/persona.md", "fba persona evaluate"): "takes minutes; tests/persona measures fewer contents",
+    ("docs/persona.md", "python tools/persona_blind_test.py"): "takes minutes; tests/persona has fewer takes",
     ("docs/persona.md", "python -m fba.persona.training -o default.recogniser"): "trains for a minute",
     ("docs/play.md", "fba play face.fba"): WINDOW,
     ("docs/play.md", "fba play face.fba --paused"): WINDOW,

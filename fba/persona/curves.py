@@ -22,8 +22,6 @@ RANKS = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Ranks, by how far vertices move, at which a class is described."""
 SPAN = 0.1
 """Ranks around each, within which frames are averaged."""
-RIDGE = 3.0
-"""Square millimetres: weight of no change, against what the pairs say."""
 STRAIGHT, NEAR, REACH = 0.02, 4.0, 6.0
 """Shares of a curve map that are straight, and that fade with the distance: millimetres of a whole part."""
 NOISE = 3.0
@@ -78,17 +76,6 @@ def general_curves(recogniser: Recogniser) -> dict[str, Curves]:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearMap:
-    """y = x . matrix, for displacements x as rows."""
-
-    matrix: Float64
-
-    def __call__(self, moved: Float64) -> Float64:
-        """Return displacements (S, 2V) of one face as those of another."""
-        return np.asarray(moved @ self.matrix)
-
-
-@dataclass(frozen=True, eq=False)
 class CurveMap:
     """y = x + k(x, centres) . weights: what is paired with curves that are near, and little where none are.
 
@@ -101,17 +88,6 @@ class CurveMap:
     def __call__(self, moved: Float64) -> Float64:
         """Return displacements (S, 2V) of one face as those of another."""
         return np.asarray(moved + _alike(moved, self.centres) @ self.weights)
-
-
-def fit_linear(here: Curves, there: Curves) -> LinearMap:
-    """Return the linear map that brings one face's curves to another's.
-
-    Least squares with as little change as may be; where no class is known of both, the map changes nothing.
-    """
-    inputs, outputs = pair_curves(here, there)
-    same = np.eye(inputs.shape[1])
-    change = np.linalg.solve(inputs.T @ inputs + RIDGE * same, inputs.T @ (outputs - inputs))
-    return LinearMap(same + change)
 
 
 def fit_curves(here: Curves, there: Curves) -> CurveMap:

@@ -10,6 +10,7 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.persona.curves import measure_curves
+from fba.persona.motion import Tally, flatten
 from fba.persona.observation import Neutral, Observation, observe
 from fba.persona.persona import SHARE_OF_WIDTH, PartStyle, Persona, part_width
 from fba.persona.points import TrackedFace
@@ -51,7 +52,8 @@ def learn(
     moved = np.concatenate([one.mask_motion(known) for one in seen])
     source = np.concatenate([np.full(len(one.rows), n) for n, one in enumerate(seen)])
     frame = np.concatenate([one.rows for one in seen])
-    parts = {part: _learn_part(part, seen, moved, source, frame, still, known) for part in PARTS}
+    rates = [float(face.rate) for face in faces]
+    parts = {part: _learn_part(part, seen, rates, moved, source, frame, still, known) for part in PARTS}
     if not _moves(moved):
         raise ModelError("the actor's face rests in all frames: there is no expression to learn")
     frames, turned = sum(map(len, faces)), sum(int(one.registered.turned.sum()) for one in seen)
@@ -76,6 +78,7 @@ def _moves(moved: Float64) -> bool:
 def _learn_part(
     part: str,
     seen: list[Observation],
+    rates: list[float],
     moved: Float64,
     source: Intp,
     frame: Intp,
@@ -93,10 +96,14 @@ def _learn_part(
     own = moved[:, vertices]
     rows = prune(own[:, :points, :2], names, SHARE_OF_WIDTH * part_width(still, part))
     even = own[..., :2] / face_scale(measure_fapu(still), part)
-    flat = np.concatenate([even[..., 0], even[..., 1]], axis=1)
+    flat = flatten(even)
+    tally = Tally(len(component.classes), flat.shape[1])
+    for number, rate in enumerate(rates):
+        take = source == number
+        tally.add(flat[take], labels.first[take], frame[take], rate)
     return PartStyle(
         tuple(names[row] for row in rows), own[rows], source[rows], frame[rows],
-        measure_curves(flat, labels, len(component.classes)),
+        measure_curves(flat, labels, len(component.classes)), tally.motion(),
     )  # fmt: skip
 
 

@@ -8,15 +8,9 @@ import numpy.typing as npt
 from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.parameters import FAP_COUNT
-from fba.persona.performance import (
-    DEFAULT_MEANS,
-    HEAD,
-    MAPPED,
-    check_means,
-    choose_masks,
-    map_part,
-    user_maps,
-)
+from fba.persona._restyle import Follower, keep_shut
+from fba.persona.motion import flatten, unflatten
+from fba.persona.performance import DEFAULT_MEANS, HEAD, MAPPED, choose_masks, usable_means, user_maps
 from fba.persona.persona import Persona
 from fba.persona.points.layout import PARTS, TRACKED, VERTICES, flat_mask, part_vertices
 from fba.persona.points.registration import MISFIT, MOST_TURNED, register_points
@@ -29,6 +23,9 @@ from fba.persona.rest import NEUTRAL_FRAMES
 class LivePersona:
     """Gives the FAPs of an actor for each frame of a user.
 
+    rate: frames per second. Other options as for `perform`. With "motion", the actor's amplitude and sides
+    come as it becomes known how the user moves, at once where `user` says so; speeds stay the user's.
+
     The first second of frames that can be used, 30 of them, is the user's neutral face. A frame without a
     face, with a head turned too far, or of no class that the actor has, changes nothing: what was shown
     stays.
@@ -40,12 +37,19 @@ class LivePersona:
         *,
         means: str = DEFAULT_MEANS,
         user: Persona | None = None,
+        rate: float = 30.0,
         recogniser: Recogniser | None = None,
     ) -> None:
-        check_means(means)
-        self._persona, self._means = persona, means
+        self._persona, self._means = persona, usable_means(persona, means)
         self._known = Recogniser.default() if recogniser is None else recogniser
-        self._maps = user_maps(persona, self._known, means, user) if means in MAPPED else {}
+        self._maps = user_maps(persona, self._known, user) if self._means in MAPPED else {}
+        self._followers: dict[str, Follower] = {}
+        if self._means == "motion":
+            usual = None if user is None else user.motions
+            for part, motion in (persona.motions or {}).items():
+                reach = persona.parts[part].reach(face_scale(persona.fapu, part))
+                self._followers[part] = Follower(motion, reach, None if usual is None else usual[part], rate)
+        self._frame = -1
         self._first: list[Float64] = []
         self._neutral: Float64 | None = None
         self._fapu = persona.fapu
@@ -62,6 +66,7 @@ class LivePersona:
 
         points: (64, 2), as in `TrackedFace`. angles: (3,), radians. Raises ModelError for other shapes.
         """
+        self._frame += 1
         seen, turns = np.asarray(points, dtype=np.float64), np.asarray(angles, dtype=np.float64)
         if seen.shape != (TRACKED, 2) or turns.shape != (3,):
             raise ModelError(
@@ -93,16 +98,21 @@ class LivePersona:
             there = face_scale(self._persona.fapu, part)
             even = own / np.append(face_scale(self._fapu, part), 1.0)
             if self._means in MAPPED:
-                self._moved[rows, :2] = there * map_part(self._maps[part], even[:, rows, :2])[0]
+                flat = flatten(even[:, rows, :2])
+                moved = self._maps[part](flat)
+                if part in self._followers:
+                    moved[0] = self._followers[part].push(
+                        flat[0], moved[0], int(labels.first[0]), self._frame
+                    )
+                self._moved[rows, :2] = there * unflatten(moved)[0]
                 continue
             style = self._persona.parts[part]
-            by_class = self._means == "masks"
-            chosen = int(
-                choose_masks(style, part, even, there, labels, component.classes, by_class=by_class)[0]
-            )
+            chosen = int(choose_masks(style, part, even, there, labels, component.classes)[0])
             if chosen >= 0:
                 self._moved[rows] = style.moved[chosen]
         if self._means in MAPPED:
             self._moved[:, 2] = own[0, :, 2]
+        if self._followers:
+            keep_shut(self._moved[None], own, self._persona.neutral, self._neutral)
         self._faps = mask_faps(self._moved[None], self._persona.fapu, self._known.jaw)[0]
         self._faps[[fap - 1 for fap in HEAD]] = angles / 1e-5

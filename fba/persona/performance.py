@@ -3,16 +3,18 @@ gives."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Intp
-from fba.errors import OptionError, did_you_mean
+from fba.errors import FbaWarning, OptionError, did_you_mean
 from fba.parameters import FAP_COUNT
-from fba.persona.curves import CurveMap, Curves, LinearMap, fit_curves, fit_linear, general_curves
+from fba.persona._restyle import keep_shut, restyle
+from fba.persona.curves import CurveMap, fit_curves, general_curves
+from fba.persona.motion import flatten, unflatten
 from fba.persona.observation import Neutral, Observation, observe
 from fba.persona.persona import MEANS, PartStyle, Persona
 from fba.persona.points import TrackedFace
@@ -29,8 +31,8 @@ EASE = 2
 each other."""
 BLOCK = 256
 """Frames whose distances from masks are computed at once."""
-DEFAULT_MEANS = "curves"
-MAPPED = ("curves", "linear")
+DEFAULT_MEANS = "motion"
+MAPPED = ("motion", "curves")
 """Means that need no masks: every frame is a key."""
 
 
@@ -75,72 +77,78 @@ def perform(
 ) -> Performance:
     """Return a user's performance in an actor's way.
 
-    means: "linear", "masks" (of the user's class, the nearest one: the source's way), or "nearest" (of all
-    masks of the part). neutral: the user's neutral frames, see `observe`. user: the user's own Persona, by
-    which the linear map knows the user's own way; None if there is none. Raises ModelError, OptionError.
+    means: "motion" (the default), "curves", or "masks" (of the user's class, the nearest one: the source's
+    way). neutral: the user's neutral frames, see `observe`. user: the user's own Persona, by which the user's
+    usual way is known; None: it is that of people in general, and amplitude and speed are those of this
+    performance. Raises ModelError, OptionError. Warns where a Persona has no statistics of motion: "curves"
+    then take the place of "motion".
     """
-    check_means(means)
+    means = usable_means(persona, means)
     known = Recogniser.default() if recogniser is None else recogniser
     seen = observe(face, known, neutral)
     own, here = seen.mask_motion(known), measure_fapu(seen.neutral)
     acted = np.zeros_like(own)
     acted[..., 2] = own[..., 2]
-    maps = user_maps(persona, known, means, user) if means in MAPPED else {}
+    maps = user_maps(persona, known, user) if means in MAPPED else {}
     labels, used, chosen, keys = {}, {}, {}, {}
     for part in PARTS:
-        even = own / np.append(face_scale(here, part), 1.0)
+        even, there = own / np.append(face_scale(here, part), 1.0), face_scale(persona.fapu, part)
         classes, style = known.components[part].classes, persona.parts[part]
         labels[part] = seen.labels[part].names(classes)
         if means in MAPPED:
             chosen[part] = np.full(len(seen.rows), -1)
             keys[part] = np.ones(len(seen.rows), dtype=bool)
             used[part] = labels[part]
-            there = face_scale(persona.fapu, part)
-            acted[:, part_vertices(part), :2] = there * map_part(maps[part], even[:, part_vertices(part), :2])
+            flat = flatten(even[:, part_vertices(part), :2])
+            moved = maps[part](flat)
+            if means == "motion" and style.motion is not None:
+                usual = None if user is None else user.parts[part].motion
+                moved = restyle(
+                    part, flat, moved, seen.labels[part].first, seen.rows, float(face.rate),
+                    style.motion, style.reach(there), usual,
+                )  # fmt: skip
+            acted[:, part_vertices(part), :2] = there * unflatten(moved)
             continue
-        chosen[part] = choose_masks(
-            style,
-            part,
-            even,
-            face_scale(persona.fapu, part),
-            seen.labels[part],
-            classes,
-            by_class=means == "masks",
-        )
+        chosen[part] = choose_masks(style, part, even, there, seen.labels[part], classes)
         used[part] = [style.labels[one] if one >= 0 else "" for one in chosen[part].tolist()]
         keys[part] = find_keys(chosen[part])
         acted[:, part_vertices(part)] = bridge(style, chosen[part], keys[part], seen.rows)
+    if means == "motion":
+        keep_shut(acted, own, persona.neutral, seen.neutral)
     return Performance(seen.rows, own, acted, labels, used, chosen, keys)
 
 
-def check_means(means: str) -> None:
-    """Raise OptionError for means that do not exist."""
+def usable_means(persona: Persona, means: str) -> str:
+    """Return the means that a Persona has what it takes for, and warn where they are others than asked for.
+
+    Raises OptionError for means that do not exist.
+    """
     if means not in MEANS:
         raise OptionError(
             f"means must be one of {', '.join(MEANS)}, not {means!r}{did_you_mean(means, MEANS)}"
         )
+    if means != "motion" or persona.motions is not None:
+        return means
+    warnings.warn(
+        f"the Persona of {persona.name or 'the actor'} has no statistics of motion, as its file is of "
+        "version 1: amplitude, speed and sides stay the user's; learn it again to have them",
+        FbaWarning, stacklevel=3,
+    )  # fmt: skip
+    return "curves"
 
 
-def user_maps(
-    persona: Persona, recogniser: Recogniser, means: str = DEFAULT_MEANS, user: Persona | None = None
-) -> dict[str, LinearMap | CurveMap]:
+def user_maps(persona: Persona, recogniser: Recogniser, user: Persona | None = None) -> dict[str, CurveMap]:
     """Return what makes the actor's displacements of each part of a user's.
 
-    means: "curves" or "linear". user: the user's own Persona; None for somebody who moves as people do in
-    general.
+    user: the user's own Persona; None for somebody who moves as people do in general.
     """
     general = general_curves(recogniser)
-    fit: Callable[[Curves, Curves], LinearMap | CurveMap] = fit_linear if means == "linear" else fit_curves
     return {
-        part: fit(general[part] if user is None else user.parts[part].curves, persona.parts[part].curves)
+        part: fit_curves(
+            general[part] if user is None else user.parts[part].curves, persona.parts[part].curves
+        )
         for part in PARTS
     }
-
-
-def map_part(map_: LinearMap | CurveMap, moved: Float64) -> Float64:
-    """Return how far the actor's vertices of a part move for a user's: (S, V, 2) to (S, V, 2)."""
-    across, up = np.split(map_(np.concatenate([moved[..., 0], moved[..., 1]], axis=1)), 2, axis=1)
-    return np.stack([across, up], axis=2)
 
 
 def choose_masks(
@@ -150,8 +158,6 @@ def choose_masks(
     scale: Float64,
     labels: Labels,
     classes: tuple[str, ...],
-    *,
-    by_class: bool = True,
 ) -> Intp:
     """Return the number of the mask that each frame shows, -1 for none: int (S,).
 
@@ -166,8 +172,6 @@ def choose_masks(
     masks = standard + style.moved[:, : len(rows), :2] / scale
     users = standard + own[:, rows, :2]
     chosen = np.full(len(own), -1, dtype=np.intp)
-    if not by_class:
-        return _nearest(users, masks, np.arange(len(masks)))
     names = np.array(labels.names(classes), dtype=object)
     for name in set(names.tolist()) - {""}:
         known = style.rows.get(name)

@@ -11,12 +11,14 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.face import Fapu
 from fba.persona.curves import Curves
+from fba.persona.motion import Motion
 from fba.persona.points.layout import flat_mask, part_vertices
 from fba.persona.recognition.faps import measure_fapu
 
-MEANS = ("curves", "linear", "masks", "nearest")
-"""How a user's face becomes the actor's, part by part: by smooth or linear maps that bring together how
-both show each class, by the nearest mask of the user's class, by the nearest mask of all."""
+MEANS = ("motion", "curves", "masks")
+"""How a user's face becomes the actor's, part by part: by smooth maps that bring together how both show each
+class and by the statistics of the actor's motion, by the maps alone, by the nearest mask of the user's
+class."""
 SHARE_OF_WIDTH = 0.05
 """l3: masks of a class that are nearer to each other than this share of the width of mouth or eye are one."""
 WIDTHS = {
@@ -32,7 +34,8 @@ class PartStyle:
 
     labels: the class of each mask, such as "LFAU_12" or "LFAU_26/LFAU_12". moved: float64 (M, V, 3),
     millimetres that the part's vertices have moved from the actor's neutral mask. source, frame: int (M,),
-    the recording and its frame that a mask is from. curves: how the part shows each class.
+    the recording and its frame that a mask is from. curves: how the part shows each class. motion: how far,
+    how fast and on which side it moves; None in Personas of files that are older than these statistics.
     """
 
     labels: tuple[str, ...]
@@ -40,6 +43,7 @@ class PartStyle:
     source: Intp
     frame: Intp
     curves: Curves
+    motion: Motion | None = None
 
     @cached_property
     def rows(self) -> dict[str, Intp]:
@@ -48,6 +52,13 @@ class PartStyle:
             name: np.array([n for n, one in enumerate(self.labels) if one == name])
             for name in sorted(set(self.labels))
         }
+
+    def reach(self, scale: Float64) -> Float64:
+        """Return how far each coordinate goes at most, in masks and curves: float64 (2V,), millimetres on
+        the standard face. scale: (2,), the actor's `face_scale`."""
+        masks = np.abs(self.moved[..., :2] / scale).max(axis=0, initial=0.0)
+        curves = np.abs(self.curves.moved).max(axis=(0, 1), initial=0.0)
+        return np.asarray(np.maximum(np.concatenate([masks[:, 0], masks[:, 1]]), curves))
 
     def count(self) -> Counter[str]:
         """Return how many masks each class has."""
@@ -87,6 +98,12 @@ class Persona:
         mask = self.neutral_mask.copy()
         mask[part_vertices(part)] += self.parts[part].moved[number]
         return mask
+
+    @property
+    def motions(self) -> dict[str, Motion] | None:
+        """How each part moves; None in Personas of files that are older than these statistics."""
+        found = {part: style.motion for part, style in self.parts.items() if style.motion is not None}
+        return found if len(found) == len(self.parts) else None
 
     def missing(self, classes: dict[str, tuple[str, ...]]) -> dict[str, list[str]]:
         """Return the classes of each part that no mask shows, alone or as the first of two."""

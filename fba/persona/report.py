@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fba.arrays import Float64
+from fba.persona.motion import describe_motion
 from fba.persona.observation import Neutral, Observation, observe
 from fba.persona.persona import Persona
 from fba.persona.points import TrackedFace
@@ -44,7 +45,8 @@ def make_report(
     body = [f"<h1>Persona of {name}</h1>", _counts(persona), "<h2>Classes and masks</h2>"]
     for part in PARTS:
         body += _part_masks(persona, part, known)
-    body += ["<h2>Components</h2>", _variance(known), "<h2>Frames among the examples</h2>"]
+    body += ["<h2>Motion</h2>", _motion(persona), "<h2>Components</h2>", _variance(known)]
+    body.append("<h2>Frames among the examples</h2>")
     body.append(
         "<p>Grey: examples by which expressions are recognised. Coloured: the actor's frames by "
         "their class, the commonest ones; the line joins them in time.</p>"
@@ -62,6 +64,23 @@ def _counts(persona: Persona) -> str:
     return (
         f"<p>{persona.kept} of {persona.frames} frames are used; {persona.untracked} have no face; in "
         f"{persona.turned} the head is turned by more than 30 degrees. Masks take {persona.size} bytes.</p>"
+    )
+
+
+def _motion(persona: Persona) -> str:
+    motion = describe_motion(persona.motions)
+    if motion is None:
+        return "<p>The file of this Persona is older than statistics of motion.</p>"
+    rows = [
+        f"<tr><td>{part.replace('_', ' ')}</td><td>{one['millimetres']:.2f}</td>"
+        f"<td>{one['speed']:.1f}</td></tr>"
+        for part, one in motion["parts"].items()
+    ]
+    sides = ", ".join(f"{name} {times:.2f}" for name, times in motion["left_over_right"].items())
+    return (
+        "<p>How far each part moves about its mean, on the standard face, and how fast for that. How many "
+        f"times as far the left side moves as the right: {sides}.</p>"
+        f"<table><tr><th></th><th>mm</th><th>1/s</th></tr>{''.join(rows)}</table>"
     )
 
 

@@ -16,6 +16,7 @@ from fba.errors import FormatError, LimitError, UnsupportedError
 from fba.face import FaceModel
 from fba.persona import load_persona, read_recording, write_recording
 from fba.persona.evaluation.actors import Style, act
+from fba.persona.points.layout import PARTS
 from fba_conformance.captures import point_files
 from fba_conformance.captures.tracked_actor import film
 
@@ -64,6 +65,26 @@ def test_info_lists_masks(persona: Path, run: Run) -> None:
     assert report["parts"]["mouth"]["masks"]["E_HAPPY"] >= 1
     assert "LFAU_22" in report["parts"]["mouth"]["missing"]
     assert report["bytes"] < 100_000
+    assert report["motion"]["left_over_right"]["mouth"] > 1.3  # the actor's left side moves more
+    assert f"left over right: mouth {report['motion']['left_over_right']['mouth']:.2f}, eyes " in said
+
+
+def test_a_persona_of_version_1_is_read_and_what_it_lacks_is_said(
+    folder: Path, persona: Path, run: Run, tmp_path: Path
+) -> None:
+    lacks = {f"_{part}.{name}": None for part in PARTS for name in ("seconds", "spread", "speed")}
+    old = repacked(persona, tmp_path / "old.persona", version=1, **lacks)
+    assert load_persona(old).motions is None
+    assert "motion: not known, as the file is of version 1; learn it again" in run("persona", "info", old)[1]
+    play = ("persona", "play", folder / "user.npz", "--persona")
+    code, _, err = run(*play, old, "-o", tmp_path / "old.fap")
+    assert (code, "no statistics of motion" in err) == (0, True)
+    code, _, err = run(*play, persona, "--means", "curves", "-o", tmp_path / "new.fap")
+    assert (code, err) == (0, "")
+    old_lines, new_lines = (
+        (tmp_path / f"{name}.fap").read_text().splitlines()[1:] for name in ("old", "new")
+    )
+    assert old_lines == new_lines
 
 
 def test_play_writes_faps_in_the_actors_way(folder: Path, persona: Path, run: Run, tmp_path: Path) -> None:
@@ -149,7 +170,9 @@ def repacked(path: Path, target: Path, **changed: object) -> Path:
     ("changed", "error", "said"),
     [
         ({"kind": "other"}, FormatError, "is no persona file"),
-        ({"version": 2}, UnsupportedError, "version 2; this is 1: make it again"),
+        ({"version": 3}, UnsupportedError, "version 3; this is 2: make it again"),
+        ({"version": 0}, UnsupportedError, "version 0; this is 2: make it again"),
+        ({"version": True}, UnsupportedError, "version True"),
         ({"version": "1"}, UnsupportedError, "version '1'"),
         ({"name": 7}, FormatError, "name must be a text"),
         ({"frames": -1}, FormatError, "whole numbers"),
@@ -161,6 +184,13 @@ def repacked(path: Path, target: Path, **changed: object) -> Path:
         ({"_neutral": np.zeros((64, 2))}, FormatError, "the neutral face is none"),
         ({"_neutral": np.array([{}])}, FormatError, "Python objects"),
         ({"_mouth.known": np.zeros(3)}, FormatError, "mouth.known has shape"),
+        ({"_mouth.spread": None}, FormatError, "lacks the array mouth.spread"),
+        ({"_mouth.spread": np.zeros((3, 54))}, FormatError, "mouth.spread has shape"),
+        ({"_mouth.speed": np.zeros(3)}, FormatError, "mouth.speed has shape"),
+        ({"_left_brow.speed": np.full(5, np.inf)}, FormatError, "left_brow.speed has"),
+        ({"_left_brow.spread": np.full((5, 12), 1e3)}, FormatError, "from -10 to 10"),
+        ({"_left_brow.speed": np.full(5, -1e3)}, FormatError, "from -10 to 10"),
+        ({"_left_brow.seconds": np.full(5, -1.0)}, FormatError, "seconds must be from 0"),
         ({"_left_eye.curves": np.full((4, 5, 18), 1e6)}, FormatError, "more than 500 mm"),
     ],
 )
@@ -196,15 +226,15 @@ def test_evaluate_prints_a_table(run: Run, monkeypatch: pytest.MonkeyPatch) -> N
     def few(**options: object) -> evaluation.Evaluation:
         assert options == {"users": 1, "seed": 4}
         row = evaluation.Row("E_HAPPY", 4.0, dict.fromkeys(evaluation.WAYS, 2.0))
-        means = dict.fromkeys(("curves", "linear", "masks", "nearest"), 0.95)
-        return evaluation.Evaluation((row,), (row,), means, {}, 0.7, 30, 10)
+        faces = evaluation.Row("E_HAPPY", 4.0, dict.fromkeys(evaluation.WAYS, 1.0))
+        means = dict.fromkeys(("motion", "curves", "masks"), 0.95)
+        return evaluation.Evaluation((row,), (faces,), means, {}, 0.7, 30, 10)
 
     monkeypatch.setattr(evaluation, "evaluate", few)
     code, said, err = run("persona", "evaluate", "--users", 1, "--seed", 4)
     assert (code, err) == (0, "")
-    for text in ("E_HAPPY", "4.00", "2.00", "50.0 %", "95.0 %", "0.70 mm"):
+    for text in ("E_HAPPY", "4.00", "2.00", "50.0 %", "75.0 %", "95.0 %", "0.70 mm"):
         assert text in said
-    assert (
-        json.loads(run("persona", "evaluate", "--users", 1, "--seed", 4, "--json")[1])["reduction"]["masks"]
-        == 0.5
-    )
+    assert said.index("50.0 %") < said.index("75.0 %")  # of motion first, then with the faces at rest
+    report = json.loads(run("persona", "evaluate", "--users", 1, "--seed", 4, "--json")[1])
+    assert (report["reduction"]["masks"], report["reduction_with_rest"]["masks"]) == (0.5, 0.75)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -83,7 +84,7 @@ def test_the_users_own_faps_are_those_that_were_performed(user: Act) -> None:
     assert np.abs(angles - user.face.angles).max() < 1e-4
 
 
-@pytest.mark.parametrize("means", ["masks", "nearest", "linear"])
+@pytest.mark.parametrize("means", ["masks", "curves"])
 def test_other_means(user: Act, persona: Persona, means: str) -> None:
     found = perform(user.face, persona, means=means)
     moments = dict(user.apex)
@@ -116,13 +117,13 @@ def test_frames_between_keys_are_interpolated(persona: Persona) -> None:
 
 
 def test_frame_by_frame_is_as_in_one_piece(user: Act, persona: Persona) -> None:
-    for means in ("curves", "masks"):
+    for means in ("motion", "curves", "masks"):
         live = LivePersona(persona, means=means)
         shown = [live.push(one, turn) for one, turn in zip(user.face.points, user.face.angles, strict=True)]
         assert shown[:29] == [None] * 29
         assert live.ready
         if means == "curves":
-            whole = play(user.face, persona).face
+            whole = play(user.face, persona, means=means).face
             assert whole is not None
             frames = [60, 100, 140]
             np.testing.assert_allclose([shown[n] for n in frames], whole.values[frames], atol=0.51)
@@ -179,9 +180,10 @@ def test_a_persona_brings_users_to_the_actor() -> None:
     """Tables 5.1 and 5.2 of the source by relation: 38.1 and 35.4 %; here with few contents."""
     found = evaluate(styles={"asymmetry": Style(mouth=1.3, lopsided=0.6)}, users=1, names=NAMES)
     assert [row.content for row in found.faces] == list(NAMES)
-    assert mean_reduction(found.faces, "curves") >= 0.38
-    assert mean_reduction(found.motion, "curves") > 0.03
-    assert found.agreement["curves"] >= 0.9
+    assert mean_reduction(found.faces, "motion") >= 0.38
+    assert mean_reduction(found.motion, "motion") > 0.15
+    assert mean_reduction(found.motion, "motion") > mean_reduction(found.motion, "curves") + 0.05
+    assert found.agreement["motion"] >= 0.9
 
 
 def test_the_report_draws_masks_and_plots(actor: Act, persona: Persona) -> None:
@@ -190,3 +192,6 @@ def test_the_report_draws_masks_and_plots(actor: Act, persona: Persona) -> None:
     assert page.count("<svg") > 10 + len(PARTS) * 2
     assert "E_HAPPY" in page
     assert "Missing" in page
+    told = re.search(r"times as far the left side moves as the right: mouth ([\d.]+), ", page)
+    assert told is not None
+    assert float(told.group(1)) > 1.3  # the actor's left side moves more

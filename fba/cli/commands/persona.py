@@ -19,7 +19,7 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.persona import Persona, TrackedFace
 
-MEANS = ("curves", "linear", "masks", "nearest")
+MEANS = ("motion", "curves", "masks")
 REPORTS = (".html",)
 
 
@@ -178,7 +178,9 @@ def info_command(file: Path, as_json: bool, limit: Limits) -> None:
 )  # fmt: skip
 @options.to_option
 @options.choice_option(
-    "--means", "How a face becomes the actor's: maps, or masks as in the source (docs/persona.md).", *MEANS
+    "--means",
+    "How a face becomes the actor's: by maps and how it moves, by maps alone, or by masks.",
+    *MEANS,
 )
 @_neutral_option
 @click.option("--no-head", is_flag=True, help="Leave out how the user's head turns.")
@@ -236,7 +238,8 @@ def play_command(
 def evaluate_command(users: int, seed: int, as_json: bool) -> None:
     """Measure how near a Persona brings users to actors whose styles are known.
 
-    Actors and users are made up. The distance of masks falls where a Persona is used; a row for each content.
+    Actors and users are made up. The distance of masks, each moved from its rest, falls where a Persona is
+    used; a row for each content. The last rows are for masks with the faces at rest, as in the source.
     """
     from fba.persona.evaluation import WAYS, evaluate, mean_reduction
 
@@ -246,9 +249,9 @@ def evaluate_command(users: int, seed: int, as_json: bool) -> None:
         return
     columns = ("without", *WAYS)
     rows = [
-        [row.content, f"{row.own:.2f}", *(f"{row.played[way]:.2f}" for way in WAYS)] for row in found.faces
+        [row.content, f"{row.own:.2f}", *(f"{row.played[way]:.2f}" for way in WAYS)] for row in found.motion
     ]
-    for name, some in (("falls by", found.faces), ("motion alone", found.motion)):
+    for name, some in (("falls by", found.motion), ("with the rest", found.faces)):
         rows.append([name, "", *(f"{100 * mean_reduction(some, way):.1f} %" for way in WAYS)])
     agreement = (f"{100 * found.agreement[way]:.1f} %" if way in found.agreement else "" for way in WAYS)
     rows.append(["class kept", "", *agreement])
@@ -274,6 +277,8 @@ def _load(path: Path, limits: Limits) -> Persona:
 
 def _describe(persona: Persona) -> dict[str, Any]:
     """Return what a Persona holds, for programs."""
+    from fba.persona.motion import describe_motion
+
     missing = _missing(persona)
     return {
         "name": persona.name,
@@ -282,6 +287,7 @@ def _describe(persona: Persona) -> dict[str, Any]:
         "turned": persona.turned,
         "untracked": persona.untracked,
         "bytes": persona.size,
+        "motion": describe_motion(persona.motions),
         "parts": {
             part: {"masks": dict(sorted(style.count().items())), "missing": missing[part]}
             for part, style in persona.parts.items()
@@ -297,10 +303,19 @@ def _missing(persona: Persona) -> dict[str, list[str]]:
 
 
 def _lines(persona: Persona) -> list[str]:
-    """Return a line for each part: classes, masks, and what is missing."""
+    """Return a line for each part: classes, masks, and what is missing; and lines for the motion."""
+    from fba.persona.motion import describe_motion
+
     lines = []
     for part, missing in _missing(persona).items():
         counts = persona.parts[part].count()
         line = f"{part}: {len(counts)} classes, {counts.total()} masks"
         lines.append(line + (f"; missing: {', '.join(missing)}" if missing else ""))
-    return lines
+    motion = describe_motion(persona.motions)
+    if motion is None:
+        return [*lines, "motion: not known, as the file is of version 1; learn it again"]
+    sides = ", ".join(f"{name} {times:.2f}" for name, times in motion["left_over_right"].items())
+    moves = (
+        f"{part} {one['millimetres']:.2f} mm, {one['speed']:.1f}/s" for part, one in motion["parts"].items()
+    )
+    return [*lines, f"motion: {'; '.join(moves)}", f"left over right: {sides}"]

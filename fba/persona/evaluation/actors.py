@@ -15,7 +15,7 @@ from fba.parameters import FAP_COUNT, faps
 from fba.persona.points import TrackedFace
 from fba.persona.training.camera import photograph
 from fba.persona.training.classes import class_faps, face_classes
-from fba.persona.training.people import make_people, move_face
+from fba.persona.training.people import People, make_people, move_face
 
 RATE = 30
 REST = 1.2
@@ -92,17 +92,17 @@ def act(
     style: Style | None = None,
     *,
     seed: int = 1,
+    take: int | None = None,
     name: str = "",
     noise: float = 0.35,
 ) -> Act:
     """Return a performance of a script: (content, intensity) one after another, after a rest.
 
-    style: None for the user's, who has no style but that of the face. seed: of the person and the film.
+    style: None for the user's, who has no style but that of the face. seed: of the person and the film. take:
+    another film of the same person; None for the one that the seed makes.
     """
     own = Style() if style is None else style
-    random = np.random.default_rng(seed)
-    people = make_people(2, random)
-    person = int(random.integers(0, 2))
+    people, person, random = _cast(seed, take)
     length = (RISE + FALL) * own.rise + HOLD + PAUSE
     count = int((REST + length * len(script) + 0.5) * RATE)
     times = np.arange(count) / RATE
@@ -114,14 +114,43 @@ def act(
         values += intensity * shape[:, None] * styled_faps(content, own)
         apex.append((content, round((start + RISE * own.rise + HOLD / 2) * RATE)))
     values *= people.gains[person]
+    return Act(_film(people, person, values, times, Fraction(RATE), random, name, noise), values, tuple(apex))
+
+
+def film_faps(
+    values: Float64, rate: Fraction, *, seed: int = 1, take: int | None = None, name: str = "",
+    noise: float = 0.35,
+) -> TrackedFace:  # fmt: skip
+    """Return what a tracker sees of a made-up person whose face shows FAPs (T, 68).
+
+    Before them, the face rests for `REST` seconds. seed, take: as for `act`.
+    """
+    people, person, random = _cast(seed, take)
+    shown = np.concatenate([np.zeros((round(REST * float(rate)), FAP_COUNT)), values])
+    times = np.arange(len(shown)) / float(rate)
+    return _film(people, person, shown, times, rate, random, name, noise)
+
+
+def _cast(seed: int, take: int | None) -> tuple[People, int, np.random.Generator]:
+    """Return people, which of them is filmed, and what the film's noise comes from."""
+    random = np.random.default_rng(seed)
+    people = make_people(2, random)
+    person = int(random.integers(0, 2))
+    return people, person, random if take is None else np.random.default_rng([seed, take])
+
+
+def _film(
+    people: People, person: int, values: Float64, times: Float64, rate: Fraction,
+    random: np.random.Generator, name: str, noise: float,
+) -> TrackedFace:  # fmt: skip
+    """Return what a tracker sees of a person, whose head turns a little once the rest is over."""
     features = move_face(people, person, values)
     waves = np.stack(
         [np.sin(2 * np.pi * (random.uniform(0.1, 0.4) * times + random.uniform())) for _ in range(3)], axis=1
     )
     angles = TURN * waves * _ease((times - REST) / 0.5)[:, None]
     picture, told = photograph(features, angles, random, noise=noise)
-    face = TrackedFace(picture, told, np.ones(count, dtype=bool), times, Fraction(RATE), name)
-    return Act(face, values, tuple(apex))
+    return TrackedFace(picture, told, np.ones(len(times), dtype=bool), times, rate, name)
 
 
 def _ease(share: Float64) -> Float64:

@@ -33,9 +33,11 @@ WITHIN = 4
 """Frames before and after the strongest one whose masks are averaged: the tracker's noise is not a style."""
 OWN, FACE = "own", "face only"
 """The user without a Persona; the user's own motion on the actor's neutral face."""
-KNOWN_USER = "curves, user known"
-"""As "curves", with a Persona of the user, too."""
-WAYS = (FACE, KNOWN_USER, *MEANS)
+KNOWN_USER = "motion, user known"
+"""As "motion", with a Persona of the user, too."""
+IN_STYLE = "user in that style"
+"""The user who performs in the actor's style: as near as another person comes, with a body of his own."""
+WAYS = (FACE, IN_STYLE, KNOWN_USER, *MEANS)
 ALIKE = (
     frozenset({"LFAU_26", "LFAU_27", "E_SURPRISE", "CAU_A26A12Lw"}),
     frozenset({"LFAU_23", "LFAU_34", "LFAU_24", "NEUTRAL"}),
@@ -61,14 +63,15 @@ class Row:
 class Evaluation:
     """Results, by the names of `WAYS`.
 
-    faces: rows for masks as they are, as in the source. motion: rows for their motion alone, on the
-    standard mask. agreement: share of parts whose class stays the user's. styles: style -> way -> mean
-    reduction of `faces`, and of `motion`. consecutive: mean distance of an actor's masks in two frames, one
-    after another. classes, masks: of the mouths of Personas, in the mean.
+    motion: rows for how masks have moved from their rest, on the standard mask: this is the style. faces:
+    rows for masks as they are, as in the source, in which faces at rest count for most. agreement: share of
+    parts whose class stays the user's. styles: style -> way -> mean reduction of `motion`, and of `faces`.
+    consecutive: mean distance of an actor's masks in two frames, one after another. classes, masks: of the
+    mouths of Personas, in the mean.
     """
 
-    faces: tuple[Row, ...]
     motion: tuple[Row, ...]
+    faces: tuple[Row, ...]
     agreement: dict[str, float]
     styles: dict[str, dict[str, tuple[float, float]]]
     consecutive: float
@@ -78,8 +81,8 @@ class Evaluation:
     def to_dict(self) -> dict[str, Any]:
         """Return plain numbers and texts, for programs."""
         return asdict(self) | {
-            "reduction": {way: mean_reduction(self.faces, way) for way in WAYS},
-            "motion_reduction": {way: mean_reduction(self.motion, way) for way in WAYS},
+            "reduction": {way: mean_reduction(self.motion, way) for way in WAYS},
+            "reduction_with_rest": {way: mean_reduction(self.faces, way) for way in WAYS},
         }
 
 
@@ -112,15 +115,15 @@ def evaluate(
     by_style = {
         name: {
             way: (
-                mean_reduction(_rows(performed, some, 0), way),
                 mean_reduction(_rows(performed, some, 1), way),
+                mean_reduction(_rows(performed, some, 0), way),
             )
             for way in WAYS
         }
         for name, some in zip(chosen, groups, strict=True)
     }
     return Evaluation(
-        _rows(performed, pairs, 0), _rows(performed, pairs, 1),
+        _rows(performed, pairs, 1), _rows(performed, pairs, 0),
         {way: float(np.mean([one.agreement[way] for one in pairs])) for way in MEANS}, by_style,
         float(np.mean([one.consecutive for one in pairs])),
         float(np.mean([len(one.counts) for one in pairs])),
@@ -155,13 +158,17 @@ def _compare(style: Style, names: tuple[str, ...], seed: list[int], known: Recog
     performed = act(script, seed=users)
     seen = observe(performed.face, known)
     own = _hold(seen.mask_motion(known), seen.rows, performed)
+    in_style = act(script, style, seed=users)
+    same = observe(in_style.face, known)
+    best = _hold(same.mask_motion(known), same.rows, in_style)
     distances = {
         OWN: _distances(own, flat_mask(seen.neutral), goal, at_rest),
         FACE: _distances(own, persona.neutral_mask, goal, at_rest),
+        IN_STYLE: _distances(best, persona.neutral_mask, goal, at_rest),
     }
     agreement = {}
     for way in (*MEANS, KNOWN_USER):
-        means, user_known = ("curves", own_persona) if way == KNOWN_USER else (way, None)
+        means, user_known = ("motion", own_persona) if way == KNOWN_USER else (way, None)
         played = perform(performed.face, persona, means=means, user=user_known, recogniser=known)
         acted = _hold(played.acted, played.rows, performed)
         distances[way] = _distances(acted, persona.neutral_mask, goal, at_rest)

@@ -41,9 +41,9 @@ def pack_archive(kind: str, version: int, header: dict[str, Any], arrays: dict[s
 
 
 def read_archive(
-    path: Path, kind: str, version: int, limits: Limits = DEFAULT_LIMITS
+    path: Path, kind: str, version: int, limits: Limits = DEFAULT_LIMITS, *, oldest: int | None = None
 ) -> tuple[dict[str, Any], dict[str, Float64]]:
-    """Return the header and the arrays of a file.
+    """Return the header and the arrays of a file. oldest: version that is read, too; None for `version`.
 
     Raises FormatError where it is none of this kind, or damaged; UnsupportedError for another version;
     LimitError.
@@ -64,9 +64,11 @@ def read_archive(
         raise FormatError(f"is damaged: its header cannot be read: {error}", path=path) from error
     if not isinstance(header, dict) or header.get("kind") != kind:
         raise FormatError(f"is no {kind} file", path=path)
-    if header.get("version") != version:
+    given = header.get("version")
+    oldest = version if oldest is None else oldest
+    if type(given) is not int or not oldest <= given <= version:
         raise UnsupportedError(
-            f"{path}: a {kind} file of version {header.get('version')!r}; this is {version}: make it again"
+            f"{path}: a {kind} file of version {given!r}; this is {version}: make it again"
         )
     return header, read_arrays(path, limits, single="")
 
