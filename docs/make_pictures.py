@@ -44,6 +44,7 @@ PICTURES = {
     "markers-page.jpg": "make_player_pictures.markers",
     "moods.jpg": "make_mood_picture.moods",
     "panels.jpg": "make_player_pictures.panels",
+    "persona-styles.jpg": "make_persona_style_picture.main",
     "persona.jpg": "make_persona_picture.main",
     "points.jpg": "make_player_pictures.points",
     "postures.jpg": "make_body_pictures.postures",

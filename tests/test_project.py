@@ -152,7 +152,12 @@ def test_rooms_are_imported_where_they_are_first_used() -> None:
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
     rooms = {path.parent.name for path in (ROOT / "fba").glob("*/__init__.py")}
-    assert rooms - {name.removeprefix("fba.") for name in listed.stdout.split()} == {"cli", "gltf", "mesh"}
+    assert rooms - {name.removeprefix("fba.") for name in listed.stdout.split()} == {
+        "cli",
+        "geometry",
+        "gltf",
+        "mesh",
+    }
 
 
 def test_all_packages_say_that_they_are_typed() -> None:

@@ -47,7 +47,7 @@ def trace(data: bytes, *, bap_steps: str | None = None) -> Iterator[Element]:
     Yields the elements before damage, then raises BitstreamError(plane, bit), which names the damaged
     element; UnsupportedError for DCT segments; ValueError for another bap_steps.
     """
-    walker = Walker(data, bap_steps=bap_steps)
+    walker = Walker(data, bap_steps=bap_steps or named_steps(data))
     more = True
     while more:
         try:
@@ -69,7 +69,7 @@ def planes(data: bytes, *, bap_steps: str | None = None) -> Iterator[dict[str, A
     fap (value by number, 3..68), viseme (4 numbers or None), expression (6 or None), bap (value by
     number), as far as the plane carries them.
     """
-    walker = Walker(data, bap_steps=bap_steps)
+    walker = Walker(data, bap_steps=bap_steps or named_steps(data))
     more = True
     while more:
         before = walker.count
@@ -90,6 +90,13 @@ def _find_code(data: bytes, code: int, start: int) -> int:
     return position if position >= 0 else len(data)
 
 
+def named_steps(data: bytes) -> str:
+    """Return the table of BAP steps that a mark before the object names, else "iso"."""
+    before = data[: min(_find_code(data, code, 0) for code in OBJECT_START_CODES)]
+    named = _NAMED_STEPS.search(before)
+    return named[1].decode() if named is not None else BAP_STEP_TABLES[0]
+
+
 class Walker:
     """Reads one object, one plane at each step. `record` describes the last plane (see `planes`).
 
@@ -97,11 +104,9 @@ class Walker:
     as the standard's look-ahead can be read. Streams are to be written so that this makes no difference.
     """
 
-    def __init__(self, data: bytes, *, bap_steps: str | None = None, byte_aligned: bool = False) -> None:
-        if bap_steps is None:
-            before = data[: min(_find_code(data, code, 0) for code in OBJECT_START_CODES)]
-            named = _NAMED_STEPS.search(before)
-            bap_steps = named[1].decode() if named is not None else BAP_STEP_TABLES[0]
+    def __init__(
+        self, data: bytes, *, bap_steps: str = BAP_STEP_TABLES[0], byte_aligned: bool = False
+    ) -> None:
         if bap_steps not in BAP_STEP_TABLES:
             raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {bap_steps!r}")
         self.reader = Reader(bytes(data), byte_aligned=byte_aligned)

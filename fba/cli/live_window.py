@@ -20,6 +20,10 @@ class StreamQueue:
         self._parts: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._ended = False
 
+    def begin(self, opening: bytes) -> None:
+        """Begin the stream with what goes before it."""
+        self.write(opening, b"")
+
     def write(self, data: bytes, ending: bytes) -> None:
         """Add bytes."""
         if data:

@@ -177,6 +177,10 @@ def _find_path(wanted: Float64, first: float, errors: Float64, slopes: Float64, 
     other BAPs leave points off; slopes: (T, P, 3), metres for a step of this one. rests: bool (T, P).
     """
     count, points = errors.shape[0], errors.shape[1]
+    if len(wanted) != count or slopes.shape != errors.shape or errors.shape[2] != 3:
+        raise IndexError("wanted levels, errors and slopes must have the same frames and points")
+    if rests.shape[0] != count or rests.shape[1] != points:
+        raise IndexError("rests must have the frames and points of errors")
     costs = np.zeros((count, 2))
     came_from = np.zeros((count, 2), np.int64)
     for frame in range(count):

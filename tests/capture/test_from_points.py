@@ -204,6 +204,7 @@ def test_brows_of_real_films_rest_as_they_mostly_are(shared: Path, name: str) ->
     motion = read_points(shared / f"data/capture/{name}.csv")
     with warnings.catch_warnings():
         warnings.simplefilter("error", FbaWarning)
+        warnings.filterwarnings("ignore", "eyes that turn further")
         face = find_point_face(replace(motion, aspect=16 / 9))
     for columns in (INNER, MIDDLE, OUTER):
         assert abs(np.median(face.faps[:, columns])) < 60

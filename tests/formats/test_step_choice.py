@@ -56,7 +56,7 @@ def keyed(degrees: list[float], quant: int = 1) -> bytes:
     values = np.zeros((len(times), 296), dtype=np.int32)
     values[:, [37, 38]] = np.rint(np.radians(np.interp(times, range(len(degrees)), degrees)) * 1e5)[:, None]
     body = BodyTrack(values, values.any(axis=0) | np.zeros((len(times), 1), bool))
-    options = EncoderOptions(bap_steps="visage", bap_quant=quant)
+    options = EncoderOptions(bap_steps="visage", bap_quant=quant, mark=False)
     return fba.encode(Animation(30, range(len(times)), None, body), options)  # type: ignore[arg-type]
 
 
@@ -100,7 +100,7 @@ def swaying(millimetres: float, *, legs: float = 0.0, seconds: float = 4.0, step
         np.radians(legs * wave)[:, None] * 1e5
     )
     body = BodyTrack(values, np.broadcast_to(values.any(axis=0), values.shape))
-    return fba.encode(Animation(30, range(121), None, body), EncoderOptions(bap_steps=steps))  # type: ignore[arg-type]
+    return fba.encode(Animation(30, range(121), None, body), EncoderOptions(bap_steps=steps, mark=False))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_nobody_stands_far_from_the_origin(metres: float, told: bool) -> None:
     values[:, bap_numbers()["HumanoidRoot_tr_frontal"] - 1] = int(metres * 1000)
     body = BodyTrack(values, values != 0)
     chosen = choose_steps(
-        fba.encode(Animation(30, range(40), None, body), EncoderOptions(bap_steps="visage"))
+        fba.encode(Animation(30, range(40), None, body), EncoderOptions(bap_steps="visage", mark=False))
     )  # type: ignore[arg-type]
     assert (chosen.table == "visage") == told
 
@@ -163,14 +163,14 @@ def turning(head: float, *, amount: float = 0.1, still: bool = True) -> Animatio
     ],
 )
 def test_a_head_turns_back_as_far_as_the_body_turns(animation: Animation, told: bool) -> None:
-    chosen = choose_steps(fba.encode(animation, EncoderOptions(bap_steps="visage")))
+    chosen = choose_steps(fba.encode(animation, EncoderOptions(bap_steps="visage", mark=False)))
     assert ("the head turns back" in chosen.reason) == told
     assert chosen.table == ("visage" if told else "iso")
 
 
 @pytest.mark.parametrize("head", [-1.0, 0.0, 0.4, 0.8, 1.2, 1.7])
 def test_a_head_that_turns_back_as_people_do_is_not_doubted(head: float) -> None:
-    assert choose_steps(fba.encode(turning(head), EncoderOptions(bap_steps="iso"))).table == "iso"
+    assert choose_steps(fba.encode(turning(head), EncoderOptions(bap_steps="iso", mark=False))).table == "iso"
 
 
 def test_coarse_quantisers_make_round_angles_of_their_own() -> None:
@@ -186,7 +186,7 @@ def test_coarse_quantisers_make_round_angles_of_their_own() -> None:
 
 def test_nothing_is_said_where_the_table_makes_no_difference() -> None:
     body = BodyTrack(np.ones((2, 296), np.int32), np.ones((2, 296), bool))
-    unquantised = fba.encode(Animation(30, range(2), None, body), EncoderOptions(bap_quant=0))  # type: ignore[arg-type]
+    unquantised = fba.encode(Animation(30, range(2), None, body), EncoderOptions(bap_quant=0, mark=False))  # type: ignore[arg-type]
     for data in (unquantised, b"", b"no stream at all"):
         assert choose_steps(data) == StepChoice("iso", "")
 

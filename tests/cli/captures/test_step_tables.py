@@ -40,7 +40,7 @@ def walk(tmp_path: Path) -> Path:
 def files_with_a_body(folder: Path) -> dict[str, Path]:
     paths = {"bap": folder / "walk.bap", "iso": folder / "iso.fba"}
     fba.write(paths["bap"], gait.walk())
-    fba.write(paths["iso"], gait.walk(), clamp=True)
+    fba.write(paths["iso"], gait.walk(), clamp=True, mark=False)
     return paths
 
 

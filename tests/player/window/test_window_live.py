@@ -59,7 +59,9 @@ def test_a_stream_is_shown_while_it_arrives(on_display: str, tmp_path: Path) -> 
 
 
 def test_a_stream_that_is_read_with_other_steps_is_noticed_once(on_display: str, tmp_path: Path) -> None:
-    stream = io.BufferedReader(io.BytesIO(fba.encode(gait.walk(), fba.EncoderOptions(bap_steps="visage"))))  # type: ignore[arg-type]
+    stream = io.BufferedReader(
+        io.BytesIO(fba.encode(gait.walk(), fba.EncoderOptions(bap_steps="visage", mark=False)))
+    )  # type: ignore[arg-type]
     live = LiveAnimation(stream, name="wire")
     assert live.wait_end(20)
     with window_of(Scene(live, timeline=LiveTimeline(live)), tmp_path) as window:  # type: ignore[arg-type]
