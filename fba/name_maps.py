@@ -37,7 +37,7 @@ def read_names(path: Path, table: str, example: str, limits: Limits) -> dict[str
 def read_toml(path: Path, expected: str, limits: Limits) -> dict[str, Any]:
     """Return the content of a TOML file of a map.
 
-    expected: lines of such a file, for messages. Raises FormatError for a file that is none, with the line,
+    expected: lines of such a file, for messages. Raises FormatError, with the line, for other files, and
     LimitError.
     """
     data = read_whole(path)

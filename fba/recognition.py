@@ -47,7 +47,7 @@ HEAD_BYTES = 4096
 EPF_TAGS = ("FBM", "FFR", "BFR", "ISI", "GDR", "CDM")
 """Tags with which EPF files begin."""
 MASK_BITS, BODY_BITS = 60, 100
-"""Bits from which on a line is a mask, and one of BAPs."""
+"""Bits at which a line is a mask, and a mask of BAPs."""
 OBJ_WORDS = ("v", "vt", "vn", "f", "g", "o", "mtllib", "usemtl", "s")
 CSV_LINES = 3
 """Lines that a table has at least."""

@@ -264,7 +264,7 @@ def _salvage(data: bytes) -> tuple[Animation | None, list[int]]:
 
 
 def _values(animation: Animation) -> Int32:
-    """Return FAPs 3 to 68 and BAPs as int32 (T, 362), 0 where there are none."""
+    """Return FAPs 3 to 68 and BAPs as int32 (T, 362), 0 where absent."""
     values = np.zeros((len(animation), 66 + 296), dtype=np.int32)
     if animation.face is not None:
         values[:, :66] = animation.face.values[:, 2:]

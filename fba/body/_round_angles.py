@@ -19,7 +19,7 @@ UNITS = {
 }
 """Their names, and how many units of BAPs they are."""
 ROUND_LEAST, ROUND_MORE = 6.0, 2.0
-"""So improbable must round angles be (see `_improbability`), and so many times as improbable as under the
+"""How improbable round angles must be (see `_improbability`), and how much more improbable than under the
 other table."""
 EVERY_LEAST = 1.3
 """So improbable they must be where every key is round with one table, and not every one with the other."""
@@ -29,7 +29,7 @@ EVERY_LEAST = 1.3
 class Roundness:
     """How round angles are.
 
-    score: how improbable it is that chance made so many of them round. every: whether all keys are round.
+    score: how improbable it is that chance made this number of them round. every: whether all keys are round.
     unit: what they are multiples of.
     """
 
@@ -97,7 +97,7 @@ def _round(angles: Int64, step: int, unit: float) -> Bool:
 
 
 def _improbability(hits: int, expected: float) -> float:
-    """Return -log10 of the most (Chernoff's bound) that chance can have for so many hits; 0 for few.
+    """Return -log10 of the most (Chernoff's bound) that chance can have for this number of hits; 0 for few.
 
     It is 6 for one in a million.
     """

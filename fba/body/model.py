@@ -60,7 +60,7 @@ class BodyPart:
         if not self.name:
             raise ModelError("a part of a body needs a name")
         if self.kind not in BODY_PART_KINDS:
-            raise ModelError(f"{where}: its kind {self.kind!r} is none of {', '.join(BODY_PART_KINDS)}")
+            raise ModelError(f"{where}: its kind {self.kind!r} is not one of {', '.join(BODY_PART_KINDS)}")
         arrays: dict[str, Any] = dict(
             mesh_arrays(where, self.vertices, self.triangles, self.normals, self.texcoords, self.colours)
         )

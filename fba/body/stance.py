@@ -20,7 +20,7 @@ STILL_SECONDS = 0.1
 SUPPORT = 0.08
 """Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
 PLACED, PLACED_SECONDS = 0.025, 0.5
-"""Metres above the lower foot up to which a foot that is still for so many seconds stands on its ground."""
+"""Metres above the lower foot up to which a foot stands on its ground if it is still for these seconds."""
 SIDES = ("l", "r")
 
 
@@ -87,7 +87,7 @@ def find_standing(above: Float64, points: Float64, rate: float) -> Bool:
 
 
 def _fastest(speed: Float64, rate: float, seconds: float) -> Float64:
-    """Return the highest of speeds (2, T) within so many seconds around each frame."""
+    """Return the highest of speeds (2, T) within this number of seconds around each frame."""
     half = round(seconds * rate / 2)
     around = np.pad(speed, ((0, 0), (half, half)), mode="edge")
     result: Float64 = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2)

@@ -85,7 +85,7 @@ def _find_turned_row(
 
 
 def _common(motion: SkeletonMotion, one: int, other: int) -> int:
-    """Return the number of the joint that two joints hang on, -1 if there is none."""
+    """Return the number of the joint that two joints hang on, -1 without one."""
     while one != other:
         one, other = int(motion.parents[max(one, other)]), min(one, other)
     return one

@@ -21,7 +21,7 @@ from fba.capture.motion import SkeletonMotion
 FRAMES = 1000
 """Frames that are looked at."""
 FEWEST_LOW = 3
-"""Frames with a hanging arm from which on they show how the clavicle rests."""
+"""Number of frames with a hanging arm that shows how the clavicle rests."""
 OWN_CLAVICLE = 5.0
 """Degrees by which clavicles of somebody whose arms hang may differ from the rest pose: the posture of a
 person. What exceeds this is the skeleton's."""

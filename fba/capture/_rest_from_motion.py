@@ -38,7 +38,7 @@ ON_AXES = 0.65
 MOST_BEND = 0.5
 """Share of elbows and knees that have to bend for that."""
 LEAST_BEND = 0.15
-"""Sine of the bend of an elbow or a knee from which on it shows the axis."""
+"""Sine of the bend of an elbow or a knee above which it shows the axis."""
 LOW_ARM = 0.6
 """Cosine of the angle between an upper arm and straight down below which its clavicle is at rest."""
 

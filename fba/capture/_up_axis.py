@@ -14,7 +14,7 @@ from fba.capture.motion import SkeletonMotion, read_axis
 
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
 CLEAR_UP = 0.75
-"""Length of the mean of upright directions from which on the motion says which way is up."""
+"""Length of the mean of upright directions above which the motion says which axis is up."""
 FRAMES = 400
 """Frames that are asked where the body rests."""
 NEAR = 0.06
@@ -120,7 +120,7 @@ def _find_freely(
     floors = {name: _find_floor(motion, mapped, name) for name in {"+y", "+z", trunk}}
     found = next((name for name in (*first, "+y", "+z") if floors[name].touched), trunk)
     if found != trunk:
-        doubt = f"joints rest on a floor along it, but trunks point along {trunk}, and the rest pose is none"
+        doubt = f"joints rest on a floor along it, but trunks point along {trunk}, and nobody can rest so"
         return Up(found, 0.6, f"{found}: joints rest on a floor along it", doubt, trunk)
     if clear < CLEAR_UP:
         return Up(trunk, clear * 0.6, f"perhaps {trunk}: the body is upright for little of the time")

@@ -30,12 +30,12 @@ LIMBS = tuple(
     for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 )
 BACKWARDS = -0.5
-"""Mean cosine to ahead of knees, or of toes where knees hardly bend, from which on they point backwards. In
+"""Mean cosine to ahead of knees, or of toes where knees hardly bend, above which they point backwards. In
 real files knees have 0.8 to 1, toes 0.15 to 1."""
 BENT = 0.12
-"""Distance of a knee from the line from hip to ankle, in leg lengths, from which on it shows the way."""
+"""Distance of a knee from the line from hip to ankle, in leg lengths, above which it shows the direction."""
 FEWEST = 5
-"""Frames with a bent knee from which on they say where knees point."""
+"""Number of frames with a bent knee that say where knees point."""
 
 
 def find_bones(

@@ -52,7 +52,7 @@ def change_map(
 def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
     """Return the map in a TOML file: the table "joints", joint of the capture -> joint of the standard.
 
-    Raises FormatError for a file that is none, with the line, and for joints that the standard lacks.
+    Raises FormatError, with the line, for other files and for joints that the standard lacks.
     """
     table = read_names(path, TABLE, f'"Hips" = "{ROOT}"', limits)
     taken: dict[str, str] = {}

@@ -23,7 +23,7 @@ NEAR = 0.01
 EXACT = 1e-4
 """The same for rates that differ by a thousandth, as 30 and 29.97."""
 GAP = 2.5
-"""Steps of the nominal rate from which on frames are missing."""
+"""Steps of the nominal rate above which frames are missing."""
 BRIDGED = 0.5
 """Seconds of the longest gap that is filled by a straight line."""
 RETURN = 0.2

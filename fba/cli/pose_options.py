@@ -106,7 +106,7 @@ def _parse_selects(kind: str, texts: tuple[str, ...]) -> list[tuple[int, int | N
 
 
 def _select(name: str, names: tuple[str, ...]) -> int | None:
-    """Return the number for a name, a viseme's sound, or a number as text; None if there is none."""
+    """Return the number for a name, a viseme's sound, or a number as text; None for other text."""
     if name.isdecimal():
         number = int(name[:9])
         return number if 0 < number < len(names) else None

@@ -233,7 +233,7 @@ class Encoder:
         return self._writer.ending() + self._mark()
 
     def _mark(self, checks: bytes | None = None) -> bytes:
-        """Return the mark behind the end of a stream, with these checks; b"" where there is none."""
+        """Return the mark behind the end of a stream, with these checks; b"" without a mark."""
         if not self.options.mark:
             return b""
         body = self.options.bap_quant and self._writer.settings_in_force(slots.BODY_BIT)

@@ -67,7 +67,7 @@ class StreamReader:
         self._buffer = Buffer()
         self._bit = 0  # next bit to decode, in the buffer
         self._scanned = 0  # byte up to which no start code was found, while looking for one
-        self._retry_at = 0  # length of the buffer from which on an incomplete plane is tried again
+        self._retry_at = 0  # length of the buffer at which an incomplete plane is tried again
         # Plain functions: a bound method would hold the reader, which then waits for the garbage collector.
         self._state: Callable[[StreamReader, bool], list[Block] | None] = StreamReader._find_object
         self._kind = ""  # what data without an object start code seems to be

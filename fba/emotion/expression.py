@@ -41,7 +41,7 @@ class Expression:
         if values.shape != (FAP_COUNT,) or not np.isfinite(values).all():
             raise ValueError(f"the FAPs of {self.name!r} must be {FAP_COUNT} finite numbers")
         if self.family and self.family not in FAMILIES:
-            raise ValueError(f"{self.name!r}: {self.family!r} is none of {', '.join(FAMILIES)}")
+            raise ValueError(f"{self.name!r}: {self.family!r} is not one of {', '.join(FAMILIES)}")
         values[:2] = 0
         values.flags.writeable = False
         object.__setattr__(self, "faps", values)

@@ -32,7 +32,7 @@ def expression(name: str) -> Expression:
     """Return the expression with this name or alias.
 
     Case does not matter, and an underscore or a hyphen stands for a space. Raises OptionError, which suggests
-    the nearest name, if there is none.
+    the nearest name, if it does not exist.
     """
     word = " ".join(name.lower().replace("_", " ").replace("-", " ").split())
     known = _by_any_name()

@@ -82,7 +82,7 @@ class Part:
 def part(expression: Expression, intensity: float, activation: float | None, presence: float) -> Part:
     """Return an expression at an intensity of 0 to 1.
 
-    activation: of the expression or its family, None where there is none. presence: see `Rules`.
+    activation: of the expression or its family, None without one. presence: see `Rules`.
     """
     return Part(
         expression.faps.astype(np.float64),

@@ -60,7 +60,7 @@ class Part:
         if not self.name or self.name == HEAD:
             raise ModelError(f"{where}: a part needs a name other than {HEAD!r}, which stands for all parts")
         if self.kind not in PART_KINDS:
-            raise ModelError(f"{where}: its kind {self.kind!r} is none of {', '.join(PART_KINDS)}")
+            raise ModelError(f"{where}: its kind {self.kind!r} is not one of {', '.join(PART_KINDS)}")
         arrays = mesh_arrays(where, self.vertices, self.triangles, self.normals, self.texcoords, self.colours)
         for name, array in arrays.items():
             object.__setattr__(self, name, array)

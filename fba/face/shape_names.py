@@ -37,7 +37,7 @@ def fap_of(name: str) -> int | None:
 
 @lru_cache(1024)  # live captures ask for the same names with every datagram
 def arkit_of(name: str) -> str | None:
-    """ARKit's name for a shape, or None where it is none of the 52."""
+    """ARKit's name for a shape, or None if it is not one of the 52."""
     known = _synonyms()
     return known.get(_words(name)) or known.get(_words(re.split(r"[.:|/]", name)[-1]))
 

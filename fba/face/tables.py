@@ -112,7 +112,7 @@ class FaceDefTransform:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise ModelError(
-                f"FaceDefTransform of {self.part!r}: {self.kind!r} is none of {', '.join(KINDS)}"
+                f"FaceDefTransform of {self.part!r}: {self.kind!r} is not one of {', '.join(KINDS)}"
             )
         for name in ("amount", "centre"):
             numbers = np.asarray(getattr(self, name), dtype=np.float64)

@@ -119,7 +119,7 @@ class Format:
 
     @property
     def face_options(self) -> tuple[str, ...]:
-        """Names of the keyword options of `read_face`; empty where there is none."""
+        """Names of the keyword options of `read_face`; empty without it."""
         return () if self.read_face is None else _option_names(self.read_face)
 
     @property
@@ -370,7 +370,7 @@ def probe(
 
 
 def _find_format(name: str) -> Format:
-    """Return the format with this name or suffix; OptionError if there is none."""
+    """Return the format with this name or suffix; OptionError if it does not exist."""
     wanted = str(name).lower().removeprefix(".")
     for entry in formats():
         if wanted == entry.name or f".{wanted}" in entry.suffixes:

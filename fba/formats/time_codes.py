@@ -57,7 +57,7 @@ def read_time_codes(
 
 
 def parse_time_code(text: str, rate: Fraction | None = None) -> float | None:
-    """Return the time of day, in seconds, of one time code; None for text that is none.
+    """Return the time of day, in seconds, of one time code; None for other text.
 
     rate: of the frames that it counts; None for `USUAL`.
     """

@@ -101,11 +101,11 @@ class Accessors:
         """Return the type of the numbers, how many an element has, and how many elements there are."""
         code = entry.member("componentType").integer(0, 1 << 16)
         if code not in COMPONENTS:
-            raise entry.error(f"componentType {code} is none of {', '.join(map(str, COMPONENTS))}")
+            raise entry.error(f"componentType {code} is not one of {', '.join(map(str, COMPONENTS))}")
         kind = np.dtype(COMPONENTS[code])
         shape = entry.member("type").text(100)
         if shape not in WIDTHS:
-            raise entry.error(f"type {shape!r} is none of {', '.join(WIDTHS)}")
+            raise entry.error(f"type {shape!r} is not one of {', '.join(WIDTHS)}")
         width = WIDTHS[shape]
         given = entry.member("count")
         if isinstance(given.data, int) and given.data > MAX_ELEMENTS:

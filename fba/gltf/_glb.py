@@ -15,7 +15,7 @@ MAX_BYTES = 1 << 30
 
 
 def split_container(data: bytes, file: str) -> tuple[memoryview, memoryview | None]:
-    """Return the JSON text and the binary chunk, None where there is none, of a container.
+    """Return the JSON text and the binary chunk (None if absent) of a container.
 
     data: all bytes of the file. file: its name for messages. Raises ModelError where the container is
     cut off, of another version, or damaged; bytes after its end are an FbaWarning.

@@ -27,7 +27,7 @@ def unpack_view(data: memoryview, entry: Value, budget: Budget) -> memoryview:
     """
     mode = entry.member("mode").text(20)
     if mode not in MARKS:
-        raise entry.member("mode").error(f"{mode!r} is none of {', '.join(MARKS)}")
+        raise entry.member("mode").error(f"{mode!r} is not one of {', '.join(MARKS)}")
     stride = entry.member("byteStride").integer(1, 256)
     count = entry.member("count").integer(1, MOST_ELEMENTS)
     if (mode == "ATTRIBUTES" and stride % 4) or (mode != "ATTRIBUTES" and stride not in (2, 4)):

@@ -128,8 +128,8 @@ def parse_document(
 def parse_json(text: memoryview, file: str, limits: Limits = DEFAULT_LIMITS) -> Any:
     """Return the JSON object in UTF-8 text.
 
-    Raises ModelError where it is none, too long or nested too deeply, LimitError where it takes more memory
-    than the limits allow: a list of empty lists takes many times its text.
+    Raises ModelError for other text and for text too long or nested too deeply, LimitError where it takes
+    more memory than the limits allow: a list of empty lists takes many times its text.
     """
     if len(text) > MAX_JSON:
         raise ModelError(

@@ -60,7 +60,7 @@ class Value:
         return ModelError(f"{self.file}: {self.path}: {text}" if self.path else f"{self.file}: {text}")
 
     def get(self, key: str) -> Value | None:
-        """Return a member of an object, or None where there is none."""
+        """Return a member of an object, or None if it is absent."""
         members = self._object()
         return self._member(key, members[key]) if key in members else None
 
@@ -113,7 +113,7 @@ class Value:
     def index(self, count: int, what: str) -> int:
         """Return a whole number below `count`: the index of a `what`."""
         if not count:
-            raise self.error(f"names {what} {_short(self.data)}, but there are none")
+            raise self.error(f"names {what} {_short(self.data)}, of which the file has none")
         return self.integer(0, count - 1)
 
     def number(self, low: float = -math.inf, high: float = math.inf) -> float:
@@ -151,7 +151,7 @@ class Value:
     def choice(self, *words: str) -> str:
         """Return the text, which must be one of the given words."""
         if not isinstance(self.data, str) or self.data not in words:
-            raise self.error(f"{_short(self.data)} is none of {', '.join(words)}")
+            raise self.error(f"{_short(self.data)} is not one of {', '.join(words)}")
         return self.data
 
     def boolean(self) -> bool:

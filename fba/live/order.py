@@ -11,13 +11,13 @@ from fba.live.protocols.sample import Sample
 DAY = 86_400.0
 NOON = DAY / 2
 JUMP = 1.0
-"""Seconds between two datagrams from which on the second has to be confirmed by a third."""
+"""Seconds between two datagrams above which the second has to be confirmed by a third."""
 TOLERANCE = 5.0
 """Seconds by which a sender's clock may have gone on further than ours."""
 LONGEST_GAP = 600.0
 """Seconds of the longest gap that is kept as long as it was."""
 WHOLE_STEP = 1.5
-"""Frames between two datagrams from which on one may still be on its way."""
+"""Frames between two datagrams above which one may still be on its way."""
 MOST_HELD = 2
 """Datagrams that wait for one before them that is missing."""
 REMEMBERED = 64
@@ -105,7 +105,7 @@ class SampleOrder:
         insort(self._held, (time, self._count, sample))
 
     def _take(self, held: int) -> list[Timed]:
-        """Return samples in order, but not those that wait for one before them, up to so many."""
+        """Return samples in order, but not those that wait for one before them, up to `most`."""
         ready = []
         while self._held:
             time, _, sample = self._held[0]

@@ -31,14 +31,14 @@ BEGINNING = 1.0
 CHUNK = 256
 """Frames that are made at once."""
 FEWEST_SHAPES = 5
-"""Shapes with ARKit's names from which on others are left out, which show the same once more."""
+"""Number of shapes with ARKit's names above which others are left out, which show the same once more."""
 OLD_NAMES = {
     "a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed",
     "blink_l": "blinkLeft", "blink_r": "blinkRight",
 }  # fmt: skip
 """VRM 1's names of VRM 0's expressions, in small letters."""
 LEAST_OFFSET = 1e-3
-"""Metres from which on a bone has a length."""
+"""Metres above which a bone has a length."""
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 EYES = ("LeftEye", "RightEye")
 

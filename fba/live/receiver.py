@@ -89,7 +89,7 @@ class Receiver:
             self._socket = None
 
     def run(self, seconds: float | None = None) -> None:
-        """Receive until `stop` is called, or so many seconds have passed."""
+        """Receive until `stop` is called, or this number of seconds has passed."""
         begun = self._clock()
         while not self._stop.is_set():
             left = WAIT if seconds is None else min(WAIT, begun + seconds - self._clock())
@@ -118,7 +118,7 @@ class Receiver:
                 self.capture.summary.dropped = dropped
 
     def _arrived(self, most: int) -> Iterator[tuple[bytes, tuple[Any, ...]]]:
-        """Read so many datagrams at most, with their senders' addresses, as far as there are any."""
+        """Read at most `most` datagrams, with their senders' addresses, as far as there are any."""
         for _ in range(most):
             opened = self._socket
             if opened is None:
@@ -162,7 +162,7 @@ def _dropped(opened: socket.socket) -> int | None:
 
 
 def split_address(text: str, port: int) -> tuple[str, int]:
-    """Return host and port of "host" or "host:port"; FbaError for a port that is none."""
+    """Return host and port of "host" or "host:port"; FbaError for an impossible port."""
     host, mark, number = text.rpartition(":")
     if not mark or ":" in host:
         return text, port

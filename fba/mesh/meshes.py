@@ -155,7 +155,7 @@ class Meshes(Generic[Part]):
         return {part.name: int(start) for part, start in zip(self.parts, counts[:-1], strict=True)}
 
     def part(self, name: str) -> Part:
-        """Return a part by name; ModelError where there is none."""
+        """Return a part by name; ModelError if it does not exist."""
         for part in self.parts:
             if part.name == name:
                 return part

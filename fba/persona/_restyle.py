@@ -33,7 +33,7 @@ LIPS = ((29, 32), (30, 33), (31, 34))
 UPPER, LOWER = (29, 30, 31, 43, 44, 46, 47, 48, 49, 50, 51), (32, 33, 34, *range(35, 42), 52, 53)
 """Points of the upper and the lower lip."""
 LID_SHUT, LIP_SHUT = (0.15, 0.4), (0.4, 1.6)
-"""Openings at which lids and lips count as shut, and from which on as open: shares of the lids' at rest;
+"""Openings at which lids and lips count as shut, and above which as open: shares of the lids' at rest;
 millimetres between the lips."""
 UPPER_LID = 0.8
 """Share of a lid's closing that the upper one does."""

@@ -17,7 +17,7 @@ from fba.persona.rest import FEWEST, eye_opening, find_rest
 
 Neutral = int | tuple[float, float] | None
 WIDER = 1.35
-"""Ratio of the usual opening of eyes to that of the neutral face from which on that is none."""
+"""Ratio of the usual opening of eyes to that of the neutral face above which that face is not neutral."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ def observe(
 
 
 def _check_eyes(points: Float64, still: Float64) -> None:
-    """Warn where eyes are mostly wider than in the neutral face: it is none, so all else would be off."""
+    """Warn where eyes are mostly wider than in the neutral face, which then is not neutral."""
     if np.median(eye_opening(points)) > WIDER * float(eye_opening(still)):
         warnings.warn(
             FbaWarning(

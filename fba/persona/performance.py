@@ -42,7 +42,7 @@ class Performance:
 
     rows: int (S,), the frames in which the user is seen. own, acted: float64 (S, 86, 3), millimetres that
     vertices move from the neutral mask, of the user's own and of the actor's. labels: part -> what the user
-    does. used: part -> the label of the mask that is shown, "" where there is none. chosen: part -> int
+    does. used: part -> the label of the mask that is shown, "" without one. chosen: part -> int
     (S,), its number, -1 for none. keys: part -> bool (S,), frames that give values; those between are
     interpolated.
     """

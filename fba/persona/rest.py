@@ -25,7 +25,7 @@ LID_SPREAD, WIDTH_SPREAD, MILLIMETRES, TURNED = 0.15, 0.10, 3.0, 0.2
 """How far a neutral face may be off: the opening of eyes and the width of the mouth as shares of the usual
 ones, the gap of the lips and the height of brows in millimetres, the head's angles in radians."""
 NO_REST = 4.0
-"""Cost, in squares of these, from which on the first second is no neutral face."""
+"""Cost, in squares of these, above which the first second is no neutral face."""
 
 
 def find_rest(points: Float64, angles: Float64, times: Float64) -> Intp:

@@ -74,7 +74,7 @@ def load_persona(
     neutral = fields.array("neutral", TRACKED, 2)
     persona = Persona(fields.text("name"), neutral, parts, *map(int, counts))
     try:
-        persona.fapu  # noqa: B018 - raises ModelError for a neutral face that is none
+        persona.fapu  # noqa: B018 - raises ModelError for an impossible neutral face
     except ModelError as error:
         raise FormatError(error.finding, path=path) from error
     return persona

@@ -83,7 +83,7 @@ def choose_faps(
 
 
 def subsets(related: tuple[int, ...], smallest: int) -> list[tuple[int, ...]]:
-    """Return the subsets of at least so many, the smallest first."""
+    """Return the subsets of at least `smallest` members, the smallest first."""
     return [one for size in range(smallest, len(related) + 1) for one in combinations(related, size)]
 
 

@@ -32,7 +32,7 @@ PLANE_BITS, SKIP_BITS = 6, 4
 AROUND = 12
 """Frames on either side of one beyond the tolerance in which paths are searched again."""
 HOPELESS = 0.2
-"""Share of frames beyond the tolerance from which on a quantiser is given up."""
+"""Share of frames beyond the tolerance above which a quantiser is given up."""
 REPAIRS = 8
 """Times that paths are searched again around frames beyond the tolerance."""
 

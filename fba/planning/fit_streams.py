@@ -99,7 +99,7 @@ def encode_with_fit(
 
 
 def _missed(wanted: Float32, shown: Float32, deformer: Deformer, most_off: float) -> Bool:
-    """Return bool (68,): FAPs that are further off than so many metres."""
+    """Return bool (68,): FAPs that are further off than this distance in metres."""
     reach = np.linalg.norm(displacements(deformer), axis=2).max(axis=1, initial=0.0) / 1000
     missed: Bool = np.abs(shown - wanted).max(axis=0) * reach > most_off
     return missed

@@ -24,7 +24,7 @@ FACE, BODY = "face", "body"
 WIDER = 2
 """How much further ranges reach than the largest change so far, up or down."""
 FAR = 0.9
-"""Part of what an I plane can carry from which on no more I planes are planned: later ones might not."""
+"""Part of what an I plane can carry above which no more I planes are planned: later ones might not."""
 FAR_STEPS = 240
 """Quantiser steps that ranges then reach at least."""
 MANY = 1 << 20

@@ -34,7 +34,7 @@ from fba.tracks import FaceTrack
 QUANTS = (1, 2, 3, 4, 5, 6, 8, 10, 12)
 """Quantisers of FAPs that are tried."""
 TRIED = 3
-"""Of them, so many: the coarsest that each FAP by itself could take, and the next finer ones."""
+"""Number of them that are tried: the coarsest that each FAP by itself could take, and the next finer ones."""
 EFFORTS = ((0.9, 1.1, 4), (1.1, 0.9, 4), (0.7, 1.1, 4), (0.9, 0.9, 10), (0.9, 1.1, 10), (1.1, 0.7, 4))
 """Share, share of gaps, and most frames left out, of the searches that are tried; the best of all first."""
 FAILURES = 3

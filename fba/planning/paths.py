@@ -120,7 +120,7 @@ def _search(bounds: Bounds, band: tuple[Int64, Int64], before: Int64, narrower: 
     """Return the cheapest way through a band: int64 (K,).
 
     A change costs what the path before tells, and more where it is beyond the tightest ranges of that, made
-    narrower by so many units.
+    narrower by this number of units.
     """
     if len(before) < 2:
         return before

@@ -245,7 +245,7 @@ def _without_unmoved_faps(face: FaceTrack, linked: Collection[int]) -> FaceTrack
 
 
 def _mask(track: FaceTrack | BodyTrack | None, count: int) -> Bool:
-    """Return the mask of a track of so many frames, bool (T, columns)."""
+    """Return the mask of a track of `count` frames, bool (T, columns)."""
     return np.zeros((count, 0), dtype=np.bool_) if track is None else track.mask
 
 

@@ -32,7 +32,7 @@ of soles that rest, and of others."""
 STIR = 6e6
 """The same for a change of that error from one frame to the next, while a sole rests."""
 REST_SPEED, REST_SECONDS = 0.06, 0.2
-"""Metres per second, over so many seconds, below which the point of a foot that stands rests."""
+"""Metres per second, over this number of seconds, below which the point of a foot that stands rests."""
 SMOOTHED = 0.25
 """Seconds over which the place of a sole that rests is averaged: captured roots come in whole millimetres."""
 SWEEPS = 3
@@ -132,7 +132,7 @@ class _Block:
 
 
 def _no_soles(count: int) -> tuple[Bool, Float64]:
-    """Return rests (T, 0) and errors (T, 0, 3) of no points, for so many frames."""
+    """Return rests (T, 0) and errors (T, 0, 3) of no points, for `count` frames."""
     return np.zeros((count, 0), dtype=np.bool_), np.zeros((count, 0, 3))
 
 

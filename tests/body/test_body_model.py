@@ -122,7 +122,7 @@ def part(**changes: Any) -> BodyPart:
     ("make", "message"),
     [
         (lambda: part(name=""), "needs a name"),
-        (lambda: part(kind="nose"), "part 'sleeve': its kind 'nose' is none of skin, neck, head"),
+        (lambda: part(kind="nose"), "part 'sleeve': its kind 'nose' is not one of skin, neck, head"),
         (lambda: part(vertices=np.zeros((3, 2))), "part 'sleeve': vertices must have shape"),
         (lambda: part(triangles=[[0, 1, 99]]), "part 'sleeve': triangle 0 names vertex"),
         (
@@ -275,7 +275,7 @@ BODY = "extensions/FBA_body"
         (f"{BODY}/skin", REMOVED, "'skin' is missing"),
         (f"{BODY}/parts", [], "a body needs at least one part"),
         (f"{BODY}/parts/0/node", 0, r"parts\[0\].node: must have a mesh"),
-        (f"{BODY}/parts/0/kind", "nose", r"parts\[0\].kind: 'nose' is none of"),
+        (f"{BODY}/parts/0/kind", "nose", r"parts\[0\].kind: 'nose' is not one of"),
         (f"{BODY}/parts/1/node", 3, "two parts of the body are named 'rod'"),
         (f"{BODY}/eyes", [[0, 0, 0]], "the pupils must be two finite positions"),
         (f"{BODY}/eyes", [[0, 0, 0], [0, 0, 1e9]], r"eyes\[1\]\[2\]: .* is not within"),

@@ -196,7 +196,7 @@ def test_standard_input_is_an_input_as_well(here: Path, programs: Path) -> None:
             "both.fba and sub/both.fba would both become out",
         ),
         ("decode both.fba both.fba --fap out", "both.fba is given twice"),
-        ("decode both.fba sub/talk.fba --fap -", "need a folder for --fap, and - is none"),
+        ("decode both.fba sub/talk.fba --fap -", "need a folder for --fap, and - is not a folder"),
         ("decode sub/talk.fba sub/talk.fap --fap sub", "would overwrite the input sub/talk.fap"),
         ("encode - - -o x", "standard input (-) can be read only once"),
         ("decode both.fba -o -", "name the format for standard output with --to"),

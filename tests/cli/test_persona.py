@@ -181,7 +181,7 @@ def repacked(path: Path, target: Path, **changed: object) -> Path:
         ({"mouth.classes": ["a"]}, FormatError, "other classes"),
         ({"_mouth.moved": None}, FormatError, "lacks the array mouth.moved"),
         ({"_neutral": np.full((64, 2), np.nan)}, FormatError, "not finite"),
-        ({"_neutral": np.zeros((64, 2))}, FormatError, "the neutral face is none"),
+        ({"_neutral": np.zeros((64, 2))}, FormatError, "the neutral face is impossible"),
         ({"_neutral": np.array([{}])}, FormatError, "Python objects"),
         ({"_mouth.known": np.zeros(3)}, FormatError, "mouth.known has shape"),
         ({"_mouth.spread": None}, FormatError, "lacks the array mouth.spread"),

@@ -46,7 +46,7 @@ RIGHT = expected_listing(JAW).text()
         (writing(RIGHT.replace("fap 3 ", "fap 4 ", 1)), "plane 0: FAP 3 is not sent, expected 0"),
         (writing(RIGHT.rpartition("plane")[0] + "end\n"), "5 planes, expected 6"),
         (writing(RIGHT.removesuffix("end\n")), "the output breaks off behind 6 planes"),
-        (writing(RIGHT.replace("end\n", "error\nend\n")), "reports damage in plane 6, where there is none"),
+        (writing(RIGHT.replace("end\n", "error\nend\n")), "reports damage in plane 6, which has none"),
         (writing(RIGHT, exit_status=3), "ended with exit status 3"),
         (writing(""), "plane"),
         (writing("Segmentation fault\n"), "line 1: expected the first line 'fba-values 1'"),

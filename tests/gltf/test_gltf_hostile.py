@@ -84,9 +84,9 @@ CASES: list[tuple[str, Any, str]] = [
     ("accessors/0/count", 10**400, r"accessors\[0\]\.count: more than"),
     ("accessors/0/count", True, r"accessors\[0\]\.count: expected a whole number, found True"),
     ("accessors/0/byteOffset", 8, r"accessors\[0\]: 3 elements from byte 8 on need 44 bytes"),
-    ("accessors/0/componentType", 5124, r"accessors\[0\]: componentType 5124 is none of"),
+    ("accessors/0/componentType", 5124, r"accessors\[0\]: componentType 5124 is not one of"),
     ("accessors/0/type", "VEC2", r"attributes\.POSITION: accessors\[0\] holds VEC2 elements, but VEC3"),
-    ("accessors/0/type", "MAT3", r"accessors\[0\]: type 'MAT3' is none of"),
+    ("accessors/0/type", "MAT3", r"accessors\[0\]: type 'MAT3' is not one of"),
     ("accessors/0/bufferView", 99, r"accessors\[0\]\.bufferView: 99 is not within"),
     ("accessors/1/componentType", 5126, r"indices: accessors\[1\] must hold unsigned integers"),
     ("accessors/2/count", 2, r"targets\[0\]\.POSITION: accessors\[2\] has 2 elements, but 3 are needed"),
@@ -121,7 +121,7 @@ CASES: list[tuple[str, Any, str]] = [
     ("animations/0/channels/0/sampler", 1, r"channels\[0\]\.sampler: 1 is not within"),
     ("animations/0/channels/0/target/path", "weights", "animates the weights of a node whose mesh"),
     ("animations/0/samplers/0/input", 0, r"samplers\[0\]\.input: accessors\[0\] holds VEC3 elements"),
-    ("animations/0/samplers/0/interpolation", "CUBIC", "'CUBIC' is none of LINEAR, STEP, CUBICSPLINE"),
+    ("animations/0/samplers/0/interpolation", "CUBIC", "'CUBIC' is not one of LINEAR, STEP, CUBICSPLINE"),
 ]  # fmt: skip
 
 

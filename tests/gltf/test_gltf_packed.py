@@ -112,7 +112,7 @@ def test_filters(name: str, kind: int, raw: bytes, meant: list[float], tmp_path:
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"mode": "POINTS"}, "none of ATTRIBUTES, TRIANGLES, INDICES"),
+        ({"mode": "POINTS"}, "not one of ATTRIBUTES, TRIANGLES, INDICES"),
         ({"byteStride": 6}, "which ATTRIBUTES cannot have"),
         ({"filter": "ZIGZAG"}, "'ZIGZAG' does not exist"),
         ({"byteLength": 40}, "damaged"),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 
 def minimise(data: bytes, fails: Callable[[bytes], bool], seconds: float) -> bytes:
-    """Return a smaller input for which `fails` holds, found within so many seconds.
+    """Return a smaller input for which `fails` holds, found within this number of seconds.
 
     Removes pieces, from half of the input down to single bytes, until no piece can be removed.
     """

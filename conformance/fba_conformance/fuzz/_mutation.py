@@ -98,7 +98,7 @@ def _word(data: bytearray, random: Random, _files: Sequence[bytes], words: Seque
 
 
 def _number(data: bytearray, random: Random, _files: Sequence[bytes], words: Sequence[bytes]) -> None:
-    """Change a number in a text, or an integer of four bytes where there is none."""
+    """Change a number in a text, or an integer of four bytes in other data."""
     position = random.randrange(len(data) + 1)
     match = _NUMBER.search(data, position) or _NUMBER.search(data)
     if match is not None and random.random() < 0.7:

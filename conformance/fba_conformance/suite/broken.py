@@ -25,7 +25,7 @@ from fba_conformance.values import Listing, PlaneValues, trace_values
 SHOWN = 4
 """Vectors that the list names for each mistake; the others are counted."""
 LONG = 1000
-"""Planes from which on a vector is tried only if no shorter one finds the mistake."""
+"""Number of planes above which a vector is tried only if no shorter one finds the mistake."""
 _PACKAGE = "fba_conformance"
 _MODULES = ("_textbook", "_reader", "_part", "listing", "trace")
 """Those of the independent decoder, each behind those that it imports."""

@@ -23,7 +23,7 @@ SHOWN = 4
 """Vectors that the report names for each line; the others are counted."""
 NOT_FOR_VECTORS = {
     "Walker.__init__: if bap_steps not in BAP_STEP_TABLES: yes": "an argument that the caller got wrong",
-    "Walker._read_rest: if checks is not None: yes": "the mark of this project, which is no part of the standard",
+    "Walker._read_rest: if checks is not None: yes": "this project's mark; the standard has none",
 }
 """Branches that no stream reaches, and why."""
 

@@ -63,7 +63,7 @@ class Vector:
         return bool(self.entry.get("times", True))
 
     def path(self, key: str) -> Path | None:
-        """Return the path of a file of the vector, or None if there is none."""
+        """Return the path of a file of the vector, or None if it is absent."""
         return self.folder / self.entry[key] if key in self.entry else None
 
     def data(self) -> bytes:

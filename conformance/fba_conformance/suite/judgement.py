@@ -14,7 +14,7 @@ def find_fault(vector: Vector, expected: Listing, found: Listing, *, failed: boo
     """
     if not vector.damaged:
         if found.error_after is not None:
-            return f"reports damage in plane {found.error_after}, where there is none"
+            return f"reports damage in plane {found.error_after}, which has none"
         if not found.ended:
             return f"the output breaks off behind {len(found.planes)} planes: its last line is not `end`"
         return expected.difference(found)

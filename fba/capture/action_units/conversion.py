@@ -35,7 +35,7 @@ def to_shapes(motion: ActionUnitMotion) -> ShapeMotion:
     """Return the weights of ARKit's shapes for action units; ModelError if none is known."""
     known = [unit for unit in motion.units if unit in unit_shapes()]
     if not known:
-        units = ", ".join(map(str, motion.units)) or "there is none"
+        units = ", ".join(map(str, motion.units)) or "no unit"
         raise ModelError(f"no action unit is known here: {units}")
     used = [name for name in ARKIT_ORDER if any(name in unit_shapes()[unit] for unit in known)]
     weights = np.zeros((len(motion), len(used)))

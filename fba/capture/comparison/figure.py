@@ -17,9 +17,9 @@ from fba.geometry import nearest_rotation
 SIDES = ("l", "r")
 FINGERS = ("index", "middle", "ring", "pinky")
 LEVEL = 0.6
-"""Length of the mean direction from feet to head along an axis from which on a person stands along it."""
+"""Length of the mean direction from feet to head along an axis above which a person stands along it."""
 STRAIGHT = 0.9
-"""Distance from feet to head, of that by way of the hips, from which on a person stands, or lies."""
+"""Distance from feet to head, of that by way of the hips, above which a person stands or lies stretched."""
 
 
 @dataclass(frozen=True, eq=False)

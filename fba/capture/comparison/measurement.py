@@ -52,7 +52,7 @@ def compare(
 
     mapped: joint of the standard -> number of the source's. scale: metres of the body in one unit of the
     source; None for the ratio of legs, or else arms. up: (3, 3), what brings up the source's axis; None for
-    what `find_up` returns. level: height of the floor in metres; None where there is none, then soles may be
+    what `find_up` returns. level: height of the floor in metres; None without a floor, then soles may be
     at any height, but the same everywhere. solver: as for `from_skeleton`. most: frames that are compared, in
     four runs evenly spread, of a motion that has more; None for all.
 

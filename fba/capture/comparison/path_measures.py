@@ -17,7 +17,7 @@ from fba.capture.comparison.standing import foot_points
 HINGED = {"shoulder": ("shoulder", "elbow", "wrist"), "hip": ("hip", "knee", "ankle")}
 """The joints of limbs whose middle one is a hinge, by the first."""
 SLIGHT_BEND = 0.12
-"""Sine of the bend of an elbow or a knee from which on its plane is known."""
+"""Sine of the bend of an elbow or a knee above which its plane is known."""
 TEAR, TEAR_SPEED = 0.5, 20.0
 """Metres, and metres a second, that hips do not move from one frame to the next."""
 

@@ -14,7 +14,7 @@ GRADES = ("good", "fair", "poor")
 class Bounds:
     """A row of thresholds.csv.
 
-    hold: seconds for which a difference must last to count. fair, poor: from which on a result is that.
+    hold: seconds for which a difference must last to count. fair, poor: thresholds of these verdicts.
     says: what the measure is about. phrase: the end of a sentence about a part, {} for the number.
     """
 

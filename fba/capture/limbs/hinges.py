@@ -27,7 +27,7 @@ by much less than this (radians) keeps them, so that it does not spin when its p
 LOOSE = 2e-3
 """The same for flexion."""
 CLEAR_BEND = 0.3
-"""Angle in radians from which on a bend shows the hinge's direction; less may be a little beyond straight."""
+"""Angle in radians above which a bend shows the hinge's direction; less may be a little beyond straight."""
 ABRUPT = 0.4
 """Radians from one frame to the next: if the source turns faster, the result may turn faster, too."""
 

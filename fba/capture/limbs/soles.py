@@ -2,7 +2,7 @@
 
 Bones point in the directions of the source's, but thigh, shank and foot have other proportions. So soles end
 up millimetres to centimetres higher or lower than the source's, and slip a little where the source's stand
-still; and the ground of each source is at another height. First the body is raised or lowered as a common,
+still; and the ground of each source is at another height. First the body is raised or lowered as a whole,
 frame by frame, so that the foot on the ground is as high above it as the source's; legs correct the rest
 (`fba.capture.limbs._leg_ik`).
 """
@@ -63,7 +63,7 @@ RETURN = 0.3
 """Weight, per second squared, of the position without correction: a foot in the air comes back to it within
 a sixth of a second, one on the ground drifts back over seconds."""
 RETURN_BODY = 1.0
-"""The same for the body as a common."""
+"""The same for the body as a whole."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,7 +96,7 @@ def change_map(
 def read_map(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> dict[str, str]:
     """Return the map in a TOML file: the table "markers", marker -> target.
 
-    Raises FormatError for a file that is none, with the line, and for targets that do not exist.
+    Raises FormatError, with the line, for other files and for targets that do not exist.
     """
     table = read_names(path, TABLE, '"Chin" = "2.1"', limits)
     for marker, target in table.items():

@@ -66,7 +66,7 @@ class PointMotion:
         if len(times) and not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
             raise ModelError("PointMotion: times must be finite, and each later than the one before")
         if self.aspect is not None and not 0.1 <= self.aspect <= 10:
-            raise ModelError(f"a picture {self.aspect:g} times as wide as high is none")
+            raise ModelError(f"a picture {self.aspect:g} times as wide as high is impossible")
         positions[np.isnan(positions).any(axis=2)] = np.nan
         if (np.abs(positions) > LARGEST).any():
             frame, point, axis = np.argwhere(np.abs(positions) > LARGEST)[0].tolist()

@@ -60,7 +60,7 @@ def check_places(places: Mapping[str, str], count: int) -> None:
 
 
 def check_points(points: str, count: int) -> None:
-    """Raise OptionError for points that a tracker with so many has not."""
+    """Raise OptionError for points that a tracker with this number of points lacks."""
     numbers_of(points, count)
 
 

@@ -163,7 +163,7 @@ class MarkerMapping:
         return replace(self, made_for=made_for)
 
     def check(self, head: MarkedHead) -> None:
-        """Raise ModelError if the mapping was made for another mesh, or a vertex is none of the head's skin.
+        """Raise ModelError if the mapping was made for another mesh, or a vertex is not on the head's skin.
 
         Warns (FbaWarning) if the mesh has the same triangles, but its vertices were moved.
         """

@@ -37,7 +37,7 @@ COUNTS, TEXTS = ("vertices", "triangles"), ("name", "connectivity", "shape")
 def read_mapping(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> MarkerMapping:
     """Return the mapping in a TOML file.
 
-    Raises FormatError for a file that is none, or whose parts contradict each other; LimitError.
+    Raises FormatError for other files and those whose parts contradict each other; LimitError.
     """
     content = read_toml(path, f"{EXAMPLE} below [{TABLE}]", limits)
     markers = content.get(TABLE)

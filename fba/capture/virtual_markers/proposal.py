@@ -25,7 +25,7 @@ NEAR = 0.015
 ASTRAY = 0.03
 """Metres from the skin at which a marker without a place is left out."""
 NEIGHBOURS, REACH = 3, 1.2
-"""The radius reaches this much beyond so many of the nearest other markers."""
+"""The radius reaches this much beyond this number of nearest other markers."""
 RADII = (0.010, 0.045)
 """Smallest and largest radius that is proposed, metres on a head of natural size."""
 FIRST_RADIUS = 0.03

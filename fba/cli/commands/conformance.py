@@ -151,7 +151,7 @@ def _program(option: str, text: str, places: Sequence[str], timeout: float) -> P
 
 
 def _chosen(vectors: Sequence[Vector], names: Sequence[str]) -> Sequence[Vector]:
-    """Return the vectors of these names or groups, all if there are none; a usage error for unknown names."""
+    """Return the vectors of these names or groups, all without names; a usage error for unknown names."""
     if not names:
         return vectors
     chosen = [one for one in vectors if {one.name, Path(one.name).stem, one.group} & set(names)]

@@ -116,7 +116,7 @@ def command(
     for target in targets:
         if several and not target.folder:
             raise click.UsageError(
-                f"several inputs need a folder for {target.flag}, and {target.place} is none"
+                f"several inputs need a folder for {target.flag}, and {target.place} is not a folder"
             )
     outputs = Outputs(
         [target.output(path) for target in targets for path in inputs],
@@ -182,7 +182,7 @@ class _Target:
 def _targets(
     by_flag: dict[str, Path | None], output: Path | None, to: str | None, given: dict[str, Any]
 ) -> list[_Target]:
-    """Return all files to write; click.UsageError if there are none, or options that fit none."""
+    """Return all files to write; click.UsageError without files, or for options that fit no file."""
     targets = []
     for flag, place in by_flag.items():
         if place is not None:

@@ -233,7 +233,7 @@ def _parse_moods(
 
 
 def _read_keys(path: Path) -> list[MoodCurve]:
-    """Read keys from a table. Raises FormatError where it is none."""
+    """Read keys from a table. Raises FormatError for other files."""
     from fba.emotion import MoodCurve
 
     keys: dict[str, list[tuple[float, float]]] = defaultdict(list)

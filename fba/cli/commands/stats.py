@@ -79,7 +79,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
 def statistics(info: StreamInfo) -> dict[str, Any]:
     """Return bits of a stream: size, bits_per_second, the busiest second, and how planes share them.
 
-    intra_bits_mean, predicted_bits_median, predicted_bits_95: bits a plane; 0 where there are none of
+    intra_bits_mean, predicted_bits_median, predicted_bits_95: bits a plane; 0 without planes of
     that kind. intra_share: what part of the planes' bits the I planes take.
     """
     assert info.plane_bits is not None

@@ -78,7 +78,7 @@ def command(
 
 
 def _known_digests(report: Path) -> dict[str, str]:
-    """Return the digests of an earlier report by file. FormatError if it is none."""
+    """Return the digests of an earlier report by file. FormatError for other files."""
     with input_file(report) as file:
         try:
             entries = json.loads(file.read_bytes())

@@ -100,7 +100,7 @@ class Models:
 
 
 def _table(count: int) -> UInt16:
-    """Return zeros, uint16 (count, STRIDE), for the models of so many slots."""
+    """Return zeros, uint16 (count, STRIDE), for the models of `count` slots."""
     return np.zeros((count, STRIDE), dtype=np.uint16)
 
 

@@ -145,7 +145,7 @@ def find_start_code(data: UInt8, bit: int, end: int, after_code: bool) -> tuple[
     """Look for alignment and a start code at `bit`; return the last byte of the code and the bit after it.
 
     The alignment is a 0 and then 1s up to the byte boundary (a whole byte if already aligned), or zeros;
-    after a start code (after_code) there is none. NO_START_CODE: a plane begins here. UNDECIDED: the bits up
+    after a start code (after_code) none follows. NO_START_CODE: a plane begins here. UNDECIDED: the bits up
     to `end` fit a start code, but it is not complete.
     """
     here = bit & 7

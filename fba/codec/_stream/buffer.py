@@ -34,7 +34,7 @@ class Buffer:
         self.length = need
 
     def can_drop(self, count: int) -> bool:
-        """Whether `drop` drops so many bytes: not if moving the rest costs too much."""
+        """Whether `drop` drops this number of bytes: not if moving the rest costs too much."""
         return count >= _SMALLEST and 2 * count >= self.length
 
     def drop(self, count: int) -> int:

@@ -141,5 +141,5 @@ class StreamClock:
 
 
 def nearest_frame(seconds: int, rate: Fraction) -> int:
-    """Return the index of the frame that a time code of so many seconds names; halves are rounded up."""
+    """Return the index of the frame that a time code, in seconds, names; halves are rounded up."""
     return math.floor(seconds * rate + Fraction(1, 2))

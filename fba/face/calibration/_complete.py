@@ -87,7 +87,7 @@ def drop_mistakes(points: Float64, expected: Float64) -> Float64:
 
 
 def _asymmetry(points: Float64) -> Float64:
-    """(84,) distance of each point from the mirror image of its mate, metres; 0 where there is none."""
+    """(84,) distance of each point from the mirror image of its mate, metres; 0 without a mate."""
     normal, offset = symmetry_plane(points)
     image = points - 2 * np.outer(points @ normal - offset, normal)
     apart = np.zeros(len(points))

@@ -193,7 +193,7 @@ def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarit
 
 
 def _foremost_z(points: Float64, point: Float64) -> float:
-    """The greatest z of points (N, 3) right behind or before a point, -inf where there are none."""
+    """The greatest z of points (N, 3) right behind or before a point; -inf without such points."""
     near = np.hypot(points[:, 0] - point[0], points[:, 1] - point[1]) < BESIDE
     return float(points[near, 2].max()) if near.any() else -np.inf
 

@@ -47,7 +47,7 @@ SYMMETRY = 0.04
 
 
 def check_neutral(model: FaceModel) -> list[Finding]:
-    """Deviations of the model's rest position from the standard's neutral face; [] where there are none.
+    """Deviations of the model's rest position from the standard's neutral face; [] without deviations.
 
     "error" where FAPs would play wrongly, "warning" where it merely looks odd or cannot be checked.
     """

@@ -30,7 +30,7 @@ SHARE = 0.03
 
 
 def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Finding]:
-    """Deviations of a face's motions from the standard; an empty list where there are none.
+    """Deviations of a face's motions from the standard; an empty list without deviations.
 
     faps: numbers of the FAPs to check (3..68), all by default; those in `model.lost` are left out. For
     each: its feature point moves by value x FAPU in the standard's direction (within 5 % at small values;

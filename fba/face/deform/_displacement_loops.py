@@ -26,7 +26,7 @@ class Scratch(NamedTuple):
 
 
 def allocate_scratch(vertices: int, parts: int) -> Scratch:
-    """Return working arrays for a face of so many vertices and parts."""
+    """Return working arrays for a face of this number of vertices and parts."""
     return Scratch(
         np.zeros((vertices, 3), dtype=np.float32),
         np.zeros((vertices, 3), dtype=np.float32),

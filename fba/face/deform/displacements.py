@@ -33,7 +33,7 @@ class Displacements:
     counts: Int64
 
     def percentile(self, percent: float) -> float:
-        """Return the distance, metres, that so many percent of vertices are within, over all frames.
+        """Return the distance, metres, that this percentage of vertices is within, over all frames.
 
         Only vertices that some FAP moves count.
         """

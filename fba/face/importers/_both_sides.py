@@ -25,7 +25,7 @@ BOTH = {
 }
 """ARKit's names, without the side, of shapes of both sides (in small letters only)."""
 MOVED = 0.2
-"""Share of a shape's largest motion from which on a vertex shows where the shape is."""
+"""Share of a shape's largest motion above which a vertex shows where the shape is."""
 BLEND = 0.1
 """Width over which one side goes over into the other, as a share of the width of what moves."""
 

@@ -43,7 +43,7 @@ class HeadSurface:
     path: of its file. parts: its surfaces, in the file's unit and axes. vertices: float64 (N, 3), the file's
     own. triangles: int32 (F, 3), of all parts, in the file's vertex numbers. part_of: int32 (F,), the number
     of each triangle's part. given: the points known so far. origin: how these were found in words, "" if
-    there are none. up: the file's vertical axis.
+    none was given. up: the file's vertical axis.
     """
 
     path: str

@@ -18,7 +18,7 @@ RIDGE = 1e-3
 
 
 def choose_order(moments: Moments, metric: Float64, most: int) -> list[int]:
-    """Return columns of FAPs to send, the most useful first, at most so many; the head's rotation before all.
+    """Return columns of FAPs to send, the most useful first, at most `most`; the head's rotation before all.
 
     Each is the one with which the squared error at the vertices that FAPs move most falls furthest; at least
     one of the eyes and one of the rest of the face, where they move.

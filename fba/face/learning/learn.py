@@ -131,7 +131,7 @@ class _Learner:
             )
 
     def check(self, count: int) -> None:
-        """Raise FbaError where so many FAPs to send cannot be learned from these streams."""
+        """Raise FbaError if this number of FAPs cannot be learned from these streams."""
         least = fewest(self.moments)
         if count < least:
             raise FbaError(

@@ -453,7 +453,7 @@ def _count_from_offset(tree: _Hierarchy, numbers: Float64) -> bool:
 def _moving_body(parents: list[int], moved: dict[int, Float64]) -> int:
     """Return the joint below the root that moves with most of the body, such as hips under a scene's root.
 
-    moved: joints whose positions vary relative to their parents. 0, the root, where there is none.
+    moved: joints whose positions vary relative to their parents. 0, the root, without one.
     """
     reach = {joint: float(np.ptp(positions, axis=0).max()) for joint, positions in moved.items()}
     size = [1] * len(parents)

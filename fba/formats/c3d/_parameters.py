@@ -54,7 +54,7 @@ class Parameters:
     texts: dict[str, tuple[str, ...]]
 
     def number(self, name: str, default: float = 0.0) -> float:
-        """Return the first number of a parameter, or the default where there is none."""
+        """Return the first number of a parameter, or the default if the parameter is empty."""
         array = self.arrays.get(name)
         return float(array[0]) if array is not None and len(array) else default
 
@@ -130,7 +130,8 @@ def _read_one(name: str, data: bytes, place: int, result: Parameters, path: Path
     kind, dimensions = _signed(data[place]), data[place + 1]
     if kind not in _KINDS or dimensions > 7:
         raise FormatError(
-            f"parameter {name!r} at byte {place} has type {kind} and {dimensions} dimensions; there is none",
+            f"parameter {name!r} at byte {place} has type {kind} and {dimensions} dimensions; expected types "
+            "-1, 1, 2, 4 and at most 7 dimensions",
             path=path,
         )
     shape = data[place + 2 : place + 2 + dimensions]

@@ -28,7 +28,7 @@ FILMS = (24, 25, 30, 48, 50, 60, 120)
 LARGEST_TURN, MOST = 2.0, 99
 """Radians that heads and eyes of tracked faces do not reach, and the percentage of angles that tell."""
 PICTURES = 500
-"""Rows a second from which on times are none."""
+"""Rows a second above which a column does not hold times."""
 UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """From axes of a camera (x right, y down, z away) to those of a face that looks into it (left, up, ahead)."""
 

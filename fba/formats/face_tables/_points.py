@@ -43,7 +43,7 @@ def build_points(
     spread = np.ptp(np.nan_to_num(positions[..., :2]), axis=1)
     positions[(spread == 0).any(axis=1)] = np.nan
     if positions.shape[2] == 3 and not (np.abs(np.nan_to_num(positions[..., 2])) > 0).any():
-        positions = positions[..., :2]  # a depth that is 0 everywhere is none
+        positions = positions[..., :2]  # a depth that is 0 everywhere carries nothing
     findings = list(findings)
     if not metric and positions.shape[2] == 3 and not _is_deep(positions):
         positions = positions[..., :2]

@@ -25,11 +25,11 @@ SWAPS = ("auto", "yes", "no")
 SWAPPED = (("mouthLeft", "mouthRight"), ("jawLeft", "jawRight"))
 """Labels that Live Link Face's tables have the wrong way round."""
 TELLING = 0.3
-"""Correlation of mouths that go aside with smiles from which on it decides."""
+"""Correlation of sideways mouths with smiles above which it decides."""
 MOST_GAPS = 3
 """Gaps that a warning names."""
 MOVES = 0.01
-"""Standard deviation from which on a difference of weights says something."""
+"""Standard deviation above which a difference of weights is evidence."""
 
 
 def to_animation(

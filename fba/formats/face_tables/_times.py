@@ -9,7 +9,7 @@ from fba.errors import FormatError
 from fba.source import Path
 
 MOST_MILLISECONDS = 5.0
-"""Median step from which on times are milliseconds: no capture is that slow in seconds."""
+"""Median step above which times are milliseconds: no capture is that slow in seconds."""
 
 
 def check_order(times: Float64, lines: list[int], path: Path) -> None:

@@ -19,7 +19,7 @@ class UnitLayout:
     """How a program lays out a table of action units.
 
     face, seconds: columns that say whose face a row is of, and when. strongest: intensity of an action unit
-    that is as strong as can be. largest: more is none.
+    that is as strong as can be. largest: the greatest valid number.
     """
 
     face: str

@@ -47,7 +47,7 @@ EYES = ("lefteyeyaw", "righteyeyaw", "lefteyepitch", "righteyepitch")
 UNUSED = ("lefteyeroll", "righteyeroll", "neutral")
 """Columns that no FAP stands for."""
 SPARSE = 1.2
-"""Counts of time codes between frames from which on frames are fewer than these count."""
+"""Counts of time codes between frames above which frames are fewer than these count."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:

@@ -100,7 +100,7 @@ def read_face(
 
 
 def _read_packets(data: bytes, path: Path) -> tuple[list[Packet], list[str]]:
-    """Return all datagrams, and what was odd. Raises FormatError with the place of what is none."""
+    """Return all datagrams, and what was odd. Raises FormatError with the place of what is no datagram."""
     packets: list[Packet] = []
     findings = []
     position = 0
@@ -205,7 +205,7 @@ def _refuse(data: bytes, position: int, path: Path) -> None:
 
 
 def _version_of(head: bytes) -> str:
-    """Return the version of the datagram that begins here; "" if there is none."""
+    """Return the version of the datagram that begins here; "" if none begins."""
     for version, length, start in (
         (head[:1], head[1:5], 5),
         (head[:2], head[2:4], 4),  # the other mode of the app, for MetaHumans

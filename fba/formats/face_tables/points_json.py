@@ -147,7 +147,7 @@ def _point_sets(value: Any, levels: int) -> Iterator[Float64]:
 
 
 def _as_points(value: Any) -> Any:
-    """Return a list as points (N, 2 or 3); None if it is none."""
+    """Return a list as points (N, 2 or 3); None for other lists."""
     if not isinstance(value, list) or len(value) < FEWEST:
         return None
     first = value[0]
@@ -172,12 +172,12 @@ def _is_number(value: Any) -> bool:
 
 
 def _numbers(values: list[Any]) -> list[float]:
-    """Return numbers; NaN for what is none, or too large to be one."""
+    """Return numbers; NaN for what is not a number, or too large."""
     return [float(one) if _is_number(one) and abs(one) < 1e300 else float("nan") for one in values]
 
 
 def _choose(found: list[Float64], number: int, face: str | None, path: Path) -> Float64 | None:
-    """Return the points of one face among those of a frame; None if there is none."""
+    """Return the points of one face among those of a frame; None if it is absent."""
     known = [one for one in found if len(one) in COUNTS]
     if not known:
         return max(found, key=len) if found else None

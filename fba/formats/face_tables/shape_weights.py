@@ -19,7 +19,7 @@ LARGEST = 4.0
 
 @cache
 def shape_of(name: str) -> str | None:
-    """Return ARKit's name of a shape, from a name in any case; None if it is none of the 52."""
+    """Return ARKit's name of a shape, from a name in any case; None if it is not one of the 52."""
     return _shapes().get(key_of(name)) or arkit_of(name)
 
 

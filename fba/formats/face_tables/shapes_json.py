@@ -103,7 +103,7 @@ def read_json(path: Path, limits: Limits) -> Any:
 
 
 def _beat(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], list[str]] | None:
-    """Return names, weights (T, N) and times of BEAT's layout, and names that are none; None for others."""
+    """Return names, weights (T, N) and times of BEAT's layout, and unknown names; None for other layouts."""
     if not (isinstance(document, dict) and isinstance(document.get("names"), list)):
         return None
     frames = document.get("frames")
@@ -128,7 +128,7 @@ def _beat(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], lis
 
 
 def _frames(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], list[str]]:
-    """Return names, weights (T, N) and times of a list of frames with scores in them; names that are none."""
+    """Return names, weights (T, N) and times of a list of frames with scores in them, and unknown names."""
     frames = _list_of_frames(document)
     if frames is None:
         raise FormatError("holds no list of frames with scores of blendshapes", path=path)

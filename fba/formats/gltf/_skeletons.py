@@ -21,7 +21,7 @@ from fba.mesh.names import UniqueNames
 
 MAX_JOINTS = 4096
 TURNED = 1e-3
-"""Change of a part of a quaternion from which on a joint turns."""
+"""Change of a component of a quaternion above which a joint turns."""
 
 
 @dataclass(frozen=True, eq=False)

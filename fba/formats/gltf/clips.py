@@ -41,7 +41,7 @@ def choose_clip(gltf: Gltf, clip: str | int | None, nodes: Collection[int]) -> C
     """Return the clip with this name or number (from 0), or the first that turns one of the nodes.
 
     A name counts whatever its capitals, if only one clip has it; a text that is no clip's name counts as
-    a number. ModelError if there is none; warns (FbaWarning) if there are several and clip is None.
+    a number. ModelError if it does not exist; warns (FbaWarning) if there are several and clip is None.
     """
     inside = set(nodes)
     if clip is None:
@@ -78,7 +78,7 @@ def choose_clip(gltf: Gltf, clip: str | int | None, nodes: Collection[int]) -> C
 
 
 def _find_clip(gltf: Gltf, clip: str | int) -> Clip | None:
-    """Return the clip with this name, or else this number; None if there is none."""
+    """Return the clip with this name, or else this number; None if it does not exist."""
     clips = gltf.animations
     if isinstance(clip, str):
         for same in (

@@ -89,7 +89,7 @@ def _add(motion: tuple[Float64, Bool], values: Float64, sent: Bool) -> None:
 
 
 def find_face_clip(gltf: Gltf, clip: str | int | None) -> Clip | None:
-    """Return the clip of this name or number, or the first, that moves a face; None if there is none.
+    """Return the clip of this name or number, or the first, that moves a face; None without one.
 
     Blender writes an action for each object that a take moves, "head|Take 1" and "eyes|Take 1": they are put
     together.

@@ -36,7 +36,7 @@ CHUNK = 200_000
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 DEFAULT_RATE = Fraction(30)
 MANY = 10
-"""Joints of skins that turn from which on they are more than those of a head."""
+"""Number of turning joints of skins above which they are more than a head's."""
 FACE_BYTES = 2500
 """Memory that a frame of a face takes."""
 HALF_TURN = (-1, 1, -1)

@@ -28,7 +28,7 @@ from fba.source import Path
 
 UNITS = {"meters": "m", "centimeters": "cm", "millimeters": "mm", "inches": "in", "feet": "ft"}
 KINDS = (("marker",), ("rigid body marker", "bone marker"))
-"""Types of columns with markers; the second only where there are none of the first, which were measured."""
+"""Types of columns with markers; the second only without the first, which were measured."""
 HEADER_LINES = 12
 TYPES = {"marker", "rigid body", "rigid body marker", "bone", "bone marker", "skeleton", "trained markerset"}
 

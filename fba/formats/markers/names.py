@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 def unique_names(labels: Sequence[str], count: int) -> list[str]:
-    """Return `count` names: labels, "marker 7" where there is none, "name (2)" where one comes again."""
+    """Return `count` names: labels, "marker 7" without a label, "name (2)" for a label that comes again."""
     result: list[str] = []
     taken: dict[str, int] = {}
     used = set(labels)

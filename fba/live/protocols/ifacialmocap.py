@@ -12,7 +12,7 @@ PLACE = "the record"
 FOLLOWED = 0.1, 0.005
 """Shares of a record's delay that move the clock, and the period."""
 LOST_TOUCH = 0.25
-"""Seconds of delay from which on the clock starts again."""
+"""Seconds of delay above which the clock starts again."""
 
 
 class SteadyClock:

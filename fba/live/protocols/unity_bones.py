@@ -43,7 +43,7 @@ def position(numbers: Float64) -> Float64:
 
 
 def rotation(numbers: Float64) -> Float64 | None:
-    """Return a unit quaternion (w, x, y, z) in our axes of Unity's (x, y, z, w); None where it is none."""
+    """Return Unity's quaternion (x, y, z, w) as (w, x, y, z) in our axes; None for an impossible one."""
     length = float(np.linalg.norm(numbers))
     if not 0.5 < length < 2:
         return None

@@ -100,7 +100,7 @@ class VmcReader:
 
 
 def _numbers(arguments: Sequence[Argument], count: int) -> list[float]:
-    """Return arguments as numbers; DatagramError where they are none, or too few."""
+    """Return arguments as numbers; DatagramError for other arguments, or too few."""
     result = [float(one) for one in arguments if isinstance(one, int | float) and math.isfinite(one)]
     if len(result) != count:
         raise DatagramError(WRONG)

@@ -17,7 +17,7 @@ MOST_TURNED = float(np.radians(30.0))
 TO_UP = np.array([1.0, -1.0])
 """From a picture's axes, y down, to the mask's, y up."""
 MISFIT = 0.25
-"""Misfit of the six points from which on they are no face."""
+"""Misfit of the six points above which they are no face."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ def register(face: TrackedFace, *, most_turned: float = MOST_TURNED) -> Register
 
     The mask is turned as the head is about y, points are brought to it by the six of `REGISTERED`, and
     turned back with the depth of the turned mask's points. Frames in which the head is turned by more than
-    `most_turned`, radians, about x or y are left out, and so are those whose points are none of a face.
+    `most_turned`, radians, about x or y are left out, and so are those whose points are not a face's.
     """
     tracked = face.tracked
     turned = tracked & (np.abs(np.nan_to_num(face.angles[:, :2])) > most_turned).any(axis=1)

@@ -22,7 +22,7 @@ class TrackedFace:
     points: float64 (T, 64, 2), in one unit, x to the right in the picture, y down;
     `fba.persona.points.layout` says what each is. angles: float64 (T, 3), radians, of the head about x
     (alpha, down), y (beta, to its left) and z (gamma, to its right), as FAPs 48 to 50 count them. tracked:
-    bool (T,); frames with numbers that are not finite are none. times: float64 (T,), seconds, increasing.
+    bool (T,); False for frames with numbers that are not finite. times: float64 (T,), seconds, increasing.
     rate: nominal frames per second. name: of the performance.
 
     Arrays are read-only copies. Raises ModelError if the parts contradict each other.

@@ -45,7 +45,7 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Float64]]:
     """Return the header and the arrays of a file. oldest: version that is read, too; None for `version`.
 
-    Raises FormatError where it is none of this kind, or damaged; UnsupportedError for another version;
+    Raises FormatError for a file of another kind or a damaged one; UnsupportedError for another version;
     LimitError.
     """
     if not read_head(path).startswith(ZIP):

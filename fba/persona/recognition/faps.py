@@ -93,7 +93,7 @@ def measure_fapu(neutral: Float64) -> Fapu:
     try:
         return Fapu.measure(features)
     except ModelError as error:
-        raise ModelError(f"the neutral face is none: {error.finding}") from error
+        raise ModelError(f"the neutral face is impossible: {error.finding}") from error
 
 
 PART_UNITS = {

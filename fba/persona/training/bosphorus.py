@@ -173,7 +173,7 @@ def _look_up(depth: DepthMap, places: Float64, path: Path) -> Float64:
 def read_database(folder: Path, limits: Limits = DEFAULT_LIMITS) -> Examples:
     """Return examples of all scans below a folder whose type is used, of persons with a neutral one.
 
-    Raises FormatError for a scan that cannot be read, or where there is none.
+    Raises FormatError for a scan that cannot be read or is missing.
     """
     known = [one.name for one in face_classes()]
     people: dict[str, list[tuple[int, Float64, Float64]]] = {}

@@ -20,7 +20,7 @@ KEPT = 2
 RIDGE = 1e-3
 """Square millimetres for each example that coordinates of points are taken to be off."""
 NEUTRALS = 3
-"""Neutral examples of a part are at most so many times those of its largest class."""
+"""Neutral examples of a part are at most this many times those of its largest class."""
 
 
 def train_recogniser(examples: Examples, *, tries: int = 3, seed: int = 1, about: str = "") -> Recogniser:

@@ -30,7 +30,7 @@ CHEAPEST, DEAREST = 1e-4, 1e9
 HOLD = math.inf
 """A price at which nothing changes."""
 FULL = 0.5
-"""Part of the buffer from which on frames are left out, where planes without a change take too much."""
+"""Part of the buffer above which frames are left out, where planes without a change take too much."""
 STILL_SHARE = 2.0
 """A plane's share of the rate, in planes without a change, that frames are left out for."""
 LONGEST_GAP = 0.2
@@ -99,7 +99,7 @@ class RateEncoder:
         self._late: Animation | None = None  # a frame after it that was left out
         self._refused: Animation | None = None  # a frame whose I plane no buffer would hold
         self._planes = 0  # with the last frame, which is not encoded yet
-        self._due = 0  # index from which on a frame may have a plane
+        self._due = 0  # first index at which a frame may have a plane
         self._origin: int | None = None
 
     @property

@@ -77,7 +77,7 @@ def _ends(
 
 
 def _there_and_back(least: Float64, most: Float64, frames: Float64, turn: int) -> Int32:
-    """Return int32 (2 (turn + 1), columns): from `least` to `most` in so many frames each, and back."""
+    """Return int32 (2 (turn + 1), columns): from `least` to `most` in `frames` each, and back."""
     share = np.minimum(np.arange(turn + 1)[:, None] / np.maximum(frames, 1.0), 1.0)
     there = np.rint(least + (most - least) * share).astype(np.int32)
     return np.concatenate([there, there[::-1]])

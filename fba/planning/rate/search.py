@@ -118,7 +118,7 @@ def _encode(
 
 
 def _changes_over(animation: Animation, stride: int) -> Animation:
-    """Return an animation, and behind it every so many of its frames, backwards, with larger changes."""
+    """Return an animation, and behind it every `step`-th of its frames, backwards, with larger changes."""
     order = np.arange(len(animation))
     if stride > 1:
         order = np.concatenate([order, order[::-1][::stride]])

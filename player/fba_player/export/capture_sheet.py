@@ -22,7 +22,7 @@ from fba_player.view.view import View
 TILE = (400, 480)
 """Width and height of one of the two pictures of a frame, in pixels."""
 FINER = 2
-"""Everything is painted so many times larger, and then reduced, which smooths edges."""
+"""Everything is painted this many times larger, and then reduced, which smooths edges."""
 HIDDEN_KINDS = ("teeth", "tongue", "lash", "mouth")
 """Parts of a face that are too small to see, or behind the lips."""
 COLOURS = {"l": "#1f77b4", "r": "#d1495b", "": "#4a4e57"}

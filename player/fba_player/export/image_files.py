@@ -53,7 +53,7 @@ def put_picture(file: BinaryIO, pixels: UInt8, suffix: str, *, transparent: bool
 
 
 def check_picture(target: Path, *, transparent: bool) -> None:
-    """Raise UnsupportedError if the suffix is none of a picture, or the picture cannot be transparent."""
+    """Raise UnsupportedError if the suffix is not a picture's, or the picture cannot be transparent."""
     suffix = target.suffix.lower()
     if suffix not in PICTURES:
         raise UnsupportedError(

@@ -193,7 +193,7 @@ def _extreme_positions(deformer: Deformer, faps: dict[int, int]) -> Float32:
 
 
 def _head_centre(model: FaceModel) -> Float64:
-    """(3,): the centre of the head's rotation in its tables; the origin if there is none."""
+    """(3,): the centre of the head's rotation in its tables; the origin if they do not turn it."""
     for number in (48, 49, 50):
         table = model.table_of.get(number)
         for transform in table.transforms if table is not None else ():

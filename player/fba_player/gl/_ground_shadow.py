@@ -65,8 +65,10 @@ class ShadowCaster:
         self._darkness = np.zeros((CELLS, CELLS), dtype=np.uint8)
 
     def cast(self, meshes: list[FaceMesh], middle: tuple[float, float]) -> CastShadow | None:
-        """The shadow of meshes on the ground y = 0 around `middle` (x, z); None if there is none, or without
-        numba."""
+        """Return the shadow of meshes on the ground y = 0 around `middle` (x, z).
+
+        None without a visible shadow, and without numba.
+        """
         if not is_compiled():
             return None
         ahead = 0.9 / KEY_DIRECTION[1]  # shadows fall away from the key light

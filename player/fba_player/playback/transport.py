@@ -152,7 +152,7 @@ class Transport:
         self.seek(self.start + min(max(share, 0.0), 1.0) * (self._last_time() - self.start))
 
     def step(self, frames: int) -> None:
-        """Pause, and go forward by so many frames, or back if negative: to the exact time of a frame."""
+        """Pause, and go forward by a number of frames, or back if negative: to the exact time of a frame."""
         self.pause()
         before, _, share = self._timeline.position(self._motion.here)
         if frames < 0 and share > 0:

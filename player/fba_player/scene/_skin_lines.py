@@ -17,7 +17,7 @@ Indices = Intp
 FINER = 8
 """Number of steps between two feature points."""
 RINGS = 3
-"""A line lies within so many rings of triangles around the shortest path along edges: lips stay apart."""
+"""Rings of triangles around the shortest path along edges in which a line lies: lips stay apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class _SkinGraph:
         return np.array(corners, dtype=np.intp), np.array(shares)
 
     def _triangles_along(self, start: int, end: int) -> Indices | None:
-        """Triangles (F, 3) along the shortest path between two vertices; None if there is none."""
+        """Triangles (F, 3) along the shortest path between two vertices; None if no path joins them."""
         from scipy.sparse.csgraph import dijkstra
 
         first, last = int(self.node[start]), int(self.node[end])

@@ -110,7 +110,7 @@ class MarkerEditing:
         self.current = names[(names.index(self.current) + by) % len(names)]
 
     def next_missing(self) -> bool:
-        """Go to the next marker without a virtual one; returns False if there is none."""
+        """Go to the next marker without a virtual one; returns False without one."""
         names, at = self.names, self.names.index(self.current)
         for name in (*names[at + 1 :], *names[: at + 1]):
             if name not in self.mapping.markers:
@@ -163,7 +163,7 @@ class MarkerEditing:
         self.current = source  # a follower is gone
 
     def undo(self) -> bool:
-        """Take back the last change, and go to the marker that was current; False if there is none."""
+        """Take back the last change, and go to the marker that was current; False without one."""
         if not self._before:
             return False
         self.current, self.mapping = self._before.pop()

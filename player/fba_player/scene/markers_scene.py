@@ -39,7 +39,7 @@ APART = 0.35
 ROOM = 1.2
 """Room beside head and cloud for a head that turns and moves, as a factor of the way between them."""
 FOLLOWED = 0.3
-"""Metres that a head goes from which on the camera follows it."""
+"""Metres that a head moves before the camera follows it."""
 
 
 class MarkersScene(Timed[CaptureTimes]):

@@ -93,7 +93,7 @@ class PointPlacement:
         self.current = self.order[(self.order.index(self.current) + by) % len(self.order)]
 
     def next_missing(self) -> bool:
-        """Go to the next point without a place; returns False if there is none."""
+        """Go to the next point without a place; returns False without one."""
         at = self.order.index(self.current)
         for name in (*self.order[at + 1 :], *self.order[: at + 1]):
             if name not in self.places:
@@ -133,7 +133,7 @@ class PointPlacement:
         return len(targets)
 
     def undo(self) -> bool:
-        """Take back the last change, and go to the point that was current; False if there is none."""
+        """Take back the last change, and go to the point that was current; False without one."""
         if not self._before:
             return False
         self.current, self.places = self._before.pop()

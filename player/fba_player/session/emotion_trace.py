@@ -51,7 +51,7 @@ def read_stretches(animation: Animation, model: FaceSettings | None) -> tuple[St
 
 
 def stretch_at(stretches: tuple[Stretch, ...], time: float) -> Stretch | None:
-    """The stretch at a time in seconds; None if there is none."""
+    """The stretch at a time in seconds; None without one."""
     return next((one for one in stretches if one.start <= time < one.end), None)
 
 

@@ -217,7 +217,7 @@ class Session:
         )
 
     def shift_sound(self, seconds: float) -> None:
-        """Let the sound begin so many seconds later than now; earlier if negative."""
+        """Let the sound begin this number of seconds later than now; earlier if negative."""
         self.sound_offset = round(self.sound_offset + seconds, 6)
         if self.audio is not None:
             self.audio.offset = self.sound_offset
@@ -247,7 +247,7 @@ class Session:
         return [(self.switch_key(one), one.label) for one in SWITCHES.values() if self.switch_key(one)]
 
     def press_switch(self, key: str) -> bool:
-        """Turn the switch with this key to its next value; returns False if there is none."""
+        """Turn the switch with this key to its next value; returns False without one."""
         for name, switch in SWITCHES.items():
             if self.switch_key(switch).lower() == key:
                 self.touched()

@@ -29,7 +29,7 @@ MOST_AT_ONCE = 1 << 24
 
 
 def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
-    """The opened `av` container and its first audio stream; FormatError where there is none to decode."""
+    """The opened `av` container and its first audio stream; FormatError if no audio can be decoded."""
     # Tags may be in any encoding. From version 19 on, PyAV takes them as they are and has no argument for it.
     tags = {"metadata_errors": "replace"} if av_version(av) < 19 else {}
     try:

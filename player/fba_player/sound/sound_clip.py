@@ -24,7 +24,7 @@ def read_time_of_day(path: PathLike) -> float | None:
     """Return when a sound was recorded: the time of day of its first sample, in seconds.
 
     That is the time reference of a broadcast WAV file (EBU Tech 3285, chunk "bext") or the time code of a
-    film. None where there is none; a reference of 0, which programs write that know no time, is none.
+    film. None if absent; a reference of 0, which programs write that know no time, counts as absent.
     Raises FormatError for a file that is no sound.
     """
     container, stream = open_sound(import_av("sound needs"), Path(path))

@@ -35,7 +35,7 @@ class FilmedSound(Protocol):
 
 
 def find_sound_beside(path: PathLike) -> Path | None:
-    """The WAV file of the same name in the folder of a stream; None where there is none."""
+    """The WAV file of the same name in the folder of a stream; None if absent."""
     stream = Path(path)
     for suffix in (".wav", ".WAV", ".Wav"):
         sound = stream.with_suffix(suffix)

@@ -66,8 +66,8 @@ class FaceShape:
     and its repetitions over the picture. two_sided: False if the inside should look dark. across: float32
     (V, 8) for single hairs: direction from the opposite vertex, half the hair's width (m), direction to the
     tip, and 1 or -1 for its side; hairs narrower than a pixel are drawn a pixel wide and fainter. closed:
-    whether the inside is never visible and not drawn. name, kind: of the model's part, "" if there is none.
-    coarser: levels of detail for small sizes, None if there are none. smooth: False if triangles are so large
+    whether the inside is never visible and not drawn. name, kind: of the model's part, "" if none begins.
+    coarser: levels of detail for small sizes, None without any. smooth: False if triangles are so large
     that light changes visibly within them. wrinkle_places: float32 (V, 2), where each vertex lies in
     `fba_player.mesh.wrinkle_map`, None for a part without wrinkles. alpha, opacity, cutoff: as of
     `fba.mesh.meshes.Material`.

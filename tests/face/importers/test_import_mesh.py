@@ -181,7 +181,7 @@ def test_kinds_can_be_given(head: FaceModel, tmp_path: Path) -> None:
     assert model.name == "mine"
     assert not model.of_kind("tongue")
     assert model.part("upper_teeth").kind == "other"
-    with pytest.raises(OptionError, match="is none of skin"):
+    with pytest.raises(OptionError, match="is not one of skin"):
         import_model(tmp_path / "face.obj", points=head.points, kinds={"tongue": "snake"})
 
 

@@ -182,7 +182,7 @@ def surrounding_cases() -> Iterator[Case]:
 
 
 def _ending(bits: int) -> bytes:
-    """Return planes of which the last ends so many bits before the end code."""
+    """Return planes of which the last ends this number of bits before the end code."""
     writer = _begun()
     for plane in script(faces(4, (3, 4))):
         writer.write_plane(plane)

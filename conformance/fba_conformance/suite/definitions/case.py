@@ -30,7 +30,7 @@ class Fault:
     """Definition of a damaged stream.
 
     name, tests, make: as for `Case`. before: number of planes before the damage. after: returns a stream of
-    those planes that can be salvaged behind it, None if there are none. kind: "damaged", or "unsupported" for
+    those planes that can be salvaged behind it, None without any. kind: "damaged", or "unsupported" for
     what is no fault, but cannot be decoded. times: whether a salvaging decoder knows the times of all planes.
     """
 

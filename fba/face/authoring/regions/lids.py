@@ -74,7 +74,7 @@ LEAST_TURN = 0.3
 HEM = 0.006
 """Shares of a motion below this are set to 0."""
 SUNK = 0.03
-"""Shortfall of a margin from the clearance of moved lids, in radii of the eyeball, from which on both margins
+"""Shortfall of a margin from the clearance of moved lids, in radii of the eyeball, above which both margins
 meet where they are, as a gap would be seen otherwise."""
 CORNER = 0.12
 """Distance from the corners, as a share of the eye's width, within which folds do not stop a lid."""
@@ -88,7 +88,7 @@ def lid_motion(
     parts: Sequence[Part],
     sculpted: Float64 | None = None,
 ) -> Motion | str:
-    """The motion of the surface for a lid's FAP, or the reason why there is none.
+    """The motion of the surface for a lid's FAP, or the reason why it cannot be made.
 
     sculpted: (N, 3) displacements of the surface by which somebody closed this eye, metres: then each vertex
     makes the share of the margin's way that it makes there, and folds that are in it are no reason to stop.

@@ -22,7 +22,7 @@ ROLL_STEPS = 8
 
 
 def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
-    """The motion of the tongue's part for a FAP, or the reason why there is none."""
+    """The motion of the tongue's part for a FAP, or the reason why it cannot be made."""
     missing = [name for name in POINTS[fap] if np.isnan(marks.point(name)).any()]
     if missing:
         return f"feature point {missing[0]} is unknown"

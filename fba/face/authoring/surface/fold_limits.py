@@ -125,7 +125,7 @@ class Patch:
 
     @cached_property
     def _most_lengths(self) -> tuple[Float64, ...]:
-        """Lengths of the edges from which on they count as torn."""
+        """Lengths of the edges above which they count as torn."""
         shortest = TINY_EDGE * self._typical_length
         return tuple(1.1 * MOST_STRETCH * np.maximum(length, shortest) for length in self._edge_lengths)
 
@@ -215,7 +215,7 @@ class Patch:
 
 
 def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:
-    """Smallest positive x with square x² + linear x + constant = 0, inf where there is none; constant > 0."""
+    """Smallest positive x with square x² + linear x + constant = 0, inf without one; constant > 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         below = linear**2 - 4 * square * constant
         root = np.sqrt(np.maximum(below, 0.0))

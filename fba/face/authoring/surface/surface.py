@@ -123,7 +123,7 @@ class Surface:
         return away
 
     def path(self, start: int, end: int, *, rim: bool = False, costs: Float64 | None = None) -> Intp:
-        """The vertices of the shortest path along edges, both ends included; empty where there is none.
+        """The vertices of the shortest path along edges, both ends included; empty if no path joins them.
 
         rim: prefer open edges, as of a mouth that is a slit or eyes that are holes. costs: (N,), factors of
         the lengths of edges at each vertex, 1 or more; the larger one of both ends counts.

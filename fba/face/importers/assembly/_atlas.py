@@ -85,7 +85,7 @@ def _plain_tile() -> _Tile:
 
 
 def _tile(texture: bytes, texcoords: Sequence[Float32], most: int) -> _Tile | None:
-    """What texture coordinates, arrays (V, 2), show of a texture, at most so many pixels each way.
+    """What texture coordinates, arrays (V, 2), show of a texture, at most `size` pixels each way.
 
     None where that cannot be cut out.
     """

@@ -10,8 +10,8 @@ from fba.face.authoring.surface.surface import Surface
 REACH = 1.6
 """Distance from the eyeball's axis, in its radii, within which margins are sought."""
 SEEN, HIDDEN = 0.02, 0.08
-"""Depths behind the front of the eyeball, in its radii, up to which a vertex is seen, and from which on it is
-surely hidden: eyeballs are not quite round, and some lids cut into them."""
+"""Depths behind the front of the eyeball, in its radii: a vertex is visible up to the first, surely hidden
+beyond the second: eyeballs are not quite round, and some lids cut into them."""
 LONGER = 1.1
 """Most length of a loop that is seen all around, by that of the shortest of which parts may be hidden."""
 MOST_STARTS = 60
@@ -33,7 +33,7 @@ def find_eye_loop(surface: Surface, centre: Float64, radius: float) -> Intp:
 def _shortest_loop(surface: Surface, centre: Float64, radius: float, hidden: float) -> tuple[Intp, float]:
     """(vertices (N,) of the shortest loop around an eye's axis, its length; none and infinite without one).
 
-    hidden: depth behind the front of the eyeball, in its radii, from which on vertices do not count.
+    hidden: depth behind the front of the eyeball, in its radii, beyond which vertices do not count.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra

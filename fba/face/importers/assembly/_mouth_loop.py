@@ -62,7 +62,7 @@ def _points(ring: Float64, falls: Float64, middle: float) -> dict[str, Float64]:
 
 
 def _loops(edges: Intp) -> list[Intp]:
-    """Closed loops of edges (E, 2), each as its vertices in order; where edges branch there is none."""
+    """Closed loops of edges (E, 2), each as its vertices in order; edges that branch form no loop."""
     ends: dict[int, list[int]] = {}
     for a, b in edges.tolist():
         ends.setdefault(a, []).append(b)

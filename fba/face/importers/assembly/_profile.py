@@ -13,7 +13,7 @@ from fba.face.model import Part
 STEPS = 400
 """Number of heights at which the profile is sampled."""
 FLAT_LIP = 0.48
-"""Share of the way from the line of the lips to the tip of the nose from which on no lip is foremost."""
+"""Share of the way from the line of the lips to the tip of the nose beyond which no lip is foremost."""
 NOSE = 0.01
 """Least depth of the bottom of a nose behind the line from its tip to the lip, in distances of the pupils."""
 CHIN = 0.3

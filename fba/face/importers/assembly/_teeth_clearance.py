@@ -45,7 +45,7 @@ the first pair that turns nothing over is taken."""
 NEARBY = 0.001
 """Metres: of needs in one square of this size, the largest counts."""
 FULL = 0.15
-"""Share of the largest motion from which on skin comes forward in full."""
+"""Share of the largest motion above which skin comes forward in full."""
 LEAST = 2e-4
 """Metres: skin that gets less far into the teeth is left alone."""
 

@@ -29,13 +29,13 @@ ROUNDS = 4
 SCALINGS = 3
 """Number of times that a shape is made smaller, until all points reach what it asks for."""
 LARGE, ENOUGH = 0.5, 0.75
-"""Share of the largest motion from which on a point counts, and the share of its way that it must reach."""
+"""Share of the largest motion above which a point counts, and the share of its way that it must reach."""
 LEAST_SCALE = 0.7
 """Least factor by which a shape is made smaller at once."""
 LEAST = 0.004
 """Least motion of a point, in distances of the pupils, of a shape that shows something."""
 STILL = 0.001
-"""Motions of a point below this, in distances of the pupils, are none."""
+"""Motions of a point below this, in distances of the pupils, do not count."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 

@@ -299,5 +299,5 @@ def check_kinds(kinds: Mapping[str, str] | None) -> dict[str, str]:
     """The kinds that a user gave by name; OptionError for one that does not exist."""
     for name, kind in (kinds or {}).items():
         if kind not in PART_KINDS and kind != DROPPED:
-            raise OptionError(f"kind of {name!r}: {kind!r} is none of {', '.join((*PART_KINDS, DROPPED))}")
+            raise OptionError(f"kind of {name!r}: {kind!r} is not one of {', '.join((*PART_KINDS, DROPPED))}")
     return dict(kinds or {})

@@ -21,7 +21,7 @@ from fba.parameters import faps
 EDGE = (0.75, 0.97)
 """Shares of the reach of a region between which a motion that leaves it is faded out."""
 FALSE_PUPIL = 0.5
-"""Relative deviation of a pupil's size from the usual one from which on it is none."""
+"""Relative deviation of a pupil's size from the usual size above which it is not a pupil."""
 MESH = ("mesh", "shapes break the standard's rules for {}: made from the mesh")
 """Name and text of the note about FAPs whose tables were replaced."""
 STOPS = (0.85, 0.7, 0.55, 0.4)

@@ -102,7 +102,7 @@ def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
 
 
 def base_file(path: str | os.PathLike[str]) -> Path:
-    """The base mesh in a folder, or the file itself; ModelError where there is none."""
+    """The base mesh in a folder, or the file itself; ModelError if it is missing."""
     path = Path(path)
     for name in ("base.obj", "3dobjs/base.obj", "data/3dobjs/base.obj"):
         if (path / name).is_file():
