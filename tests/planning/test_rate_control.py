@@ -13,7 +13,7 @@ import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
 from fba.capture.live import widest_faces
 from fba.codec import Encoder
-from fba.errors import RangeError
+from fba.errors import OptionError, RangeError
 from fba.face.resolve import resolve
 from fba.parameters import bap_steps, fap_steps
 from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate, measure_errors
@@ -249,6 +249,12 @@ def test_no_frames() -> None:
 def test_rates_and_buffers_are_positive(rate: float, size: float) -> None:
     with pytest.raises(ValueError, match="positive"):
         RateEncoder(rate, size)
+
+
+def test_a_bit_rate_decides_where_i_planes_come() -> None:
+    """Its bucket would not count those of a period."""
+    with pytest.raises(OptionError, match="leave intra_period out"):
+        RateEncoder(900, 1.0, EncoderOptions(intra_period=1))
 
 
 def test_an_angle_that_goes_on_past_half_a_turn_takes_the_short_way() -> None:

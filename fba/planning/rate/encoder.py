@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.animation import Animation, Frame
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, write_mark
-from fba.errors import FbaWarning, RangeError, Remedy
+from fba.errors import FbaWarning, OptionError, RangeError, Remedy
 from fba.planning.frame_order import check_order
 from fba.planning.rate.bucket import LeakyBucket
 from fba.planning.rate.expectations import expected_motion, quantiser_for
@@ -74,8 +74,8 @@ class RateEncoder:
     next. I planes come at the beginning and when something is sent that was not before; frames are left out
     until the buffer has room for one. The mark has no checksums, for which bits would have to stay free.
 
-    Raises RangeError where the first I plane does not fit the buffer at all, and as `Encoder` does,
-    ValueError for a rate or a buffer that is not positive.
+    Raises RangeError where the first I plane does not fit the buffer at all, and as `Encoder` does, OptionError
+    for an intra_period, ValueError for a rate or a buffer that is not positive.
     """
 
     def __init__(
@@ -87,6 +87,8 @@ class RateEncoder:
         choose_quantisers: bool = True,
         finest: float = 0.05,
     ) -> None:
+        if options is not None and options.intra_period is not None:
+            raise OptionError("intra_period and a bit rate contradict each other: leave intra_period out")
         self.bucket = LeakyBucket(bit_rate, bit_rate * buffer)
         self.statistics = RateStatistics()
         self._encoder = Encoder(replace(options or EncoderOptions(), checksums=False))
