@@ -74,8 +74,8 @@ class RateEncoder:
     next. I planes come at the beginning and when something is sent that was not before; frames are left out
     until the buffer has room for one. The mark has no checksums, for which bits would have to stay free.
 
-    Raises RangeError where the first I plane does not fit the buffer at all, and as `Encoder` does, OptionError
-    for an intra_period, ValueError for a rate or a buffer that is not positive.
+    Raises RangeError where the first I plane does not fit the buffer at all, and as `Encoder` does,
+    OptionError for an intra_period, ValueError for a rate or a buffer that is not positive.
     """
 
     def __init__(
