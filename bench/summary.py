@@ -1,9 +1,9 @@
-"""The README's table of results: its rows, and `./dev bench --summary`, which measures and prints it anew.
+"""The results in docs/measure.md, some of which the README shows: `./dev bench --summary` measures them.
 
 A figure is made of what the row's benchmark stores in `benchmark.extra_info`, in the run that prints it. So
 a new row needs an entry in ROWS and a benchmark that stores its numbers; then put what the command prints
-into the README. `./dev bench --check` compares the figures that do not depend on the machine, and
-tests/test_bench.py checks that ROWS, the README and the benchmarks agree.
+into the page. `./dev bench --check` compares the figures that do not depend on the machine, and
+tests/test_bench.py checks that ROWS, the page, the README and the benchmarks agree.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "measure.md"
 HEADER = ("result", "conditions", "measured", "by")
 
 
@@ -30,7 +31,7 @@ class Row:
 
     result, conditions: text of the first two columns. figure: a format string over the benchmark's
     `extra_info`. benchmark: its pytest id below bench/. command: an `fba` command that shows the same.
-    fixed: whether the figure is the same on every machine.
+    fixed: whether the figure is the same on every machine. chosen: whether the README shows it, too.
     """
 
     result: str
@@ -39,13 +40,13 @@ class Row:
     benchmark: str
     command: str = ""
     fixed: bool = False
+    chosen: bool = False
 
     @property
     def source(self) -> str:
         """Markdown of the last column."""
-        file, _, name = self.benchmark.partition("::")
-        link = f"[`{name}`](bench/{file})"
-        return f"`{self.command}`, {link}" if self.command else link
+        benchmark = f"`{self.benchmark}`"
+        return f"`{self.command}`, {benchmark}" if self.command else benchmark
 
     def line(self, figure: str) -> str:
         """The row in Markdown."""
@@ -70,6 +71,7 @@ ROWS = (
         "test_results.py::test_vectors_of_others",
         "fba conformance FOLDER",
         fixed=True,
+        chosen=True,
     ),
     Row(
         "the same, encoded again to the same bytes",
@@ -78,6 +80,7 @@ ROWS = (
         "test_results.py::test_vectors_of_others",
         "fba conformance FOLDER",
         fixed=True,
+        chosen=True,
     ),
     Row(
         "test vectors that come with `fba`, both ways",
@@ -93,9 +96,10 @@ ROWS = (
         "{percent:.0f} % of the original",
         "test_results.py::test_size_of_real_streams",
         fixed=True,
+        chosen=True,
     ),
-    Row("decoding", f"{STREAM}, new arrays", CODED, "test_codec.py::test_decode"),
-    Row("encoding, ranges fitted", STREAM, CODED, "test_codec.py::test_encode"),
+    Row("decoding", f"{STREAM}, new arrays", CODED, "test_codec.py::test_decode", chosen=True),
+    Row("encoding, ranges fitted", STREAM, CODED, "test_codec.py::test_encode", chosen=True),
     Row(
         "memory to decode an hour of 68 FAPs at 25 Hz at once",
         "peak of the whole process",
@@ -115,6 +119,7 @@ ROWS = (
         "test_results.py::test_captures",
         "fba encode --report --json",
         fixed=True,
+        chosen=True,
     ),
     Row(
         "BVH to BAPs: height of the feet on the ground against the source's, scaled",
@@ -124,6 +129,7 @@ ROWS = (
         "test_results.py::test_captures",
         "fba encode --report --json",
         fixed=True,
+        chosen=True,
     ),
     Row(
         "50 markers on a face (C3D) to a stream",
@@ -185,6 +191,7 @@ ROWS = (
         "19,580 vertices; warm, one core, `out=`",
         "{milliseconds:.2f} ms a frame, {ratio:.0f} times a copy of the arrays",
         "test_face.py::test_deform[built-in head]",
+        chosen=True,
     ),
     Row(
         "the same, without normals",
@@ -221,6 +228,7 @@ ROWS = (
         PICTURES,
         "{processor:.1f} ms of processor each; {pictures:.0f} a second by the clock",
         "test_player.py::test_pictures[person]",
+        chosen=True,
     ),
     Row(
         "pictures of the built-in head alone",
@@ -245,6 +253,7 @@ ROWS = (
         PROGRAM,
         "{processors:.1f} s of processor; {seconds:.1f} s by the clock",
         "test_start.py::test_first_picture[hello.fap]",
+        chosen=True,
     ),
     Row(
         "the same",
@@ -329,9 +338,9 @@ def measure(rows: Sequence[Row], output: Path) -> tuple[int, dict[str, dict[str,
     return code, {name: found for name, found in measured.items() if name not in reasons.of}, reasons.of
 
 
-def readme_figures() -> list[str]:
-    """The figures in the README's table, a row each, in the order of ROWS."""
-    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+def shown_figures() -> list[str]:
+    """The figures in the page's table, a row each, in the order of ROWS."""
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
     begin = lines.index(f"| {' | '.join(HEADER)} |") + 2
     return [line.split(" | ")[2] for line in lines[begin : begin + len(ROWS)]]
 
@@ -351,9 +360,9 @@ def _near(shown: str, measured: str) -> bool:
 
 
 def check() -> int:
-    """Measures what is the same on every machine, and compares it with the README; 1 where they differ."""
+    """Measures what is the same on every machine, and compares it with the page; 1 where they differ."""
     rows = [row for row in ROWS if row.fixed]
-    shown = dict(zip(ROWS, readme_figures(), strict=True))
+    shown = dict(zip(ROWS, shown_figures(), strict=True))
     with tempfile.TemporaryDirectory() as folder, redirect_stdout(sys.stderr):
         code, measured, reasons = measure(rows, Path(folder) / "measured.json")
     for row in rows:
@@ -361,7 +370,7 @@ def check() -> int:
         if row.benchmark not in measured or agree(shown[row], now):
             print(f"ok: {row.result}: {now}")
         else:
-            print(f"WRONG: {row.result}: {now}; the README says {shown[row]}")
+            print(f"WRONG: {row.result}: {now}; docs/measure.md says {shown[row]}")
             code = 1
     return int(code)
 

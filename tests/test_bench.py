@@ -1,4 +1,4 @@
-"""The README's table of results, the table that `./dev bench --summary` prints, and the benchmarks agree."""
+"""Tables of results: docs/measure.md, README.md, what `./dev bench --summary` prints, and the benchmarks."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from fba.cli.main import group
 ROOT = Path(__file__).parents[1]
 
 
-def readme_table() -> list[list[str]]:
-    """The cells of the README's table of results, its header first."""
-    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+def table_of(page: Path) -> list[list[str]]:
+    """The cells of a page's table of results, its header first."""
+    lines = page.read_text(encoding="utf-8").splitlines()
     begin = lines.index(f"| {' | '.join(HEADER)} |")
     length = next(number for number, line in enumerate(lines[begin:]) if not line.startswith("|"))
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[begin : begin + length]]
@@ -35,13 +35,16 @@ def pattern(figure: str) -> str:
     return r"\d[\d,]*(\.\d+)?".join(re.escape(part) for part in parts)
 
 
-def test_the_readme_shows_every_row_as_it_is_printed() -> None:
-    shown = readme_table()[2:]
+def test_the_page_shows_every_row_as_it_is_printed_and_the_readme_ten_of_them() -> None:
+    shown = table_of(summary.PAGE)[2:]
     assert [(cells[0], cells[1], cells[3]) for cells in shown] == [
         (row.result, row.conditions, row.source) for row in ROWS
     ]
     for cells, row in zip(shown, ROWS, strict=True):
         assert re.fullmatch(f"{pattern(row.figure)}|not measured: .+", cells[2]), f"{row.result}: {cells[2]}"
+    chosen = [cells for cells, row in zip(shown, ROWS, strict=True) if row.chosen]
+    assert table_of(ROOT / "README.md")[2:] == chosen
+    assert len(chosen) == 10
 
 
 def test_every_row_names_a_benchmark_that_exists() -> None:
@@ -100,7 +103,7 @@ def test_a_row_without_a_figure_says_why() -> None:
     assert summary.figure(row, {}, {row.benchmark: "no display"}) == "not measured: no display"
     assert summary.figure(row, {}, {}) == "not measured: the benchmark did not run"
     assert row.line("1 a second") == (
-        "| speed | warm | 1 a second | `fba bench FILE`, [`test_b[c]`](bench/test_a.py) |"
+        "| speed | warm | 1 a second | `fba bench FILE`, `test_a.py::test_b[c]` |"
     )
 
 
@@ -144,7 +147,7 @@ sys.exit(summary.main())
     assert done.stdout.splitlines() == [
         "| result | conditions | measured | by |",
         "|---|---|---|---|",
-        "| quick | here | 7 of them | [`test_quick`](bench/test_small.py) |",
-        "| absent | here | not measured: no such thing here | [`test_absent`](bench/test_small.py) |",
-        "| wrong | here | not measured: the benchmark failed | [`test_wrong`](bench/test_small.py) |",
+        "| quick | here | 7 of them | `test_small.py::test_quick` |",
+        "| absent | here | not measured: no such thing here | `test_small.py::test_absent` |",
+        "| wrong | here | not measured: the benchmark failed | `test_small.py::test_wrong` |",
     ]
