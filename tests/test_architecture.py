@@ -87,9 +87,7 @@ fba.live.protocols
 fba.live
 fba.persona.points
 fba.persona.recognition
-fba.persona.training
 fba.persona
-fba.persona.evaluation
 fba_conformance
 fba_conformance.fuzz
 fba_conformance.suite.definitions

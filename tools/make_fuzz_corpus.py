@@ -27,7 +27,6 @@ from fba.capture import MarkerMotion  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.live import KINDS  # noqa: E402
 from fba.persona import learn, save_persona  # noqa: E402
-from fba.persona.evaluation.actors import act  # noqa: E402
 from fba_conformance.captures import marker_files, point_files  # noqa: E402
 from fba_conformance.captures.face_files import (  # noqa: E402
     beat,
@@ -55,6 +54,7 @@ from mesh_files import ply  # noqa: E402
 from small_bodies import rod  # noqa: E402
 from small_people import write_person  # noqa: E402
 from stored_models import face  # noqa: E402
+from tools.persona.actors import act  # noqa: E402
 
 
 def mask(*numbers: int, width: int = 68) -> str:

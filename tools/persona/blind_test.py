@@ -1,4 +1,4 @@
-"""Tells moods by how faces move: `python tools/persona_blind_test.py [--real FOLDER]`.
+"""Tells moods by how faces move: `python -m tools.persona.blind_test [--real FOLDER]`.
 
 Each of three moods has takes of one person; a Persona is learnt from some, and whose the others are is told
 blindly, with the mean of each take removed: by masks alone, and by the statistics of motion that a Persona
@@ -25,13 +25,13 @@ import fba
 from fba.arrays import Float64
 from fba.parameters import FAP_COUNT
 from fba.persona import Persona, TrackedFace, learn, play
-from fba.persona.evaluation.actors import INTENSITIES, Style, act, contents, film_faps
 from fba.persona.motion import Motion, flatten, measure_motion
 from fba.persona.observation import Observation, observe
 from fba.persona.points.distances import mask_distance
 from fba.persona.points.layout import PARTS, part_points, part_vertices, standard_mask
 from fba.persona.recognition import Recogniser
 from fba.persona.recognition.faps import face_scale, measure_fapu
+from tools.persona.actors import INTENSITIES, Style, act, contents, film_faps
 
 MOODS = {
     "lively": Style(mouth=1.25, brows=1.4, rise=0.75),

@@ -10,8 +10,8 @@ from fba.persona.recognition.component import Component, train_component
 from fba.persona.recognition.displacements import displacements
 from fba.persona.recognition.faps import face_scale, mask_faps, measure_fapu
 from fba.persona.recognition.recogniser import JAW_FAPS, Recogniser
-from fba.persona.training.classes import class_labels, face_classes, part_classes
-from fba.persona.training.examples import Examples
+from tools.persona.training.classes import class_labels, face_classes, part_classes
+from tools.persona.training.examples import Examples
 
 HELD = 5
 """Every fifth person is kept for validation."""

@@ -12,9 +12,9 @@ from fba.parameters import FAP_COUNT
 from fba.persona.points.layout import REGISTERED, mask_of_face, points_of_face, standard_points
 from fba.persona.points.procrustes import fit_similarity
 from fba.persona.points.registration import register_points
-from fba.persona.training.camera import photograph
-from fba.persona.training.classes import class_faps
-from fba.persona.training.people import make_people, move_face
+from tools.persona.training.camera import photograph
+from tools.persona.training.classes import class_faps
+from tools.persona.training.people import make_people, move_face
 
 TURNS = np.radians([6.0, 12.0, 6.0])
 """Standard deviations of the head's pitch, yaw and roll; within two of them."""

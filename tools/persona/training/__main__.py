@@ -1,4 +1,4 @@
-"""`python -m fba.persona.training -o FILE` trains what recognises expressions: from one seed always the
+"""`python -m tools.persona.training -o FILE` trains what recognises expressions: from one seed always the
 same."""
 
 from __future__ import annotations
@@ -7,16 +7,16 @@ import argparse
 import sys
 from pathlib import Path
 
-from fba.persona.training.bosphorus import read_database
-from fba.persona.training.examples import make_examples
-from fba.persona.training.training import train_recogniser
+from tools.persona.training.bosphorus import read_database
+from tools.persona.training.examples import make_examples
+from tools.persona.training.training import train_recogniser
 
 PEOPLE, EACH = 40, 6
 
 
 def main() -> None:
     """Make examples, train, write the file, and print how well each part is recognised."""
-    parser = argparse.ArgumentParser(prog="python -m fba.persona.training", description=main.__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tools.persona.training", description=main.__doc__)
     parser.add_argument("-o", "--output", type=Path, required=True, help="file to write")
     parser.add_argument("--people", type=int, default=PEOPLE, help="faces that are made up")
     parser.add_argument("--each", type=int, default=EACH, help="examples of each class of each of them")

@@ -36,10 +36,10 @@ from fba.persona.points.layout import (
     standard_points,
 )
 from fba.persona.points.procrustes import fit_similarity
-from fba.persona.training.classes import NEUTRAL, face_classes
-from fba.persona.training.depth_maps import DepthMap, fill_holes, find_outline, make_depth_map
-from fba.persona.training.examples import Examples
 from fba.source import read_whole
+from tools.persona.training.classes import NEUTRAL, face_classes
+from tools.persona.training.depth_maps import DepthMap, fill_holes, find_outline, make_depth_map
+from tools.persona.training.examples import Examples
 
 NAME = re.compile(r"(bs\d{3})_(N|E|LFAU|UFAU|CAU|YR|PR|CR|O|IGN)_(\w+?)_(\d{1,3})", re.ASCII)
 EXPRESSIVE = ("N", "E", "LFAU", "UFAU", "CAU")

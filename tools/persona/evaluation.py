@@ -4,18 +4,20 @@ A made-up actor is filmed for two minutes with every viseme, action unit and emo
 is learnt. A user, another person without that style, performs them once more, and so does the actor. At the
 strongest moment of each, masks are compared: K_U, the user's own, and K_P, played with the Persona, each
 against K_A, the actor's.
+
+python -m tools.persona.evaluation [--users 2] [--seed 1]
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.persona.evaluation.actors import Act, Style, act, all_contents, contents, named_styles
+from fba.cli.printing import print_table
 from fba.persona.learning import learn
 from fba.persona.observation import observe
 from fba.persona.performance import perform
@@ -24,6 +26,7 @@ from fba.persona.points.distances import mask_distance
 from fba.persona.points.layout import PARTS, SAME, flat_mask, standard_mask
 from fba.persona.recognition import Recogniser, decide
 from fba.persona.recognition.displacements import displacements
+from tools.persona.actors import Act, Style, act, all_contents, contents, named_styles
 
 TAUGHT = 2
 """Times that an actor performs every content for a Persona to be learnt."""
@@ -78,12 +81,24 @@ class Evaluation:
     classes: float
     masks: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain numbers and texts, for programs."""
-        return asdict(self) | {
-            "reduction": {way: mean_reduction(self.motion, way) for way in WAYS},
-            "reduction_with_rest": {way: mean_reduction(self.faces, way) for way in WAYS},
-        }
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the table: distances by content, then by how much they fall in the mean."""
+    parser = argparse.ArgumentParser(prog="python -m tools.persona.evaluation", description=main.__doc__)
+    parser.add_argument("--users", type=int, default=2, help="users for each actor (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=1, help="of actors and users (default: %(default)s)")
+    options = parser.parse_args(arguments)
+    if options.users < 1 or options.seed < 0:
+        parser.error("--users must be at least 1, and --seed at least 0")
+    result = evaluate(users=options.users, seed=options.seed)
+    rows = [
+        [row.content, f"{row.own:.2f}", *(f"{row.played[way]:.2f}" for way in WAYS)] for row in result.motion
+    ]
+    for name, some in (("falls by", result.motion), ("with the rest", result.faces)):
+        rows.append([name, "", *(f"{100 * mean_reduction(some, way):.1f} %" for way in WAYS)])
+    agreement = (f"{100 * result.agreement[way]:.1f} %" if way in result.agreement else "" for way in WAYS)
+    print_table(("without", *WAYS), [*rows, ["class kept", "", *agreement]], "content")
+    print(f"masks of two consecutive frames of an actor: {result.consecutive:.2f} mm")
 
 
 def mean_reduction(rows: Sequence[Row], way: str) -> float:
@@ -225,3 +240,7 @@ def _same(one: str, other: str) -> bool:
     """Whether two labels have a class in common, or one that is hardly told apart."""
     here, there = set(one.split("/")), set(other.split("/"))
     return bool(here & there) or any(here & group and there & group for group in ALIKE)
+
+
+if __name__ == "__main__":
+    main()

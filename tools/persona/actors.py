@@ -13,9 +13,9 @@ from fba.arrays import Bool, Float64
 from fba.face import VISEME_NAMES, Definitions
 from fba.parameters import FAP_COUNT, faps
 from fba.persona.points import TrackedFace
-from fba.persona.training.camera import photograph
-from fba.persona.training.classes import class_faps, face_classes
-from fba.persona.training.people import People, make_people, move_face
+from tools.persona.training.camera import photograph
+from tools.persona.training.classes import class_faps, face_classes
+from tools.persona.training.people import People, make_people, move_face
 
 RATE = 30
 REST = 1.2
