@@ -92,7 +92,6 @@ fba_conformance
 fba_conformance.fuzz
 fba_conformance.suite.definitions
 fba_conformance.suite
-fba_conformance.captures
 fba_player.mesh
 fba_player.view
 fba_player.figure

@@ -27,19 +27,6 @@ from fba.capture import MarkerMotion  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.live import KINDS  # noqa: E402
 from fba.persona import learn, save_persona  # noqa: E402
-from fba_conformance.captures import marker_files, point_files  # noqa: E402
-from fba_conformance.captures.face_files import (  # noqa: E402
-    beat,
-    face_angles,
-    face_weights,
-    ifacialmocap_records,
-    livelink_csv,
-    livelink_udp,
-    mediapipe_frames,
-    openface_csv,
-    pyfeat_csv,
-)
-from fba_conformance.captures.tracked_actor import film  # noqa: E402
 from fba_conformance.fuzz._small_head import (  # noqa: E402
     small_head,
     small_head_fdp,
@@ -54,6 +41,19 @@ from mesh_files import ply  # noqa: E402
 from small_bodies import rod  # noqa: E402
 from small_people import write_person  # noqa: E402
 from stored_models import face  # noqa: E402
+from tools.captures import marker_files, point_files  # noqa: E402
+from tools.captures.face_files import (  # noqa: E402
+    beat,
+    face_angles,
+    face_weights,
+    ifacialmocap_records,
+    livelink_csv,
+    livelink_udp,
+    mediapipe_frames,
+    openface_csv,
+    pyfeat_csv,
+)
+from tools.captures.tracked_actor import film  # noqa: E402
 from tools.persona.actors import act  # noqa: E402
 
 

@@ -16,8 +16,8 @@ from fba.errors import FormatError, LimitError, UnsupportedError
 from fba.face import FaceModel
 from fba.persona import load_persona, read_recording, write_recording
 from fba.persona.points.layout import PARTS
-from fba_conformance.captures import point_files
-from fba_conformance.captures.tracked_actor import film
+from tools.captures import point_files
+from tools.captures.tracked_actor import film
 from tools.persona.actors import Style, act
 
 Run = Callable[..., tuple[int, str, str]]

@@ -21,7 +21,7 @@ from fba.face import Deformer, FaceModel
 from fba.face.feature_points import row_of
 from fba.parameters import BAP_COUNT
 from fba.tracks import BodyTrack, FaceTrack
-from fba_conformance.captures.performances import HEAD, head_motion, speech
+from tools.captures.performances import HEAD, head_motion, speech
 
 BETWEEN = {
     "FHM": (("11.1", 0.5), ("9.12", 0.5)), "FHM2": (("11.1", 0.7), ("9.12", 0.3)),

@@ -18,7 +18,7 @@ from fba.arrays import Float64
 from fba.capture.points import PointMotion
 from fba.face import Deformer, FaceModel
 from fba.face.feature_points import row_of
-from fba_conformance.captures.performances import head_motion, speech
+from tools.captures.performances import head_motion, speech
 
 Spot = tuple[tuple[str, float], ...]
 """Feature points, and their shares in a point."""

@@ -1,4 +1,4 @@
-"""The study of losses: `python -m fba_conformance.loss`, shortened."""
+"""The study of losses: `python -m bench.loss`, shortened."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from random import Random
 import numpy as np
 import pytest
 
+from bench import loss
 from fba import Animation, FbaWarning, decode
 from fba_conformance import _motion as motion
-from fba_conformance import loss
 
 ONCE, SECOND = loss.SETTINGS[0], loss.Setting("every second", Fraction(1))
 

@@ -15,18 +15,18 @@ from fba.face import FaceModel
 from fba.formats import format_of
 from fba.formats.face_tables import livelink_csv, livelink_udp
 from fba.parameters import faps
-from fba_conformance.captures.marked_actor import as_face, record
-from fba_conformance.captures.marker_files import MAKERS
-from fba_conformance.captures.measurement import (
+from tools.captures.marked_actor import as_face, record
+from tools.captures.marker_files import MAKERS
+from tools.captures.measurement import (
     Errors,
     measure_animation,
     measure_marker_file,
     worst,
 )
-from fba_conformance.captures.performances import speech
-from fba_conformance.captures.point_files import LAYOUTS
-from fba_conformance.captures.shaped_face import FACE_FILES, encode_file
-from fba_conformance.captures.tracked_actor import film
+from tools.captures.performances import speech
+from tools.captures.point_files import LAYOUTS
+from tools.captures.shaped_face import FACE_FILES, encode_file
+from tools.captures.tracked_actor import film
 
 RATE = 100
 

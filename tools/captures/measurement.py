@@ -22,11 +22,11 @@ from fba.errors import FbaWarning
 from fba.face import FaceModel
 from fba.parameters import faps
 from fba.tracks import FaceTrack
-from fba_conformance.captures import damage, marker_files
-from fba_conformance.captures.marked_actor import Take, record
-from fba_conformance.captures.performances import HEAD, head_motion
-from fba_conformance.captures.shaped_face import action_units_at
-from fba_conformance.captures.tracked_actor import FAR, FOCAL, film
+from tools.captures import damage, marker_files
+from tools.captures.marked_actor import Take, record
+from tools.captures.performances import HEAD, head_motion
+from tools.captures.shaped_face import action_units_at
+from tools.captures.tracked_actor import FAR, FOCAL, film
 
 PER_CENT = 1024 / 100
 """Units of a FAP in a hundredth of its FAPU."""

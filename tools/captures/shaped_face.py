@@ -18,7 +18,7 @@ from fba.arrays import Float64
 from fba.capture import ActionUnitMotion, ShapeMotion, from_action_units, from_blendshapes
 from fba.capture.sampling import find_rate
 from fba.rotations import axis_matrices
-from fba_conformance.captures import face_files
+from tools.captures import face_files
 
 SIZES = {
     "Blink": 1.0,

@@ -1,8 +1,8 @@
 """Writes captures whose FAPs are known, or measures how many of these come back.
 
-python -m fba_conformance.captures write FOLDER [--seconds 10] [--head HEAD]
-python -m fba_conformance.captures measure [--seconds 10] [--head HEAD]... [--faps FILE]...
-python -m fba_conformance.captures correlate RECORDING...
+python -m tools.captures write FOLDER [--seconds 10] [--head HEAD]
+python -m tools.captures measure [--seconds 10] [--head HEAD]... [--faps FILE]...
+python -m tools.captures correlate RECORDING...
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.errors import FbaError, FbaWarning
 from fba.face import FaceModel
-from fba_conformance.captures import measurement, report
-from fba_conformance.captures.heads import load_head, other_head
-from fba_conformance.captures.marked_actor import as_animation, as_face, record
-from fba_conformance.captures.marker_files import MAKERS, write
-from fba_conformance.captures.performances import perform_track, speech
-from fba_conformance.captures.point_files import LAYOUTS
-from fba_conformance.captures.shaped_face import FACE_FILES, encode_file
-from fba_conformance.captures.tracked_actor import film
+from tools.captures import measurement, report
+from tools.captures.heads import load_head, other_head
+from tools.captures.marked_actor import as_animation, as_face, record
+from tools.captures.marker_files import MAKERS, write
+from tools.captures.performances import perform_track, speech
+from tools.captures.point_files import LAYOUTS
+from tools.captures.shaped_face import FACE_FILES, encode_file
+from tools.captures.tracked_actor import film
 
 RATE, FILM_RATE = 100, 30
 """Frames a second of the markers, and of films."""
@@ -36,7 +36,7 @@ RATE, FILM_RATE = 100, 30
 
 def main(arguments: list[str] | None = None) -> None:
     """Does what the command line says."""
-    parser = argparse.ArgumentParser(prog="python -m fba_conformance.captures", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tools.captures", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     writing = commands.add_parser("write", help="write captures in all formats, and their FAPs")
     writing.add_argument("folder", type=Path)

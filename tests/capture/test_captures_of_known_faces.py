@@ -1,6 +1,6 @@
 """Captures whose FAPs are known: these come back, from another head, from every format, through noise.
 
-`python -m fba_conformance.captures measure` does the same at length.
+`python -m tools.captures measure` does the same at length.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import pytest
 
 import fba
 from fba.face import FaceModel
-from fba_conformance.captures import __main__ as command
-from fba_conformance.captures import damage
-from fba_conformance.captures.face_files import ANGLES, UDP_ORDER, livelink_csv, livelink_udp
-from fba_conformance.captures.heads import other_head
-from fba_conformance.captures.marked_actor import Take, as_animation, perform
-from fba_conformance.captures.marker_files import MAKERS
-from fba_conformance.captures.measurement import (
+from tools.captures import __main__ as command
+from tools.captures import damage
+from tools.captures.face_files import ANGLES, UDP_ORDER, livelink_csv, livelink_udp
+from tools.captures.heads import other_head
+from tools.captures.marked_actor import Take, as_animation, perform
+from tools.captures.marker_files import MAKERS
+from tools.captures.measurement import (
     Errors,
     measure_animation,
     measure_marker_file,
@@ -26,9 +26,9 @@ from fba_conformance.captures.measurement import (
     measure_points,
     worst,
 )
-from fba_conformance.captures.performances import perform_track, speech
-from fba_conformance.captures.point_files import LAYOUTS
-from fba_conformance.captures.shaped_face import FACE_FILES, encode_file
+from tools.captures.performances import perform_track, speech
+from tools.captures.point_files import LAYOUTS
+from tools.captures.shaped_face import FACE_FILES, encode_file
 
 pytestmark = pytest.mark.filterwarnings("ignore::fba.errors.FbaWarning")
 EXACT, NOISY, DEGREES = 2.0, 5.0, 0.3
