@@ -89,7 +89,6 @@ fba.persona.points
 fba.persona.recognition
 fba.persona
 fba_conformance
-fba_conformance.fuzz
 fba_conformance.suite.definitions
 fba_conformance.suite
 fba_player.mesh

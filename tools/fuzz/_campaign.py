@@ -18,11 +18,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from fba_conformance.fuzz._engine import Finding, Report, mutated
-from fba_conformance.fuzz._minimise import minimise
-from fba_conformance.fuzz.corpus import read_corpus
-from fba_conformance.fuzz.targets import Target
-from fba_conformance.fuzz.worker import NUMBER, file_name
+from tools.fuzz._engine import Finding, Report, mutated
+from tools.fuzz._minimise import minimise
+from tools.fuzz.corpus import read_corpus
+from tools.fuzz.targets import Target
+from tools.fuzz.worker import NUMBER, file_name
 
 HANGING = 120.0
 """Seconds of processor time without progress after which a process hangs."""
@@ -222,7 +222,7 @@ def minimise_in_processes(target: Target, data: bytes, holding: tuple[int, ...] 
 
 def worker_command(target: Target, *arguments: str) -> list[str]:
     """Return the command that starts a worker."""
-    return [sys.executable, "-m", "fba_conformance.fuzz.worker", target.name, *arguments]
+    return [sys.executable, "-m", "tools.fuzz.worker", target.name, *arguments]
 
 
 def environment(target: Target) -> dict[str, str]:

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from fba.errors import OptionError, did_you_mean
-from fba_conformance.fuzz._outcome import Outcome
+from tools.fuzz._outcome import Outcome
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def targets() -> tuple[Target, ...]:
         *(
             Target(
                 f"encode-{part}", f"random performances of {whose}, encoded in every manner and decoded",
-                f"fba_conformance.fuzz._performances:check_{part}", random=True,
+                f"tools.fuzz._performances:check_{part}", random=True,
             )
             for part, whose in (("face", "faces"), ("body", "bodies"), ("both", "faces with bodies"))
         ),
@@ -130,7 +130,7 @@ def find_target(name: str) -> Target:
     raise OptionError(f"there is no target {name!r}{did_you_mean(name, names)}; there are {', '.join(names)}")
 
 
-_STREAM = "fba_conformance.fuzz._stream_contract:check_stream"
+_STREAM = "tools.fuzz._stream_contract:check_stream"
 _START_CODES = (
     b"\0\0\1\xba", b"\0\0\1\xbb", b"\0\0\1\xb1", b"\0\0\1\x01", b"\0\0\1\x03", b"\0\0\1\xb3", b"\0\0\1",
 )  # fmt: skip
@@ -143,4 +143,4 @@ _TEXT = (
 
 
 def _reader(name: str, description: str, *words: bytes) -> Target:
-    return Target(name, description, f"fba_conformance.fuzz._readers:check_{name}", words)
+    return Target(name, description, f"tools.fuzz._readers:check_{name}", words)

@@ -13,10 +13,10 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from fba_conformance.fuzz._minimise import minimise
-from fba_conformance.fuzz._mutation import mutate
-from fba_conformance.fuzz._outcome import ContractError, Outcome
-from fba_conformance.fuzz.targets import Target
+from tools.fuzz._minimise import minimise
+from tools.fuzz._mutation import mutate
+from tools.fuzz._outcome import ContractError, Outcome
+from tools.fuzz.targets import Target
 
 MOST_SECONDS, MOST_SECONDS_PER_BYTE = 3.0, 0.002
 """Processor time that one input may take, and more for each of its bytes: generous, as machines differ."""

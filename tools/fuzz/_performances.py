@@ -23,7 +23,7 @@ from fba.parameters import BAP_COUNT, FAP_COUNT, bap_steps, fap_steps
 from fba.planning import LiveEncoder, Tolerance, encode_planned, encode_within_tolerance
 from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate
 from fba.tracks import BodyTrack, FaceTrack
-from fba_conformance.fuzz._outcome import ContractError, Outcome
+from tools.fuzz._outcome import ContractError, Outcome
 
 AMPLITUDES = 1, 30, 300, 1860, 20_000, 2_000_000_000
 """Most that values differ from 0: within a step, in speech, at the limits of ranges, beyond all of them, and

@@ -3,7 +3,7 @@
 Encodes random animations of few parameters, with values that jump between round numbers, because these make
 planes of many zeros. An independent reader reads each stream as `fba.decode` does, and looks before each
 plane in the byte-aligned way, too: where both see the same before every plane, both read the same planes.
-`python -m fba_conformance.look_ahead --planes 1000000` tries as many planes.
+`python -m tools.look_ahead --planes 1000000` tries as many planes.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def compare(planes: int, seed: int = 0) -> tuple[int, int, list[str]]:
 
 def main() -> None:
     """Compare, and print what differs; exit status 1 if anything does."""
-    parser = argparse.ArgumentParser(prog="python -m fba_conformance.look_ahead", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tools.look_ahead", description=__doc__)
     parser.add_argument("--planes", type=int, default=10_000, help="number of planes (default 10000)")
     parser.add_argument("--seed", type=int, default=0, help="number of the series of streams (default 0)")
     arguments = parser.parse_args()

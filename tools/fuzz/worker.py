@@ -1,4 +1,4 @@
-"""A process that checks inputs of one target: `fba_conformance.fuzz` starts and watches it.
+"""A process that checks inputs of one target: `tools.fuzz` starts and watches it.
 
 It writes the number of the input that it is at into a small file, so that the watcher knows which one made it
 crash or hang, and prints its report as a line of JSON.
@@ -16,9 +16,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from fba_conformance.fuzz._engine import Report, run, run_files
-from fba_conformance.fuzz.corpus import read_corpus
-from fba_conformance.fuzz.targets import find_target
+from tools.fuzz._engine import Report, run, run_files
+from tools.fuzz.corpus import read_corpus
+from tools.fuzz.targets import find_target
 
 NUMBER = struct.Struct("<q")
 ADDRESS_SPACE = 6_000_000_000
@@ -27,7 +27,7 @@ ADDRESS_SPACE = 6_000_000_000
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return 1 if there were findings."""
-    parser = argparse.ArgumentParser(prog="python -m fba_conformance.fuzz.worker")
+    parser = argparse.ArgumentParser(prog="python -m tools.fuzz.worker")
     parser.add_argument("target")
     parser.add_argument("--corpus", type=Path)
     parser.add_argument("--seed", type=int, default=0)

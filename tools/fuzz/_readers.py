@@ -39,8 +39,8 @@ from fba.mesh.ply import read_ply
 from fba.mesh.vrml import read_vrml
 from fba.mesh.wfm import read_wfm
 from fba.persona.storage import load_persona
-from fba_conformance.fuzz._outcome import ContractError, Outcome
-from fba_conformance.fuzz._small_head import small_head_obj, small_head_points, small_head_vrml
+from tools.fuzz._outcome import ContractError, Outcome
+from tools.fuzz._small_head import small_head_obj, small_head_points, small_head_vrml
 
 _WORLD = b"""#VRML V2.0 utf8
 Shape { geometry IndexedFaceSet {

@@ -1,4 +1,4 @@
-"""`python -m fba_conformance.fuzz.bounds`: run all that is compiled with the bounds of every access checked.
+"""`python -m tools.fuzz.bounds`: run all that is compiled with the bounds of every access checked.
 
 Three parts: the test suite, random performances encoded in every manner, and mutated files. All run with
 `NUMBA_BOUNDSCHECK=1`, under which compiled code raises IndexError where it would read or write beside an
@@ -20,9 +20,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fba.compiled import is_compiled
-from fba_conformance.fuzz._campaign import Campaign, run_campaign
-from fba_conformance.fuzz._engine import Report
-from fba_conformance.fuzz.targets import targets
+from tools.fuzz._campaign import Campaign, run_campaign
+from tools.fuzz._engine import Report
+from tools.fuzz.targets import targets
 
 CHECKED = "NUMBA_BOUNDSCHECK"
 PERFORMANCES, MUTANTS = 20_000, 500_000

@@ -1,6 +1,6 @@
 """The corpus: small files of every kind, one folder a target, that mutations start from.
 
-`tools/make_fuzz_corpus.py` makes it. Only the checkout has it; streams are made here where it is missing.
+`tools/make_fuzz_corpus.py` makes it. Where a folder has no streams, they are made here.
 """
 
 from __future__ import annotations
@@ -8,10 +8,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from fba.errors import OptionError
-from fba_conformance.fuzz.targets import Target
 from fba_conformance.small_streams import doubtful_marks, long_streams, small_streams
+from tools.fuzz.targets import Target
 
-CHECKOUT = Path(__file__).parents[3] / "tests" / "fuzz" / "corpus"
+CHECKOUT = Path(__file__).parents[2] / "tests" / "fuzz" / "corpus"
 
 
 def read_corpus(target: Target, folder: Path | None = None) -> list[bytes]:

@@ -1,6 +1,6 @@
 """Pictures of the window with its panels, drawn without a window, for tests and documentation.
 
-python -m fba_player.ui.window_picture talk.fba -o window.png --panels file,view --time 1.5
+python -m tools.window_picture talk.fba -o window.png --panels file,view --time 1.5
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ def main(arguments: list[str]) -> int:
     from fba_player.scene.scene import Scene
     from fba_player.session.source import Source
 
-    parser = argparse.ArgumentParser(prog="python -m fba_player.ui.window_picture", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tools.window_picture", description=__doc__)
     parser.add_argument("file")
     parser.add_argument("-o", "--output", required=True)
     parser.add_argument("--panels", default="", help="names with commas between them")

@@ -15,10 +15,10 @@ from pathlib import Path
 from re import findall
 
 from fba.errors import OptionError
-from fba_conformance.fuzz._campaign import Campaign, environment, minimise_in_processes, save
-from fba_conformance.fuzz._engine import Finding, Report
-from fba_conformance.fuzz.corpus import read_corpus
-from fba_conformance.fuzz.targets import Target
+from tools.fuzz._campaign import Campaign, environment, minimise_in_processes, save
+from tools.fuzz._engine import Finding, Report
+from tools.fuzz.corpus import read_corpus
+from tools.fuzz.targets import Target
 
 MOST_BYTES = 20_000
 
@@ -58,7 +58,7 @@ def _run_target(campaign: Campaign, target: Target, seconds: float) -> Report:
         ]
         limits += ["-timeout=60", "-rss_limit_mb=4096", f"-artifact_prefix={found}/", "-print_final_stats=1"]
         done = subprocess.run(
-            [sys.executable, "-m", "fba_conformance.fuzz._guided_worker", target.name, str(corpus), *limits],
+            [sys.executable, "-m", "tools.fuzz._guided_worker", target.name, str(corpus), *limits],
             env={**environment(target), "NUMBA_DISABLE_JIT": "1"}, capture_output=True, check=False,
         )  # fmt: skip
         words = done.stderr.decode("utf-8", "replace") + done.stdout.decode("utf-8", "replace")

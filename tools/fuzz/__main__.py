@@ -1,4 +1,4 @@
-"""`python -m fba_conformance.fuzz`: fuzz all targets or some, or check files that were found before."""
+"""`python -m tools.fuzz`: fuzz all targets or some, or check files that were found before."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fba.errors import FbaError
-from fba_conformance.fuzz._campaign import Campaign, environment, run_campaign, worker_command
-from fba_conformance.fuzz._guided import run_guided
-from fba_conformance.fuzz.targets import Target, find_target, targets
+from tools.fuzz._campaign import Campaign, environment, run_campaign, worker_command
+from tools.fuzz._guided import run_guided
+from tools.fuzz.targets import Target, find_target, targets
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -16,9 +16,9 @@ import atheris
 
 def main(arguments: Sequence[str]) -> None:
     """Fuzz until libFuzzer ends the process."""
-    with atheris.instrument_imports(include=["fba", "fba_conformance"]):
-        from fba_conformance.fuzz._engine import Check
-        from fba_conformance.fuzz.targets import find_target
+    with atheris.instrument_imports(include=["fba", "fba_conformance", "tools.fuzz"]):
+        from tools.fuzz._engine import Check
+        from tools.fuzz.targets import find_target
 
         # Loops are not compiled here, so only libFuzzer's own limit of time holds.
         check = Check(find_target(arguments[0]), Path(tempfile.mkdtemp(prefix="fba-fuzz-")), math.inf)
