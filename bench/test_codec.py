@@ -1,6 +1,6 @@
 """Speed and memory of the codec.
 
-The textbook coder of `fba_conformance.linear` and ours code the same symbols in the same run, compiled the
+The textbook coder of `bench.linear` and ours code the same symbols in the same run, compiled the
 same way: the ratio is what to quote.
 """
 
@@ -19,13 +19,13 @@ import numpy as np
 import pytest
 
 import fba
+from bench import linear
 from fba import Animation
 from fba.codec import encode_planes
 from fba.codec._plane.arithmetic import ALPHABET_MAX, STRIDE, Counts, decode_segment, encode_segment, learn
 from fba.codec.settings import RANGE_CODE_MAX, FrameRate, PartSettings, PlaneSettings, RangeLists
 from fba.compiled import compiled
 from fba.parameters import fap_steps
-from fba_conformance import linear
 
 ROUNDS = 15
 pytestmark = pytest.mark.benchmark(timer=time.process_time)  # of one core, whoever else uses the machine

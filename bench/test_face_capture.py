@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import fba
-from fba_conformance.captures import face_files
+from tools.captures import face_files
 
 SECONDS, RATE = 600, 60
 

@@ -11,7 +11,7 @@ import pytest
 
 import fba
 from fba.face import FaceModel
-from fba_conformance.captures import marked_actor, marker_files
+from tools.captures import marked_actor, marker_files
 
 SECONDS, RATE = 60, 100
 

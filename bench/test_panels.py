@@ -19,7 +19,7 @@ from fba_player.session.source import Source
 
 pytest.importorskip("imgui_bundle", exc_type=ImportError)
 
-from fba_player.ui.window_picture import Studio
+from tools.window_picture import Studio
 
 GOAL = 2e-3
 """Seconds a picture."""

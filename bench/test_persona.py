@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from fba.persona import LivePersona, Persona, TrackedFace, learn, play
-from fba.persona.evaluation.actors import act, all_contents, named_styles
 from fba.persona.persona import MEANS
+from tools.persona.actors import act, all_contents, named_styles
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from fba.codec import Encoder, EncoderOptions
 from fba.formats.face_tables import livelink_udp
 from fba.planning import LiveEncoder, Tolerance, encode_planned, encode_within_tolerance
 from fba.planning.rate import RateEncoder
-from fba_conformance.captures import face_files
+from tools.captures import face_files
 
 HOUR = 90_000
 """Frames at 25 Hz."""

@@ -16,9 +16,9 @@ import fba
 from fba import player
 from fba.animation import Animation
 from fba.face import FaceModel
-from fba_conformance.captures.heads import other_head
-from fba_conformance.captures.marked_actor import as_face
-from fba_conformance.captures.performances import HEAD, head_motion, perform_track
+from tools.captures.heads import other_head
+from tools.captures.marked_actor import as_face
+from tools.captures.performances import HEAD, head_motion, perform_track
 
 TARGET = Path(__file__).with_name("images") / "capture-markers.jpg"
 SAMPLES = Path(fba.__file__).parent / "samples"

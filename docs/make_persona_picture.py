@@ -11,11 +11,10 @@ from fba import player
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.persona import learn, play
-from fba.persona.evaluation import act, named_styles
-from fba.persona.evaluation.actors import Act, all_contents
 from fba.persona.observation import observe
 from fba.persona.points.layout import TRACKED, flat_mask, standard_mask, triangles
 from fba.persona.recognition import Recogniser
+from tools.persona.actors import Act, act, all_contents, named_styles
 
 TARGET = Path(__file__).with_name("images") / "persona.jpg"
 SIZE, SCALE = (210, 240), 1.45

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from PIL import Image, ImageDraw
 
 from fba.animation import Animation
 from fba.persona import learn, play
-from fba.persona.evaluation.actors import act
-
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tools"))
-
-import persona_blind_test as blind  # noqa: E402
+from tools.persona import blind_test as blind
+from tools.persona.actors import act
 
 TARGET = Path(__file__).with_name("images") / "persona-styles.jpg"
 SCRIPT = (("E_SURPRISE", 0.9), ("E_HAPPY", 0.9), ("viseme 10 (A:)", 0.9), ("E_SADNESS", 1.0))

@@ -25,7 +25,7 @@ from fba_player.session.puppet import Expression
 from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.ui.panels.puppet_panel import PuppetPanel
-from fba_player.ui.window_picture import SETTLES, Studio, picture
+from tools.window_picture import SETTLES, Studio, picture
 
 SAMPLES = Path(fba.__file__).resolve().with_name("samples")
 SIZE = (1280, 720)

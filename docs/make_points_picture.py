@@ -11,9 +11,9 @@ import fba
 from fba import player
 from fba.arrays import Float64
 from fba.capture.points import from_points
-from fba_conformance.captures.heads import other_head
-from fba_conformance.captures.performances import perform_track
-from fba_conformance.captures.tracked_actor import film
+from tools.captures.heads import other_head
+from tools.captures.performances import perform_track
+from tools.captures.tracked_actor import film
 
 TARGET = Path(__file__).with_name("images") / "capture-points.jpg"
 SIZE = (200, 230)

@@ -87,14 +87,10 @@ fba.live.protocols
 fba.live
 fba.persona.points
 fba.persona.recognition
-fba.persona.training
 fba.persona
-fba.persona.evaluation
 fba_conformance
-fba_conformance.fuzz
 fba_conformance.suite.definitions
 fba_conformance.suite
-fba_conformance.captures
 fba_player.mesh
 fba_player.view
 fba_player.figure

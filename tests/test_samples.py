@@ -18,8 +18,8 @@ from fba.face import resolve
 from fba.formats import merge
 from fba.formats.bvh.reader import read_motion
 from fba.parameters import bap_numbers, baps, fap_numbers, faps
-from fba_conformance.captures.measurement import root_mean_squares
-from fba_conformance.captures.performances import perform_track
+from tools.captures.measurement import root_mean_squares
+from tools.captures.performances import perform_track
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = Path(fba.__file__).parent / "samples"

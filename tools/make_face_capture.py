@@ -13,11 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import fba
-from fba_conformance.captures import damage
-from fba_conformance.captures.heads import other_head
-from fba_conformance.captures.marked_actor import record
-from fba_conformance.captures.marker_files import c3d
-from fba_conformance.captures.performances import perform_track
+from tools.captures import damage
+from tools.captures.heads import other_head
+from tools.captures.marked_actor import record
+from tools.captures.marker_files import c3d
+from tools.captures.performances import perform_track
 
 SAMPLES = Path(fba.__file__).parent / "samples"
 RATE = 50

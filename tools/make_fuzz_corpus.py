@@ -27,9 +27,15 @@ from fba.capture import MarkerMotion  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.live import KINDS  # noqa: E402
 from fba.persona import learn, save_persona  # noqa: E402
-from fba.persona.evaluation.actors import act  # noqa: E402
-from fba_conformance.captures import marker_files, point_files  # noqa: E402
-from fba_conformance.captures.face_files import (  # noqa: E402
+from fba_conformance.small_streams import doubtful_marks, long_streams, small_streams  # noqa: E402
+from gltf_documents import Sheet  # noqa: E402
+from live_senders import vmc_frames, vtube_objects  # noqa: E402
+from mesh_files import ply  # noqa: E402
+from small_bodies import rod  # noqa: E402
+from small_people import write_person  # noqa: E402
+from stored_models import face  # noqa: E402
+from tools.captures import marker_files, point_files  # noqa: E402
+from tools.captures.face_files import (  # noqa: E402
     beat,
     face_angles,
     face_weights,
@@ -40,21 +46,15 @@ from fba_conformance.captures.face_files import (  # noqa: E402
     openface_csv,
     pyfeat_csv,
 )
-from fba_conformance.captures.tracked_actor import film  # noqa: E402
-from fba_conformance.fuzz._small_head import (  # noqa: E402
+from tools.captures.tracked_actor import film  # noqa: E402
+from tools.fuzz._small_head import (  # noqa: E402
     small_head,
     small_head_fdp,
     small_head_obj,
     small_head_wfm,
     small_head_xface,
 )
-from fba_conformance.small_streams import doubtful_marks, long_streams, small_streams  # noqa: E402
-from gltf_documents import Sheet  # noqa: E402
-from live_senders import vmc_frames, vtube_objects  # noqa: E402
-from mesh_files import ply  # noqa: E402
-from small_bodies import rod  # noqa: E402
-from small_people import write_person  # noqa: E402
-from stored_models import face  # noqa: E402
+from tools.persona.actors import act  # noqa: E402
 
 
 def mask(*numbers: int, width: int = 68) -> str:

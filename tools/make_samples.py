@@ -12,9 +12,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from performance import body, bvh, face
-
 import fba
+from performance import body, bvh, face
 
 NAME = "hello"
 

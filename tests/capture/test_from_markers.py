@@ -26,8 +26,8 @@ from fba.face.authoring import author
 from fba.face.feature_points import row_of
 from fba.limits import Limits
 from fba.parameters import faps
-from fba_conformance.captures.marked_actor import NAMES, Take, perform
 from small_head import adult_points, small_head
+from tools.captures.marked_actor import NAMES, Take, perform
 
 TURNED = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """To axes with z up and the actor looking along x."""

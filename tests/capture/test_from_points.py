@@ -20,9 +20,9 @@ from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.formats.face_tables.points_csv import read_points
 from fba.parameters import faps
-from fba_conformance.captures.performances import speech
-from fba_conformance.captures.tracked_actor import PointTake, film
 from small_head import small_head
+from tools.captures.performances import speech
+from tools.captures.tracked_actor import PointTake, film
 
 PER_MILLE = 1024 / 1000
 UNTOLD = (14, 18, 39, 40)

@@ -26,7 +26,7 @@ from fba.face import FaceModel
 from fba.face.feature_points import row_of
 from fba.formats.gltf.moved_head import write_moved_head
 from fba.gltf.reader import read_gltf
-from fba_conformance.captures.marked_actor import perform as act
+from tools.captures.marked_actor import perform as act
 
 UPPER, LOWER = "3.1", "3.3"
 """Middles of the left lids."""

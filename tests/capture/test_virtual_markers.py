@@ -27,8 +27,8 @@ from fba.face import Deformer, FaceModel
 from fba.face.authoring.surface.landmarks import find_landmarks
 from fba.face.feature_points import row_of
 from fba.face.model import Part
-from fba_conformance.captures.marked_actor import Take
-from fba_conformance.captures.marked_actor import perform as act
+from tools.captures.marked_actor import Take
+from tools.captures.marked_actor import perform as act
 
 EXAMPLE = np.array([
     (0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 6), (0, 6, 7), (0, 7, 1), (1, 2, 10), (1, 10, 9), (1, 9, 7),

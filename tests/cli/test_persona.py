@@ -1,4 +1,4 @@
-"""`fba persona`: learn, info, play and evaluate; files that are none, of other versions, or damaged."""
+"""`fba persona`: learn, info and play; files that are none, of other versions, or damaged."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ import fba
 from fba.errors import FormatError, LimitError, UnsupportedError
 from fba.face import FaceModel
 from fba.persona import load_persona, read_recording, write_recording
-from fba.persona.evaluation.actors import Style, act
 from fba.persona.points.layout import PARTS
-from fba_conformance.captures import point_files
-from fba_conformance.captures.tracked_actor import film
+from tools.captures import point_files
+from tools.captures.tracked_actor import film
+from tools.persona.actors import Style, act
 
 Run = Callable[..., tuple[int, str, str]]
 SCRIPT = [("E_HAPPY", 0.6), ("E_HAPPY", 0.9), ("LFAU_27", 0.8), ("UFAU_43", 1.0)]
@@ -218,23 +218,3 @@ def test_damaged_personas(persona: Path, run: Run, tmp_path: Path) -> None:
         archive.writestr("header.json", b" " * 3_000_000)
     with pytest.raises(FormatError, match="header of 3000000 bytes"):
         load_persona(path)
-
-
-def test_evaluate_prints_a_table(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    from fba.persona import evaluation
-
-    def few(**options: object) -> evaluation.Evaluation:
-        assert options == {"users": 1, "seed": 4}
-        row = evaluation.Row("E_HAPPY", 4.0, dict.fromkeys(evaluation.WAYS, 2.0))
-        faces = evaluation.Row("E_HAPPY", 4.0, dict.fromkeys(evaluation.WAYS, 1.0))
-        means = dict.fromkeys(("motion", "curves", "masks"), 0.95)
-        return evaluation.Evaluation((row,), (faces,), means, {}, 0.7, 30, 10)
-
-    monkeypatch.setattr(evaluation, "evaluate", few)
-    code, said, err = run("persona", "evaluate", "--users", 1, "--seed", 4)
-    assert (code, err) == (0, "")
-    for text in ("E_HAPPY", "4.00", "2.00", "50.0 %", "75.0 %", "95.0 %", "0.70 mm"):
-        assert text in said
-    assert said.index("50.0 %") < said.index("75.0 %")  # of motion first, then with the faces at rest
-    report = json.loads(run("persona", "evaluate", "--users", 1, "--seed", 4, "--json")[1])
-    assert (report["reduction"]["masks"], report["reduction_with_rest"]["masks"]) == (0.5, 0.75)

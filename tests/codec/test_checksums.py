@@ -13,10 +13,10 @@ import fba
 from fba import Animation, BitstreamError, Decoder, EncoderOptions, FbaError, FbaWarning
 from fba.codec import Damage, Encoder, probe_stream, verify_stream, write_mark
 from fba_conformance import _motion as motion
-from fba_conformance.look_ahead import random_options
 from fba_conformance.small_streams import doubtful_marks
 from fba_conformance.trace import planes as read_planes
 from fba_conformance.trace import trace
+from tools.look_ahead import random_options
 
 PERIOD = 10
 SECTIONS = EncoderOptions(
@@ -191,7 +191,7 @@ def test_right_streams_match_their_checks() -> None:
     """Planes that had to be moved apart by start codes, empty ones, parts that come and go."""
     from random import Random
 
-    from fba_conformance.look_ahead import random_animation
+    from tools.look_ahead import random_animation
 
     random = Random(8)
     with warnings.catch_warnings():

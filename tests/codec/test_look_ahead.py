@@ -7,7 +7,7 @@ import pytest
 
 from fba import Animation, Encoder, EncoderOptions, FaceTrack, decode, encode
 from fba.parameters import FAP_COUNT, faps
-from fba_conformance.look_ahead import compare, planes_read
+from tools.look_ahead import compare, planes_read
 
 
 def face(values: dict[int, list[int]], *, viseme: bool = False) -> Animation:
@@ -69,7 +69,7 @@ def test_an_i_plane_of_zeros_is_guarded_as_well(start_codes: bool) -> None:
 
 
 def test_random_streams_are_read_alike() -> None:
-    """`python -m fba_conformance.look_ahead` compares as many as one likes."""
+    """`python -m tools.look_ahead` compares as many as one likes."""
     _, planes, differing = compare(500, seed=20)
     assert planes >= 500
     assert differing == []

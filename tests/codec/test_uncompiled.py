@@ -22,8 +22,8 @@ import hashlib, json
 import fba
 from fba import compiled
 from fba_conformance import _motion as motion
-from fba_conformance.fuzz import _engine as fuzz
-from fba_conformance.fuzz.targets import find_target
+from tools.fuzz import _engine as fuzz
+from tools.fuzz.targets import find_target
 from fba_conformance.small_streams import small_streams
 from fractions import Fraction
 

@@ -11,7 +11,7 @@ from test_marker_files import cloud
 
 from fba.errors import FbaWarning, FormatError
 from fba.formats.c3d.reader import read_markers
-from fba_conformance.captures import marker_files
+from tools.captures import marker_files
 
 METRES = {"mm": 1e-3, "m": 1.0, "": 1e-3}
 SAMPLES = ("BTS", "C3DRotationExample", "FP_Type1", "Optotrak", "Qualisys", "Vicon", "read_NOTworking2")

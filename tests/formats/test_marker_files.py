@@ -15,7 +15,7 @@ from fba.capture.markers.motion import MarkerMotion
 from fba.errors import FbaError, FbaWarning, FormatError, LimitError
 from fba.formats import format_of
 from fba.limits import Limits
-from fba_conformance.captures import marker_files
+from tools.captures import marker_files
 
 RATE = Fraction(50)
 

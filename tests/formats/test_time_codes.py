@@ -17,7 +17,7 @@ from fba.formats.time_codes import (
     read_time_codes,
     seconds_between,
 )
-from fba_conformance.captures import marker_files
+from tools.captures import marker_files
 
 
 def times_of(*codes: str) -> tuple[list[float], Fraction, float]:

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 from fba.compiled import is_compiled
-from fba_conformance.fuzz import bounds
-from fba_conformance.fuzz._campaign import Campaign
-from fba_conformance.fuzz._engine import Finding, Report
-from fba_conformance.fuzz.targets import targets
+from tools.fuzz import bounds
+from tools.fuzz._campaign import Campaign
+from tools.fuzz._engine import Finding, Report
+from tools.fuzz.targets import targets
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ROOT / "fba", ROOT / "player" / "fba_player", ROOT / "conformance" / "fba_conformance"
+ROOMS = [ROOT / name for name in ("fba", "player", "conformance", "bench", "tools")]
 needs_machine_code = pytest.mark.skipif(not is_compiled(), reason="nothing is compiled here")
 
 

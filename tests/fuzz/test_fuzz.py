@@ -26,17 +26,17 @@ from fba.face.importers import KINDS as HEADS
 from fba.face.importers import sniff
 from fba.formats.registry import format_of, formats
 from fba.live import KINDS
-from fba_conformance.fuzz import __main__ as program
-from fba_conformance.fuzz import _campaign as campaign
-from fba_conformance.fuzz import _engine as engine
-from fba_conformance.fuzz import _guided as guided
-from fba_conformance.fuzz import _stream_contract as contract
-from fba_conformance.fuzz._minimise import minimise
-from fba_conformance.fuzz._mutation import mutate
-from fba_conformance.fuzz._outcome import ContractError, Outcome
-from fba_conformance.fuzz.corpus import CHECKOUT, read_corpus
-from fba_conformance.fuzz.targets import Target, find_target, targets
 from fba_conformance.small_streams import small_streams
+from tools.fuzz import __main__ as program
+from tools.fuzz import _campaign as campaign
+from tools.fuzz import _engine as engine
+from tools.fuzz import _guided as guided
+from tools.fuzz import _stream_contract as contract
+from tools.fuzz._minimise import minimise
+from tools.fuzz._mutation import mutate
+from tools.fuzz._outcome import ContractError, Outcome
+from tools.fuzz.corpus import CHECKOUT, read_corpus
+from tools.fuzz.targets import Target, find_target, targets
 
 SEED = 20_000
 READERS = [target.name for target in targets() if not (target.random or target.name.startswith("stream"))]
@@ -45,7 +45,7 @@ OWN = "fuzzed_functions"
 """Module with the functions below, for processes that the fuzzer starts."""
 FUNCTIONS = """
 import os, time
-from fba_conformance.fuzz._outcome import Outcome
+from tools.fuzz._outcome import Outcome
 
 def crashes(data, folder):
     if b"{" in data:

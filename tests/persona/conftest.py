@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fba.persona import Persona, learn
-from fba.persona.evaluation.actors import Act, Style, act, all_contents
+from tools.persona.actors import Act, Style, act, all_contents
 
 NAMES = ("E_HAPPY", "LFAU_27", "LFAU_18", "UFAU_2", "UFAU_43", "UFAU_4")
 STYLE = Style(mouth=1.3, brows=1.4, lopsided=0.5)

@@ -11,9 +11,9 @@ import pytest
 from fba.errors import FormatError, ModelError
 from fba.face import FeaturePointFace
 from fba.persona.points.layout import points_of_face
-from fba.persona.training.bosphorus import parse_name, read_cloud, read_database, read_landmarks, read_scan
-from fba.persona.training.classes import class_faps, face_classes
-from fba.persona.training.depth_maps import DepthMap, cut_out_face, fill_holes, find_outline, make_depth_map
+from tools.persona.training.bosphorus import parse_name, read_cloud, read_database, read_landmarks, read_scan
+from tools.persona.training.classes import class_faps, face_classes
+from tools.persona.training.depth_maps import DepthMap, cut_out_face, fill_holes, find_outline, make_depth_map
 
 PIXELS = 4.0
 """Pixels of the picture in a millimetre."""

@@ -10,8 +10,6 @@ import pytest
 
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.persona import LivePersona, Persona, Recogniser, learn, perform, play
-from fba.persona.evaluation import evaluate, mean_reduction
-from fba.persona.evaluation.actors import Act, Style, act
 from fba.persona.learning import prune
 from fba.persona.performance import bridge, find_keys
 from fba.persona.persona import part_width
@@ -19,6 +17,8 @@ from fba.persona.points.distances import mask_distance
 from fba.persona.points.layout import PARTS, part_points
 from fba.persona.recognition.faps import measure_fapu, told_numbers
 from fba.persona.report import make_report
+from tools.persona.actors import Act, Style, act
+from tools.persona.evaluation import evaluate, mean_reduction
 
 NAMES = ("E_HAPPY", "LFAU_27", "LFAU_18", "UFAU_2", "UFAU_43", "UFAU_4", "viseme 10 (A:)", "viseme 14 (U)")
 LIPS = {"left": 12, "right": 13}

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
 from fba.persona import LivePersona, Persona, learn, load_persona, perform, play, save_persona
 from fba.persona import _restyle as restyle
-from fba.persona.evaluation.actors import Act, Style, act, all_contents
 from fba.persona.motion import Motion, Tally, find_gains, flatten, measure_motion
 from fba.persona.points.layout import PARTS, part_vertices, standard_points
 from fba.persona.recognition.faps import face_scale
+from tools.persona import blind_test
+from tools.persona.actors import Act, Style, act, all_contents
 
-TOOL = Path(__file__).parents[2] / "tools" / "persona_blind_test.py"
 NAMES = ("E_HAPPY", "LFAU_27", "LFAU_18", "UFAU_2", "UFAU_4", "viseme 1 (p b m)")
 RATE = 30.0
 CYCLES, AMPLITUDE = 1.5, 4.0
@@ -254,18 +251,7 @@ def test_statistics_come_back_from_a_file(persona: Persona, tmp_path: Path) -> N
     assert load_persona(tmp_path / "old.persona").motions is None
 
 
-@pytest.fixture(scope="module")
-def blind_test() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("persona_blind_test", TOOL)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_moods_are_told_by_motion_and_played_so_that_they_are(blind_test: ModuleType) -> None:
+def test_moods_are_told_by_motion_and_played_so_that_they_are() -> None:
     """The table of docs/persona.md with fewer takes: 90 % is the goal, a third is chance."""
     rows = blind_test.made_up(takes=7, learnt=5, user_takes=2, means=("motion",))
     held_out, acted = rows

@@ -26,7 +26,7 @@ from fba.persona.points.layout import (
 )
 from fba.persona.recognition.faps import mask_faps, measure_fapu
 from fba.persona.rest import find_rest
-from fba_conformance.captures.tracked_actor import film
+from tools.captures.tracked_actor import film
 
 RANDOM = np.random.default_rng(0)
 

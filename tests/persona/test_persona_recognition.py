@@ -13,9 +13,9 @@ from fba.persona.points.layout import PARTS
 from fba.persona.recognition import decide, train
 from fba.persona.recognition.component import DIMENSIONS, ENOUGH, UNITS, find_axes, train_component
 from fba.persona.recognition.network import _loss
-from fba.persona.training import __main__ as training
-from fba.persona.training.classes import class_faps, face_classes, part_classes
-from fba.persona.training.examples import Examples, make_examples
+from tools.persona.training import __main__ as training
+from tools.persona.training.classes import class_faps, face_classes, part_classes
+from tools.persona.training.examples import Examples, make_examples
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_training_writes_only_where_it_is_told(
     def make_none(*_: object) -> Examples:
         raise AssertionError("it must not begin")
 
-    monkeypatch.setattr("fba.persona.training.__main__.make_examples", make_none)
+    monkeypatch.setattr("tools.persona.training.__main__.make_examples", make_none)
     for options, said in (([], "required: -o"), (["-o", str(tmp_path / "no" / "a")], "there is no folder")):
         monkeypatch.setattr("sys.argv", ["training", *options])
         with pytest.raises(SystemExit) as ended:

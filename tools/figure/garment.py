@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import figure
 import numpy as np
 from cutting import Cloth
 from meshes import average_with_neighbours, open_edges, tube
 from subdivide import refine
 
+import figure
 from fba.arrays import Float64, Int64
 from fba.easing import smoothstep
 from fba.mesh.meshes import vertex_normals

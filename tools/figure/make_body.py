@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import clothes
-import figure
 import numpy as np
 import rig
 import shoes
@@ -21,6 +20,7 @@ from cutting import Cloth
 from person import Person
 from sculpt import ORIGIN
 
+import figure
 from fba.arrays import Bool, Float64, Int64
 from fba.body import Skeleton
 from fba.body.model import BodyModel, BodyPart, Material

@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import eyeballs
-import figure
 import garment
 import landmarks
 import lashes
@@ -24,6 +23,7 @@ from meshes import Mesh, mirror
 from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS, ORIGIN
 from subdivide import Refined, refine
 
+import figure
 from fba.arrays import Float64, Int32
 from fba.easing import smoothstep
 from fba.face.authoring import author

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import figure
 import numpy as np
 from subdivide import refine
 
+import figure
 from fba.arrays import Bool, Float64, Int64
 from fba.easing import smoothstep
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bending
-import figure
 import numpy as np
 from person import Person, make_person, reproportion
 
+import figure
 from fba.arrays import Float64, Int64
 from fba.body import Skeleton
 from fba.body.solve.bind_pose import (

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from figure import Surface
 from meshes import sides
 
 from fba.arrays import Bool, Float64, Int64
+from figure import Surface
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from fba.cli.command import Group, examples
 from fba.cli.inputs import EXISTING, input_file
 from fba.cli.marker_options import AspectType
 from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
-from fba.cli.printing import print_json, print_table
+from fba.cli.printing import print_json
 from fba.limits import Limits
 
 if TYPE_CHECKING:
@@ -63,7 +63,6 @@ _fps_option = options.fps_option("Frame rate of recordings that do not say their
         "fba persona learn scene1.csv scene2.csv -o actor.persona --report actor.html",
         "fba persona info actor.persona",
         "fba persona play user.csv --persona actor.persona -o out.fba",
-        "fba persona evaluate",
     ),
 )
 def command() -> None:
@@ -227,36 +226,6 @@ def play_command(
         write(target, animation, format=writing.name, **extra)
     whose = "the user's own way" if persona is None else f"the way of {persona.name}"
     outputs.say(f"{display_name(output)}: {len(animation)} frames in {whose}")
-
-
-@command.command("evaluate", epilog=examples("fba persona evaluate --users 1"))
-@click.option(
-    "--users", type=click.IntRange(1, 20), default=2, show_default=True, help="Users for each actor."
-)
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of actors and users.")
-@options.json_option
-def evaluate_command(users: int, seed: int, as_json: bool) -> None:
-    """Measure how near a Persona brings users to actors whose styles are known.
-
-    Actors and users are made up. The distance of masks, each moved from its rest, falls where a Persona is
-    used; a row for each content. The last rows are for masks with the faces at rest, as in the source.
-    """
-    from fba.persona.evaluation import WAYS, evaluate, mean_reduction
-
-    found = evaluate(users=users, seed=seed)
-    if as_json:
-        print_json(found.to_dict())
-        return
-    columns = ("without", *WAYS)
-    rows = [
-        [row.content, f"{row.own:.2f}", *(f"{row.played[way]:.2f}" for way in WAYS)] for row in found.motion
-    ]
-    for name, some in (("falls by", found.motion), ("with the rest", found.faces)):
-        rows.append([name, "", *(f"{100 * mean_reduction(some, way):.1f} %" for way in WAYS)])
-    agreement = (f"{100 * found.agreement[way]:.1f} %" if way in found.agreement else "" for way in WAYS)
-    rows.append(["class kept", "", *agreement])
-    print_table(columns, rows, "content")
-    click.echo(f"masks of two consecutive frames of an actor: {found.consecutive:.2f} mm")
 
 
 def _read(

@@ -50,8 +50,7 @@ class Recogniser:
 
     @staticmethod
     def default() -> Recogniser:
-        """Return the one that is trained with faces that are made up; `python -m fba.persona.training`
-        makes it."""
+        """Return the one that comes with fba, trained with faces that are made up (docs/persona.md)."""
         return _default()
 
     @staticmethod

@@ -15,8 +15,8 @@ from fba.capture import ActionUnitMotion, ShapeMotion, from_action_units, from_b
 from fba.errors import FbaWarning
 from fba.face import FaceModel
 from fba.parameters import fap_numbers
-from fba_conformance.captures.tracked_actor import film
 from live_senders import captured, vmc_frames
+from tools.captures.tracked_actor import film
 
 COUNT = 40
 RAMP = np.linspace(0, 1, COUNT)

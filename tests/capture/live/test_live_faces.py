@@ -20,7 +20,8 @@ from fba.live import Capture, Summary, find_kind
 from fba.live.recording import StreamPipe, StreamRecorder, stream_rate
 from fba.live.sending import send
 from fba.planning.rate import RateEncoder
-from fba_conformance.captures.face_files import (
+from live_senders import at_rate, captured, vtube_objects
+from tools.captures.face_files import (
     STEP,
     UDP_ORDER,
     camel,
@@ -30,7 +31,6 @@ from fba_conformance.captures.face_files import (
     ifacialmocap_records,
     livelink_udp,
 )
-from live_senders import at_rate, captured, vtube_objects
 
 ROWS = 60
 WEIGHTS, ANGLES = face_weights(ROWS), face_angles(ROWS)

@@ -23,8 +23,8 @@ from fba.errors import FormatError
 from fba.live import StreamFile, StreamRecorder
 from fba.live.recording import StreamPipe
 from fba.tracks import BodyTrack, FaceTrack
-from fba_conformance.captures.face_files import datagram
 from started_programs import started
+from tools.captures.face_files import datagram
 
 FRAMES = 40
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import fba
-from fba_conformance.captures.face_files import ANGLES, UDP_ORDER, livelink_csv, openface_csv
+from tools.captures.face_files import ANGLES, UDP_ORDER, livelink_csv, openface_csv
 
 ROWS = 90
 

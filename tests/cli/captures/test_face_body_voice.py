@@ -13,8 +13,8 @@ import pytest
 
 import fba
 from fba import Animation
-from fba_conformance.captures.face_files import ANGLES, UDP_ORDER, livelink_csv
 from sound_clicks import write_click
+from tools.captures.face_files import ANGLES, UDP_ORDER, livelink_csv
 
 Run = Callable[..., Any]
 START = 67_739.5

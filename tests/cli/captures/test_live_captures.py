@@ -16,7 +16,7 @@ import fba.live.receiver
 from fba.face.resolve import resolve
 from fba.live import Receiver
 from fba.parameters import fap_numbers
-from fba_conformance.captures.face_files import datagram
+from tools.captures.face_files import datagram
 
 Run = Callable[..., Any]
 Arriving = Callable[[list[bytes]], None]

@@ -15,8 +15,8 @@ import pytest
 
 import fba
 from fba.face import FaceModel
-from fba_conformance.captures import marker_files
-from fba_conformance.captures.marked_actor import Take, perform
+from tools.captures import marker_files
+from tools.captures.marked_actor import Take, perform
 
 Run = Callable[..., Any]
 

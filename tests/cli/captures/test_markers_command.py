@@ -17,9 +17,9 @@ from fba.capture.markers.targets import target_points
 from fba.capture.virtual_markers import perform, read_head, read_mapping
 from fba.face.feature_points import names, row_of
 from fba.formats.gltf.moved_head import write_moved_head
-from fba_conformance.captures.marker_files import wide
 from mesh_files import write_obj
 from small_head import small_head
+from tools.captures.marker_files import wide
 
 Run = Callable[..., Any]
 MARKED = ("2.1", "2.10", "4.1", "4.2", "5.1", "5.2", "8.1", "8.2", "8.3", "8.4", "9.3", "11.1", "11.2",

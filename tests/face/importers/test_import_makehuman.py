@@ -13,7 +13,6 @@ from fba.face.checks import check_neutral
 from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
-from fba.face.importers.makehuman._targets import expression_shapes, read_target, shape_of
 from fba.face.importers.makehuman.makehuman import read_makehuman
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers
@@ -147,30 +146,3 @@ def test_broken_fitted_eyes_are_named(folder: Path, tmp_path: Path) -> None:
         (tmp_path / "high-poly.mhclo").write_text(text.replace(old, new, 1))
         with pytest.raises(ModelError, match=words):
             read_makehuman(tmp_path)
-
-
-def test_targets_move_the_head(folder: Path, tmp_path: Path) -> None:
-    head = read_makehuman(folder)
-    count = len(head.base.vertices)
-    file = folder / "expression-units/eyebrows-left-inner-up.target"
-    moved = read_target(file, count)
-    # the file's own line for the inner end of the left brow
-    np.testing.assert_allclose(moved[6983], [-0.011, 0.05, 0.006])
-    skin = shape_of(head, moved)["skin"]
-    row = row_of()
-    np.testing.assert_allclose(skin[head.bound[row["4.1"]]], [-0.0011, 0.005, 0.0006], atol=1e-7)
-    assert np.abs(skin[head.bound[row["4.2"]]]).max() < 1e-6
-    shapes = expression_shapes(head)
-    assert len(shapes) == 34
-    # an opening mouth takes lower teeth and tongue along
-    assert {"skin", "lower teeth", "tongue"} <= set(shapes["mouth-open"])
-    bad = tmp_path / "bad.target"
-    for text, words in (
-        ("1 2 3\n", ":1: a vertex and three numbers"),
-        ("99999999 0 0 0\n", ":1: vertex 99999999"),
-        ("1 0 0 nan\n", ":1: a coordinate"),
-        ("# nothing\n", "moves no vertex"),
-    ):
-        bad.write_text(text)
-        with pytest.raises(ModelError, match=words):
-            read_target(bad, count)

@@ -17,7 +17,7 @@ from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats import format_of
 from fba.formats.face_tables import openface, pyfeat
 from fba.parameters import fap_numbers
-from fba_conformance.captures.face_files import openface_csv, pyfeat_csv
+from tools.captures.face_files import openface_csv, pyfeat_csv
 
 ROWS = 30
 WAVE = 0.5 - 0.5 * np.cos(np.linspace(0, 6, ROWS))

@@ -16,7 +16,7 @@ from fba.formats import format_of
 from fba.formats.face_tables import ifacialmocap, shapes_json
 from fba.formats.face_tables import livelink_csv as tables
 from fba.formats.face_tables import livelink_udp as packets
-from fba_conformance.captures.face_files import (
+from tools.captures.face_files import (
     STEP,
     beat,
     camel,

@@ -12,7 +12,7 @@ from fba.arrays import Float64
 from fba.errors import FbaWarning, FormatError, LimitError, OptionError
 from fba.formats.face_tables.livelink_csv import read_face
 from fba.parameters import fap_numbers
-from fba_conformance.captures.face_files import (
+from tools.captures.face_files import (
     ANGLES,
     STEP,
     UDP_ORDER,

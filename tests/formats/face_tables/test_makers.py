@@ -20,8 +20,8 @@ from fba.formats import format_of
 from fba.formats.face_tables import openface, pyfeat, shapes_json
 from fba.formats.face_tables.livelink_csv import read_face
 from fba.parameters import fap_numbers
-from fba_conformance.captures.face_files import ANGLES, camel, face_angles, face_weights, livelink_csv
-from fba_conformance.captures.tracked_actor import film
+from tools.captures.face_files import ANGLES, camel, face_angles, face_weights, livelink_csv
+from tools.captures.tracked_actor import film
 
 ROWS = 48
 WEIGHTS = {camel(name): values for name, values in face_weights(ROWS).items()}

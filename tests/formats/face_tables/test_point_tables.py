@@ -20,8 +20,8 @@ from fba.face import FaceModel
 from fba.formats import format_of
 from fba.formats.face_tables import pyfeat
 from fba.formats.face_tables.points import read_points
-from fba_conformance.captures.face_files import openface_csv, pyfeat_csv
-from fba_conformance.captures.point_files import (
+from tools.captures.face_files import openface_csv, pyfeat_csv
+from tools.captures.point_files import (
     LAYOUTS,
     array,
     arrays,
@@ -32,7 +32,7 @@ from fba_conformance.captures.point_files import (
     openpose_frames,
     wide,
 )
-from fba_conformance.captures.tracked_actor import film
+from tools.captures.tracked_actor import film
 
 FRAMES = 12
 

@@ -16,7 +16,7 @@ from fba.capture.points import PointMotion
 from fba.errors import FormatError
 from fba.face import FaceModel
 from fba.formats.face_tables.points import read_points
-from fba_conformance.captures.tracked_actor import film
+from tools.captures.tracked_actor import film
 
 FRAMES = 6
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fba_player.ui.window_picture import Studio
+    from tools.window_picture import Studio
 
 
 class StudioHand:

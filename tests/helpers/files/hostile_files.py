@@ -489,7 +489,7 @@ NAMES = '[{"t":-1,"jawOpen":0,"mouthClose":0,"eyeBlinkLeft":0,"eyeBlinkRight":0,
 
 
 def _faces() -> dict[str, HostileFile]:
-    from fba_conformance.captures.face_files import datagram, face_weights, livelink_csv
+    from tools.captures.face_files import datagram, face_weights, livelink_csv
 
     def frames(size: int) -> bytes:
         return b"".join(datagram([0.2] * 61, 2 + number / 60) for number in range(size // 320))
@@ -541,7 +541,7 @@ def read_markers(path: Path) -> object:
 
 def _markers() -> dict[str, HostileFile]:
     from fba.capture.markers.motion import MarkerMotion
-    from fba_conformance.captures.marker_files import c3d, qualisys, trc
+    from tools.captures.marker_files import c3d, qualisys, trc
 
     def take(markers: int, frames: int) -> MarkerMotion:
         positions = np.full((frames, markers, 3), 0.5)

@@ -20,7 +20,7 @@ from studio_hand import panel_of
 graphics.imported("imgui_bundle")
 
 from fba_player.ui.panels._differences_panel import DifferencesPanel, thin_curve  # noqa: E402 - needs imgui
-from fba_player.ui.window_picture import Studio  # noqa: E402
+from tools.window_picture import Studio  # noqa: E402
 
 SIZE = (900, 640)
 

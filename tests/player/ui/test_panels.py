@@ -19,7 +19,7 @@ from set_clock import Clock
 
 imgui = graphics.imported("imgui_bundle").imgui
 
-from fba_player.ui.window_picture import Studio  # noqa: E402 - needs imgui
+from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (900, 600)
 

@@ -24,7 +24,7 @@ from studio_hand import StudioHand, panel_of
 graphics.imported("imgui_bundle")
 
 from fba_player.ui.panels._puppet_emotion import DOT, LABEL, place_labels  # noqa: E402 - needs imgui
-from fba_player.ui.window_picture import Studio  # noqa: E402 - needs imgui
+from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 BROW = 30
 

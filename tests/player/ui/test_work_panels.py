@@ -21,7 +21,7 @@ from studio_hand import StudioHand, panel_of
 
 imgui = graphics.imported("imgui_bundle").imgui
 
-from fba_player.ui.window_picture import Studio  # noqa: E402 - needs imgui
+from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (1000, 640)
 

@@ -27,8 +27,8 @@ from small_head import small_head
 glfw = graphics.imported("glfw")
 graphics.imported("imgui_bundle")
 
-from fba_player.ui.window_picture import Studio  # noqa: E402 - needs imgui
 from fba_player.window.map_markers import check_window, open_markers  # noqa: E402
+from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (900, 560)
 MARKED = ("2.1", "2.10", "4.1", "4.2", "5.1", "5.2", "8.1", "8.2", "8.3", "8.4", "9.3", "11.1", "11.2",

@@ -24,8 +24,8 @@ from small_head import small_head
 glfw = graphics.imported("glfw")
 graphics.imported("imgui_bundle")
 
-from fba_player.ui.window_picture import Studio  # noqa: E402 - needs imgui
 from fba_player.window.place_points import check_window, open_placement  # noqa: E402
+from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (640, 480)
 
