@@ -12,7 +12,7 @@ from fba.arrays import Float32, Float64, Intp
 from fba.mesh.meshes import vertex_normals
 from fba_player.figure.face import FaceFigure, build_figure
 from fba_player.mesh.textures import linear_light
-from fba_player.playback.capture_times import CaptureTimes
+from fba_player.playback.timeline import CaptureTimes
 from fba_player.scene._fap_heatmap import GLOSS, SHADES, heat_colours
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.scene.placement_scene import LIGHT, plain_shape
