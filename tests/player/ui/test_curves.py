@@ -13,7 +13,7 @@ from fba.animation import Animation, FaceTrack
 from fba.parameters import faps
 from fba_player.playback.timeline import Timeline
 from fba_player.ui.panels._curve_data import BLOCK, SHORTEST, Courses, TimeZoom, amount, envelope
-from fba_player.ui.panels._parameter_chooser import search_parameters
+from fba_player.ui.panels._curves_panel import search_parameters
 from player_tracks import body_track, face_track
 
 
