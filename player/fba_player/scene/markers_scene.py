@@ -32,13 +32,13 @@ RADIUS, CENTRE_RADIUS, CURRENT_RADIUS = 4.2, 2.6, 6.0
 """Of dots, pixels in a picture 720 high."""
 LIFT = 0.006
 """Metres of skin through which dots are seen."""
-GRAB = 10.0
+MAX_CLICK_DISTANCE = 10.0
 """Pixels, in a picture 720 high, from a dot within which a click means it."""
-APART = 0.35
+CLOUD_GAP = 0.35
 """Room between cloud and head, as a share of the head's width."""
 ROOM = 1.2
 """Room beside head and cloud for a head that turns and moves, as a factor of the way between them."""
-FOLLOWED = 0.3
+MIN_FOLLOWED_TRAVEL = 0.3
 """Metres that a head moves before the camera follows it."""
 
 
@@ -88,7 +88,9 @@ class MarkersScene(Timed[CaptureTimes]):
     def travel(self, time: float) -> tuple[float, float, float]:
         """How far the head has gone, metres; zeros for one that stays about where it is."""
         made = self.editing.performance
-        if made is None or float(np.ptp(made.shift, axis=0).max()) * self.editing.head.metres < FOLLOWED:
+        if made is None:
+            return 0.0, 0.0, 0.0
+        if float(np.ptp(made.shift, axis=0).max()) * made.head.metres < MIN_FOLLOWED_TRAVEL:
             return 0.0, 0.0, 0.0
         frame, after, share = self.timeline.position(time)
         middle = made.head.vertices[made.head.face].mean(axis=0)
@@ -126,7 +128,7 @@ class MarkersScene(Timed[CaptureTimes]):
         pixels = _pixels(np.concatenate(places), camera, size) if places else np.zeros((0, 2))
         away = np.linalg.norm(pixels - (x, y), axis=1)
         away[np.isnan(away)] = np.inf
-        reach = GRAB * size[1] / 720
+        reach = MAX_CLICK_DISTANCE * size[1] / 720
         if not len(away) or away.min() > reach:
             return None
         return found[int(away.argmin())]
@@ -166,7 +168,7 @@ class MarkersScene(Timed[CaptureTimes]):
     def _beside(self) -> Float64:
         """(3,) way from the head to the cloud beside it, metres."""
         low, high = self._box
-        return np.array([-(1 + APART) * float(high[0] - low[0]), 0.0, 0.0])
+        return np.array([-(1 + CLOUD_GAP) * float(high[0] - low[0]), 0.0, 0.0])
 
     @cached_property
     def _rest_normals(self) -> Float32:

@@ -24,11 +24,11 @@ INSIDE = ("7.1", "11.5")
 """Points on no surface, which the importer works out: they are not asked for."""
 MATES = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 """The point on the other side, of those that have one."""
-TOUCHING = 0.002
+TOUCHING_DISTANCE = 0.002
 """Vertices this much further than the nearest, as a share of the head's height, may be meant as well: lips
 touch, and the side that the skin faces tells them apart."""
-FEWEST_FOR_GUESS = 4
-"""Points from which the place of another is guessed at least."""
+MIN_POINTS_FOR_GUESS = 4
+"""Least number of placed points from which the place of another is guessed."""
 
 Place = int | tuple[float, float, float]
 """Where a point is: a vertex by its number in the file, or a position in the file's axes."""
@@ -135,7 +135,7 @@ class PointPlacement(HandEditing[dict[str, Place]]):
     def guess(self) -> Float64 | None:
         """(3,) the vertex about where the current point is, from those that have a place; None if too few."""
         known = [name for name in self.names if name in self.places]
-        if len(known) < FEWEST_FOR_GUESS:
+        if len(known) < MIN_POINTS_FOR_GUESS:
             return None
         rows = [row_of()[name] for name in known]
         adult, here = neutral_points()[rows], self.positions()[rows]
@@ -188,7 +188,7 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         away = np.linalg.norm(vertices - wanted, axis=1)
         if not isinstance(place, int):
             return int(self._used[int(away.argmin())])
-        near = np.flatnonzero(away <= away.min() + TOUCHING * float(np.ptp(vertices[:, 1])))
+        near = np.flatnonzero(away <= away.min() + TOUCHING_DISTANCE * float(np.ptp(vertices[:, 1])))
         facing = self._normals[self._used[near]] @ (self._normals[place] * flip)
         same = near[facing >= facing.max() - 0.2]
         return int(self._used[same[int(away[same].argmin())]])
