@@ -15,7 +15,7 @@ from fba_player.mesh.textures import linear_light
 from fba_player.playback.timeline import CaptureTimes
 from fba_player.scene._fap_heatmap import GLOSS, SHADES, heat_colours
 from fba_player.scene.marker_editing import MarkerEditing
-from fba_player.scene.placement_scene import LIGHT, plain_shape
+from fba_player.scene.placement_scene import fit_box, make_dots, plain_mesh, plain_shape
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.geometry import first_hit, ray_through, rotation_vector, translation, unit_rows
 from fba_player.view.protocols import Timed
@@ -231,8 +231,7 @@ class MarkersScene(Timed[CaptureTimes]):
         for part, rows, shape in zip(head.parts, head.rows, self._shapes(self._plain_shapes), strict=True):
             assert part.normals is not None
             normals = unit_rows((part.normals + changes[rows]) @ pose[:3, :3].T).astype(np.float32)
-            light = np.tile(np.array(LIGHT, dtype=np.float32), (len(rows), 1))
-            meshes.append(FaceMesh(shape, world[rows], normals, light, np.eye(4), np.zeros(3), np.zeros(3)))
+            meshes.append(plain_mesh(shape, world[rows], normals))
         return meshes, []
 
     def _shapes(self, plain: list[FaceShape]) -> list[FaceShape]:
@@ -314,19 +313,18 @@ class MarkersScene(Timed[CaptureTimes]):
             if self.shows_cloud and source in at:
                 ends = np.stack([at[source], world[centre.vertex]])[None]
                 lines = (Lines(ends.astype(np.float32), LINE, 1.2, LIFT),)
-        return tuple(_make_dots(*group) for group in groups if len(group[0])), lines
+        dots = tuple(
+            make_dots(points, (name,) * len(points), colour, radius, LIFT)
+            for points, colour, radius, name in groups
+            if len(points)
+        )
+        return dots, lines
 
     @property
     def _subject(self) -> Subject:
         """What the camera is fitted to: the head, and the cloud if it is beside it."""
         figure = self._figure
-        if figure is not None:
-            subject = figure.subject
-        else:
-            low, high = self._box
-            x, y, z = ((low + high) / 2).tolist()
-            wide, tall, deep = ((high - low) / 2).tolist()
-            subject = Subject((x, y, z), tall * 1.05, max(wide, deep), deep)
+        subject = figure.subject if figure is not None else fit_box(*self._box)
         if not (self.editing.beside and self.shows_cloud):
             return subject
         x, y, z = subject.centre
@@ -346,10 +344,3 @@ def _pixels(points: Float64, camera: Camera, size: tuple[int, int]) -> Float64:
     clip[clip[:, 3] < 1e-6] = np.nan
     pixels: Float64 = (clip[:, :2] / clip[:, 3:] * (0.5, -0.5) + 0.5) * size
     return pixels
-
-
-def _make_dots(points: Float64, colour: Colour, radius: float, name: str) -> Dots:
-    count = len(points)
-    facing = np.zeros((count, 3), dtype=np.float32)
-    names = (name,) * count
-    return Dots(points.astype(np.float32), colour, radius, LIFT, names, facing)
