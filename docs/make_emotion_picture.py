@@ -9,8 +9,9 @@ from PIL import Image, ImageDraw
 
 from fba import Animation, FaceTrack, emotion
 from fba.arrays import Float32
-from fba_player.export.contact_sheet import FAINT, PAPER, SPACE, TEXT, close_up
+from fba_player.export.contact_sheet import close_up
 from fba_player.export.offscreen import Offscreen
+from fba_player.export.sheet_layout import FAINT, PAPER, TEXT, lay_out
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera
 from fba_player.view.font import label_font
@@ -29,18 +30,15 @@ MIXTURES = (
 
 def sheet(tiles: Sequence[tuple[str, str, Float32]], columns: int, size: int = TILE) -> Image.Image:
     """Faces with a name and a note below each."""
-    rows = -(-len(tiles) // columns)
     letters = 15
-    height = size + 2 * letters + 14
-    page = Image.new("RGB", (columns * (size + SPACE) + SPACE, rows * (height + SPACE) + SPACE), PAPER)
+    layout = lay_out(len(tiles), (size, size + 2 * letters + 14), columns)
+    page = Image.new("RGB", layout.size, PAPER)
     draw = ImageDraw.Draw(page)
     font, small = label_font(letters), label_font(letters * 0.85)
     scene = Scene(Animation(25, np.arange(1), FaceTrack.empty(1)))
     with Offscreen(scene, (size, size), samples=4) as view:
         view.camera = Camera(yaw=YAW).fit(close_up("face", scene), 1.0)
-        for number, (name, note, faps) in enumerate(tiles):
-            x = SPACE + number % columns * (size + SPACE)
-            y = SPACE + number // columns * (height + SPACE)
+        for (name, note, faps), (x, y) in zip(tiles, layout.corners, strict=True):
             page.paste(Image.fromarray(view.still(faps)[..., :3]), (x, y))
             draw.text((x + 3, y + size + 2), name, font=font, fill=TEXT)
             draw.text((x + 3, y + size + letters + 7), note, font=small, fill=FAINT)

@@ -15,6 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 from fba.animation import Animation
 from fba.arrays import Float64, UInt8
 from fba.capture.comparison import Stick
+from fba_player.export.sheet_layout import lay_out
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.view import View
@@ -60,19 +61,18 @@ def draw_sheet(animation: Animation, sights: Sequence[Sight], headline: str, gra
     animation: the result, decoded. headline, grade: of the whole.
     """
     width, height = TILE
-    head, caption = 44, 52
-    columns = min(len(sights), 2) or 1
-    rows = -(-len(sights) // columns)
-    sheet = Image.new("RGB", (columns * 2 * width, head + rows * (height + caption)), PAPER)
+    caption = 52
+    cell = (2 * width, height + caption)
+    layout = lay_out(len(sights), cell, min(len(sights), 2) or 1, space=0, top=44)
+    sheet = Image.new("RGB", layout.size, PAPER)
     draw = ImageDraw.Draw(sheet)
     draw.text((14, 10), headline, GRADES[grade], font=_font(20))
     assert animation.body is not None
     frames = [sight.frame for sight in sights]
     chosen = replace(animation.body, values=animation.body.values[frames], mask=animation.body.mask[frames])
     scene = Scene(Animation(Fraction(1), np.arange(max(len(frames), 1)), body=chosen)) if frames else None
-    for number, sight in enumerate(sights):
+    for number, (sight, (x, y)) in enumerate(zip(sights, layout.corners, strict=True)):
         assert scene is not None
-        x, y = number % columns * 2 * width, head + number // columns * (height + caption)
         view = scene.view_at(float(number))
         for offset, picture in zip((0, width), _draw_pair(view, sight), strict=True):
             sheet.paste(picture, (x + offset, y + caption))

@@ -16,6 +16,7 @@ from fba.face.model import FaceModel, point_row
 from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
 from fba.tracks import FaceTrack
 from fba_player.export.offscreen import Offscreen
+from fba_player.export.sheet_layout import FAINT, PAPER, TEXT, check_tile, lay_out
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.font import label_font, shortened
@@ -25,10 +26,8 @@ SHEETS = ("faps", "visemes", "expressions", "all", "review")
 COLUMNS = {"faps": 11, "visemes": 7, "expressions": 3, "review": 8}
 TILE = {"faps": (160, 160), "visemes": (220, 220), "expressions": (360, 360), "review": (200, 200)}
 """Columns, and width and height of a picture in pixels."""
-TEXT, FAINT, PAPER = (232, 235, 240), (158, 165, 175), (34, 37, 43)
-SPACE = 4
-"""Pixels between pictures."""
 FULL = 63
+"""Intensity of the expressions, the greatest that a stream can state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,19 +48,20 @@ class Tile:
 def contact_sheet(
     what: str = "all", model: FaceModel | None = None, *, tile: tuple[int, int] | None = None
 ) -> UInt8:
-    """Draw a sheet of labelled pictures: uint8 (H, W, 3), sRGB.
+    """Return a sheet of labelled pictures: uint8 (H, W, 3), sRGB.
 
     what: "faps", each of the 66 at a value and from a side that show it well; "visemes", the 14;
     "expressions", the 6 at full intensity; "all", one sheet below the other; "review", what shows whether a
     head was imported well: at rest, the main motions, visemes and expressions. model: the face, by default
     the built-in head. tile: width and height of one picture in pixels.
 
-    Raises ValueError for another name or a size below 16, DisplayError where there is no OpenGL.
+    Raises ValueError for another name, pictures below 16x16 or a sheet that would be too large, DisplayError
+    where there is no OpenGL.
     """
     if what not in SHEETS:
         raise ValueError(f"no contact sheet {what!r}; there are {', '.join(SHEETS)}")
-    if tile is not None and min(tile) < 16:
-        raise ValueError(f"a picture of a contact sheet must have at least 16x16 pixels, not {tile}")
+    if tile is not None:
+        check_tile(tile)
     kinds = SHEETS[:3] if what == "all" else (what,)
     scene = Scene(Animation(Fraction(25), np.arange(1), FaceTrack.empty(1)), model or FaceModel.default())
     sheets = [_sheet(scene, kind, tile or TILE[kind]) for kind in kinds]
@@ -77,7 +77,7 @@ def contact_sheet(
 
 
 def tiles(kind: str, scene: Scene) -> list[Tile]:
-    """The pictures of a sheet: "faps", "visemes", "expressions" or "review"."""
+    """Return the pictures of a sheet: "faps", "visemes", "expressions" or "review"."""
     if kind == "faps":
         return list(_fap_tiles())
     if kind == "review":
@@ -123,9 +123,9 @@ def _review_tiles() -> tuple[Tile, ...]:
 
 
 def close_up(view: str, scene: Scene) -> Subject:
-    """The subject of a close-up: "face", or a part of it such as "mouth", by the model's feature points.
+    """Return the subject of a close-up: "face", or a part of it such as "mouth".
 
-    Without those points it is the face.
+    Parts are where the model's feature points are; without those points the subject is the face.
     """
     face = scene.face_subject
     unit = scene.model.fapu
@@ -158,18 +158,15 @@ def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> UInt8:
     from PIL import Image, ImageDraw
 
     shown = tiles(kind, scene)
-    columns = COLUMNS[kind]
-    rows = -(-len(shown) // columns)
     width, height = size
     letters = max(min(width // 12, 16), 7)
     line = round(letters * 1.35)
-    step = (width + SPACE, height + 2 * line + SPACE + 4)
-    sheet = Image.new("RGB", (columns * step[0] + SPACE, rows * step[1] + SPACE), PAPER)
+    layout = lay_out(len(shown), (width, height + 2 * line + 4), COLUMNS[kind])
+    sheet = Image.new("RGB", layout.size, PAPER)
     draw = ImageDraw.Draw(sheet)
     font, small = label_font(letters), label_font(letters * 0.9)
     with Offscreen(scene, size, samples=4) as view:
-        for number, one in enumerate(shown):
-            x, y = SPACE + number % columns * step[0], SPACE + number // columns * step[1]
+        for one, (x, y) in zip(shown, layout.corners, strict=True):
             subject = close_up(one.view, scene)
             view.camera = Camera(yaw=one.yaw, pitch=one.pitch).fit(subject, width / height)
             sheet.paste(Image.fromarray(view.still(one.faps)[..., :3]), (x, y))

@@ -12,6 +12,7 @@ from fba.arrays import UInt8
 from fba.errors import RangeError
 from fba_player.export.offscreen import Offscreen
 from fba_player.export.render import as_scene, check_inside
+from fba_player.export.sheet_layout import FAINT, PAPER, TEXT, check_tile, lay_out
 from fba_player.playback.timeline import timecode
 from fba_player.view.camera import Camera
 from fba_player.view.font import label_font, shortened
@@ -21,14 +22,8 @@ Progress = Callable[[int, int], None]
 
 TILE = (320, 240)
 """Default width and height of one picture in pixels."""
-SHAPE = 16 / 10
-"""Width / height that a sheet should have."""
-MOST_PIXELS = 200_000_000
-SMALLEST = 16
 SAMPLES = 4
-TEXT, FAINT, PAPER = (232, 235, 240), (158, 165, 175), (34, 37, 43)
-SPACE = 4
-"""Pixels between pictures."""
+"""Samples of each pixel, which smooth edges."""
 
 
 def film_sheet(
@@ -41,7 +36,7 @@ def film_sheet(
     end: float | None = None,
     progress: Progress | None = None,
 ) -> UInt8:
-    """Draw a sheet of frames of an animation with their time codes: uint8 (H, W, 3), sRGB.
+    """Return a sheet of frames of an animation with their time codes: uint8 (H, W, 3), sRGB.
 
     count: number of frames, including the first and the last; at most all. tile: width and height of one
     picture in pixels, by default 320x240. camera: as in `Offscreen`. start, end: the part to show, in
@@ -54,25 +49,13 @@ def film_sheet(
     size = tile or TILE
     if count < 1:
         raise ValueError(f"a contact sheet has at least one picture, not {count}")
-    if min(size) < SMALLEST:
-        raise ValueError(f"a picture of a contact sheet must have at least 16x16 pixels, not {size}")
+    check_tile(size)
     frames = choose_frames(scene, count, start, end)
-    width, height = size
-    letters = max(min(width // 20, 16), 7)
-    step = (width + SPACE, height + round(letters * 1.6) + SPACE)
-    columns = choose_columns(len(frames), step)
-    rows = -(-len(frames) // columns)
-    sheet_size = (columns * step[0] + SPACE, rows * step[1] + SPACE)
-    if sheet_size[0] * sheet_size[1] > MOST_PIXELS:
-        raise ValueError(
-            f"{len(frames)} pictures of {width}x{height} make a sheet of {sheet_size[0]}x{sheet_size[1]} "
-            "pixels, too large to be one: choose fewer, or a smaller size"
-        )
-    return _draw_sheet(scene, frames, size, camera, (columns, *sheet_size, letters), progress)
+    return _draw_sheet(scene, frames, size, camera, progress)
 
 
 def choose_frames(scene: Showable, count: int, start: float | None, end: float | None) -> list[int]:
-    """Choose frames at even distances in time: positions in the animation, ascending, without repeats."""
+    """Return frames at even distances in time: positions in the animation, ascending, without repeats."""
     timeline = scene.timeline
     times = np.array([float(timeline.time_of(frame)) for frame in range(timeline.frames)])
     for name, value in (("start", start), ("end", end)):
@@ -95,40 +78,31 @@ def choose_frames(scene: Showable, count: int, start: float | None, end: float |
     return [int(frame) for frame in np.unique(nearer)]
 
 
-def choose_columns(count: int, step: tuple[int, int]) -> int:
-    """Number of columns for a sheet a little wider than high, with few empty cells. step: size of a cell."""
-    ideal = math.sqrt(count * SHAPE * step[1] / step[0])
-    candidates = range(max(math.floor(ideal * 0.8), 1), min(math.ceil(ideal * 1.3), count) + 1)
-    return min(candidates or (count,), key=lambda columns: (-count % columns / count, abs(columns - ideal)))
-
-
 def _draw_sheet(
     scene: Showable,
     frames: list[int],
     size: tuple[int, int],
     camera: Camera | str | None,
-    layout: tuple[int, int, int, int],
     progress: Progress | None,
 ) -> UInt8:
     from PIL import Image, ImageDraw
 
-    columns, wide, high, letters = layout
-    sheet = Image.new("RGB", (wide, high), PAPER)
+    width, height = size
+    letters = max(min(width // 20, 16), 7)
+    layout = lay_out(len(frames), (width, height + round(letters * 1.6)))
+    sheet = Image.new("RGB", layout.size, PAPER)
     draw = ImageDraw.Draw(sheet)
     font = label_font(letters)
-    line = round(letters * 1.6)
     with Offscreen(scene, size, camera, samples=SAMPLES) as view:
-        for number, frame in enumerate(frames):
-            x = SPACE + number % columns * (size[0] + SPACE)
-            y = SPACE + number // columns * (size[1] + line + SPACE)
+        for number, (frame, (x, y)) in enumerate(zip(frames, layout.corners, strict=True)):
             time = scene.timeline.time_of(frame)
             sheet.paste(Image.fromarray(view.frame(float(time))[..., :3]), (x, y))
             code, where = timecode(float(time), scene.timeline.rate), f"frame {frame}"
-            below = y + size[1] + 1
-            draw.text((x + 2, below), shortened(draw, code, font, size[0]), font=font, fill=TEXT)
-            room = size[0] - draw.textlength(code, font=font) - draw.textlength(where, font=font)
+            below = y + height + 1
+            draw.text((x + 2, below), shortened(draw, code, font, width), font=font, fill=TEXT)
+            room = width - draw.textlength(code, font=font) - draw.textlength(where, font=font)
             if room > 2 * letters:
-                draw.text((x + size[0] - 2, below), where, font=font, fill=FAINT, anchor="ra")
+                draw.text((x + width - 2, below), where, font=font, fill=FAINT, anchor="ra")
             if progress is not None:
                 progress(number + 1, len(frames))
     return np.asarray(sheet)

@@ -23,13 +23,14 @@ from fba_player.view.protocols import Showable
 
 WIDTH, SHAPE = 480, 4 / 3
 """Width of the film in pixels, and width / height."""
-SECONDS = Fraction(15)
+MAX_FILM_SECONDS = Fraction(15)
 """Longest film: longer ones would make the page large, and the reader wait."""
 RATE = Fraction(30)
 """Most frames per second."""
-MOST_BYTES = 4 << 20
+MAX_FILM_BYTES = 4 << 20
 """Size of a film above which the page gets a still picture instead."""
-NARROWEST = 16
+MIN_WIDTH = 16
+"""Least width of a preview in pixels."""
 
 
 class Preview:
@@ -53,8 +54,8 @@ class Preview:
         audio: PathLike | None = None,
         audio_offset: float = 0.0,
     ) -> None:
-        if width < NARROWEST:
-            raise ValueError(f"a preview is at least {NARROWEST} pixels wide, not {width}")
+        if width < MIN_WIDTH:
+            raise ValueError(f"a preview is at least {MIN_WIDTH} pixels wide, not {width}")
         for name, value in (("start", start), ("end", end)):
             if value is not None and not math.isfinite(value):
                 raise ValueError(f"{name} must be a finite number of seconds, not {value}")
@@ -99,11 +100,11 @@ class Preview:
         begin, end = scene.timeline.start, scene.timeline.end
         begin = begin if self._start is None else max(Fraction(self._start), begin)
         end = end if self._end is None else min(Fraction(self._end), end)
-        last = min(end, begin + SECONDS)
+        last = min(end, begin + MAX_FILM_SECONDS)
         note = ""
         if last < end:
             note = (
-                f"Shown are {float(SECONDS):g} s from {clock_text(begin)} on. "
+                f"Shown are {float(MAX_FILM_SECONDS):g} s from {clock_text(begin)} on. "
                 "player.Preview(clip, start=...) shows others, player.render(clip, 'clip.mp4') all."
             )
         with tempfile.TemporaryDirectory(prefix="fba-") as folder:
@@ -113,7 +114,7 @@ class Preview:
                 start=float(begin), end=float(last), audio=self._audio, audio_offset=self._audio_offset,
             )  # fmt: skip
             data = path.read_bytes()
-        if len(data) > MOST_BYTES:
+        if len(data) > MAX_FILM_BYTES:
             size = f"{len(data) / 2**20:.1f} MB"
             text = (
                 f"A still picture only: the film would add {size} to the page; show less of it, or smaller."

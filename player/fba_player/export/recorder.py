@@ -21,12 +21,12 @@ from fba.atomic import PathLike
 from fba.errors import UnsupportedError
 from fba_player.sound.soundtrack import FilmedSound
 
-WAITING = 6
-"""Most pictures that wait for the encoder."""
-WAITING_BYTES = 96 << 20
+MAX_WAITING_PICTURES = 6
+"""Largest number of pictures that wait for the encoder."""
+MAX_WAITING_BYTES = 96 << 20
 """Most bytes of them; at least two pictures, however large."""
-FASTEST = 1000
-"""Most frames per second of a film."""
+MAX_FILM_RATE = 1000
+"""Largest rate of a film in frames per second."""
 FILMS = (".mp4", ".gif")
 TURN = 0.0005
 """Seconds after which a running thread yields to a waiting one: a tenth of Python's default."""
@@ -132,7 +132,7 @@ class Recorder:
         self._closed = self._stop = False
         self._free: queue.SimpleQueue[UInt8] = queue.SimpleQueue()
         self._full: queue.SimpleQueue[tuple[UInt8, int] | None] = queue.SimpleQueue()
-        for _ in range(min(max(WAITING_BYTES // (size[0] * size[1] * 4 or 1), 2), WAITING)):
+        for _ in range(min(max(MAX_WAITING_BYTES // (size[0] * size[1] * 4 or 1), 2), MAX_WAITING_PICTURES)):
             self._free.put(np.zeros((size[1], size[0], 4), dtype=np.uint8))
         self._thread = threading.Thread(target=self._encode, name="fba recorder", daemon=True)
         self._thread.start()
@@ -264,8 +264,8 @@ class Recorder:
 def exact_rate(rate: Fraction | int | str) -> Fraction:
     """The frame rate as MP4 can store it. Raises ValueError unless it is above 0 and at most 1000."""
     exact = Fraction(rate)
-    if not 0 < exact <= FASTEST:
-        raise ValueError(f"a film's frame rate must lie above 0 and at most at {FASTEST}, not {exact}")
+    if not 0 < exact <= MAX_FILM_RATE:
+        raise ValueError(f"a film's frame rate must lie above 0 and at most at {MAX_FILM_RATE}, not {exact}")
     return exact.limit_denominator(1001) if exact.denominator > 100_000 else exact
 
 

@@ -34,7 +34,7 @@ __all__ = ["film_rate", "record", "render", "write_picture"]
 
 SMOOTH_RATES = (Fraction(10), Fraction(60))
 """Frames per second, least and most, of a film for which no rate is given: screens show no more than 60."""
-MOST_FRAMES = 1_000_000
+MAX_FILM_FRAMES = 1_000_000
 """Most frames of a film: a longer one comes from damaged times, or a part of it was meant."""
 SLACK = 0.001
 """Seconds that a given time may lie outside the animation: people round times."""
@@ -270,9 +270,9 @@ def _frame_range(
             f"{float(begin):g} s to {float(stop):g} s"
         )
     count = max(math.ceil((last - first) * rate), 1)
-    if count > MOST_FRAMES:
+    if count > MAX_FILM_FRAMES:
         raise FbaError(
             f"this film would have {count} frames ({float(last - first):g} s at {rate} frames/s, at most "
-            f"{MOST_FRAMES}): choose a part with start and end, or a lower rate"
+            f"{MAX_FILM_FRAMES}): choose a part with start and end, or a lower rate"
         )
     return first, count

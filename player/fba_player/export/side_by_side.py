@@ -13,11 +13,11 @@ from fba.animation import Animation
 from fba.arrays import UInt8
 from fba.atomic import PathLike
 from fba.errors import UnsupportedError
-from fba_player.export.film_sheet import MOST_PIXELS, PAPER, SMALLEST, SPACE, TEXT, choose_columns
 from fba_player.export.image_files import write_picture
 from fba_player.export.offscreen import Offscreen
 from fba_player.export.recorder import Recorder
 from fba_player.export.render import PICTURE_SAMPLES, as_scene, film_rate
+from fba_player.export.sheet_layout import PAPER, TEXT, check_tile, lay_out
 from fba_player.view.camera import Camera
 from fba_player.view.font import label_font, shortened
 from fba_player.view.protocols import Showable
@@ -37,7 +37,7 @@ def draw_side_by_side(
     camera: Camera | str | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Draw performances in a grid, each from its own beginning; returns the path.
+    """Draw performances in a grid, each from its own beginning; return the path.
 
     performances: by the name that is written below. path: .mp4 or .gif for a film, as long as the longest
     performance and at the rate of the first; .png or .jpg for a picture of their middles. tile: width and
@@ -57,8 +57,7 @@ def draw_side_by_side(
         raise ValueError("there is no performance to draw")
     scenes = {name: as_scene(performance) for name, performance in performances.items()}
     size = tile or TILE
-    if min(size) < SMALLEST:
-        raise ValueError(f"each performance needs at least 16x16 pixels, not {size[0]}x{size[1]}")
+    check_tile(size)
     with ExitStack() as stack:
         grid = _Grid(list(scenes), size)
         views = [
@@ -94,32 +93,21 @@ class _Grid:
         from PIL import Image, ImageDraw
 
         letters = max(min(tile[0] // 18, 22), 7)
-        self._step = (tile[0] + SPACE, tile[1] + round(letters * 1.6) + SPACE)
-        self._columns = choose_columns(len(names), self._step)
-        rows = -(-len(names) // self._columns)
-        wide, high = self._columns * self._step[0] + SPACE, rows * self._step[1] + SPACE
+        layout = lay_out(len(names), (tile[0], tile[1] + round(letters * 1.6)))
+        wide, high = layout.size
         self.size = (wide + wide % 2, high + high % 2)  # films need even sizes
-        if self.size[0] * self.size[1] > MOST_PIXELS:
-            raise ValueError(
-                f"{len(names)} performances of {tile[0]}x{tile[1]} pixels are too large a picture"
-            )
+        self._corners = layout.corners
         paper = Image.new("RGB", self.size, PAPER)
         draw = ImageDraw.Draw(paper)
         font = label_font(letters)
-        for number, name in enumerate(names):
-            x, y = self._corner(number)
+        for name, (x, y) in zip(names, self._corners, strict=True):
             text = shortened(draw, name, font, tile[0])
             draw.text((x + tile[0] / 2, y + tile[1] + 1), text, font=font, fill=TEXT, anchor="ma")
         self._paper = np.asarray(paper)
 
-    def _corner(self, number: int) -> tuple[int, int]:
-        row, column = divmod(number, self._columns)
-        return SPACE + column * self._step[0], SPACE + row * self._step[1]
-
     def draw(self, pictures: list[UInt8]) -> UInt8:
-        """The whole, uint8 (H, W, 3), with a picture in every cell."""
+        """Return the whole, uint8 (H, W, 3), with a picture in every cell."""
         pixels = self._paper.copy()
-        for number, picture in enumerate(pictures):
-            x, y = self._corner(number)
+        for picture, (x, y) in zip(pictures, self._corners, strict=True):
             pixels[y : y + picture.shape[0], x : x + picture.shape[1]] = picture[..., :3]
         return pixels

@@ -14,9 +14,10 @@ from fba.face.model import FaceModel, Part, point_row
 from fba.geometry import fit_similarity
 from fba_player.view.view import Eye
 
-ROUND = 0.03
+MAX_ROUNDNESS_ERROR = 0.03
 """A part whose median distance from its sphere exceeds this share of the radius is drawn as a mesh."""
-FEWEST = 12
+MIN_BALL_VERTICES = 12
+"""Parts with fewer vertices are no eyeballs; with fewer behind, all of them give an eyeball's rotation."""
 SAMPLED = 96
 """Vertices from which an eyeball's rotation is computed."""
 DILATE = (29, 30)
@@ -78,20 +79,20 @@ class Eyeball:
 def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     """The sphere that fits a part, or None if it is not round."""
     vertices = part.vertices.astype(np.float64)
-    if len(vertices) < FEWEST or flat_width(part) is not None:
+    if len(vertices) < MIN_BALL_VERTICES or flat_width(part) is not None:
         return None
     on_sphere = np.ones(len(vertices), dtype=bool)
     for _ in range(4):  # leaves out what stands out, such as a cornea
         centre, radius = _fit_sphere(vertices[on_sphere])
         away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
         on_sphere = away <= max(float(np.quantile(away, 0.7)), 1e-9)
-    if not np.isfinite(radius) or radius <= 0 or float(np.median(away)) > ROUND * radius:
+    if not np.isfinite(radius) or radius <= 0 or float(np.median(away)) > MAX_ROUNDNESS_ERROR * radius:
         return None
     if float(np.ptp(vertices, axis=0).max()) > 2.4 * radius:
         return None
     side = 0 if centre[0] > 0 else 1
     behind = np.flatnonzero((vertices[:, 2] - centre[2]) < 0.75 * radius)
-    if len(behind) < FEWEST:
+    if len(behind) < MIN_BALL_VERTICES:
         behind = np.arange(len(vertices))
     rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED).astype(int))]
     unit = model.fapu.IRISD

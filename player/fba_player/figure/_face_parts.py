@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}
 TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
 HAIRY = ("lash", "brow", "hair")
-THICKEST_HAIR = 0.0012
+MAX_HAIR_WIDTH = 0.0012
 """Strips wider than this (m) are not single hairs."""
 ROUGH = 0.36
 """Strength of the skin's relief."""
 NECK = 2.3
 """Length over which the neck bends, in multiples of the eye-nose separation (ENS)."""
-MOST_BENT, BENT, LONG = 0.1, 0.8, 0.005
+MAX_BENT_SHARE, BENT_COSINE, LONG_EDGE = 0.1, 0.8, 0.005
 """Light is computed for every pixel if more than this share of a part's edges bend by more than the angle
 with this cosine and are longer than this (m)."""
 NORMAL_WEIGHT, TEXTURE_WEIGHT, COLOUR_WEIGHT = 0.002, 0.5, 0.004
@@ -138,7 +138,7 @@ def find_hairs(part: Part) -> Float32 | None:
     paired = (opposite[opposite] == np.arange(count)) & (opposite != np.arange(count))
     half = np.zeros(count)
     half[rows] = length[nearest] / 2
-    if not paired.any() or 2 * float(np.median(half[paired])) > THICKEST_HAIR:
+    if not paired.any() or 2 * float(np.median(half[paired])) > MAX_HAIR_WIDTH:
         return None
     hair = _pieces(edges, count)
     tip = np.full(count, -1)
@@ -180,7 +180,7 @@ def _is_smooth(part: Part) -> bool:
     normals, corners = part.normals[part.triangles], part.vertices[part.triangles]
     cosines = np.einsum("tkn,tkn->tk", normals, np.roll(normals, 1, axis=1))
     lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    return bool(((cosines < BENT) & (lengths > LONG)).mean() < MOST_BENT)
+    return bool(((cosines < BENT_COSINE) & (lengths > LONG_EDGE)).mean() < MAX_BENT_SHARE)
 
 
 def _picture(part: Part) -> FacePicture | None:

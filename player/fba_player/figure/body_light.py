@@ -35,11 +35,12 @@ CAPSULES = (
 )  # fmt: skip
 """Joints at both ends, and the radius (m) for a body 1.75 m tall."""
 KEY = tuple(np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION))
-TALL = 1.75
+ADULT_HEIGHT = 1.75
 COARSE = 0.0064
 """Light is computed at the vertices that are left when the surface is simplified with this error (m)."""
-NEAREST = 3
-LARGE = 4000
+NEIGHBOURS = 3
+"""Number of sampled vertices from which the light at a vertex is interpolated."""
+MIN_CACHED_VERTICES = 4000
 """Neighbours are cached on disk for bodies with at least this many vertices."""
 MAKING = 1
 """Cache version of neighbours; increment when `_nearest_samples` gives other results."""
@@ -82,8 +83,11 @@ class BodyLight:
 
     @cached_property
     def _prepared(self) -> Prepared:
-        """(N,) vertices at which light is computed; (V, NEAREST) indices into these from which each vertex is
-        interpolated, and (V, NEAREST) their weights; (V,) how much of the sky folds leave each vertex."""
+        """What does not change with the pose, for the V vertices of all parts.
+
+        (N,) vertices at which light is computed; (V, NEIGHBOURS) indices into these from which each vertex
+        is interpolated, and (V, NEIGHBOURS) their weights; (V,) share of the sky that folds leave.
+        """
         body = self.body
         rows: list[Integer] = []
         for part in body.parts:
@@ -112,15 +116,17 @@ def build_body_light(body: BodyModel, coarser: Mapping[str, DetailLevels | None]
     names = body.skeleton.names
     known = [row for row in CAPSULES if row[0] in names and row[1] in names]
     ends = np.array([[names.index(a), names.index(b)] for a, b, _ in known], dtype=np.intp)
-    tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else TALL
+    tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else ADULT_HEIGHT
     share = 0.92 if "head" in {part.kind for part in body.parts} else 0.85  # up to the crown, or to the neck
-    radii = np.array([row[2] for row in known]) * (tall / share / TALL if tall > 0 else 1.0)
+    radii = np.array([row[2] for row in known]) * (tall / share / ADULT_HEIGHT if tall > 0 else 1.0)
     return BodyLight(body, coarser, ends, radii)
 
 
 def _nearest_samples(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:
-    """For each vertex of all parts, (V, 3) each: indices (V, NEAREST) of the nearest sampled vertices of its
-    part, counted over the rows of all parts, and their weights (V, NEAREST)."""
+    """Return the nearest sampled vertices of its part for each of the V vertices of all parts.
+
+    They are indices (V, NEIGHBOURS), counted over the rows of all parts, and their weights (V, NEIGHBOURS).
+    """
 
     def make() -> list[Array]:
         from scipy.spatial import cKDTree
@@ -129,9 +135,9 @@ def _nearest_samples(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, 
         count = 0
         for vertices, samples in zip(parts, rows, strict=True):
             if len(samples):
-                away, index = cKDTree(vertices[samples]).query(vertices, k=min(NEAREST, len(samples)))
+                away, index = cKDTree(vertices[samples]).query(vertices, k=min(NEIGHBOURS, len(samples)))
                 away, index = away.reshape(len(vertices), -1), index.reshape(len(vertices), -1)
-                missing = NEAREST - index.shape[1]
+                missing = NEIGHBOURS - index.shape[1]
                 away = np.pad(away, ((0, 0), (0, missing)), constant_values=1e9)
                 index = np.pad(index, ((0, 0), (0, missing)))
                 weight = 1 / np.maximum(away, 1e-4)
@@ -141,11 +147,11 @@ def _nearest_samples(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, 
         return [np.concatenate(near).astype(np.int32), np.concatenate(shares).astype(np.float32)]
 
     total = sum(map(len, parts))
-    if total < LARGE:
+    if total < MIN_CACHED_VERTICES:
         near, shares = make()
         return near, shares
     key = make_key("near", MAKING, *parts, *rows)
-    near, shares = load_or_make(key, ((total, NEAREST),) * 2, make, [np.int32, np.float32])
+    near, shares = load_or_make(key, ((total, NEIGHBOURS),) * 2, make, [np.int32, np.float32])
     if near.min() < 0 or near.max() >= sum(map(len, rows)):
         near, shares = make()
     return near, shares

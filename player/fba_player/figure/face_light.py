@@ -30,7 +30,7 @@ ON_TEETH = 0.3
 """Share of the missing light that is added on teeth when the mouth is open."""
 STEP = 2
 """Decimals to which the head's rotation is rounded; the light changes invisibly little."""
-MOVES = 0.05
+MIN_SWAY = 0.05
 """Occlusion is not computed at vertices that turn with the head by less than this."""
 
 
@@ -125,7 +125,7 @@ class FaceLight:
         triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
         faps = np.zeros(68, dtype=np.float32)
         still, normals = self._posed(faps)
-        shut = cached_visibility(still, normals, triangles, self._sway > MOVES)
+        shut = cached_visibility(still, normals, triangles, self._sway > MIN_SWAY)
         if self._lips is None:
             return Baked(shut, shut, np.zeros(len(still), dtype=bool), (0.0, 0.0))
         for fap, value in MOUTH_OPEN.items():

@@ -18,7 +18,7 @@ DIRECTIONS = 72
 """Number of directions from which the mesh is rendered."""
 PIXEL = 0.0014
 """Size of a depth map's pixel, metres: finer than the folds that are to be shaded."""
-MOST_PIXELS = 400
+MAX_DEPTH_PIXELS = 400
 SOFTNESS = (1.0, 0.92, 0.72, 0.46)
 """Factor for each band of the harmonics, for a light some 40 degrees wide."""
 SKIN_DEPTH = 0.0045
@@ -66,7 +66,7 @@ def bake(
         baked = vertices[rows]
         centre = (baked.min(axis=0) + baked.max(axis=0)) / 2
         reach = float(np.linalg.norm(baked - centre, axis=1).max()) * 1.01
-        size = int(np.clip(2 * reach / PIXEL, 16, MOST_PIXELS))
+        size = int(np.clip(2 * reach / PIXEL, 16, MAX_DEPTH_PIXELS))
         depth = np.empty((size, size), dtype=np.float32)
         for column, direction in enumerate(directions):
             frame = _frame(direction).astype(np.float32)

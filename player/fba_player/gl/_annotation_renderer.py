@@ -11,9 +11,9 @@ import numpy as np
 
 from fba.arrays import Array, Float32, Float64, UInt8
 from fba_player.gl._labels import (
-    MOST_NAMES,
-    SMALLEST,
-    SMALLEST_WITH_LEGEND,
+    MAX_NAMES,
+    MIN_LEGEND_HEIGHT,
+    MIN_NAMES_HEIGHT,
     legend_picture,
     names_picture,
     place_names,
@@ -30,18 +30,18 @@ from fba_player.view.camera import Camera
 from fba_player.view.geometry import world_normals, world_positions
 from fba_player.view.view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend, Lines
 
-REFERENCE_HEIGHT, LEAST_SCALE = 720, 0.35
+REFERENCE_HEIGHT, MIN_SCALE = 720, 0.35
 CROWDED = 7.0
 """Lines shorter than this (pixels) are drawn fainter, so that a fine mesh is a tint and no black spot."""
 HIDDEN = 0.2
 """Opacity of a dot behind a surface."""
-LEAST_RADIUS = 0.8
-NAME_SIZE, SMALLEST_NAME = 13, 10
-LEAST_LEGEND = 0.65
+MIN_DOT_RADIUS = 0.8
+NAME_SIZE, MIN_NAME_SIZE = 13, 10
+MIN_LEGEND_SCALE = 0.65
 MARGIN = 14
-MOST_LABELS = 16
+CACHED_LABELS = 16
 """Number of label textures that are cached."""
-MOST_SHELLS = 48
+CACHED_SHELLS = 48
 """Number of shells whose triangles are cached; the least recently used goes first."""
 PROGRAMS = ("line", "dot", "shell", "grid", "label")
 
@@ -81,9 +81,9 @@ class ExtrasRenderer:
         self._programs: dict[str, Any] = {}
         self._square: Any = None
         self._buffers: dict[str, Any] = {}
-        self._labels = RecentlyUsed[tuple[Any, Any]](MOST_LABELS, lambda label: label[0].release())
+        self._labels = RecentlyUsed[tuple[Any, Any]](CACHED_LABELS, lambda label: label[0].release())
         self._depths: Float32 | None = None
-        self._triangles = RecentlyUsed[Any](MOST_SHELLS, lambda triangles: triangles.release())
+        self._triangles = RecentlyUsed[Any](CACHED_SHELLS, lambda triangles: triangles.release())
 
     def draw(self, extras: Extras, camera: Camera, size: tuple[int, int]) -> None:
         """Draw into the bound framebuffer, over a picture from that camera and with its depths."""
@@ -96,7 +96,7 @@ class ExtrasRenderer:
             set_uniform(program, "camera", matrix_bytes(matrix))
             set_uniform(program, "eye", tuple(float(v) for v in camera.eye))
             set_uniform(program, "size", (float(size[0]), float(size[1])))
-        scale = max(size[1] / REFERENCE_HEIGHT, LEAST_SCALE)
+        scale = max(size[1] / REFERENCE_HEIGHT, MIN_SCALE)
         gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
         self._draw_shells(extras.shells)
         gl.fbo.depth_mask = False
@@ -111,12 +111,12 @@ class ExtrasRenderer:
                 self._draw_dots(dots, scale, _pixels_per_metre(dots, camera, size))
         gl.enable_only(gl.BLEND)
         self._depths = None
-        if size[1] >= SMALLEST:
+        if size[1] >= MIN_NAMES_HEIGHT:
             for dots in extras.dots:
                 if any(dots.names):
                     self._draw_names(dots, matrix, camera.eye, size, scale)
-        if extras.legend is not None and size[1] >= SMALLEST_WITH_LEGEND:
-            self._draw_legend(extras.legend, size, max(scale, LEAST_LEGEND))
+        if extras.legend is not None and size[1] >= MIN_LEGEND_HEIGHT:
+            self._draw_legend(extras.legend, size, max(scale, MIN_LEGEND_SCALE))
         gl.fbo.depth_mask = True
         gl.enable_only(gl.DEPTH_TEST)
 
@@ -204,7 +204,7 @@ class ExtrasRenderer:
         if not len(dots.positions):
             return
         gl, program = self._gl, self._programs["dot"]
-        set_uniform(program, "radius", max(min(dots.radius * scale, dots.most * near), LEAST_RADIUS))
+        set_uniform(program, "radius", max(min(dots.radius * scale, dots.most * near), MIN_DOT_RADIUS))
         set_uniform(program, "lift", dots.lift)
         set_uniform(program, "colour", dots.colour)
         content = [
@@ -219,14 +219,14 @@ class ExtrasRenderer:
     def _draw_names(
         self, dots: Dots, matrix: Float64, eye: Float64, size: tuple[int, int], scale: float
     ) -> None:
-        pixels = max(round(NAME_SIZE * scale), SMALLEST_NAME)
+        pixels = max(round(NAME_SIZE * scale), MIN_NAME_SIZE)
         texture, boxes = self._label((dots.names, pixels), lambda: names_picture(dots.names, pixels))
         at = dots.positions.astype(np.float64)
         facing = np.einsum("ij,ij->i", dots.facing, eye - at) >= 0
         pixel, depth = project(at, matrix, size)
         nearer = project(_lift(at, eye, dots.lift), matrix, size)[1]
         inside = facing & np.isfinite(depth) & ((pixel >= 0) & (pixel < size)).all(axis=1)
-        if not 0 < inside.sum() <= MOST_NAMES:
+        if not 0 < inside.sum() <= MAX_NAMES:
             return
         column, row = pixel[inside].astype(int).T
         inside[inside] = nearer[inside] <= self._depths_of(size)[size[1] - 1 - row, column]

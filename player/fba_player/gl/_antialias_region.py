@@ -15,9 +15,10 @@ from fba_player.view.view import FaceMesh, View
 
 MARGIN = 0.03
 """Margin on every side, as a share of a rectangle's size."""
-NEAR = 1e-3
+MIN_DEPTH = 1e-3
+"""Metres in front of the camera; a corner that is nearer gives the whole picture."""
 ROW = 64
-STILL = 0.3
+MAX_STILL_SWAY = 0.3
 """Vertices that turn with the head by less than this get a box of their own: shoulders are wide and low."""
 
 
@@ -73,7 +74,7 @@ def bounding_rectangles(view: View, matrix: Float64, size: tuple[int, int]) -> l
 def _face_boxes(face: FaceMesh) -> list[Float64]:
     if not np.any(face.turn):
         return [_corners(face.positions) @ face.matrix[:3, :3].T + face.matrix[:3, 3]]
-    still = face.shape.sway < STILL
+    still = face.shape.sway < MAX_STILL_SWAY
     boxes = []
     for box in (_corners(face.positions[still]), _corners(face.positions[~still])):
         turned = turn_partly(box, np.ones(len(box)), face.turn, face.centre)
@@ -85,7 +86,7 @@ def _face_boxes(face: FaceMesh) -> list[Float64]:
 def _rectangle(points: Float64, matrix: Float64, size: tuple[int, int]) -> Rectangle:
     """The part of a picture with points (N, 3) and a margin; all of it if one is behind the camera."""
     clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
-    if not np.isfinite(clip).all() or (clip[:, 3] < NEAR).any():
+    if not np.isfinite(clip).all() or (clip[:, 3] < MIN_DEPTH).any():
         return (0, 0, *size)
     flat = clip[:, :2] / clip[:, 3:]
     low, high = flat.min(axis=0), flat.max(axis=0)

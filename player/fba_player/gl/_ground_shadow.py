@@ -34,7 +34,7 @@ KEY_SHARE, SKY_SHARE = 0.62, 0.85
 """Darkness of the ground where all of the key light, or all of the sky, is hidden."""
 KEY_BLUR, SKY_BLUR = 1, 4
 """Radius, in cells, of the two passes of blur."""
-LEAST = 3
+MIN_DARKNESS = 3
 """Fainter darkness, of 255, is not drawn."""
 
 
@@ -295,7 +295,7 @@ def _darken(key: Float32, sky: Float32, darkness: UInt8) -> tuple[int, int, int,
             edge = min(row, cells - 1 - row, column, cells - 1 - column)
             dark = 255.0 * (1.0 - lit) * min(edge / 8.0, 1.0)
             darkness[row, column] = np.uint8(min(max(dark, 0.0), 255.0))
-            if dark >= LEAST:
+            if dark >= MIN_DARKNESS:
                 left, right = min(left, column), max(right, column + 1)
                 bottom, top = min(bottom, row), max(top, row + 1)
     return max(left - 1, 0), max(bottom - 1, 0), min(right + 1, cells), min(top + 1, cells)

@@ -11,9 +11,9 @@ from fba_player.view.view import Legend
 TEXT = (240, 242, 245, 255)
 FAINT = (186, 192, 200, 255)
 SHADE = (18, 21, 26, 190)
-SMALLEST, SMALLEST_WITH_LEGEND = 96, 240
+MIN_NAMES_HEIGHT, MIN_LEGEND_HEIGHT = 96, 240
 """Heights (pixels) below which a picture has no names, and no legend."""
-MOST_NAMES = 45
+MAX_NAMES = 45
 """If more points are in view, none is named."""
 GAP = 2.0
 
@@ -66,10 +66,10 @@ def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int
 
     dots: (N, 2), pixels from the upper left, NaN for hidden ones. sizes: (N, 2), of the names. Each name is
     beside its dot, or above its point if radius is 0, and none overlaps another. Nothing is drawn if the
-    picture has more than `MOST_NAMES` dots.
+    picture has more than `MAX_NAMES` dots.
     """
     inside = np.isfinite(dots).all(axis=1) & ((dots >= 0) & (dots < size)).all(axis=1)
-    if inside.sum() > MOST_NAMES:
+    if inside.sum() > MAX_NAMES:
         return np.zeros(0, dtype=np.intp), np.zeros((0, 2))
     reach = radius + GAP
     taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in dots[inside]]

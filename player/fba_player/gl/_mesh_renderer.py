@@ -22,13 +22,13 @@ from fba_player.mesh.wrinkle_map import BOTTOM, TEXELS, TOP, WIDTH, wrinkle_map
 from fba_player.mesh.wrinkle_map import SHAPE as WRINKLE_SHAPE
 from fba_player.view.view import FaceMesh, FaceShape
 
-MOST_SHAPES = 64
+CACHED_SHAPES = 64
 """Number of parts whose buffers are cached; the least recently used goes first."""
 CORE = 0.9
 """Opacity from which pixels of blended parts are drawn as opaque ones, before all others are blended."""
-FAINTEST_WRINKLE = 0.01
+MIN_WRINKLE = 0.01
 """Strength from which wrinkles are drawn."""
-FAINTEST = 0.25
+MIN_RELIEF = 0.25
 """The skin's relief is not drawn if it is reduced to less than this share of its size."""
 
 
@@ -38,7 +38,7 @@ class FaceRenderer:
     def __init__(self, context: Any) -> None:
         self._gl = context
         self._programs: dict[tuple[str, ...], Any] = {}
-        self._shapes = RecentlyUsed[dict[str, Any]](MOST_SHAPES, _release)
+        self._shapes = RecentlyUsed[dict[str, Any]](CACHED_SHAPES, _release)
         self._reliefs: dict[int, Any] = {}
         self._wrinkles: dict[int, Any] = {}
         self._pixels: UInt8 | None = None
@@ -187,7 +187,7 @@ class FaceRenderer:
 
     def _wrinkle_map(self, mesh: FaceMesh, parts: dict[str, Any], wide: float) -> Any:
         """The map of wrinkles for pixels of this width (m), or None where there is nothing to see."""
-        if mesh.wrinkles is None or parts["wrinkles"] is None or mesh.wrinkles.max() < FAINTEST_WRINKLE:
+        if mesh.wrinkles is None or parts["wrinkles"] is None or mesh.wrinkles.max() < MIN_WRINKLE:
             return None
         halvings = count_halvings(parts["wrinkle_texel"], wide, max(WRINKLE_SHAPE))
         if halvings not in self._wrinkles:
@@ -212,7 +212,7 @@ class FaceRenderer:
             self._pixels = skin_relief()
         size = self._pixels.shape[0]
         halvings = count_halvings(RELIEF / size, wide, size)
-        if size / 2**halvings < FAINTEST * size:
+        if size / 2**halvings < MIN_RELIEF * size:
             return None
         if halvings not in self._reliefs:
             from PIL import Image

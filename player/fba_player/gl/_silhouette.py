@@ -18,7 +18,7 @@ TILE = 8
 """Size (pixels) of the tiles that are smoothed if an outline runs through them."""
 BESIDE = 1.5
 """Pixels on each side of an outline that may need smoothing."""
-MOST_SHAPES = 64
+CACHED_SHAPES = 64
 """Number of shapes whose edges are cached."""
 
 
@@ -69,7 +69,7 @@ class Outliner:
     """
 
     def __init__(self) -> None:
-        self._edges = RecentlyUsed[Edges](MOST_SHAPES, lambda _: None)
+        self._edges = RecentlyUsed[Edges](CACHED_SHAPES, lambda _: None)
         self._size = (1, 1)
         self._marked = np.zeros((1, 1), dtype=np.uint8)
 

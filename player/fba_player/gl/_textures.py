@@ -16,9 +16,10 @@ from fba_player.gl.resources import make_texture
 from fba_player.mesh.textures import texture_breadth
 from fba_player.view.view import FaceShape
 
-SHARPEST = 0.8
+MIN_TEXEL = 0.8
 """Least width of a texel, in pixels of the screen."""
-SMALLEST = 16
+MIN_LEVEL_SIZE = 16
+"""Least width in texels of a reduced picture."""
 
 
 class Pictures:
@@ -67,8 +68,8 @@ def count_halvings(texel: float, pixel: float, size: int) -> int:
     """How often to halve a picture of `size` texels, `texel` metres wide, to make them about a pixel wide."""
     if not texel > 0 or not pixel > 0:
         return 0
-    ratio = SHARPEST * pixel / texel
+    ratio = MIN_TEXEL * pixel / texel
     if not ratio > 1:
         return 0
-    most = int(math.log2(max(size / SMALLEST, 1)))
+    most = int(math.log2(max(size / MIN_LEVEL_SIZE, 1)))
     return min(math.ceil(math.log2(ratio)), most) if ratio < math.inf else most

@@ -20,14 +20,15 @@ from fba_player.mesh.primitives import capsule_mesh, sphere_mesh
 from fba_player.view.camera import Camera
 from fba_player.view.view import CAPSULE_FLOATS, Eye, Mesh, View
 
-MOST_BLOBS = 8
+MAX_BLOBS = 8
+"""Largest number of soft shadows on the ground."""
 THROUGH = 0.16
 """Opacity of a mark behind a surface."""
-THINNEST = 0.9
+MIN_MARK_RADIUS = 0.9
 """Least radius of a mark, pixels."""
 RAISED = 0.003
 """Marks are drawn over surfaces that hide them by less than this (m)."""
-MOST_SHAPES = 32
+CACHED_SHAPES = 32
 """Number of meshes whose buffers are cached; the least recently used goes first."""
 
 
@@ -49,7 +50,7 @@ class Renderer:
         square = np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4")
         self._studio_buffer = context.buffer(corners.tobytes())
         self._square = context.buffer(square.tobytes())
-        self._blobs = context.buffer(reserve=MOST_BLOBS * 16, dynamic=True)
+        self._blobs = context.buffer(reserve=MAX_BLOBS * 16, dynamic=True)
         self._shadow = context.vertex_array(
             self._programs["shadow"], [(self._square, "2f", "in_corner"), (self._blobs, "4f/i", "in_blob")]
         )
@@ -72,7 +73,7 @@ class Renderer:
         self._outliner = Outliner()
         self._details = Details()
         self._extras = ExtrasRenderer(context)
-        self._shapes = RecentlyUsed[list[Any]](MOST_SHAPES, _release)
+        self._shapes = RecentlyUsed[list[Any]](CACHED_SHAPES, _release)
         self._seen: tuple[object, ...] = ()
         set_uniform(self._programs["capsule"], "opacity", 1.0)
 
@@ -177,7 +178,7 @@ class Renderer:
     def _draw_shadows(self, view: View) -> None:
         """Draw soft shadows on the ground."""
         gl = self._gl
-        blobs = np.ascontiguousarray(view.blobs[:MOST_BLOBS], dtype="f4")
+        blobs = np.ascontiguousarray(view.blobs[:MAX_BLOBS], dtype="f4")
         if not view.ground or not len(blobs):
             return
         gl.enable_only(gl.BLEND)
@@ -251,7 +252,7 @@ class Renderer:
         if not len(marks):
             return
         gl = self._gl
-        set_uniform(self._programs["capsule"], "thinnest", THINNEST)
+        set_uniform(self._programs["capsule"], "thinnest", MIN_MARK_RADIUS)
         set_uniform(self._programs["capsule"], "raised", RAISED)
         self._draw_capsules(marks)
         gl.enable_only(gl.DEPTH_TEST | gl.BLEND | gl.CULL_FACE)

@@ -18,7 +18,7 @@ from fba.compiled import compiled, inlined
 
 BORDER = 2.0
 """Weight of a border relative to the surface."""
-MOST_AROUND = 64
+MAX_TRIANGLES_AROUND = 64
 """A vertex with more triangles than this is never removed."""
 TURNED = 0.3
 """No triangle may turn by more than the angle of this cosine."""
@@ -203,16 +203,16 @@ def candidates(
     """Write the neighbour that each vertex is best collapsed onto, or -1, and the squared error; return how
     many vertices have one.
 
-    Bounds: at most MOST_AROUND triangles with two corners each besides the vertex are near it.
+    Bounds: at most MAX_TRIANGLES_AROUND triangles with two corners each besides the vertex are near it.
     """
     n = points.shape[1]
-    near = np.empty(2 * MOST_AROUND, dtype=np.int32)
-    shared = np.empty(2 * MOST_AROUND, dtype=np.int32)
+    near = np.empty(2 * MAX_TRIANGLES_AROUND, dtype=np.int32)
+    shared = np.empty(2 * MAX_TRIANGLES_AROUND, dtype=np.int32)
     count_with_goal = 0
     for u in range(len(points)):
         goal[u] = -1
         first, stop = start[u], start[u + 1]
-        if locked[u] or first == stop or stop - first > MOST_AROUND:
+        if locked[u] or first == stop or stop - first > MAX_TRIANGLES_AROUND:
             continue
         count = 0
         for o in range(first, stop):

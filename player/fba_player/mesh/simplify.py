@@ -15,10 +15,10 @@ from fba.compiled import is_compiled
 
 TOLERANCES = (0.0001, 0.0002, 0.0004, 0.0008, 0.0016, 0.0032, 0.0064)
 """Root-mean-square errors of the levels of detail, metres."""
-FEWEST = 200
+MIN_TRIANGLES = 200
 """Meshes with fewer triangles than this are not simplified."""
-MOST_PASSES = 40
-WORTH = 0.004
+MAX_PASSES = 40
+MIN_REMOVED_SHARE = 0.004
 """A pass that removes less than this share of the vertices is the last one of its level."""
 MAKING = "2"
 """Cache version; increment when `simplify` gives other results."""
@@ -40,12 +40,12 @@ class DetailLevels:
         """int32 (F, 3): triangles of the coarsest level whose error is at most `tolerance` (m); None for the
         mesh as it is."""
         level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
-        if level < 0 or len(self.triangles) < FEWEST or not is_compiled():
+        if level < 0 or len(self.triangles) < MIN_TRIANGLES or not is_compiled():
             return None
         onto, first = self._collapses
         target = np.arange(len(onto), dtype=np.int32)
         collapses = first <= level
-        for _ in range(MOST_PASSES * len(TOLERANCES)):  # no more steps than passes were made
+        for _ in range(MAX_PASSES * len(TOLERANCES)):  # no more steps than passes were made
             if not collapses[target].any():
                 break
             target = np.where(collapses[target], onto[target], target)
@@ -99,7 +99,7 @@ def simplify(
     onto = np.arange(count, dtype=np.int32)
     first = np.full(count, len(tolerances), dtype=np.int32)
     for level, tolerance in enumerate(tolerances):
-        for _ in range(MOST_PASSES):
+        for _ in range(MAX_PASSES):
             candidates = loops.candidates(
                 points, poses, left, start, owners, border, locked, a, b, c, w, tolerance**2, goal, cost
             )
@@ -111,7 +111,7 @@ def simplify(
             first[(onto != np.arange(count)) & (first == len(tolerances))] = level
             left = _without_flat(left)
             loops.around(left, count, start, owners)
-            if done < WORTH * len(left):
+            if done < MIN_REMOVED_SHARE * len(left):
                 break
     return onto, first
 

@@ -19,13 +19,13 @@ from fba.arrays import Float32, Float64, Int32, UInt8
 from fba.cache import load_or_make, make_key
 from fba.limits import DEFAULT_LIMITS, Limits
 
-LARGEST = 4096
-"""Wider or higher pictures are scaled down to this many pixels."""
+MAX_PICTURE_SIZE = 4096
+"""Pixels to which wider or higher pictures are scaled down."""
 PIXEL_BYTES, SCALED_BYTES, COEFFICIENT_BYTES = 4, 8, 6
 """Memory of a pixel while it is decoded, and scaled down; of a progressive JPEG, that of its coefficients."""
 BAND = 256
 """Rows that are converted at once."""
-LARGE = 100_000
+MIN_CACHED_BYTES = 100_000
 """Files of at least this many bytes are cached on disk when reduced."""
 MAKING = 2
 """Cache version of pictures; increment when `FacePicture` gives other pixels or measures."""
@@ -60,7 +60,7 @@ class FacePicture:
 
     def reduced(self, factor: int) -> UInt8:
         """uint8 (h, w, 4): reduced by `factor` each way, as square roots of linear light, and alpha."""
-        if factor < 2 or len(self.data) < LARGE:
+        if factor < 2 or len(self.data) < MIN_CACHED_BYTES:
             return _reduced(self.pixels, factor)
         width, height = (-(-across // factor) for across in self.size)
         key = make_key("texture", MAKING, factor, np.frombuffer(self.data, dtype=np.uint8))
@@ -84,12 +84,12 @@ def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture
         height, width = pixels.shape[:2]
         return [np.array([width, height, (pixels[..., 3] == 255).all()], dtype=np.int32)]
 
-    if len(data) < LARGE:
+    if len(data) < MIN_CACHED_BYTES:
         (measures,) = measure()
     else:
         key = make_key("picture", MAKING, np.frombuffer(data, dtype=np.uint8))
         (measures,) = load_or_make(key, ((3,),), measure, np.int32)
-        if measures.min() < 0 or measures.max() > LARGEST:
+        if measures.min() < 0 or measures.max() > MAX_PICTURE_SIZE:
             (measures,) = measure()
     return FacePicture(data, (int(measures[0]), int(measures[1])), bool(measures[2]))
 
@@ -104,7 +104,7 @@ def _check_size(data: bytes, limits: Limits) -> None:
             needed = width * height * COEFFICIENT_BYTES
         else:
             _prepare(image)
-            scaled = max(image.size) > LARGEST
+            scaled = max(image.size) > MAX_PICTURE_SIZE
             needed = image.width * image.height * (SCALED_BYTES if scaled else PIXEL_BYTES)
         limits.check_bytes(needed, what, source=len(data))
 
@@ -126,17 +126,17 @@ def _opened(data: bytes) -> Iterator[Any]:
 
 def _prepare(image: Any) -> None:
     """Let a large JPEG be decoded at half its size or less."""
-    if max(image.size) > LARGEST:
-        least = LARGEST * 9 // 10  # so that one of 8000 pixels becomes one of 4000
+    if max(image.size) > MAX_PICTURE_SIZE:
+        least = MAX_PICTURE_SIZE * 9 // 10  # so that one of 8000 pixels becomes one of 4000
         image.draft("RGB", (least, least))
 
 
 def _decode(data: bytes) -> UInt8:
-    """uint8 (H, W, 4): the pixels of a file, at most `LARGEST` wide and high."""
+    """uint8 (H, W, 4): the pixels of a file, at most `MAX_PICTURE_SIZE` wide and high."""
     with _opened(data) as image:
         _prepare(image)
-        if max(image.size) > LARGEST:
-            image.thumbnail((LARGEST, LARGEST))
+        if max(image.size) > MAX_PICTURE_SIZE:
+            image.thumbnail((MAX_PICTURE_SIZE, MAX_PICTURE_SIZE))
         pixels = np.empty((image.height, image.width, 4), dtype=np.uint8)
         for top in range(0, image.height, BAND):  # a whole copy in RGBA would double the memory
             rows = image.crop((0, top, image.width, min(top + BAND, image.height)))

@@ -11,8 +11,8 @@ import numpy as np
 from fba.arrays import Float64, Int64
 from fba_player.playback.timeline import FRAME_ROUNDING, Timeline, frame_position
 
-FINEST = 1_000_000
-"""Greatest common frame rate of performances with different rates."""
+MAX_RATE = 1_000_000
+"""Largest common rate, in frames per second, of performances with different rates."""
 
 
 class CompareTimeline:
@@ -108,8 +108,8 @@ class CompareTimeline:
                 math.lcm(*(abs(part).numerator for part in parts)),
                 math.gcd(*(abs(part).denominator for part in parts)),
             )
-            if rate > FINEST:
-                rate = Fraction(FINEST)
+            if rate > MAX_RATE:
+                rate = Fraction(MAX_RATE)
             indices = []
             for one, later in self._shown():
                 step, first = rate / one.rate, later * rate

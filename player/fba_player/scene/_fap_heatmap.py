@@ -23,7 +23,7 @@ STEPS, ANGLE = 100, 10_000
 GLOSS = 0.15
 SHADES = 33
 """Number of colours in the legend."""
-LEAST = 1e-6
+MIN_MOVEMENT = 1e-6
 """Movements smaller than this (m) count as none."""
 
 
@@ -43,7 +43,7 @@ class FapHeatmap:
     def legend(self) -> Legend:
         """A legend of the colours in millimetres."""
         unit = "0.1 rad" if self.fap.unit == "AU" else f"+{self.value} steps of {self.fap.unit}/1024"
-        moved = f"mm moved by {unit}" if self.most > LEAST else "moves no vertex of this face"
+        moved = f"mm moved by {unit}" if self.most > MIN_MOVEMENT else "moves no vertex of this face"
         stops = tuple(tuple(float(v) for v in row) for row in heat_colours(np.linspace(0, 1, SHADES)))
         return Legend(self.fap.label, moved, self.most * 1000, stops)  # type: ignore[arg-type]
 
@@ -105,8 +105,8 @@ class FapHeatmap:
         return MeshShape(sphere_mesh()[1], colours, two_sided=True)
 
     def _colours(self, distances: Float32) -> Float64:
-        share = distances / max(self.most, LEAST)
-        share[distances <= LEAST] = 0.0
+        share = distances / max(self.most, MIN_MOVEMENT)
+        share[distances <= MIN_MOVEMENT] = 0.0
         return linear_light(heat_colours(share))
 
 

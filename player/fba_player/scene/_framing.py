@@ -12,11 +12,11 @@ from fba_player.view.camera import Subject
 BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
 """A body that stands at the origin."""
 HIPS = 0.78
-STANDING = 0.12
+MAX_STANDING_TRAVEL = 0.12
 """Legs that move by less than this (m) count as still."""
-MOST_TRAVEL = 4.0
+MAX_FIXED_TRAVEL = 4.0
 """The camera follows a performance that moves further than this (m)."""
-NEAR = 0.12
+MIN_APPROACH = 0.12
 """Movement (m) below which the camera's distance is not enlarged."""
 ARMS = 1.0
 """Half the width (m) of a person with stretched arms."""
@@ -30,7 +30,8 @@ LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 class Extent:
     """The space that a performance takes.
 
-    follows: whether it goes too far for one fixed camera. legs_move: whether by more than `STANDING`.
+    follows: whether it goes too far for one fixed camera. legs_move: whether legs move by more than
+    `MAX_STANDING_TRAVEL`.
     """
 
     subject: Subject
@@ -58,9 +59,9 @@ def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HE
     headroom: metres above the highest joint.
     """
     legs = positions[:, [names.index(name) for name in LEGS if name in names]]
-    legs_move = bool(legs.size) and bool(np.abs(legs - legs[0]).max() > STANDING)
+    legs_move = bool(legs.size) and bool(np.abs(legs - legs[0]).max() > MAX_STANDING_TRAVEL)
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
-    if not np.isfinite(high - low).all() or (high - low).max() > MOST_TRAVEL:
+    if not np.isfinite(high - low).all() or (high - low).max() > MAX_FIXED_TRAVEL:
         x, y, z = (float(v) for v in positions[0, 0])
         more = _head_above(positions, names, headroom)
         subject = Subject(
@@ -74,7 +75,7 @@ def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HE
     tall = max(float(high[1] - low[1]) / 2 * 1.06, 0.9)
     path = positions[:, 0, [0, 2]]
     towards = float(np.linalg.norm(path - (x, z), axis=1).max())  # from any side
-    subject = Subject((x, y, z), tall, max(wide, BODY_SUBJECT.half_width), max(towards - NEAR, 0.0))
+    subject = Subject((x, y, z), tall, max(wide, BODY_SUBJECT.half_width), max(towards - MIN_APPROACH, 0.0))
     return Extent(subject, follows=False, legs_move=legs_move)
 
 

@@ -11,7 +11,7 @@ from fba.arrays import Float32, Float64
 from fba.parameters import baps, faps
 from fba_player.scene._compare_timeline import CompareTimeline
 
-MOST_FRAMES = 20_000
+MAX_FRAMES = 20_000
 """Longer performances are sampled at this many moments."""
 
 
@@ -84,8 +84,8 @@ def differences(timeline: CompareTimeline, second: int = 1) -> Differences:
     low, high = (float(v) for v in (max(b[0] for b in bounds), min(b[1] for b in bounds)))
     times = timeline.times()
     times = times[(times >= low - 1e-9) & (times <= high + 1e-9)]
-    if len(times) > MOST_FRAMES:
-        times = times[np.linspace(0, len(times) - 1, MOST_FRAMES).astype(int)]
+    if len(times) > MAX_FRAMES:
+        times = times[np.linspace(0, len(times) - 1, MAX_FRAMES).astype(int)]
     faces, bodies = one.many(times - float(timeline.later[0]))
     other_faces, other_bodies = other.many(times - float(timeline.later[second]))
     face = one.animation.face is not None and other.animation.face is not None

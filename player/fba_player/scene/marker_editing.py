@@ -6,6 +6,7 @@ It knows no picture and no mouse; a window shows it as a `MarkersScene`.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Collection
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -21,18 +22,20 @@ from fba.capture.virtual_markers.mapping_files import write_mapping
 from fba.capture.virtual_markers.performance import Neutral, SteadyMarkers, perform_steady, steady
 from fba.capture.virtual_markers.proposal import usual_radius
 from fba.capture.virtual_markers.weights import find_influences
-from fba.errors import FbaError, FbaWarning, OptionError
+from fba.errors import FbaError, FbaWarning
+from fba_player.scene.hand_editing import HandEditing
 
 
-class MarkerEditing:
+class MarkerEditing(HandEditing[MarkerMapping]):
     """The virtual markers of a capture and a head while they are made.
 
-    motion, head: what is brought together. mapping: as it is now. path: the file to write, None if none was
-    named. neutral: the frames in which the face is neutral. current: the name of the marker that the next
-    click on the head places. problem: why the head does not move yet, "" if it does. doubts: what was odd
-    about the capture or the mapping. beside: whether the cloud of markers is beside the head, not over it.
-    shows_weights: whether the head has the colours of the current marker's reach.
+    motion, head: what is brought together. neutral: the frames in which the face is neutral. problem: why the
+    head does not move yet, "" if it does. doubts: what was odd about the capture or the mapping. beside:
+    whether the cloud of markers is beside the head, not over it. shows_weights: whether the head has the
+    colours of the current marker's reach.
     """
+
+    item, subject = "marker", "the mapping"
 
     def __init__(
         self,
@@ -43,28 +46,28 @@ class MarkerEditing:
         *,
         neutral: Neutral = "auto",
     ) -> None:
+        current = next((name for name in motion.names if name not in mapping.markers), motion.names[0])
+        super().__init__(mapping, current, path)
         self.motion = motion
         self.head = head
-        self.mapping = mapping
-        self.path = path
         self.neutral = neutral
-        self.current = next((name for name in motion.names if name not in mapping.markers), motion.names[0])
         self.problem = ""
         self.doubts: tuple[str, ...] = ()
         self.beside = True
         self.shows_weights = True
-        self.written = False
-        self._saved = mapping
-        self._before: list[tuple[str, MarkerMapping]] = []
-        self._last_step: tuple[str, str] | None = None
         self._steady: tuple[object, SteadyMarkers] | None = None
         self._made: tuple[MarkerMapping, MarkerPerformance | None] | None = None
         self._reach: tuple[object, Influence | None] | None = None
 
     @property
-    def changed(self) -> bool:
-        """Whether there is something that was not saved."""
-        return self.mapping != self._saved
+    def mapping(self) -> MarkerMapping:
+        """The mapping as it is now."""
+        return self.state
+
+    @property
+    def placed(self) -> Collection[str]:
+        """Names of the markers that have a virtual one."""
+        return self.mapping.markers
 
     @property
     def marker(self) -> VirtualMarker | None:
@@ -98,26 +101,6 @@ class MarkerEditing:
         follows = "" if self.marker is None else self.marker.follows
         return follows or self.current
 
-    def choose(self, name: str) -> None:
-        """Make a marker the current one. Raises ValueError for one that is not there."""
-        if name not in self.names:
-            raise ValueError(f"the capture has no marker {name!r}")
-        self.current = name
-
-    def step(self, by: int) -> None:
-        """Make the marker `by` places further in the capture the current one; it goes round."""
-        names = self.names
-        self.current = names[(names.index(self.current) + by) % len(names)]
-
-    def next_missing(self) -> bool:
-        """Go to the next marker without a virtual one; returns False without one."""
-        names, at = self.names, self.names.index(self.current)
-        for name in (*names[at + 1 :], *names[: at + 1]):
-            if name not in self.mapping.markers:
-                self.current = name
-                return True
-        return False
-
     def place(self, vertex: int) -> None:
         """Put the current marker's centre on a vertex of the head."""
         old = self.marker
@@ -127,13 +110,13 @@ class MarkerEditing:
         if old is not None:
             lid = old.lid and bool(lid_at(self.head, vertex))
             placed = replace(placed, fixed=old.fixed, follows=old.follows, lid=lid)
-        self._change("vertex", self.mapping.changed(self.current, placed))
+        self._change(self.mapping.changed(self.current, placed))
 
     def resize(self, radius: float, depth: float) -> None:
         """Give the current marker another reach, in the head's unit. Raises OptionError for none."""
         if self.marker is not None and self.marker.vertex is not None:
             marker = replace(self.marker, radius=radius, depth=depth)
-            self._change("size", self.mapping.changed(self.current, marker))
+            self._change(self.mapping.changed(self.current, marker), gesture="resize")
 
     def fix(self, fixed: bool) -> None:
         """Make the current marker fixed, or not; one without a vertex can only be fixed, a follower not."""
@@ -146,37 +129,21 @@ class MarkerEditing:
             marker = None
         else:
             marker = replace(old, fixed=fixed, lid=False)
-        self._change("fixed", self.mapping.changed(self.current, marker))
+        self._change(self.mapping.changed(self.current, marker))
 
     def assign(self, assignment: str) -> None:
         """Set to whom vertices belong: "shared" or "exclusive"."""
-        self._change("assignment", replace(self.mapping, assignment=assignment))
+        self._change(replace(self.mapping, assignment=assignment))
 
     def add_up(self, overlap: str) -> None:
         """Set how displacements of shared vertices go together: "match" or "add"."""
-        self._change("overlap", replace(self.mapping, overlap=overlap))
+        self._change(replace(self.mapping, overlap=overlap))
 
     def remove(self) -> None:
         """Take away the current marker's virtual one."""
         source = self.source
-        self._change("remove", self.mapping.changed(self.current, None))
+        self._change(self.mapping.changed(self.current, None))
         self.current = source  # a follower is gone
-
-    def undo(self) -> bool:
-        """Take back the last change, and go to the marker that was current; False without one."""
-        if not self._before:
-            return False
-        self.current, self.mapping = self._before.pop()
-        self._last_step = None
-        return True
-
-    def save(self) -> None:
-        """Write the mapping, marked as made for this head. Raises OSError, FbaError where it cannot be."""
-        if self.path is None:
-            raise OptionError("no file was named for the mapping")
-        write_mapping(self.path, self.mapping.for_head(self.head))
-        self._saved = self.mapping
-        self.written = True
 
     @cached_property
     def seen(self) -> Bool:
@@ -203,6 +170,10 @@ class MarkerEditing:
     def first_radius(self) -> float:
         """The radius that a new virtual marker gets, in the head's unit: the middle one of all."""
         return usual_radius(self.mapping, self.head)
+
+    def _write(self, path: Path) -> None:
+        """Write the mapping, marked as made for this head."""
+        write_mapping(path, self.mapping.for_head(self.head))
 
     def _perform(self) -> MarkerPerformance | None:
         doubts: list[str] = []
@@ -235,12 +206,3 @@ class MarkerEditing:
         if self.mapping.assignment == "exclusive":
             found = give_to_nearest(found)
         return found[list(chosen).index(self.current)]
-
-    def _change(self, what: str, mapping: MarkerMapping) -> None:
-        if mapping == self.mapping:
-            return
-        step = (what, self.current)
-        if what != "size" or step != self._last_step:  # a slider that is dragged is one step
-            self._before.append((self.current, self.mapping))
-        self._last_step = step
-        self.mapping = mapping

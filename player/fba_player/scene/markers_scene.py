@@ -12,10 +12,10 @@ from fba.arrays import Float32, Float64, Intp
 from fba.mesh.meshes import vertex_normals
 from fba_player.figure.face import FaceFigure, build_figure
 from fba_player.mesh.textures import linear_light
-from fba_player.playback.capture_times import CaptureTimes
+from fba_player.playback.timeline import CaptureTimes
 from fba_player.scene._fap_heatmap import GLOSS, SHADES, heat_colours
 from fba_player.scene.marker_editing import MarkerEditing
-from fba_player.scene.placement_scene import LIGHT, plain_shape
+from fba_player.scene.placement_scene import fit_box, make_dots, plain_mesh, plain_shape
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.geometry import first_hit, ray_through, rotation_vector, translation, unit_rows
 from fba_player.view.protocols import Timed
@@ -32,13 +32,13 @@ RADIUS, CENTRE_RADIUS, CURRENT_RADIUS = 4.2, 2.6, 6.0
 """Of dots, pixels in a picture 720 high."""
 LIFT = 0.006
 """Metres of skin through which dots are seen."""
-GRAB = 10.0
+MAX_CLICK_DISTANCE = 10.0
 """Pixels, in a picture 720 high, from a dot within which a click means it."""
-APART = 0.35
+CLOUD_GAP = 0.35
 """Room between cloud and head, as a share of the head's width."""
 ROOM = 1.2
 """Room beside head and cloud for a head that turns and moves, as a factor of the way between them."""
-FOLLOWED = 0.3
+MIN_FOLLOWED_TRAVEL = 0.3
 """Metres that a head moves before the camera follows it."""
 
 
@@ -88,7 +88,9 @@ class MarkersScene(Timed[CaptureTimes]):
     def travel(self, time: float) -> tuple[float, float, float]:
         """How far the head has gone, metres; zeros for one that stays about where it is."""
         made = self.editing.performance
-        if made is None or float(np.ptp(made.shift, axis=0).max()) * self.editing.head.metres < FOLLOWED:
+        if made is None:
+            return 0.0, 0.0, 0.0
+        if float(np.ptp(made.shift, axis=0).max()) * made.head.metres < MIN_FOLLOWED_TRAVEL:
             return 0.0, 0.0, 0.0
         frame, after, share = self.timeline.position(time)
         middle = made.head.vertices[made.head.face].mean(axis=0)
@@ -126,7 +128,7 @@ class MarkersScene(Timed[CaptureTimes]):
         pixels = _pixels(np.concatenate(places), camera, size) if places else np.zeros((0, 2))
         away = np.linalg.norm(pixels - (x, y), axis=1)
         away[np.isnan(away)] = np.inf
-        reach = GRAB * size[1] / 720
+        reach = MAX_CLICK_DISTANCE * size[1] / 720
         if not len(away) or away.min() > reach:
             return None
         return found[int(away.argmin())]
@@ -166,7 +168,7 @@ class MarkersScene(Timed[CaptureTimes]):
     def _beside(self) -> Float64:
         """(3,) way from the head to the cloud beside it, metres."""
         low, high = self._box
-        return np.array([-(1 + APART) * float(high[0] - low[0]), 0.0, 0.0])
+        return np.array([-(1 + CLOUD_GAP) * float(high[0] - low[0]), 0.0, 0.0])
 
     @cached_property
     def _rest_normals(self) -> Float32:
@@ -229,8 +231,7 @@ class MarkersScene(Timed[CaptureTimes]):
         for part, rows, shape in zip(head.parts, head.rows, self._shapes(self._plain_shapes), strict=True):
             assert part.normals is not None
             normals = unit_rows((part.normals + changes[rows]) @ pose[:3, :3].T).astype(np.float32)
-            light = np.tile(np.array(LIGHT, dtype=np.float32), (len(rows), 1))
-            meshes.append(FaceMesh(shape, world[rows], normals, light, np.eye(4), np.zeros(3), np.zeros(3)))
+            meshes.append(plain_mesh(shape, world[rows], normals))
         return meshes, []
 
     def _shapes(self, plain: list[FaceShape]) -> list[FaceShape]:
@@ -312,19 +313,18 @@ class MarkersScene(Timed[CaptureTimes]):
             if self.shows_cloud and source in at:
                 ends = np.stack([at[source], world[centre.vertex]])[None]
                 lines = (Lines(ends.astype(np.float32), LINE, 1.2, LIFT),)
-        return tuple(_make_dots(*group) for group in groups if len(group[0])), lines
+        dots = tuple(
+            make_dots(points, (name,) * len(points), colour, radius, LIFT)
+            for points, colour, radius, name in groups
+            if len(points)
+        )
+        return dots, lines
 
     @property
     def _subject(self) -> Subject:
         """What the camera is fitted to: the head, and the cloud if it is beside it."""
         figure = self._figure
-        if figure is not None:
-            subject = figure.subject
-        else:
-            low, high = self._box
-            x, y, z = ((low + high) / 2).tolist()
-            wide, tall, deep = ((high - low) / 2).tolist()
-            subject = Subject((x, y, z), tall * 1.05, max(wide, deep), deep)
+        subject = figure.subject if figure is not None else fit_box(*self._box)
         if not (self.editing.beside and self.shows_cloud):
             return subject
         x, y, z = subject.centre
@@ -344,10 +344,3 @@ def _pixels(points: Float64, camera: Camera, size: tuple[int, int]) -> Float64:
     clip[clip[:, 3] < 1e-6] = np.nan
     pixels: Float64 = (clip[:, :2] / clip[:, 3:] * (0.5, -0.5) + 0.5) * size
     return pixels
-
-
-def _make_dots(points: Float64, colour: Colour, radius: float, name: str) -> Dots:
-    count = len(points)
-    facing = np.zeros((count, 3), dtype=np.float32)
-    names = (name,) * count
-    return Dots(points.astype(np.float32), colour, radius, LIFT, names, facing)

@@ -122,10 +122,7 @@ class PlacementScene(Timed[Timeline]):
             assert part.normals is not None
             positions = self.to_world(part.vertices.astype(np.float64)).astype(np.float32)
             normals = unit_rows(part.normals @ turn.T).astype(np.float32)
-            light = np.tile(np.array(LIGHT, dtype=np.float32), (len(positions), 1))
-            meshes.append(
-                FaceMesh(plain_shape(part), positions, normals, light, np.eye(4), np.zeros(3), np.zeros(3))
-            )
+            meshes.append(plain_mesh(plain_shape(part), positions, normals))
         return meshes
 
     @cached_property
@@ -139,9 +136,7 @@ class PlacementScene(Timed[Timeline]):
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
             half = max(float(np.ptp(points, axis=0).max()) * MARGIN / 2, HEIGHT / 2)
             low, high = np.maximum(low, middle - half), np.minimum(high, middle + half)
-        x, y, z = ((low + high) / 2).tolist()
-        wide, tall, deep = ((high - low) / 2).tolist()
-        return Subject((x, y, z), tall * 1.05, max(wide, deep), deep)
+        return fit_box(low, high)
 
     def _dots(self) -> tuple[Dots, ...]:
         placement = self.placement
@@ -154,22 +149,42 @@ class PlacementScene(Timed[Timeline]):
         ]
         guess = placement.guess() if current not in placement.places else None
         if guess is not None:
-            groups.append(_make_dots(self.to_world(guess[None]), (f"{current}?",), GUESSED, "guessed"))
+            groups.append(
+                make_dots(self.to_world(guess[None]), (f"{current}?",), GUESSED, RADII["guessed"], LIFT)
+            )
         return tuple(group for group in groups if len(group.positions))
 
     def _dots_of(self, known: list[str], colour: Colour, kind: str) -> Dots:
         positions = [self.placement.position(name) for name in known]
         points = np.array([one for one in positions if one is not None]).reshape(-1, 3)
-        return _make_dots(self.to_world(points), tuple(known), colour, kind)
+        return make_dots(self.to_world(points), tuple(known), colour, RADII[kind], LIFT)
 
 
-def _make_dots(points: Float64, names: tuple[str, ...], colour: Colour, kind: str) -> Dots:
+def make_dots(points: Float64, names: tuple[str, ...], colour: Colour, radius: float, lift: float) -> Dots:
+    """Return dots of one colour that face the camera everywhere.
+
+    points: float64 (N, 3), metres in the world. radius: pixels in a picture 720 high. lift: metres of skin
+    through which they are seen.
+    """
     facing: Float32 = np.zeros((len(points), 3), dtype=np.float32)
-    return Dots(points.astype(np.float32), colour, RADII[kind], LIFT, names, facing)
+    return Dots(points.astype(np.float32), colour, radius, lift, names, facing)
+
+
+def fit_box(low: Float64, high: Float64) -> Subject:
+    """Return the subject of a camera that shows all of a box from any side. low, high: corners (3,), metres."""
+    x, y, z = ((low + high) / 2).tolist()
+    wide, tall, deep = ((high - low) / 2).tolist()
+    return Subject((x, y, z), tall * 1.05, max(wide, deep), deep)
+
+
+def plain_mesh(shape: FaceShape, positions: Float32, normals: Float32) -> FaceMesh:
+    """Return a part of a head in the world, lit alike at all vertices. positions, normals: float32 (V, 3)."""
+    light = np.tile(np.array(LIGHT, dtype=np.float32), (len(positions), 1))
+    return FaceMesh(shape, positions, normals, light, np.eye(4), np.zeros(3), np.zeros(3))
 
 
 def plain_shape(part: Part) -> FaceShape:
-    """A part in its own colours, or as clay if it has none."""
+    """Return the shape of a part in its colours, or as clay if it has none."""
     colours = part.colours
     if colours is None:
         is_plain = part.material.colour == Material().colour and part.material.texture is None

@@ -5,6 +5,7 @@ It knows no picture and no mouse; a window shows it as a `PlacementScene`.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import cached_property
 from pathlib import Path
 
@@ -17,55 +18,65 @@ from fba.face.importers.head_surface import HeadSurface
 from fba.face.importers.points.points_file import GivenPoints, write_points
 from fba.mesh.meshes import vertex_normals
 from fba.parameters import feature_points
+from fba_player.scene.hand_editing import HandEditing
 
 INSIDE = ("7.1", "11.5")
 """Points on no surface, which the importer works out: they are not asked for."""
 MATES = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 """The point on the other side, of those that have one."""
-TOUCHING = 0.002
+TOUCHING_DISTANCE = 0.002
 """Vertices this much further than the nearest, as a share of the head's height, may be meant as well: lips
 touch, and the side that the skin faces tells them apart."""
-FEWEST_FOR_GUESS = 4
-"""Points from which the place of another is guessed at least."""
+MIN_POINTS_FOR_GUESS = 4
+"""Least number of placed points from which the place of another is guessed."""
 
 Place = int | tuple[float, float, float]
 """Where a point is: a vertex by its number in the file, or a position in the file's axes."""
 
 
-class PointPlacement:
+class PointPlacement(HandEditing[dict[str, Place]]):
     """The feature points of a head while they are placed by hand.
 
-    surface: the head, with the points known so far. path: the file to write. places: of the points that have
-    one, by name. order: the names in the order in which they are asked for: first those that were not known
-    (those of the FAPU first, then those that have FAPs), then those to be checked. current: the name of the
-    point that the next click places. hidden: numbers of the parts that are not shown; clicks go through
-    them.
+    surface: the head, with the points known so far. hidden: numbers of the parts that are not shown; clicks
+    go through them.
     """
 
+    item, subject = "feature point", "the points"
+    path: Path
+
     def __init__(self, surface: HeadSurface, path: str | Path) -> None:
+        places = _places_of(surface.given)
+        self._names = _asking_order(set(places))
+        super().__init__(places, self._names[0], Path(path))
         self.surface = surface
-        self.path = Path(path)
-        self.places: dict[str, Place] = _places_of(surface.given)
-        self.order = _asking_order(set(self.places))
-        self.current = self.order[0]
         self.hidden: set[int] = set()
-        self.written = False
-        self._saved = dict(self.places)
-        self._before: list[tuple[str, dict[str, Place]]] = []
 
     @property
-    def changed(self) -> bool:
-        """Whether there is something that was not saved."""
-        return self.places != self._saved
+    def names(self) -> tuple[str, ...]:
+        """The points in the order in which they are asked for.
+
+        First come those without a place at the start (those of the FAPU, those with FAPs, the rest), then
+        those to be checked.
+        """
+        return self._names
 
     @property
-    def missing(self) -> tuple[str, ...]:
-        """Points without a place, in the order in which they are asked for."""
-        return tuple(name for name in self.order if name not in self.places)
+    def places(self) -> dict[str, Place]:
+        """Places of the points that have one, by name."""
+        return self.state
+
+    @places.setter
+    def places(self, places: dict[str, Place]) -> None:
+        self.state = places
+
+    @property
+    def placed(self) -> Collection[str]:
+        """Names of the points that have a place."""
+        return self.places
 
     @property
     def missing_units(self) -> tuple[str, ...]:
-        """Those of them without which no face can be made."""
+        """Points without a place that every face needs."""
         return tuple(name for name in self.missing if name in FAPU_POINTS)
 
     def position(self, name: str) -> Float64 | None:
@@ -82,34 +93,13 @@ class PointPlacement:
             points[row_of()[name]] = self.position(name)
         return points
 
-    def choose(self, name: str) -> None:
-        """Make a point the current one. Raises ValueError for one that is not asked for."""
-        if name not in self.order:
-            raise ValueError(f"feature point {name!r} is not placed by hand")
-        self.current = name
-
-    def step(self, by: int) -> None:
-        """Make the point `by` places further in the order the current one; it goes round."""
-        self.current = self.order[(self.order.index(self.current) + by) % len(self.order)]
-
-    def next_missing(self) -> bool:
-        """Go to the next point without a place; returns False without one."""
-        at = self.order.index(self.current)
-        for name in (*self.order[at + 1 :], *self.order[: at + 1]):
-            if name not in self.places:
-                self.current = name
-                return True
-        return False
-
     def place(self, vertex: int) -> None:
         """Place the current point on a vertex, by its number in the file."""
-        self._change({self.current: vertex})
+        self._change({**self.places, self.current: vertex})
 
     def remove(self) -> None:
         """Take the current point off the head."""
-        if self.current in self.places:
-            self._remember()
-            del self.places[self.current]
+        self._change({name: place for name, place in self.places.items() if name != self.current})
 
     def mirror(self) -> str | None:
         """Place the current point's mate at its mirror image; if only the mate has a place, the current one.
@@ -122,24 +112,17 @@ class PointPlacement:
         source, target = (self.current, mate) if self.current in self.places else (mate, self.current)
         if source not in self.places:
             return None
-        self._change({target: self._mirrored(source)})
+        self._change({**self.places, target: self._mirrored(source)})
         return target
 
     def mirror_all(self) -> int:
         """Place all points without a place whose mates have one, at their mirror images; returns how many."""
         targets = {name: MATES[name] for name in self.missing if MATES.get(name) in self.places}
-        if targets:
-            self._change({name: self._mirrored(mate) for name, mate in targets.items()})
+        mirrored = {name: self._mirrored(mate) for name, mate in targets.items()}
+        self._change({**self.places, **mirrored})
         return len(targets)
 
-    def undo(self) -> bool:
-        """Take back the last change, and go to the point that was current; False without one."""
-        if not self._before:
-            return False
-        self.current, self.places = self._before.pop()
-        return True
-
-    def save(self) -> None:
+    def _write(self, path: Path) -> None:
         """Write the file, atomically. Raises ModelError if no point is placed, FormatError if it cannot."""
         vertices = {name: place for name, place in self.places.items() if isinstance(place, int)}
         points = np.full((len(names()), 3), np.nan)
@@ -147,13 +130,12 @@ class PointPlacement:
             if not isinstance(place, int):
                 points[row_of()[name]] = place
         comment = f"feature points of {Path(self.surface.path).name}, vertices counted from 0"
-        write_points(self.path, GivenPoints(points, vertices), comment)
-        self._saved, self.written = dict(self.places), True
+        write_points(path, GivenPoints(points, vertices), comment)
 
     def guess(self) -> Float64 | None:
         """(3,) the vertex about where the current point is, from those that have a place; None if too few."""
-        known = [name for name in self.order if name in self.places]
-        if len(known) < FEWEST_FOR_GUESS:
+        known = [name for name in self.names if name in self.places]
+        if len(known) < MIN_POINTS_FOR_GUESS:
             return None
         rows = [row_of()[name] for name in known]
         adult, here = neutral_points()[rows], self.positions()[rows]
@@ -180,7 +162,7 @@ class PointPlacement:
         """x of the plane between left and right, in the file's axes."""
         at = self.positions()[:, 0]
         sides = [(at[row_of()[left]] + at[row_of()[right]]) / 2 for left, right in MIRRORED.items()]
-        central = [at[row_of()[name]] for name in self.order if name not in MATES]
+        central = [at[row_of()[name]] for name in self.names if name not in MATES]
         known = [float(x) for x in (*sides, *central) if np.isfinite(x)]
         if known:
             return float(np.median(known))
@@ -206,18 +188,10 @@ class PointPlacement:
         away = np.linalg.norm(vertices - wanted, axis=1)
         if not isinstance(place, int):
             return int(self._used[int(away.argmin())])
-        near = np.flatnonzero(away <= away.min() + TOUCHING * float(np.ptp(vertices[:, 1])))
+        near = np.flatnonzero(away <= away.min() + TOUCHING_DISTANCE * float(np.ptp(vertices[:, 1])))
         facing = self._normals[self._used[near]] @ (self._normals[place] * flip)
         same = near[facing >= facing.max() - 0.2]
         return int(self._used[same[int(away[same].argmin())]])
-
-    def _change(self, places: dict[str, int]) -> None:
-        if any(self.places.get(name) != place for name, place in places.items()):
-            self._remember()
-            self.places.update(places)
-
-    def _remember(self) -> None:
-        self._before.append((self.current, dict(self.places)))
 
 
 def describe_point(name: str) -> str:

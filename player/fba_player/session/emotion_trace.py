@@ -13,7 +13,7 @@ from fba.emotion.recogniser import NEUTRAL, UNKNOWN
 from fba.errors import OptionError
 from fba.face.resolve import FaceSettings
 
-MOST_FRAMES = 20_000
+MAX_FRAMES = 20_000
 """Longer animations are not read: that would take more than some seconds beside the playing."""
 
 
@@ -41,7 +41,7 @@ class Stretch:
 
 def read_stretches(animation: Animation, model: FaceSettings | None) -> tuple[Stretch, ...]:
     """The expressions of an animation, one stretch after the other; none without a face, or if it is long."""
-    if animation.face is None or len(animation) > MOST_FRAMES:
+    if animation.face is None or len(animation) > MAX_FRAMES:
         return ()
     try:
         readings = read_expressions(animation, model)

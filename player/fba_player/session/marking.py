@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from fba.errors import FbaError
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.scene.markers_scene import MarkersScene
+from fba_player.session.page import Page
 
 if TYPE_CHECKING:
     from fba_player.session.session import Session
@@ -28,16 +27,10 @@ KEYS = (
     ("Esc", "close"),
 )
 """For the panel."""
-OTHER_ACTIONS = ("panel", "points", "camera body", "follow")
-"""Beginnings of the actions of the table of keys that mean nothing here; all others keep their keys."""
-UNSAVED = "the mapping"
-"""Name of a mapping that is not saved, in the warning before the window closes."""
-LONG = 8.0
-"""Seconds for which errors are shown."""
 
 
 def editing_of(session: Session) -> MarkerEditing | None:
-    """The virtual markers that the session's window is for; None where it shows something else."""
+    """Return the virtual markers that the session's window is for; None if it is for something else."""
     return session.scene.editing if isinstance(session.scene, MarkersScene) else None
 
 
@@ -58,39 +51,10 @@ def click_on_picture(session: Session, x: float, y: float) -> None:
         return
     scene.editing.place(vertex)
     session.say(f"{scene.editing.current} on vertex {vertex}", about="marking")
-    note_unsaved(session, scene.editing)
+    MARKING.note_unsaved(session, scene.editing)
 
 
-def press_key(session: Session, name: str) -> bool:
-    """Do what a key means here; returns False if it has no meaning. name: as in the table of keys."""
-    editing = editing_of(session)
-    if editing is None or name not in _ACTIONS:
-        return False
-    session.touched()
-    act_on(session, editing, _ACTIONS[name])
-    return True
-
-
-def act_on(session: Session, editing: MarkerEditing, action: str) -> None:
-    """Do an action: "next", "previous", "missing", "fix", "over", "weights", "undo", "remove" or "save"."""
-    _DOERS[action](session, editing)
-    note_unsaved(session, editing)
-
-
-def note_unsaved(session: Session, editing: MarkerEditing) -> None:
-    """Tell the session whether there is something to save."""
-    if editing.changed:
-        session.unsaved.add(UNSAVED)
-    else:
-        session.unsaved.discard(UNSAVED)
-
-
-def _missing(session: Session, editing: MarkerEditing) -> None:
-    if not editing.next_missing():
-        session.say("All markers are on the head: Ctrl+S saves them", about="marking")
-
-
-def _fix(session: Session, editing: MarkerEditing) -> None:
+def _fix(_: Session, editing: MarkerEditing) -> None:
     marker = editing.marker
     editing.fix(marker is None or not marker.fixed)
 
@@ -100,36 +64,23 @@ def _over(session: Session, editing: MarkerEditing) -> None:
     session.viewpoint.reset()
 
 
-def _weights(session: Session, editing: MarkerEditing) -> None:
+def _weights(_: Session, editing: MarkerEditing) -> None:
     editing.shows_weights = not editing.shows_weights
 
 
-def _undo(session: Session, editing: MarkerEditing) -> None:
-    if not editing.undo():
-        session.say("There is nothing to undo", "warning", about="marking")
-
-
-def _save(session: Session, editing: MarkerEditing) -> None:
-    try:
-        editing.save()
-    except (FbaError, OSError) as error:
-        session.say(f"Not saved: {error}", "error", LONG, about="marking")
-        return
+def _tell_saved(session: Session, editing: MarkerEditing) -> None:
     session.say(f"{len(editing.mapping.markers)} markers saved as {editing.path}", about="marking")
 
 
-_DOERS: dict[str, Callable[[Session, MarkerEditing], None]] = {
-    "next": lambda _, editing: editing.step(1),
-    "previous": lambda _, editing: editing.step(-1),
-    "missing": _missing,
-    "fix": _fix,
-    "over": _over,
-    "weights": _weights,
-    "undo": _undo,
-    "remove": lambda _, editing: editing.remove(),
-    "save": _save,
-}
-_ACTIONS = {
-    "down": "next", "up": "previous", "enter": "missing", "x": "fix", "o": "over", "w": "weights",
-    "ctrl+z": "undo", "delete": "remove", "backspace": "remove", "ctrl+s": "save",
-}  # fmt: skip
+MARKING: Page[MarkerEditing] = Page(
+    panel="markers",
+    topic="marking",
+    plays=True,
+    find=editing_of,
+    click=click_on_picture,
+    keeps=lambda action: not action.startswith(("panel", "points", "camera body", "follow")),
+    all_placed="All markers are on the head: Ctrl+S saves them",
+    tell_saved=_tell_saved,
+    actions={"fix": _fix, "over": _over, "weights": _weights},
+    keys={"x": "fix", "o": "over", "w": "weights"},
+)

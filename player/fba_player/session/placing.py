@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from fba.errors import FbaError
 from fba_player.scene.placement_scene import PlacementScene
 from fba_player.scene.point_placement import PointPlacement
+from fba_player.session.page import Page
 
 if TYPE_CHECKING:
     from fba_player.session.session import Session
@@ -27,16 +26,12 @@ KEYS = (
     ("Esc", "close"),
 )
 """For the panel."""
-KEPT_ACTIONS = ("camera", "reset_view", "screenshot", "fullscreen", "escape", "close")
-"""First words of the actions of the table of keys that keep their keys."""
-UNSAVED = "the points"
-"""Name of points that are not saved, in the warning before the window closes."""
-LONG = 8.0
-"""Seconds for which errors are shown."""
+SAVED_SECONDS = 8.0
+"""Seconds for which the notice of a saved file is shown: it may name what is missing."""
 
 
 def placement_of(session: Session) -> PointPlacement | None:
-    """The points that the session's window is for; None where it shows something else."""
+    """Return the points that the session's window is for; None if it is for something else."""
     return session.scene.placement if isinstance(session.scene, PlacementScene) else None
 
 
@@ -49,28 +44,7 @@ def click_on_head(session: Session, x: float, y: float) -> None:
         session.say("Click on the head to place the point", "warning", about="placing")
         return
     scene.placement.place(vertex)
-    _note_unsaved(session, scene.placement)
-
-
-def press_key(session: Session, name: str) -> bool:
-    """Do what a key means here; returns False if it has no meaning. name: as in the table of keys."""
-    placement = placement_of(session)
-    if placement is None or name not in _ACTIONS:
-        return False
-    session.touched()
-    act_on(session, placement, _ACTIONS[name])
-    return True
-
-
-def act_on(session: Session, placement: PointPlacement, action: str) -> None:
-    """Do an action: "next", "previous", "missing", "mirror", "mirror all", "undo", "remove" or "save"."""
-    _DOERS[action](session, placement)
-    _note_unsaved(session, placement)
-
-
-def _missing(session: Session, placement: PointPlacement) -> None:
-    if not placement.next_missing():
-        session.say("All points have a place: Ctrl+S saves them", about="placing")
+    PLACING.note_unsaved(session, scene.placement)
 
 
 def _mirror(session: Session, placement: PointPlacement) -> None:
@@ -86,44 +60,24 @@ def _mirror_all(session: Session, placement: PointPlacement) -> None:
     session.say(f"{count} point{'' if count == 1 else 's'} mirrored", about="placing")
 
 
-def _undo(session: Session, placement: PointPlacement) -> None:
-    if not placement.undo():
-        session.say("There is nothing to undo", "warning", about="placing")
-
-
-def _save(session: Session, placement: PointPlacement) -> None:
-    try:
-        placement.save()
-    except (FbaError, OSError) as error:
-        session.say(f"Not saved: {error}", "error", LONG, about="placing")
-        return
+def _tell_saved(session: Session, placement: PointPlacement) -> None:
     missing = placement.missing_units
     rest = f"; no face can be made without {', '.join(missing)}" if missing else ""
-    kind = "warning" if missing else "done"
-    session.say(
-        f"{len(placement.places)} points saved as {placement.path}{rest}", kind, LONG, about="placing"
-    )
+    text = f"{len(placement.places)} points saved as {placement.path}{rest}"
+    session.say(text, "warning" if missing else "done", SAVED_SECONDS, about="placing")
 
 
-def _note_unsaved(session: Session, placement: PointPlacement) -> None:
-    if placement.changed:
-        session.unsaved.add(UNSAVED)
-    else:
-        session.unsaved.discard(UNSAVED)
-
-
-_DOERS: dict[str, Callable[[Session, PointPlacement], None]] = {
-    "next": lambda _, placement: placement.step(1),
-    "previous": lambda _, placement: placement.step(-1),
-    "missing": _missing,
-    "mirror": _mirror,
-    "mirror all": _mirror_all,
-    "undo": _undo,
-    "remove": lambda _, placement: placement.remove(),
-    "save": _save,
-}
-_ACTIONS = {
-    "down": "next", "right": "next", "up": "previous", "left": "previous", "space": "missing",
-    "enter": "missing", "m": "mirror", "ctrl+m": "mirror all", "ctrl+z": "undo", "delete": "remove",
-    "backspace": "remove", "ctrl+s": "save",
-}  # fmt: skip
+PLACING: Page[PointPlacement] = Page(
+    panel="points",
+    topic="placing",
+    plays=False,
+    find=placement_of,
+    click=click_on_head,
+    keeps=lambda action: (
+        action.split()[0] in ("camera", "reset_view", "screenshot", "fullscreen", "escape", "close")
+    ),
+    all_placed="All points have a place: Ctrl+S saves them",
+    tell_saved=_tell_saved,
+    actions={"mirror": _mirror, "mirror all": _mirror_all},
+    keys={"right": "next", "left": "previous", "space": "missing", "m": "mirror", "ctrl+m": "mirror all"},
+)

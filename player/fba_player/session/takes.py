@@ -17,9 +17,9 @@ from fba.tracks import BodyTrack, FaceTrack
 RATE = Fraction(25)
 """Frames per second of a take where the rate of the animation is outside of `RATES`."""
 RATES = (5, 120)
-LONGEST = 3600.0
-"""Most seconds of a take."""
-STILL = 0.2
+MAX_TAKE_SECONDS = 3600.0
+"""Longest duration of a take."""
+HOLD_SECONDS = 0.2
 """Seconds without a picture after which values are held, not interpolated, until the next one."""
 ALWAYS = slice(180, 186)
 """BAPs of the root, which a take with a body always sends."""
@@ -54,14 +54,14 @@ class TakeRecorder:
     def add(self, seconds: float, faps: Float32, baps: Float64) -> None:
         """Add FAPs (68,) and BAPs (296,) shown `seconds` after the take began.
 
-        After `LONGEST` nothing more is added, and `full` is set. Raises ValueError if times go back.
+        After `MAX_TAKE_SECONDS` nothing more is added, and `full` is set. Raises ValueError if times go back.
         """
         before = self._last or (0.0, faps, baps)
         if seconds < before[0]:
             raise ValueError(f"times of a take must not go back: {seconds} after {before[0]}")
-        self.full = self.full or seconds > LONGEST
-        seconds = min(seconds, LONGEST)
-        since = before[0] if seconds - before[0] <= STILL else seconds
+        self.full = self.full or seconds > MAX_TAKE_SECONDS
+        seconds = min(seconds, MAX_TAKE_SECONDS)
+        since = before[0] if seconds - before[0] <= HOLD_SECONDS else seconds
         while (at := float(len(self._faps) / self.rate)) <= seconds + 1e-9:
             share = min((at - since) / (seconds - since), 1.0) if at >= since and seconds > since else 0.0
             if at >= seconds - 1e-9:

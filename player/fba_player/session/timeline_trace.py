@@ -12,9 +12,9 @@ from fba.codec import StreamInfo
 
 PREDICTED = (120, 160, 190)
 INTRA = (238, 178, 84)
-LEAST = 0.06
+MIN_HEIGHT = 0.06
 """Least height of a plane, as a share of the full height."""
-GAP = 5
+MIN_GAP_WIDTH = 5
 """Pixels per plane from which there is a gap between planes."""
 ROWS = 4096
 """Frames processed at once."""
@@ -81,9 +81,9 @@ def trace_picture(trace: Trace, low: float, high: float, size: tuple[int, int]) 
     key[starts[trace.intra]] = True
     key = key[owner]
     tall = np.sqrt(tall[owner] / amounts.max())
-    tall[tall > 0] = LEAST + (1 - LEAST) * tall[tall > 0]
+    tall[tall > 0] = MIN_HEIGHT + (1 - MIN_HEIGHT) * tall[tall > 0]
     filled = np.bincount(starts, minlength=width) > 0
-    if width / len(amounts) >= GAP:
+    if width / len(amounts) >= MIN_GAP_WIDTH:
         tall[np.flatnonzero(filled)[1:] - 1] = 0.0
     level = tall * height
     cover = np.clip(level[None, :] - (height - 1 - np.arange(height))[:, None], 0.0, 1.0)

@@ -18,13 +18,13 @@ CHANNELS = 2
 RATES = (8000, 192_000)
 """Samples per second, least and most; other rates are resampled to `USUAL_RATE`."""
 USUAL_RATE = 48_000
-LOWEST_RATE, HIGHEST_RATE = 1000, 1_000_000
+MIN_RATE, MAX_RATE = 1000, 1_000_000
 """Samples per second that are read: resampling takes time and memory in proportion to the change."""
 RUN_UP = 0.5
 """Seconds decoded before the first sample that is read: MP3 and AAC frames need the ones before them."""
-GAP = 0.02
+MIN_GAP_SECONDS = 0.02
 """Seconds by which the times in a file must exceed its count of samples to be taken as a gap."""
-MOST_AT_ONCE = 1 << 24
+MAX_PACKET_SAMPLES = 1 << 24
 """Samples; a packet that decodes to more is damaged."""
 
 
@@ -126,9 +126,9 @@ class SoundFile:
         self._container, self._stream = open_sound(self._av, self.path)
 
     def _rate(self, rate: int) -> int:
-        if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+        if not MIN_RATE <= rate <= MAX_RATE:
             raise FormatError(
-                f"claims {rate} samples a second; {LOWEST_RATE} to {HIGHEST_RATE} can be read", path=self.path
+                f"claims {rate} samples a second; {MIN_RATE} to {MAX_RATE} can be read", path=self.path
             )
         fits = rate in self._rates if self._rates else RATES[0] <= rate <= RATES[1]
         return rate if fits else USUAL_RATE
@@ -160,7 +160,7 @@ class SoundFile:
                 stated = round(float((frame.pts - begun) * frame.time_base) * self.rate)
             if at is None:
                 at = self._first = stated or 0
-            elif stated is not None and GAP * self.rate < stated - at < MOST_AT_ONCE:
+            elif stated is not None and MIN_GAP_SECONDS * self.rate < stated - at < MAX_PACKET_SAMPLES:
                 yield np.zeros((stated - at, CHANNELS), dtype=np.int16)
                 at = stated
             frame.pts = None
@@ -197,7 +197,7 @@ class SoundFile:
                     self._warn(error)
                 continue
             for frame in frames:
-                if 0 < frame.samples <= MOST_AT_ONCE:
+                if 0 < frame.samples <= MAX_PACKET_SAMPLES:
                     yield frame
 
     def _warn(self, error: Exception) -> None:

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-EDGE, GAP, CLOSE = 14.0, 10.0, 4.0
+EDGE, GAP, FOLDED_GAP = 14.0, 10.0, 4.0
 """Points around columns, between panels, and below folded panels."""
 TITLE = 32.0
 """Height of a folded panel, which shows only its title."""
-MIDDLE, LEAST_MIDDLE = 0.3, 240.0
+MIDDLE, MIN_MIDDLE = 0.3, 240.0
 """Least width between the columns: a share of the display's, and points."""
-NARROWEST = 280.0
+MIN_COLUMN = 280.0
 """Least width of a column; if two do not fit beside the middle, there is only the right one."""
 
 
@@ -66,8 +66,8 @@ class Docks:
         self._sides = {name: side for name, side in self._sides.items() if name in names}
         self._used = [name for name in self._used if name in names]
         room = wide - 2 * EDGE
-        middle = max(MIDDLE * wide, LEAST_MIDDLE)
-        both = room - middle >= 2 * NARROWEST
+        middle = max(MIDDLE * wide, MIN_MIDDLE)
+        both = room - middle >= 2 * MIN_COLUMN
         columns: dict[str, list[DockRequest]] = {"left": [], "right": []}
         known = [name for name in self._sides if name in names]  # in the order in which they opened
         for request in sorted(
@@ -78,7 +78,7 @@ class Docks:
                 self._used.append(request.name)
             columns[self._sides[request.name] if both else "right"].append(request)
         widths = {side: max((one.width for one in column), default=0.0) for side, column in columns.items()}
-        most = max(room - middle, min(room, NARROWEST))
+        most = max(room - middle, min(room, MIN_COLUMN))
         if sum(widths.values()) > most:
             half = max(most / 2, most - min(widths.values()))
             widths = {side: min(own, half) for side, own in widths.items()}
@@ -107,7 +107,7 @@ class Docks:
             if left_over < TITLE:
                 break
             docks[request.name] = Dock(left, y, wide, min(height, left_over), request.name in folded)
-            y += height + (CLOSE if request.name in folded else GAP)
+            y += height + (FOLDED_GAP if request.name in folded else GAP)
         return docks
 
 
@@ -145,7 +145,7 @@ def _least_height(column: list[DockRequest], folded: set[str]) -> float:
 
 
 def _gaps(column: list[DockRequest], folded: set[str]) -> float:
-    return sum(CLOSE if request.name in folded else GAP for request in column[:-1])
+    return sum(FOLDED_GAP if request.name in folded else GAP for request in column[:-1])
 
 
 def _share_height(least: list[float], most: list[float], room: float) -> list[float]:

@@ -15,11 +15,11 @@ from fba_player.ui.panels.panel import STANDING, Panel, tooltip
 
 ABOVE = 40.0
 """Points from the bar to notices, which leaves room for the text under the mouse of the timeline."""
-FADE = 0.4
+FADE_SECONDS = 0.4
 """Seconds in which a notice fades."""
-MOST_OF_WIDTH = 0.55
+MAX_BUTTONS_SHARE = 0.55
 """Share of the window's width; wider buttons become one with a menu, so that they do not cover the figure."""
-NARROW = 560.0
+MIN_NAME_WIDTH = 560.0
 """Width in points below which the name is left out."""
 
 
@@ -40,7 +40,7 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
 
     taken: points that are used at the left. room: right limit in points.
     """
-    if display[0] < NARROW or display[1] < 200:
+    if display[0] < MIN_NAME_WIDTH or display[1] < 200:
         return
     to = imgui.get_background_draw_list()
     x, y = EDGE + 4 + taken, EDGE + 7
@@ -62,7 +62,7 @@ def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, fl
         return display[0]
     labels = [panel.label for panel in panels]
     wide = _width(labels)
-    together = wide > MOST_OF_WIDTH * display[0]
+    together = wide > MAX_BUTTONS_SHARE * display[0]
     if together:
         wide = _width(["Panels"])
     left = display[0] - EDGE - wide
@@ -110,7 +110,7 @@ def draw_notices(session: Session, display: tuple[float, float], above: float) -
     to = imgui.get_foreground_draw_list()
     y = display[1] - above - ABOVE
     for notice in reversed(session.notices()):
-        alpha = min((notice.until - session.clock()) / FADE, 1.0)
+        alpha = min((notice.until - session.clock()) / FADE_SECONDS, 1.0)
         colour = {"error": theme.ALERT, "warning": theme.WARM}.get(notice.kind, theme.ACCENT)
         size = imgui.calc_text_size(notice.text, False, max(display[0] - 80, 60))
         left = (display[0] - size.x) / 2

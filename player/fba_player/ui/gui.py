@@ -16,9 +16,10 @@ from fba_player.ui._imgui_renderer import ImguiRenderer
 from fba_player.ui._panel_windows import PanelWindows
 from fba_player.ui.panels.registry import make_panels
 
-HIDES = 3.0
+HIDE_SECONDS = 3.0
 """Seconds without input after which the bar is hidden while playing."""
-FADE = 0.25
+FADE_SECONDS = 0.25
+"""Seconds in which the bar fades."""
 
 
 class Gui:
@@ -153,9 +154,9 @@ class Gui:
 
     def _hide(self, io: imgui.IO) -> None:
         session = self.session
-        busy = imgui.is_any_item_active() or (io.want_capture_mouse and session.idle < 10 * HIDES)
-        away = self.hides and session.transport.playing and session.idle > HIDES and not busy
-        step = io.delta_time / FADE
+        busy = imgui.is_any_item_active() or (io.want_capture_mouse and session.idle < 10 * HIDE_SECONDS)
+        away = self.hides and session.transport.playing and session.idle > HIDE_SECONDS and not busy
+        step = io.delta_time / FADE_SECONDS
         self.shown = max(self.shown - step, 0.0) if away else min(self.shown + 2 * step, 1.0)
 
     def _mouse(self, io: imgui.IO) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-SMALLEST = 6
+MIN_FONT_SIZE = 6
+"""Pixels."""
 
 
 def label_font(size: float) -> Any:
-    """The font at a size in pixels, at least `SMALLEST`."""
-    return _font(max(round(size), SMALLEST))
+    """The font at a size in pixels, at least `MIN_FONT_SIZE`."""
+    return _font(max(round(size), MIN_FONT_SIZE))
 
 
 def shortened(draw: Any, text: str, font: Any, width: float) -> str:

@@ -42,10 +42,10 @@ LOST = (
     "OpenGL stopped working ({reason}): the graphics driver was reset, or has no memory left. Start the "
     "player again; a smaller window, or LIBGL_ALWAYS_SOFTWARE=1 (drawing without the graphics card), may help"
 )
-IDLE = 0.05
+IDLE_SECONDS = 0.05
 """Seconds to wait for input while nothing moves."""
-FASTEST = 1 / 250
-"""Least seconds per picture, for displays that do not limit the rate."""
+MIN_PICTURE_SECONDS = 1 / 250
+"""Shortest time from one picture to the next, for displays that do not limit the rate."""
 WARNING_SECONDS = 12.0
 """Seconds for which warnings about the file are shown."""
 SETTLES = 4
@@ -131,7 +131,7 @@ class Window:
         if self._pictures_due:
             glfw.poll_events()
         else:
-            glfw.wait_events_timeout(IDLE)
+            glfw.wait_events_timeout(IDLE_SECONDS)
         if glfw.window_should_close(self._window) and not session.closing:
             session.leave()
             glfw.set_window_should_close(self._window, session.closing)
@@ -142,13 +142,13 @@ class Window:
             return True
         size = self._framebuffer()
         if size[0] < 1 or size[1] < 1:  # minimised
-            glfw.wait_events_timeout(IDLE)
+            glfw.wait_events_timeout(IDLE_SECONDS)
             return True
         self._pictures_due -= 1
         self._draw_checked(size)
         glfw.swap_buffers(self._window)
         self.pictures += 1
-        left = FASTEST - (wall.perf_counter() - begun)
+        left = MIN_PICTURE_SECONDS - (wall.perf_counter() - begun)
         if left > 0:
             wall.sleep(left)
         return True

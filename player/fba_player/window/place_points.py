@@ -5,16 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from fba.atomic import PathLike
-from fba.errors import DisplayError
 from fba.face.importers.head_surface import HeadSurface
-from fba_player.gl.context import cure
 from fba_player.scene.placement_scene import PlacementScene
 from fba_player.scene.point_placement import PointPlacement
 from fba_player.window._window import Window
-from fba_player.window.display import check_display
+from fba_player.window.display import check_page
 
-SECONDS = 8.0
-"""For which the window says what was known."""
+NOTICE_SECONDS = 8.0
+"""Seconds for which the first notice is shown."""
 BY_HAND = (
     "Without a window, write the file by hand: lines 'name,vertex' (vertices of the mesh, counted from 0) "
     "or 'name,x,y,z' (in its unit), for instance '9.3,297' for the tip of the nose"
@@ -24,13 +22,7 @@ BY_HAND = (
 
 def check_window() -> None:
     """Raise DisplayError, which says how to write the points by hand, if the page cannot be shown."""
-    try:
-        import imgui_bundle  # noqa: F401 - the page is made with it
-    except ImportError as error:
-        raise DisplayError(
-            f"the page for points needs imgui: {error}. {cure(error, 'mpeg4-fba[player]')}. {BY_HAND}"
-        ) from error
-    check_display(BY_HAND)
+    check_page("points", BY_HAND)
 
 
 def place_points(
@@ -48,12 +40,12 @@ def place_points(
 
 
 def open_placement(placement: PointPlacement, *, size: tuple[int, int] = (1280, 800)) -> Window:
-    """The window for placing points, opened but not yet shown: `run` shows it until it is closed."""
+    """Return the window for placing points, opened but not yet shown: `run` shows it until it is closed."""
     scene = PlacementScene(placement)
     window = Window(scene, title=f"{scene.title}: feature points", size=size)
     window.session.open.add("points")
-    known = len(placement.order) - len(placement.missing)
+    known = len(placement.names) - len(placement.missing)
     if known:
-        text = f"{known} of {len(placement.order)} points {placement.surface.origin}: check them, too"
-        window.session.say(text, seconds=SECONDS)
+        text = f"{known} of {len(placement.names)} points {placement.surface.origin}: check them, too"
+        window.session.say(text, seconds=NOTICE_SECONDS)
     return window

@@ -5,15 +5,20 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from fba.animation import Animation
+from fba.arrays import Float32, Float64
 from fba.atomic import PathLike
+from fba.face.resolve import Resolver
+from fba.tracks import BodyTrack, FaceTrack
 from fba_player.export.render import as_scene
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.scene import Scene
-from fba_player.session.newest import Newest, follow_newest
 from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.view.camera import Camera
@@ -22,6 +27,11 @@ from fba_player.window._window import WARNING_SECONDS, Window
 if TYPE_CHECKING:
     from fba_player.sound.player import Audio
     from fba_player.view.protocols import Showable
+
+Newest = Callable[[], tuple[FaceTrack | None, BodyTrack | None]]
+"""Returns tracks of one frame, the newest face and body of a live capture; None for a missing one."""
+NEWEST_SECONDS = 1.0
+"""Seconds from the end of what has arrived within which a picture shows the newest values."""
 
 
 def play(
@@ -101,3 +111,29 @@ def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
             f"There is no sound device: {name} is not heard, but recorded films have it", "warning", 8.0
         )
     return session.audio
+
+
+def follow_newest(session: Session, newest: Newest) -> None:
+    """Let pictures show the newest values of a capture, which the stream's last frame has only later.
+
+    They do while the stream arrives and is played at its end. A user who pauses or seeks back sees the
+    stream instead, until it is played to its end again.
+    """
+    scene = session.scene
+    settings = scene.model if isinstance(scene, Scene) else None
+
+    def show(faps: Float32, baps: Float64) -> None:
+        transport = session.transport
+        if not scene.timeline.growing:
+            session.rolling.discard("newest")
+            return
+        if not transport.playing or transport.behind > NEWEST_SECONDS:
+            return
+        face, body = newest()
+        if face is not None:
+            faps[:] = Resolver(settings).push(face)[0]
+        if body is not None:
+            np.copyto(baps, body.values[0], where=body.mask[0])
+
+    session.before_frame.append(show)
+    session.rolling.add("newest")

@@ -97,7 +97,7 @@ def test_a_clip_shows_itself_as_a_small_film(talking: Animation) -> None:
 
 @pytest.mark.usefixtures("opengl")
 def test_long_clips_are_cut_and_fast_ones_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(notebook, "SECONDS", 0.05)
+    monkeypatch.setattr(notebook, "MAX_FILM_SECONDS", 0.05)
     long = Animation(120, np.array([0, 9000]), face=face_track([{3: 1}, {3: 900}]))
     preview = Preview(long, width=48, start=2.0)
     page = shown(preview)
@@ -111,7 +111,7 @@ def test_long_clips_are_cut_and_fast_ones_thinned(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.usefixtures("opengl")
 def test_large_films_stay_out_of_the_page(talking: Animation, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(notebook, "MOST_BYTES", 1000)
+    monkeypatch.setattr(notebook, "MAX_FILM_BYTES", 1000)
     page = shown(Preview(talking, width=64))
     assert "would add 0.0 MB to the page" in page.text
     assert Image.open(io.BytesIO(page.data("img", "image/png"))).size == (64, 48)

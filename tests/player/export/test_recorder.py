@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fba.errors import FormatError, UnsupportedError
-from fba_player.export.recorder import WAITING, Recorder
+from fba_player.export.recorder import MAX_WAITING_PICTURES, Recorder
 
 pytest.importorskip("av")
 
@@ -53,21 +53,21 @@ class Full(Slow):
 def test_a_window_does_not_wait(tmp_path: Path) -> None:
     sink = Slow()
     recorder = Recorder.into(sink, tmp_path / "x", SIZE, Fraction(10))
-    taken = [recorder.add(BLACK, number / 10, wait=False) for number in range(WAITING + 3)]
-    assert taken == [True] * WAITING + [False] * 3
+    taken = [recorder.add(BLACK, number / 10, wait=False) for number in range(MAX_WAITING_PICTURES + 3)]
+    assert taken == [True] * MAX_WAITING_PICTURES + [False] * 3
     assert recorder.dropped == 3
-    assert recorder.frames == WAITING
+    assert recorder.frames == MAX_WAITING_PICTURES
     sink.go.set()
-    assert recorder.close() == Path(str(WAITING))
-    assert sink.numbers == list(range(WAITING))
+    assert recorder.close() == Path(str(MAX_WAITING_PICTURES))
+    assert sink.numbers == list(range(MAX_WAITING_PICTURES))
 
 
 def test_whoever_waits_loses_nothing(tmp_path: Path) -> None:
     sink = Slow()
     threading.Timer(0.05, sink.go.set).start()
     with Recorder.into(sink, tmp_path / "x", SIZE, Fraction(10)) as recorder:
-        assert all(recorder.add(BLACK) for _ in range(3 * WAITING))
-    assert sink.numbers == list(range(3 * WAITING))
+        assert all(recorder.add(BLACK) for _ in range(3 * MAX_WAITING_PICTURES))
+    assert sink.numbers == list(range(3 * MAX_WAITING_PICTURES))
     assert sink.aborted == 0
 
 
@@ -93,7 +93,7 @@ def test_what_the_encoder_met_is_raised_soon_and_at_the_end(tmp_path: Path) -> N
     recorder = Recorder.into(sink, tmp_path / "x", SIZE, Fraction(10))
 
     def many() -> None:
-        for _ in range(10 * WAITING):
+        for _ in range(10 * MAX_WAITING_PICTURES):
             recorder.add(BLACK)
             time.sleep(0.001)
 

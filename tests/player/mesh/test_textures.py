@@ -10,7 +10,7 @@ import pytest
 
 Image = pytest.importorskip("PIL.Image")
 
-from fba_player.mesh.textures import LARGE, load_picture  # noqa: E402 - needs Pillow
+from fba_player.mesh.textures import MIN_CACHED_BYTES, load_picture  # noqa: E402 - needs Pillow
 
 
 def encoded(pixels: np.ndarray) -> bytes:
@@ -39,7 +39,7 @@ def test_a_large_one_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("FBA_CACHE", str(tmp_path))
     noise = np.random.default_rng(5).integers(0, 256, (300, 200, 3), dtype=np.uint8)
     data = encoded(noise)
-    assert len(data) > LARGE
+    assert len(data) > MIN_CACHED_BYTES
     first = load_picture(data)
     seen = first.reduced(4)
 

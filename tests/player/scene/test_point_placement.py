@@ -53,11 +53,11 @@ def test_it_asks_for_what_is_missing_first_and_for_what_every_face_needs_before_
     placement: PointPlacement,
 ) -> None:
     needed = [name for name in FAPU_POINTS if name != "9.15"]
-    assert list(placement.order[:9]) == needed
-    assert placement.order[9] == "2.1"  # the first that has FAPs
-    assert placement.order.index("2.11") == placement.order.index("10.4") + 1  # the first that has none
-    assert placement.order[-1] == "9.15"  # known already: only to be checked
-    assert sorted([*placement.order, "7.1", "11.5"]) == sorted(names())
+    assert list(placement.names[:9]) == needed
+    assert placement.names[9] == "2.1"  # the first that has FAPs
+    assert placement.names.index("2.11") == placement.names.index("10.4") + 1  # the first that has none
+    assert placement.names[-1] == "9.15"  # known already: only to be checked
+    assert sorted([*placement.names, "7.1", "11.5"]) == sorted(names())
     assert placement.missing_units == tuple(needed)
     assert placement.current == "3.5"
 
@@ -78,7 +78,7 @@ def test_next_goes_round_and_next_missing_passes_over_what_has_a_place(placement
     placement.choose("3.5")
     assert placement.next_missing()
     assert placement.current == "3.1"
-    placement.places = dict.fromkeys(placement.order, 0)
+    placement.places = dict.fromkeys(placement.names, 0)
     assert not placement.next_missing()
     with pytest.raises(ValueError, match=r"7\.1"):
         placement.choose("7.1")

@@ -42,7 +42,7 @@ def test_without_a_face_and_for_long_ones_there_are_none(monkeypatch: object) ->
     body = BodyTrack(np.zeros((3, 296), dtype=np.int32), np.ones((3, 296), dtype=bool))
     assert read_stretches(Animation(25, np.arange(3), None, body), None) == ()
     face = angry_for_a_while()
-    monkeypatch.setattr(emotion_trace, "MOST_FRAMES", 100)  # type: ignore[attr-defined]
+    monkeypatch.setattr(emotion_trace, "MAX_FRAMES", 100)  # type: ignore[attr-defined]
     assert read_stretches(face, None) == ()
 
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from fba.animation import Animation, FaceTrack
 from fba.parameters import faps
 from fba_player.playback.timeline import Timeline
-from fba_player.ui.panels._curve_data import BLOCK, SHORTEST, Courses, TimeZoom, amount, envelope
-from fba_player.ui.panels._parameter_chooser import search_parameters
+from fba_player.ui.panels._curve_data import BLOCK, MIN_SHOWN_SECONDS, Courses, TimeZoom, amount, envelope
+from fba_player.ui.panels._curves_panel import search_parameters
 from player_tracks import body_track, face_track
 
 
@@ -127,7 +127,7 @@ def test_zooming_keeps_the_time_under_the_mouse() -> None:
     time_zoom.follow(20.0)
     assert (time_zoom.low, time_zoom.high) == (15.0, 65.0)
     time_zoom.zoom(1e-9, 30.0)
-    assert time_zoom.high - time_zoom.low == pytest.approx(SHORTEST)
+    assert time_zoom.high - time_zoom.low == pytest.approx(MIN_SHOWN_SECONDS)
     time_zoom.zoom(1e9, 30.0)
     assert time_zoom.shows_all
 

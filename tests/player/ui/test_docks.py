@@ -7,9 +7,9 @@ import pytest
 from fba_player.ui._docks import (
     EDGE,
     GAP,
-    LEAST_MIDDLE,
     MIDDLE,
-    NARROWEST,
+    MIN_COLUMN,
+    MIN_MIDDLE,
     TITLE,
     Dock,
     DockRequest,
@@ -99,8 +99,8 @@ def test_closing_one_gives_its_room_to_the_others() -> None:
 def test_the_middle_stays_free(wide: float) -> None:
     found = Docks().arrange([request("a", width=430), request("b", "right", width=380)], wide, TOP, 410)
     left, right = free_middle(found.values(), wide)
-    assert (1 - left - right) * wide >= max(MIDDLE * wide, LEAST_MIDDLE) - 1e-6
-    assert min(dock.width for dock in found.values()) >= NARROWEST
+    assert (1 - left - right) * wide >= max(MIDDLE * wide, MIN_MIDDLE) - 1e-6
+    assert min(dock.width for dock in found.values()) >= MIN_COLUMN
 
 
 def test_a_narrow_display_has_one_column() -> None:
@@ -108,7 +108,7 @@ def test_a_narrow_display_has_one_column() -> None:
     assert found["a"].left == found["b"].left
     left, right = free_middle(found.values(), 640)
     assert left == 0.0
-    assert (1 - right) * 640 >= LEAST_MIDDLE
+    assert (1 - right) * 640 >= MIN_MIDDLE
 
 
 @pytest.mark.parametrize(("wide", "high"), [(200.0, 60.0), (320.0, 100.0), (640.0, 200.0), (900.0, 250.0)])

@@ -124,7 +124,7 @@ def test_keys_work_through_the_points(on_display: str, surface: HeadSurface, tmp
     with window:
         settle(window)
         head = small_head().bound
-        first = placement.order
+        first = placement.names
         press(glfw.KEY_DOWN)
         assert placement.current == first[1]
         press(glfw.KEY_UP)
@@ -158,14 +158,14 @@ def test_keys_work_through_the_points(on_display: str, surface: HeadSurface, tmp
 
 
 def test_an_unwritable_file_is_said_in_the_window(surface: HeadSurface, tmp_path: Path) -> None:
-    from fba_player.session.placing import press_key
+    from fba_player.session.placing import PLACING
 
     placement = PointPlacement(surface, tmp_path / "nowhere" / "points.csv")
     session = Session(PlacementScene(placement), size=SIZE)
-    assert press_key(session, "ctrl+s")
+    assert PLACING.press_key(session, "ctrl+s")
     assert session.notices()[-1].text.startswith("Not saved: ")
     assert not placement.written
-    assert not press_key(session, "p")
+    assert not PLACING.press_key(session, "p")
 
 
 def test_without_a_display_the_file_s_format_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from fba.compiled import is_compiled
 
 WINDOW = 1.0
 """Seconds over which the bit rate is averaged."""
-MOST_VALUES = 3_000_000 if is_compiled() else 30_000
+MAX_VALUES = 3_000_000 if is_compiled() else 30_000
 """Most values of an animation that is encoded only to show its bit rate: about a second."""
 
 
@@ -68,7 +68,7 @@ def measure_rates(info: StreamInfo) -> Rates | None:
 def probe_encoded(animation: Animation) -> StreamInfo | None:
     """Information about an animation as if encoded; None if it is too long or cannot be encoded."""
     tracks = [track for track in (animation.face, animation.body) if track is not None]
-    if not len(animation) or sum(int(track.mask.sum()) for track in tracks) > MOST_VALUES:
+    if not len(animation) or sum(int(track.mask.sum()) for track in tracks) > MAX_VALUES:
         return None
     from fba.codec import encode, probe_stream
     from fba.errors import FbaError

@@ -19,10 +19,10 @@ FILLED_IN_WEIGHT = 0.5
 TYPICAL_ANGLE, TYPICAL_SHIFT = 45.0, 300.0
 """Degrees and millimetres of a BAP that count as much as the typical motion of a FAP."""
 
-SHORTEST = 0.05
-"""Least seconds that are shown."""
-NEAR = 1e-6
-"""Seconds of tolerance."""
+MIN_SHOWN_SECONDS = 0.05
+"""Shortest range of time that is shown."""
+TIME_TOLERANCE = 1e-6
+"""Seconds within which two times are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +242,7 @@ class TimeZoom:
     @property
     def shows_all(self) -> bool:
         """Whether the full range is shown."""
-        return self.low <= self.first + NEAR and self.high >= self.last - NEAR
+        return self.low <= self.first + TIME_TOLERANCE and self.high >= self.last - TIME_TOLERANCE
 
     def bound(self, first: float, last: float) -> None:
         """Set the full range; if all of it was shown, it still is."""
@@ -272,13 +272,13 @@ class TimeZoom:
     def follow(self, time: float) -> None:
         """If a time lies outside, move on by a page: the time is then near the left edge."""
         wide = self.high - self.low
-        if not self.low - NEAR <= time <= self.high + NEAR:
+        if not self.low - TIME_TOLERANCE <= time <= self.high + TIME_TOLERANCE:
             self.pan(time - wide * 0.1 - self.low)
 
     def _set(self, low: float, high: float) -> None:
-        if high - low < SHORTEST:
+        if high - low < MIN_SHOWN_SECONDS:
             middle = (low + high) / 2
-            low, high = middle - SHORTEST / 2, middle + SHORTEST / 2
+            low, high = middle - MIN_SHOWN_SECONDS / 2, middle + MIN_SHOWN_SECONDS / 2
         wide = min(high - low, self.last - self.first)
         low = min(max(low, self.first), max(self.last - wide, self.first))
         self.low, self.high = low, low + wide

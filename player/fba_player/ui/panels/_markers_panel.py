@@ -2,84 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from imgui_bundle import imgui
 
 from fba.capture.virtual_markers.mapping import ASSIGNMENTS, OVERLAPS
 from fba_player.scene.marker_editing import MarkerEditing
-from fba_player.session.marking import KEYS, act_on, editing_of, note_unsaved
+from fba_player.session.marking import KEYS, MARKING
 from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.panels.panel import Panel, facts, heading, shorten, tooltip
+from fba_player.ui.panels._editing_panel import EditingPanel, draw_buttons, draw_name
+from fba_player.ui.panels.panel import facts, heading, tooltip
 
-LIST_HEIGHT = 0.30
-"""Share of the panel's height that the list takes."""
-SLOWEST, FASTEST = 0.02, 2.0
-"""Smallest and largest radius that can be set, in multiples of what a new virtual marker gets."""
+MIN_REACH, MAX_REACH = 0.02, 2.0
+"""Smallest and largest radius and depth that can be set, in multiples of a new virtual marker's radius."""
 ASSIGNMENT_TEXTS = {"shared": "several markers", "exclusive": "the nearest alone"}
 OVERLAP_TEXTS = {"match": "meet their markers", "add": "are added"}
 
 
-class MarkersPanel(Panel):
+class MarkersPanel(EditingPanel[MarkerEditing]):
     """All markers of the capture; a click on one makes it the current one."""
 
     name, title, label = "markers", "Virtual markers", "Markers"
     width, height = 340.0, 2000.0
+    page, list_height = MARKING, 0.30
 
-    def __init__(self) -> None:
-        self._shown = ""
-
-    def available(self, session: Session) -> bool:
-        return editing_of(session) is not None
-
-    def draw(self, session: Session) -> None:
-        editing = editing_of(session)
-        assert editing is not None
+    def draw_editing(self, session: Session, editing: MarkerEditing) -> None:
         _current(session, editing)
         _reach(editing)
         _buttons(session, editing)
-        self._list(editing)
+        captured, fixed = editing.motion.names, len(editing.mapping.fixed)
+        placed = sum(name in editing.placed for name in captured)
+        heading(f"{placed} of {len(captured)} on the head, {fixed} fixed", exact=True)
+        self.draw_list(editing)
         _settings(editing)
-        note_unsaved(session, editing)
+        MARKING.note_unsaved(session, editing)
         _state(editing)
         if imgui.collapsing_header("Keys"):
             facts("keys", list(KEYS))
 
-    def closed(self, session: Session) -> None:
-        session.open.add(self.name)  # without it the page would be of no use
-
-    def _list(self, editing: MarkerEditing) -> None:
-        markers, names = editing.mapping.markers, editing.names
-        placed = sum(name in markers for name in editing.motion.names)
-        heading(
-            f"{placed} of {len(editing.motion.names)} on the head, {len(editing.mapping.fixed)} fixed",
-            exact=True,
-        )
-        tall = max(imgui.get_window_height() * LIST_HEIGHT, 80.0)
-        if imgui.begin_child("list", (0, tall)):
-            for name in names:
-                marker = markers.get(name)
-                is_current = name == editing.current
-                fixed = "  fixed" if marker is not None and marker.fixed else ""
-                where = (
-                    "" if marker is None else "  beside" if marker.vertex is None else f"  {marker.vertex}"
-                )
-                colour = theme.FAINT if marker is None else theme.TEXT
-                text = shorten(f"{name}{where}{fixed}", imgui.get_content_region_avail().x)
-                imgui.push_style_color(imgui.Col_.text, colour)
-                if imgui.selectable(f"{text}##{name}", is_current)[0]:
-                    editing.choose(name)
-                imgui.pop_style_color()
-                if is_current and self._shown != name:
-                    imgui.set_scroll_here_y(0.4)
-        imgui.end_child()
-        self._shown = editing.current
+    def row_of(self, editing: MarkerEditing, name: str) -> tuple[str, theme.Colour]:
+        marker = editing.mapping.markers.get(name)
+        if marker is None:
+            return name, theme.FAINT
+        where = "beside" if marker.vertex is None else str(marker.vertex)
+        return f"{name}  {where}{'  fixed' if marker.fixed else ''}", theme.TEXT
 
 
 def _current(session: Session, editing: MarkerEditing) -> None:
     marker = editing.marker
-    imgui.push_font(None, theme.LARGE)
-    imgui.text_colored(theme.ACCENT, editing.current)
-    imgui.pop_font()
+    draw_name(editing.current)
     imgui.push_text_wrap_pos(0.0)
     if marker is None:
         imgui.text_colored(theme.WARM, "not on the head yet: click where it is")
@@ -99,7 +71,7 @@ def _reach(editing: MarkerEditing) -> None:
     is_placed = marker is not None and marker.vertex is not None
     imgui.begin_disabled(not is_placed)
     usual = editing.first_radius
-    low, high = SLOWEST * usual, FASTEST * usual
+    low, high = MIN_REACH * usual, MAX_REACH * usual
     radius = marker.radius if marker is not None and is_placed else usual
     depth = marker.depth if marker is not None and is_placed else usual
     digits = "%.4f" if usual < 0.5 else "%.2f"
@@ -122,36 +94,24 @@ def _reach(editing: MarkerEditing) -> None:
 
 
 def _buttons(session: Session, editing: MarkerEditing) -> None:
-    buttons = (
-        ("Previous", "previous", True),
-        ("Next", "next", True),
-        ("Next free", "missing", any(name not in editing.mapping.markers for name in editing.motion.names)),
-        ("Remove", "remove", editing.marker is not None),
-        ("Undo", "undo", True),
-        ("Save", "save", editing.path is not None),
-    )
-    for number, (label, action, useful) in enumerate(buttons):
-        if number not in (0, 3):
-            imgui.same_line()
-        imgui.begin_disabled(not useful)
-        if imgui.button(label):
-            act_on(session, editing, action)
-        imgui.end_disabled()
+    rows = (
+        (("Previous", "previous", True), ("Next", "next", True),
+         ("Next free", "missing", bool(editing.missing))),
+        (("Remove", "remove", editing.marker is not None), ("Undo", "undo", True),
+         ("Save", "save", editing.path is not None)),
+    )  # fmt: skip
+    draw_buttons(session, MARKING, editing, rows)
 
 
 def _settings(editing: MarkerEditing) -> None:
     heading("A vertex belongs to")
-    for number, name in enumerate(ASSIGNMENTS):
-        if number:
-            imgui.same_line()
-        if imgui.radio_button(ASSIGNMENT_TEXTS[name], editing.mapping.assignment == name):
-            editing.assign(name)
+    assignment = _choose(ASSIGNMENTS, ASSIGNMENT_TEXTS, editing.mapping.assignment)
+    if assignment is not None:
+        editing.assign(assignment)
     heading("Displacements that overlap")
-    for number, name in enumerate(OVERLAPS):
-        if number:
-            imgui.same_line()
-        if imgui.radio_button(OVERLAP_TEXTS[name], editing.mapping.overlap == name):
-            editing.add_up(name)
+    overlap = _choose(OVERLAPS, OVERLAP_TEXTS, editing.mapping.overlap)
+    if overlap is not None:
+        editing.add_up(overlap)
     heading("Shown")
     changed, on = imgui.checkbox("reach of the marker", editing.shows_weights)
     if changed:
@@ -160,6 +120,17 @@ def _settings(editing: MarkerEditing) -> None:
     changed, on = imgui.checkbox("cloud beside", editing.beside)
     if changed:
         editing.beside = on
+
+
+def _choose(names: Sequence[str], texts: Mapping[str, str], current: str) -> str | None:
+    """Draw radio buttons beside each other; return the name that was clicked, else None."""
+    clicked = None
+    for number, name in enumerate(names):
+        if number:
+            imgui.same_line()
+        if imgui.radio_button(texts[name], current == name):
+            clicked = name
+    return clicked
 
 
 def _state(editing: MarkerEditing) -> None:

@@ -14,7 +14,7 @@ from fba_player.session.mood import PuppetMood
 from fba_player.ui import theme
 from fba_player.ui.panels.panel import choose_name, heading, shorten, tooltip
 
-TALLEST, FLATTEST = 240.0, 130.0
+MAX_PLANE_HEIGHT, MIN_PLANE_HEIGHT = 240.0, 130.0
 """Height of the plane in points, at most and at least; between them it leaves room for what is below it."""
 WIDE = 300.0
 """Width in points from which the sliders stand in two columns."""
@@ -83,7 +83,7 @@ class EmotionTab:
         below: points that it leaves free.
         """
         wide, room = imgui.get_content_region_avail()
-        high = min(max(min(TALLEST, room - below), FLATTEST), wide * 0.8)
+        high = min(max(min(MAX_PLANE_HEIGHT, room - below), MIN_PLANE_HEIGHT), wide * 0.8)
         x, y = imgui.get_cursor_screen_pos()
         self.plane = (x + SIDE, y + SIDE, x + wide - SIDE, y + high - SIDE)
         imgui.invisible_button("plane", (max(wide, 1), high))

@@ -23,11 +23,11 @@ from fba_player.ui.ruler import Ruler
 
 BARS = 34.0
 """Height of the bars in points."""
-LITTLE = 0.02
+MIN_LISTED_SHARE = 0.02
 """Least share of bits around the planes that is listed."""
-ALL_COLUMNS = 340.0
+MIN_TABLE_WIDTH = 340.0
 """Least width in points for all columns of the table; a narrower one has one less."""
-STEP = 3.0
+MIN_BAR_WIDTH = 3.0
 """Least width in points of a bar with its gap."""
 
 
@@ -145,14 +145,15 @@ class RatePanel(Panel):
         if self._bars[0] == made_for:
             return self._bars[1]
         inside = int(((rates.times >= time_zoom.low) & (rates.times <= time_zoom.high)).sum())
-        count = max(min(int(wide / STEP), inside), 1)
+        count = max(min(int(wide / MIN_BAR_WIDTH), inside), 1)
         tall, intra = bars_of_planes(
             rates.times, rates.bits, rates.intra, time_zoom.low, time_zoom.high, count
         )
         heights = np.where(tall > 0, 2 + (BARS - 6) * np.sqrt(tall / max(float(rates.bits.max()), 1.0)), 0.0)
         each = wide / count
+        gap = 1 if each >= MIN_BAR_WIDTH else 0
         bars = [
-            (number * each, (number + 1) * each - (1 if each >= STEP else 0), float(height), bool(key))
+            (number * each, (number + 1) * each - gap, float(height), bool(key))
             for number, (height, key) in enumerate(zip(heights, intra, strict=True))
             if height
         ]
@@ -173,11 +174,11 @@ def _row(rates: Rates, time: float) -> int:
 
 
 def _table(rates: Rates) -> None:
-    narrow = imgui.get_content_region_avail().x < ALL_COLUMNS
+    narrow = imgui.get_content_region_avail().x < MIN_TABLE_WIDTH
     if not imgui.begin_table("totals", 4 if narrow else 5, imgui.TableFlags_.sizing_fixed_fit):
         return
     for total in rates.totals:
-        if total.planes is None and total.share < LITTLE:
+        if total.planes is None and total.share < MIN_LISTED_SHARE:
             continue
         imgui.table_next_row()
         count = "" if total.planes is None else f"{total.planes} plane{'s' * (total.planes != 1)}"

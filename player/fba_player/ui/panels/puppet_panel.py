@@ -19,9 +19,9 @@ from fba_player.ui.panels.panel import Panel, shorten, tooltip
 
 TITLE, VALUE, RELEASE = 148.0, 68.0, 18.0
 """Widths in points of the title of a row, its value, and its release button."""
-SLIDER = 84.0
+MIN_SLIDER = 84.0
 """Least width of a slider in points: titles are cut first."""
-SHORTEST = 70.0
+MIN_TITLE = 70.0
 """Least width of a title in points."""
 
 
@@ -178,7 +178,7 @@ class PuppetPanel(Panel):
         if self.together and row.mirror is not None:
             title = title.removesuffix(" L").removesuffix(" R")
         width = imgui.get_content_region_avail().x
-        name_wide = min(TITLE, max(width - RELEASE - VALUE - SLIDER, SHORTEST))
+        name_wide = min(TITLE, max(width - RELEASE - VALUE - MIN_SLIDER, MIN_TITLE))
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.TEXT if touched else theme.FAINT, shorten(title, name_wide - 6))
         if imgui.is_item_hovered():
