@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float64, Floating, Integer
 from fba.face.calibration._align import known_rows
 from fba.face.calibration._eyes import FittedEye, eyeball_weight
-from fba.face.calibration._shape import Shape, fit_similarity
+from fba.face.calibration._shape import Shape, fit_size
 from fba.face.feature_points import row_of
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
@@ -55,7 +55,7 @@ def carry_tables(
                 moves = np.einsum("vij,vkj->vki", matrices[mesh.vertices], moves)
             if fap.unit == "AU":  # displacements by an angle scale with the part
                 old, new = model.parts[numbers[mesh.part]], parts[numbers[mesh.part]]
-                moves = moves * fit_similarity(old.vertices, new.vertices.astype(np.float64)).size
+                moves = moves * fit_size(old.vertices, new.vertices.astype(np.float64)).scale
             moved[mesh.part] = moves * (units[0] / units[1] if lid else 1.0)
         correction = _point_correction(model, table, moved) if fap.unit != "AU" else None
         meshes = []
