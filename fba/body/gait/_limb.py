@@ -10,7 +10,8 @@ import numpy.typing as npt
 from fba.arrays import Float64
 from fba.rotations import apply, axis_matrices
 
-KNEE, ELBOW = 1.0, -1.0
+KNEE = 1.0
+ELBOW = -1.0
 """Sense in which a hinge bends: a knee about +x (backward), an elbow about -x (forward)."""
 
 
