@@ -11,8 +11,9 @@ from fba.arrays import Float64
 from fba.rotations import apply, axis_matrices
 
 KNEE = 1.0
+"""Sense in which a knee bends: about +x, backward."""
 ELBOW = -1.0
-"""Sense in which a hinge bends: a knee about +x (backward), an elbow about -x (forward)."""
+"""Sense in which an elbow bends: about -x, forward."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -141,8 +141,8 @@ def _check_stride(stride: float | None, character: Character, anatomy: Anatomy) 
         raise ValueError(f"walk: the stride must be a number of metres, not {stride!r}") from error
     if not (np.isfinite(metres) and metres >= SHORTEST_STRIDE * anatomy.scale):
         raise ModelError(
-            f"gait: the stride must be at least {SHORTEST_STRIDE * anatomy.scale:.2g} m, not {stride!r}; it is "
-            "the distance from one contact of a foot to its next, two steps: 1.4 m in an even walk"
+            f"gait: the stride must be at least {SHORTEST_STRIDE * anatomy.scale:.2g} m, not {stride!r}; "
+            "it is the distance from one contact of a foot to its next, two steps: 1.4 m in an even walk"
         )
     if metres > 4.0 * anatomy.sides["r"].leg.reach:
         raise ModelError(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 LID_FAPS = {19: "left", 20: "right", 21: "left", 22: "right"}
-LEAST = 1e-6
+MEAN_STRETCH_WEIGHT = 1e-6
 """Weight of the average stretch, for directions in which a vertex has no edges."""
 
 
@@ -184,8 +184,8 @@ def surface_stretches(part: Part, after: Floating) -> Float64:
     along = [n.astype(np.float64) for n in normals]
     squares += weight[:, None, None] * along[0][:, :, None] * along[0][:, None, :]
     products += (weight * size)[:, None, None] * along[1][:, :, None] * along[0][:, None, :]
-    squares += (LEAST * weight)[:, None, None] * np.eye(3)
-    products += (LEAST * weight * size)[:, None, None] * np.eye(3)
+    squares += (MEAN_STRETCH_WEIGHT * weight)[:, None, None] * np.eye(3)
+    products += (MEAN_STRETCH_WEIGHT * weight * size)[:, None, None] * np.eye(3)
     matrices: Float64 = products @ np.linalg.inv(squares)
     return matrices
 
