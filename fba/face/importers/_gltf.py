@@ -185,13 +185,13 @@ def _with_gloss(colours: Float32, material: Material) -> Float32:
 
 
 def looks_backwards(gltf: Gltf) -> bool:
-    """Whether the file is of VRM 0, whose avatars look to -z."""
+    """Return whether the file is of VRM 0, whose avatars look to -z."""
     extensions = gltf.document.get("extensions")
     return extensions is not None and extensions.get("VRM") is not None
 
 
 def expression_targets(gltf: Gltf) -> dict[int, dict[str, list[tuple[int, float]]]]:
-    """Morph targets of each mesh that show one of ARKit's shapes together: mesh -> name -> (number, weight).
+    """Return the morph targets that show a shape of ARKit together: mesh -> name -> (number, weight).
 
     Raises ModelError where an expression names what does not exist.
     """

@@ -26,8 +26,10 @@ from fba.persona.recognition.recogniser import JAW_FAPS
 PUPILS = {"3.5": (61, 63), "3.6": (62, 64)}
 """Pupils are between these points."""
 JAW = 3
-UPPER_LIDS, LOWER_LIDS = (18, 19), (20, 21)
-"""Columns of the FAPs of the lids."""
+UPPER_LIDS = (18, 19)
+"""Columns of the FAPs of the upper lids."""
+LOWER_LIDS = (20, 21)
+"""Columns of the FAPs of the lower lids."""
 MIN_LID_FAPS = (-450.0, -150.0)
 """FAPs of upper and lower lids that are open as far as lids go; narrow eyes at rest would ask for more."""
 LEFT_OUT = frozenset({61, 62, 63, 64})

@@ -28,7 +28,7 @@ JPEG_QUALITY = 92
 
 
 def join_pieces(pieces: Sequence[Piece], name: str, kind: str) -> Piece:
-    """Several pieces as one part, which looks as they do.
+    """Return several pieces as one part, which looks as they do.
 
     Where textures differ, they become one; colours that differ become those of the vertices. Roughness,
     opacity and the like are those of the largest piece.
@@ -64,7 +64,7 @@ def join_pieces(pieces: Sequence[Piece], name: str, kind: str) -> Piece:
 
 
 def _join_textures(parts: Sequence[Part], main: Part) -> tuple[Material, Float32 | None]:
-    """(material of the joined part, its texture coordinates (V, 2) or None).
+    """Return the material of the joined part, and its texture coordinates (V, 2) or None.
 
     Where the textures cannot become one, that of the main part stays, and others are as their colours.
     """
@@ -78,14 +78,14 @@ def _join_textures(parts: Sequence[Part], main: Part) -> tuple[Material, Float32
 
 
 def _own_texcoords(part: Part, main: Part) -> Float32:
-    """(V, 2) texture coordinates of a part, 0 where it has another texture than the main part."""
+    """Return texture coordinates (V, 2) of a part, 0 where it has another texture than the main part."""
     if part.texcoords is None or part.material.texture != main.material.texture:
         return np.zeros((len(part.vertices), 2), np.float32)
     return part.texcoords
 
 
 def _colours(part: Part) -> Float32:
-    """(V, 4) colours of a part's vertices, without any of their own those of its material."""
+    """Return colours (V, 4) of a part's vertices; those of its material where the vertices have none."""
     if part.colours is not None:
         return part.colours
     return np.tile(
@@ -111,7 +111,7 @@ class _Tile:
 
 
 def make_atlas(parts: Sequence[Part]) -> Atlas | None:
-    """One texture with what each part shows of its own, side by side; None where one cannot be made.
+    """Return a texture of what each part shows of its own, side by side; None where there cannot be one.
 
     Textures repeat, as glTF's do by default. Parts without a texture get a white spot. It cannot be made of
     pictures that are damaged or too large, nor of textures that repeat more than `MAX_REPEATS` times.

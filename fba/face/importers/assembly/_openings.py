@@ -32,7 +32,9 @@ MAX_OPENING = 0.8
 
 
 def find_eye_loop(surface: Surface, centre: Float64, radius: float) -> Intp:
-    """(N,) vertices of the shortest loop of visible edges around an eye's axis, in order; empty without one.
+    """Return the vertices (N,) of the shortest loop of visible edges around an eye's axis, in order.
+
+    It is empty where there is no loop.
 
     centre: (3,), radius: of the eyeball, in the unit of the surface. The face looks to +z. Lids are thick: of
     the loops around their back and their front edges, one that the eyeball does not hide is taken.
@@ -44,7 +46,9 @@ def find_eye_loop(surface: Surface, centre: Float64, radius: float) -> Intp:
 
 
 def _shortest_loop(surface: Surface, centre: Float64, radius: float, hidden: float) -> tuple[Intp, float]:
-    """(vertices (N,) of the shortest loop around an eye's axis, its length; none and infinite without one).
+    """Return the vertices (N,) of the shortest loop around an eye's axis, and its length.
+
+    Without a loop there are no vertices, and the length is infinite.
 
     hidden: depth behind the front of the eyeball, in its radii, beyond which vertices do not count.
     """
@@ -92,7 +96,7 @@ def _shortest_loop(surface: Surface, centre: Float64, radius: float, hidden: flo
 
 
 def lid_points_of_loop(points: Float64, loop: Intp, x: float) -> dict[str, int]:
-    """The vertices of a loop that are the middles of the lids and the corners of the eye.
+    """Return the vertices of a loop that are the middles of the lids and the corners of the eye.
 
     points: (N, 3) of the surface. x: of the pupil. Names: "upper", "lower", "left", "right" (the subject's).
     """
@@ -114,7 +118,7 @@ def lid_points_of_loop(points: Float64, loop: Intp, x: float) -> dict[str, int]:
 def mouth_points(
     skin: Part, drop: Float64, upper: Float64, lower: Float64, apart: float
 ) -> dict[str, Float64]:
-    """Inner points of the lips (2.2 to 2.9) on the open edges around a mouth; none without such a loop.
+    """Return the inner points of the lips (2.2 to 2.9) on the open edges around a mouth; none without a loop.
 
     drop: (V,) how far an opening jaw lowers each vertex of the skin. upper, lower: (3,) places near
     the middles of the lips. apart: distance of the pupils.
@@ -135,7 +139,7 @@ def mouth_points(
 
 
 def _inner_lip_points(ring: Float64, falls: Float64, middle: float) -> dict[str, Float64]:
-    """Points on a ring (N, 3) around a mouth. falls: (N,) of its vertices. middle: the x of the midline."""
+    """Return points on a ring (N, 3) around a mouth. falls: (N,) of its vertices. middle: the x of the midline."""
     left, right = int(ring[:, 0].argmax()), int(ring[:, 0].argmin())
     order = np.arange(len(ring))
     first, last = sorted((left, right))
@@ -155,7 +159,7 @@ def _inner_lip_points(ring: Float64, falls: Float64, middle: float) -> dict[str,
 
 
 def _closed_loops(edges: Intp) -> list[Intp]:
-    """Closed loops of edges (E, 2), each as its vertices in order; edges that branch form no loop."""
+    """Return closed loops of edges (E, 2), each as its vertices in order; edges that branch form none."""
     ends: dict[int, list[int]] = {}
     for a, b in edges.tolist():
         ends.setdefault(a, []).append(b)

@@ -49,13 +49,13 @@ CORNER_WIDTH = 0.055
 UNLIKE = 1.3
 """Ratio of the radii above which two shells are not a pair of eyes."""
 IN_FRONT = 0.7
-"""Least distance of a pupil in front of its eyeball's centre, in radii."""
+"""Distance that a pupil is in front of its eyeball's centre at least, in radii."""
 RIGHT_LID = ("3.2", "3.4", "3.8", "3.12")
 """Points of the right lids' margins and of the corners between them."""
 LIDS_ALIKE = 0.02
-"""Most difference between the heights of both eyes' openings, as a share, of lids that stay as located."""
+"""Share by which the heights of both eyes' openings differ, at most, where lids stay as located."""
 MIN_FAPS = 20
-"""With at least this many shapes named after FAPs, points are where these move most."""
+"""Number of shapes named after FAPs from which points are where these move most."""
 
 
 def find_points(

@@ -182,7 +182,7 @@ def pupil_distance(points: Float64) -> float:
 
 
 def turn_outward(pieces: Sequence[Piece], centre: Float64, reach: float = np.inf) -> tuple[list[Piece], int]:
-    """(pieces with the skin facing away from the centre of the head, number of triangles turned).
+    """Return pieces with the skin facing away from the centre of the head, and the number of turned triangles.
 
     reach: distance from the centre within which skin is that of the head; hands and feet of avatars, which
     may have its material, face anywhere as seen from there. Within the skin, triangles that run against their
@@ -212,7 +212,7 @@ def _turn_triangles(piece: Piece, wrong: Bool) -> Piece:
 
 
 def _flip(triangles: Int32, wrong: Bool) -> Int32:
-    """Triangles (F, 3), those of a mask (F,) turned over."""
+    """Return triangles (F, 3), those of a mask (F,) turned over."""
     return np.where(wrong[:, None], triangles[:, ::-1], triangles)
 
 

@@ -251,7 +251,7 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
 
 
 def fit_clothes(path: Path, base: Float64) -> Polygons:
-    """The mesh of an .mhclo file, placed on a base mesh (V, 3), in the base mesh's units.
+    """Return the mesh of an .mhclo file, placed on a base mesh (V, 3), in the base mesh's units.
 
     Each line after `verts` is either one vertex of the base, or three vertices, their weights and an
     offset; offsets are scaled by distances on the base mesh (`x_scale a b d`: |a - b| / d along x, and
