@@ -15,14 +15,16 @@ from fba.arrays import Int64
 from fba.body.solve.pose_loops import UNIT
 from fba.parameters import bap_numbers, baps
 
-LEAST, MOST = np.radians(2.0), np.radians(45.0)
-"""Between these angles a body must turn."""
-AGAINST = -0.6
-"""At most this is the correlation of body and head where one turns against the other."""
-TOO_FAR = -1.8
-"""A head that turns back by more than that many times the body's turn looks away from what it looked at."""
-ENOUGH = -0.4
-"""One that turns back by less follows the body."""
+MIN_TURN = np.radians(2.0)
+"""Radians that a body must turn at least."""
+MAX_TURN = np.radians(45.0)
+"""Radians that a body may turn at most."""
+OPPOSED = -0.6
+"""Correlation of body and head up to which the head turns against the body."""
+TURNED_AWAY = -1.8
+"""Turn of the head, relative to the body's, below which it looks away from what it looked at."""
+KEPT_AHEAD = -0.4
+"""Turn of the head, relative to the body's, above which it follows the body."""
 
 
 def head_turns_too_far(values: Int64, other: Int64) -> float | None:
@@ -32,9 +34,9 @@ def head_turns_too_far(values: Int64, other: Int64) -> float | None:
     turn back as people's do in `other`.
     """
     now, then = _head_by_body(values), _head_by_body(other)
-    if now is None or then is None or not LEAST <= then[0] <= MOST:
+    if now is None or then is None or not MIN_TURN <= then[0] <= MAX_TURN:
         return None
-    return -now[1] if now[1] < TOO_FAR <= then[1] <= ENOUGH else None
+    return -now[1] if now[1] < TURNED_AWAY <= then[1] <= KEPT_AHEAD else None
 
 
 def _head_by_body(values: Int64) -> tuple[float, float] | None:
@@ -47,7 +49,7 @@ def _head_by_body(values: Int64) -> tuple[float, float] | None:
     head = values[:, columns].sum(axis=1) * UNIT
     if not body.any() or not head.any() or np.ptp(body) == 0 or np.ptp(head) == 0:
         return None
-    if np.corrcoef(body, head)[0, 1] > AGAINST:
+    if np.corrcoef(body, head)[0, 1] > OPPOSED:
         return None
     return float(np.ptp(body)), float(np.polyfit(body, head, 1)[0])
 

@@ -12,20 +12,24 @@ from fba.body.skin.skin_weights import INFLUENCES, strongest_weights
 from fba.cache import load_or_make, make_key
 from fba.easing import smoothstep
 
-NEAR, FAR = 0.010, 0.030
-"""Metres from the body's neck: up to the first a vertex moves with the neck, beyond the second with the
-skull alone."""
+WITH_NECK = 0.010
+"""Metres from the body's neck up to which a vertex of the face moves with the neck."""
+WITH_SKULL = 0.030
+"""Metres from the body's neck beyond which a vertex of the face moves with the skull alone."""
 NEIGHBOURS = 4
-SAME, ALMOST, ROUNDS = 1e-5, 0.01, 20
-"""Metres within which vertices are the same; metres within which they are paired at first; most rounds in
-which a face is moved by the median offset of its pairs."""
+SAME_PLACE = 1e-5
+"""Metres within which two vertices are the same."""
+PAIR_DISTANCE = 0.01
+"""Metres within which vertices are paired at first."""
+MAX_ROUNDS = 20
+"""Rounds, at most, in which a face is moved by the median offset of its pairs."""
 RIM = 0.3
-"""The share of a neck's width that its lower rim has at least."""
+"""Share of a neck's width that its lower rim has at least."""
 SEAM = 0.002
 """A face whose vertices come this close (m) to those of the body's neck brings its own neck."""
 
-LARGE = 4000
-"""Results for faces of this many vertices or more are cached on disk."""
+CACHED_VERTICES = 4000
+"""Number of vertices from which results for a face are cached on disk."""
 CACHE_VERSION = 1
 """Version of cached results; increment when results change."""
 
@@ -56,7 +60,7 @@ def blend_with_neck(neck: list[BodyPart], joints: int, skull: int, placed: Float
         result = _compute_blend(neck, joints, skull, placed, free)
         return [*result[:4], np.array([result.brings_neck])]
 
-    if len(placed) < LARGE:
+    if len(placed) < CACHED_VERTICES:
         arrays = make()
     else:
         of_neck = [array for p in neck for array in (p.vertices, p.triangles, p.joints, p.weights)]
@@ -97,15 +101,15 @@ def _measure_offset(anchors: Float32, placed: Float64) -> Float64:
     if not len(placed):
         return none
     tree, moved = cKDTree(placed), anchors.astype(np.float64)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         away, rows = tree.query(moved)
-        near = away < ALMOST
-        if not near.any() or float((away < SAME).mean()) > 0.5:
+        near = away < PAIR_DISTANCE
+        if not near.any() or float((away < SAME_PLACE).mean()) > 0.5:
             break
         moved = moved + np.median(placed[rows[near]] - moved[near], axis=0)
     offset: Float64 = anchors[0].astype(np.float64) - moved[0]
-    result = float((tree.query(moved)[0] < SAME).mean()) > 0.5
-    return offset if result and float(np.linalg.norm(offset)) > SAME else none
+    result = float((tree.query(moved)[0] < SAME_PLACE).mean()) > 0.5
+    return offset if result and float(np.linalg.norm(offset)) > SAME_PLACE else none
 
 
 def _dense_weights(neck: list[BodyPart], joints: int) -> Float64:
@@ -128,7 +132,7 @@ def _blend_weights(
     share = 1 / np.maximum(away, 1e-6) ** 2
     share /= share.sum(axis=1, keepdims=True)
     result = np.einsum("vk,vkj->vj", share, dense[rows])
-    alone = np.where(below[:, None], 0.0, smoothstep((away[:, :1] - NEAR) / (FAR - NEAR)))
+    alone = np.where(below[:, None], 0.0, smoothstep((away[:, :1] - WITH_NECK) / (WITH_SKULL - WITH_NECK)))
     result *= 1 - alone
     result[:, skull] += alone[:, 0]
     return strongest_weights(result)

@@ -11,18 +11,21 @@ from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
 from fba.body.solve.pose_loops import UNIT
 from fba.parameters import BAP_STEP_TABLES, bap_steps
 
-ROUND_DEGREES, ROUND_RADIANS = 5.0, 0.1
-"""Of these, angles that were set by hand are multiples: of degrees, or of what BAPs count in."""
+ROUND_DEGREES = 5.0
+"""Degrees of which angles are multiples that were set by hand in degrees."""
+ROUND_RADIANS = 0.1
+"""Radians of which angles are multiples that were set by hand in radians."""
 UNITS = {
     f"{ROUND_DEGREES:g} degrees": ROUND_DEGREES / DEGREES,
     f"{ROUND_RADIANS:g} rad": ROUND_RADIANS / UNIT,
 }
 """Their names, and how many units of BAPs they are."""
-ROUND_LEAST, ROUND_MORE = 6.0, 2.0
-"""How improbable round angles must be (see `_improbability`), and how much more improbable than under the
-other table."""
-EVERY_LEAST = 1.3
-"""So improbable they must be where every key is round with one table, and not every one with the other."""
+MIN_IMPROBABILITY = 6.0
+"""How improbable round angles must be, as `_improbability` counts."""
+MIN_ADVANTAGE = 2.0
+"""Factor by which they must be more improbable than under the other table."""
+MIN_IMPROBABILITY_ALL_ROUND = 1.3
+"""How improbable they must be where every key is round with one table, and not with the other."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +54,8 @@ def find_rounder_table(levels: Int64, used: str) -> tuple[str, str] | None:
         for table in BAP_STEP_TABLES
     }
     best = max(found, key=lambda table: found[table].score)
-    least = EVERY_LEAST if found[best].every and not found[used].every else ROUND_LEAST
-    clear = found[best].score > least and found[best].score > ROUND_MORE * found[used].score
+    least = MIN_IMPROBABILITY_ALL_ROUND if found[best].every and not found[used].every else MIN_IMPROBABILITY
+    clear = found[best].score > least and found[best].score > MIN_ADVANTAGE * found[used].score
     return (best, found[best].unit) if best != used and clear else None
 
 

@@ -8,21 +8,21 @@ import numpy as np
 
 from fba.arrays import Float64
 
-LOWEST = 20
-"""Percentile of the lower foot's height that is taken for the ground: single frames may be below it."""
-FAR = 0.15
-"""Largest height in metres of the ground above 0; beyond, feet stand on a chair, or leap. Below 0, the ground
+GROUND_PERCENTILE = 20
+"""Percentile of the lower foot's height that counts as the ground: single frames may be below it."""
+MAX_HEIGHT = 0.15
+"""Metres above 0 up to which the ground may be; beyond, feet stand on a chair, or leap. Below 0, the ground
 may be at any depth: no feet are under it."""
-STEEPEST = 0.08
-"""Largest rise over run of the ground; beyond, the source climbs or uses stairs."""
-LONG = 1.0
-"""Least extent in metres of the feet's positions from which a slope is estimated."""
-SLIGHT = 0.015
-"""Least rise in metres of a slope under the feet."""
-UPPER = 0.05
+MAX_SLOPE = 0.08
+"""Rise over run up to which the ground may slope; beyond, the source climbs or uses stairs."""
+MIN_EXTENT = 1.0
+"""Metres that the feet must cover for a slope to be estimated."""
+MIN_RISE = 0.015
+"""Metres that a slope must rise under the feet."""
+WEIGHT_ABOVE = 0.05
 """Weight of feet above the plane relative to feet below it: the plane shall be under them."""
-NEAR = 0.03
-"""Distance in metres from the plane beyond which feet count less."""
+FULL_WEIGHT_DISTANCE = 0.03
+"""Metres from the plane beyond which feet count less."""
 STEPS = 20
 
 
@@ -48,21 +48,21 @@ def find(lowest: Float64, points: Float64) -> Ground:
     lower = lowest.argmin(axis=0)
     frames = np.arange(len(lower))
     heights, positions = lowest[lower, frames], points[lower, frames]
-    level = float(np.percentile(heights, LOWEST))
-    flat = Ground(level if level <= FAR else 0.0)
+    level = float(np.percentile(heights, GROUND_PERCENTILE))
+    flat = Ground(level if level <= MAX_HEIGHT else 0.0)
     middle = positions[:, [0, 2]].mean(axis=0)
     across = positions[:, [0, 2]] - middle
-    if np.ptp(across, axis=0).max() < LONG:
+    if np.ptp(across, axis=0).max() < MIN_EXTENT:
         return flat
     plane = _plane(heights, across)
     rise = across @ plane[1:]
-    if np.linalg.norm(plane[1:]) > STEEPEST or np.ptp(np.percentile(rise, [5, 95])) < SLIGHT:
+    if np.linalg.norm(plane[1:]) > MAX_SLOPE or np.ptp(np.percentile(rise, [5, 95])) < MIN_RISE:
         return flat
     over = heights - rise
-    sloping = float(np.percentile(over, LOWEST))
+    sloping = float(np.percentile(over, GROUND_PERCENTILE))
     # if the plane is the ground, standing feet are all at one height above it
-    spread = [np.ptp(np.percentile(values, [LOWEST / 2, 60])) for values in (over, heights)]
-    if sloping > FAR or spread[0] > 0.6 * spread[1]:
+    spread = [np.ptp(np.percentile(values, [GROUND_PERCENTILE / 2, 60])) for values in (over, heights)]
+    if sloping > MAX_HEIGHT or spread[0] > 0.6 * spread[1]:
         return flat
     return Ground(sloping - float(middle @ plane[1:]), (float(plane[1]), float(plane[2])))
 
@@ -70,11 +70,11 @@ def find(lowest: Float64, points: Float64) -> Ground:
 def _plane(heights: Float64, across: Float64) -> Float64:
     """Return height and slopes (3,) of the plane under most points: least squares, with less weight above."""
     columns = np.column_stack([np.ones(len(heights)), across])
-    hold = np.diag([0.0, 1.0, 1.0]) * len(heights) * (0.3 * LONG) ** 2 * UPPER
+    hold = np.diag([0.0, 1.0, 1.0]) * len(heights) * (0.3 * MIN_EXTENT) ** 2 * WEIGHT_ABOVE
     plane = np.array([np.percentile(heights, 30), 0.0, 0.0])
     for _ in range(STEPS):
         over = heights - columns @ plane
-        weights = np.where(over > 0, UPPER, 1.0) / np.maximum(1.0, np.abs(over) / NEAR)
+        weights = np.where(over > 0, WEIGHT_ABOVE, 1.0) / np.maximum(1.0, np.abs(over) / FULL_WEIGHT_DISTANCE)
         matrix = (columns * weights[:, None]).T @ columns + hold
         try:
             plane = np.linalg.solve(matrix, columns.T @ (weights * heights))

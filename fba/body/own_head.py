@@ -13,9 +13,12 @@ from fba import rotations
 from fba.arrays import Float32, Float64, Intp
 from fba.parameters import FAP_COUNT, fap_numbers
 
-UP, ASIDE = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
-SMALL, FEW = 0.1, 0.03
-"""Weights of keeping shapes small, and few, relative to reaching the largest values of a FAP."""
+UP = np.array([0.0, 1.0, 0.0])
+ASIDE = np.array([1.0, 0.0, 0.0])
+SMALL_WEIGHT = 0.1
+"""Weight of keeping shapes small, relative to reaching the largest values of a FAP."""
+FEW_WEIGHT = 0.03
+"""Weight of keeping shapes few, relative to reaching the largest values of a FAP."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +65,7 @@ class OwnHead:
                 faps[:, fap_numbers()[f"{what}_{eye.side}_eyeball"] - 1] = 0
         used = np.abs(faps).max(axis=0, initial=0.0) > 0
         scales = np.where(used, 1 / np.maximum(self.ranges, 1.0), 0.0)
-        return scales, np.concatenate([(faps * scales).T, SMALL * np.eye(len(faps))])
+        return scales, np.concatenate([(faps * scales).T, SMALL_WEIGHT * np.eye(len(faps))])
 
     def weights(self, faps: npt.ArrayLike) -> Float64:
         """Return the weights (K,), 0 to 1, of the shapes that together come closest to FAPs (68,)."""
@@ -76,7 +79,7 @@ class OwnHead:
             return self._last[0][1]
         scales, matrix = self._matrix
         count, reached = len(self.shapes), values * scales
-        chosen = nnls(matrix, np.concatenate([reached, np.full(count, -FEW / SMALL)]))[0] > 0
+        chosen = nnls(matrix, np.concatenate([reached, np.full(count, -FEW_WEIGHT / SMALL_WEIGHT)]))[0] > 0
         result: Float64 = np.zeros(count)
         matrix = matrix[:FAP_COUNT]
         while chosen.any():  # a shape that would be overdone stays at 1, and the others make up for it

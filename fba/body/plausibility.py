@@ -6,13 +6,17 @@ times. `find_doubt` measures the motion under the table it was decoded with and 
 only where the first looks wrong and the second does not. It also looks at angles: people who animate by hand
 set joints to whole fives of degrees or tenths of a radian, which come out as such under the right table only
 (`_round_angles`). Of a body that stays where it is, the head shows the scale, because it keeps looking ahead
-while the trunk turns (`_head_turns`). The bounds are set so
-that none of the 177 foreign streams and none of our captures, walks and vectors is doubted when it is decoded
-with its own table.
+while the trunk turns (`_head_turns`). The bounds are set so that none of the 177 foreign streams and none of
+our captures, walks and vectors is doubted when it is decoded with its own table.
+
+People who sway move their hips over feet that stand, so the feet move against the root. A root that goes to
+and fro by decimetres while both feet stay where they are under it is a skater, or a sway of some millimetres
+read with steps that are too large.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -22,7 +26,6 @@ import numpy.typing as npt
 from fba.arrays import Bool, Float64, Int64
 from fba.body._head_turns import head_turns_too_far
 from fba.body._round_angles import find_rounder_table
-from fba.body._sliding import slide_on_resting_legs
 from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
@@ -33,7 +36,7 @@ from fba.tracks import BodyTrack, batches
 SAMPLES = 32
 RUN = 64
 """At most SAMPLES runs of RUN successive frames, spread evenly, are examined, to bound the cost."""
-LEAST = 1.0
+MIN_SECONDS = 1.0
 """Seconds that a motion must last to be judged."""
 MARGIN = 20.0
 """Degrees that a joint must be beyond `limits.widest` to count."""
@@ -51,14 +54,18 @@ STANDS = 0.15
 """Share of the legs' speed below which the root counts as staying where it is."""
 SLIDES = 0.06
 """Metres that a body on such legs may slide along the ground, beyond what a quantiser step explains."""
-AWAY, NEAR = 25.0, 0.1
-"""Metres from the origin of a capture at which nobody stands who stays within that share of them."""
+AWAY_DISTANCE = 25.0
+"""Metres from the origin of a capture beyond which nobody stands who stays in place."""
+IN_PLACE = 0.1
+"""Share of its distance from the origin within which a body stays that stays in place."""
 JUMP = 1.0
 """Metres that the root's height may change by jumping, crouching and lying down, which count as no travel."""
 SUNK = -2.0
 """Height of the root over that of the default posture, metres, at which the whole body is underground."""
 _FEET = ("l_ankle", "r_ankle", "l_metatarsal", "r_metatarsal")
 _ROOT = ("vertical", "lateral", "frontal")
+REST_DISTANCE = 0.02
+"""Metres that the feet of legs at rest may move against the root, in any direction."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,7 @@ class Motion:
     longest way of the root from a frame to the next. hops: whether one of these ways is more than a quantiser
     step long. slid: metres that the body slides to and fro along the ground while its legs rest, less the
     quantiser step that rounding alone moves it. away: metres along the ground from the origin of a body that
-    stays there (see `NEAR`), else 0. height: metres, median of the root's height over that of the
+    stays there (see `IN_PLACE`), else 0. height: metres, median of the root's height over that of the
     default posture.
     """
 
@@ -132,7 +139,7 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
     if (rounder := find_rounder_table(levels, used)) is not None:
         table, unit = rounder
         return Doubt(used, table, (f"angles are odd that {table} makes multiples of {unit}",))
-    if numbers[-1] - numbers[0] < LEAST * rate:
+    if numbers[-1] - numbers[0] < MIN_SECONDS * rate:
         return None
     now = measure(levels * steps, numbers[sampled], rate)
     for other in BAP_STEP_TABLES:
@@ -171,7 +178,7 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
         carried=float(np.linalg.norm(swing[:, [0, 2]], axis=1).sum() / seconds),
         jump=float(lengths.max(initial=0.0)),
         hops=bool((ways > quantum).any()),
-        slid=slide_on_resting_legs(root[:, 1:], _feet(ahead), index),
+        slid=_slide_on_resting_legs(root[:, 1:], _feet(ahead), index),
         away=_distance(root[:, 1:]) * MILLIMETRE,
         height=float(np.median(root[:, 0])) * MILLIMETRE,
     )
@@ -185,7 +192,7 @@ def _root_columns() -> list[int]:
 def _distance(ground: Int64) -> float:
     """Return how far from the origin (T, 2), in mm, along the ground, keep; 0 if they go far themselves."""
     distance = float(np.linalg.norm(np.median(ground, axis=0)))
-    return distance if np.ptp(ground, axis=0).max() < NEAR * distance else 0.0
+    return distance if np.ptp(ground, axis=0).max() < IN_PLACE * distance else 0.0
 
 
 def _new_faults(now: Motion, other: Motion) -> tuple[str, ...]:
@@ -203,7 +210,7 @@ def _new_faults(now: Motion, other: Motion) -> tuple[str, ...]:
         findings.append(f"the root stays where it is while the legs carry it {now.carried:.1f} m/s")
     if now.slid > SLIDES > other.slid and other.travel < SWAY:
         findings.append(f"the body slides {now.slid:.1f} m to and fro on legs that rest")
-    if now.away > AWAY > other.away:
+    if now.away > AWAY_DISTANCE > other.away:
         findings.append(f"the body stands {now.away:.0f} m away from the origin")
     if now.height < SUNK < other.height:
         findings.append(f"the body {-now.height:.0f} m under the ground")
@@ -260,3 +267,38 @@ def _rotate_points(point: Float64, values: Int64, row: int) -> None:
         first, second = point[:, one].copy(), point[:, two].copy()
         point[:, one] = cosine * first - sine * second
         point[:, two] = sine * first + cosine * second
+
+
+def _slide_on_resting_legs(root: Int64, feet: Float64, index: Int64) -> float:
+    """Return how many metres a root goes to and fro, at most, while all feet stay in place under it.
+
+    root: (T, K), millimetres, along the ground. feet: (T, F, 3), metres, from the root. index: (T,) numbers
+    of the frames. One quantiser step an axis is taken off: by that much rounding moves a root that stands.
+    """
+    quantum = np.gcd.reduce(root - root[0], axis=0)
+    ways = [_to_and_fro(root[run]) - quantum for run in _rests(feet, index)]
+    return MILLIMETRE * max(0, int(np.max(ways)))
+
+
+def _to_and_fro(root: Int64) -> Int64:
+    """Return how far coordinates (T, K) go one way and back, each; 0 for one that goes one way only.
+
+    Who jumps with stiff legs goes one way.
+    """
+    ahead = (root - np.minimum.accumulate(root)).max(axis=0)
+    back = (np.maximum.accumulate(root) - root).max(axis=0)
+    shorter: Int64 = np.minimum(ahead, back)
+    return shorter
+
+
+def _rests(feet: Float64, index: Int64) -> Iterator[slice]:
+    """Yield the runs of successive frames in which every foot stays where it is under the root.
+
+    A run ends with the frame in which a foot has moved by more than `REST_DISTANCE` from where the run began.
+    """
+    begin = 0
+    for frame in range(1, len(index)):
+        if index[frame] != index[frame - 1] + 1 or np.abs(feet[frame] - feet[begin]).max() > REST_DISTANCE:
+            yield slice(begin, frame)
+            begin = frame
+    yield slice(begin, len(index))

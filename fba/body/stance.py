@@ -11,16 +11,18 @@ from fba.body.skeleton import Skeleton
 
 HEEL = 0.045
 """Metres from an ankle back to the heel."""
-STILL = 0.15
+STILL_SPEED = 0.15
 """Speed in metres per second below which a heel or a ball stands."""
-LEVEL = 0.15
+LEVEL_SPEED = 0.15
 """Speed in metres per second, up or down, below which the lower foot stands, wherever it slides."""
 STILL_SECONDS = 0.1
-"""For so long at least: at the top of a leap, feet are still for less."""
-SUPPORT = 0.08
+"""Seconds for which a foot that stands is still: at the top of a leap, feet are still for less."""
+SUPPORT_HEIGHT = 0.08
 """Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
-PLACED, PLACED_SECONDS = 0.025, 0.5
-"""Metres above the lower foot up to which a foot stands on its ground if it is still for these seconds."""
+PLACED_HEIGHT = 0.025
+"""Metres above the lower foot up to which a foot stands on its ground if it is still for `PLACED_SECONDS`."""
+PLACED_SECONDS = 0.5
+"""Seconds for which a foot must be still to stand on ground that is higher than the lower foot."""
 SIDES = ("l", "r")
 
 
@@ -70,19 +72,19 @@ def find_standing(above: Float64, points: Float64, rate: float) -> Bool:
 
     above: (2, T), heights of the soles above the ground, metres. points: (2, 2, T, 3), heels and balls. The
     lower foot, while it is level and not far from the ground, stands on it, even if it slides or a treadmill
-    carries it; so does the other one while an end of it is still, up to `PLACED` higher, by which captures
-    of feet are often off.
+    carries it; so does the other one while an end of it is still, up to `PLACED_HEIGHT` higher, by which
+    captures of feet are often off.
     """
     if above.shape[1] < 2:
         return np.zeros(above.shape, dtype=np.bool_)
     speed = np.linalg.norm(np.gradient(points, axis=2), axis=3).min(axis=1) * rate
     rising = np.abs(np.gradient(above, axis=1)) * rate
     lowest = above.min(axis=0)
-    lower, near = above <= lowest, above <= lowest + PLACED
-    still = _fastest(speed, rate, STILL_SECONDS) < STILL
-    alone = (_fastest(rising, rate, STILL_SECONDS) < LEVEL) & ~near[::-1]
-    placed = (_fastest(speed, rate, PLACED_SECONDS) < STILL) & near
-    stands: Bool = (above < SUPPORT) & np.where(lower, still | alone, placed)
+    lower, near = above <= lowest, above <= lowest + PLACED_HEIGHT
+    still = _fastest(speed, rate, STILL_SECONDS) < STILL_SPEED
+    alone = (_fastest(rising, rate, STILL_SECONDS) < LEVEL_SPEED) & ~near[::-1]
+    placed = (_fastest(speed, rate, PLACED_SECONDS) < STILL_SPEED) & near
+    stands: Bool = (above < SUPPORT_HEIGHT) & np.where(lower, still | alone, placed)
     return stands
 
 

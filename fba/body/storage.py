@@ -30,8 +30,8 @@ NAME = "FBA_body"
 VERSION = 1
 MAX_PARTS = 1000
 MAX_NOTES = 1000
-LARGEST = 1e6
-"""Metres: largest coordinate of a body."""
+MAX_COORDINATE = 1e6
+"""Metres that a coordinate of a body may have at most."""
 BIND_TOLERANCE = 1e-3
 """Metres and sines by which a file's inverse bind matrices may contradict its nodes."""
 
@@ -147,7 +147,11 @@ def read_body(document: Document) -> BodyModel:
     listed = content.member("parts")
     parts = tuple(_part(entry, gltf, where, row, document) for entry in listed.elements(MAX_PARTS))
     eyes = content.get("eyes")
-    pupils = None if eyes is None else [each.numbers(3, -LARGEST, LARGEST) for each in eyes.elements(2)]
+    pupils = (
+        None
+        if eyes is None
+        else [each.numbers(3, -MAX_COORDINATE, MAX_COORDINATE) for each in eyes.elements(2)]
+    )
     name = content.get("name")
     with locating_errors(content), np.errstate(all="ignore"):
         return BodyModel(
@@ -184,8 +188,8 @@ def _skeleton(gltf: Gltf, joints: tuple[int, ...]) -> tuple[Skeleton, Float64, I
         bind[number, :3, 3] = own.translation
         if parent >= 0:
             bind[number] = bind[parent] @ bind[number]
-    if not (np.abs(centres) < LARGEST).all():
-        raise ModelError(f"a joint is more than {LARGEST:g} m away")
+    if not (np.abs(centres) < MAX_COORDINATE).all():
+        raise ModelError(f"a joint is more than {MAX_COORDINATE:g} m away")
     names = tuple(gltf.nodes[node].name for node in wanted)
     skeleton = Skeleton(names, np.array(parents, dtype=np.int64), centres)
     return skeleton, bind, np.array([column[node] for node in wanted], dtype=np.int64)
@@ -233,6 +237,6 @@ def _carried(primitive: Primitive, row: Int32) -> tuple[Int32, Float32]:
         raise ModelError(
             f"{primitive.joints.shape[1]} joints for each vertex, but at most {INFLUENCES} can be read"
         )
-    if (np.abs(primitive.positions) > LARGEST).any():
-        raise ModelError(f"a vertex is more than {LARGEST:g} m away")
+    if (np.abs(primitive.positions) > MAX_COORDINATE).any():
+        raise ModelError(f"a vertex is more than {MAX_COORDINATE:g} m away")
     return row[primitive.joints], primitive.weights

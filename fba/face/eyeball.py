@@ -46,7 +46,7 @@ class Eyeball:
 def eyeballs(model: FaceModel) -> dict[str, Eyeball]:
     """The eyeballs by side, "left" and "right": the biggest part of kind "eye" on each, if any."""
     result: dict[str, Eyeball] = {}
-    middle = symmetry_plane(model.points)
+    middle = _middle_x(model.points)
     for part in model.of_kind("eye"):
         own = float(part.vertices[:, 0].min() + part.vertices[:, 0].max()) / 2 if len(part.vertices) else 0.0
         side = "left" if own > middle else "right"
@@ -83,8 +83,8 @@ def flat_width(part: Part) -> float | None:
     return float(extents.max()) if extents[2] < FLAT * extents.max() else None
 
 
-def symmetry_plane(points: Float64) -> float:
-    """The x of the plane between left and right: the pupils' mean, or 0 where they are unknown."""
+def _middle_x(points: Float64) -> float:
+    """Return the x halfway between the pupils, or 0 where they are unknown."""
     pair = points[[row_of()["3.5"], row_of()["3.6"]], 0]
     return float(pair.mean()) if np.isfinite(pair).all() else 0.0
 

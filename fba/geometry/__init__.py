@@ -4,6 +4,7 @@ May use: arrays alone.
 """
 
 from fba.geometry.fits import (
+    FittedSimilarity,
     Similarity,
     fit_similarity,
     nearest_orthonormal,
@@ -11,4 +12,11 @@ from fba.geometry.fits import (
     principal_axes,
 )
 
-__all__ = ["Similarity", "fit_similarity", "nearest_orthonormal", "nearest_rotation", "principal_axes"]
+__all__ = [
+    "FittedSimilarity",
+    "Similarity",
+    "fit_similarity",
+    "nearest_orthonormal",
+    "nearest_rotation",
+    "principal_axes",
+]

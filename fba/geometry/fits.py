@@ -10,50 +10,71 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Float64
+from fba.arrays import Float64, Floating
 
 
 @dataclass(frozen=True, eq=False)
 class Similarity:
-    """x -> scale * rotation @ (x - centre) + target. Several at once have leading axes.
+    """x -> scale * rotation @ (x - centre) + target, in 2 or 3 dimensions. Several have leading axes.
 
-    rotation: float64 (..., 3, 3), orthogonal. scale: (...). centre, target: (..., 3), the weighted means of
-    both sets of points. error: (...), root mean square distance that is left, in the unit of the targets.
+    rotation: float64 (..., P, P), orthogonal. scale: (...). centre, target: (..., P).
     """
 
     rotation: Float64
     scale: Float64
     centre: Float64
     target: Float64
-    error: Float64
 
-    def apply(self, points: Float64) -> Float64:
-        """Return points (..., N, 3) moved."""
-        turned = (points - self.centre[..., None, :]) @ np.swapaxes(self.rotation, -1, -2)
+    def apply(self, points: Floating) -> Float64:
+        """Return points (..., N, Q) moved, (..., N, P). Missing dimensions are taken to be 0."""
+        full = _pad(points, self.rotation.shape[-1])
+        turned = (full - self.centre[..., None, :]) @ np.swapaxes(self.rotation, -1, -2)
         return np.asarray(self.scale[..., None, None] * turned + self.target[..., None, :])
 
 
-def fit_similarity(
-    points: Float64, targets: Float64, weights: Float64 | None = None, *, reflected: bool = False
-) -> Similarity:
-    """Return the similarity that brings points (..., N, 3) closest to targets (..., N, 3).
+@dataclass(frozen=True, eq=False)
+class FittedSimilarity(Similarity):
+    """A similarity between two sets of points; `centre` and `target` are their weighted means.
 
-    weights: (N,), not negative; None for equal ones. reflected: whether to fit a reflection instead of a
-    rotation.
+    error: (...), root mean square distance that is left, in the unit of the targets. misfit: (...), share of
+    the targets' variance that is left, 0 to 1; NaN where all points or all targets coincide.
+    """
+
+    error: Float64
+    misfit: Float64
+
+
+def fit_similarity(
+    points: Floating,
+    targets: Float64,
+    weights: Float64 | None = None,
+    *,
+    reflected: bool | None = False,
+    rotation: Float64 | None = None,
+) -> FittedSimilarity:
+    """Return the similarity that brings points (..., N, Q) closest to targets (..., N, P), P >= Q.
+
+    Dimensions that the points lack are taken to be 0.
+    weights: (N,), not negative; None for equal weights.
+    reflected: whether to fit a reflection instead of a rotation; None for the closer of the two.
+    rotation: (P, P), a rotation to use; only scale and position are fitted then.
     The scale is NaN or infinite where all points coincide.
     """
-    share = np.full(points.shape[-2], 1.0) if weights is None else weights
+    full = _pad(points, targets.shape[-1])
+    share = np.full(full.shape[-2], 1.0) if weights is None else weights
     share = share / share.sum()
-    centre, target = share @ points, share @ targets
-    here, there = points - centre[..., None, :], targets - target[..., None, :]
-    rotation = nearest_rotation(
-        np.swapaxes(there * share[:, None], -1, -2) @ here, handed=-1.0 if reflected else 1.0
-    )
+    centre, target = _mean(full, share), _mean(targets, share)
+    here, there = full - centre[..., None, :], targets - target[..., None, :]
+    if rotation is None:
+        both = np.swapaxes(there * share[:, None], -1, -2) @ here
+        handed = -1.0 if reflected else 1.0
+        rotation = nearest_orthonormal(both) if reflected is None else nearest_rotation(both, handed=handed)
     turned = here @ np.swapaxes(rotation, -1, -2)
     with np.errstate(divide="ignore", invalid="ignore"):
         scale = np.asarray((turned * there).sum(axis=-1) @ share / ((here**2).sum(axis=-1) @ share))
-    off = scale[..., None, None] * turned - there
-    return Similarity(rotation, scale, centre, target, np.sqrt((off**2).sum(axis=-1) @ share))
+        off = ((scale[..., None, None] * turned - there) ** 2).sum(axis=-1) @ share
+        misfit = np.asarray(off / ((there**2).sum(axis=-1) @ share))
+    return FittedSimilarity(rotation, scale, centre, target, np.sqrt(off), misfit)
 
 
 def nearest_rotation(matrices: Float64, *, handed: float = 1.0) -> Float64:
@@ -88,3 +109,17 @@ def principal_axes(points: Float64) -> tuple[Float64, Float64]:
     full = np.zeros(points.shape[1])
     full[: len(values)] = values
     return axes, full
+
+
+def _mean(points: Floating, share: Float64) -> Float64:
+    """Return the weighted mean of points (..., N, P), which is exact where all of them coincide."""
+    first = points[..., :1, :]
+    return np.asarray(first[..., 0, :] + share @ (points - first))
+
+
+def _pad(points: Floating, width: int) -> Floating:
+    """Return points (..., N, Q) with columns of zeros up to this width."""
+    missing = width - points.shape[-1]
+    if missing <= 0:
+        return points
+    return np.concatenate([points, np.zeros((*points.shape[:-1], missing))], axis=-1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import procrustes
 from scipy.spatial.transform import Rotation
 
 from fba.geometry import fit_similarity, nearest_orthonormal, nearest_rotation, principal_axes
@@ -21,6 +22,37 @@ def test_a_similarity_is_found_again(reflected: bool) -> None:
     assert float(fit.scale) == pytest.approx(2.5)
     assert fit.apply(POINTS) == pytest.approx(2.5 * POINTS @ turn.T + (4, -1, 2))
     assert float(fit.error) == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("signs", "determinant"), [((1, 1, 1), 1), ((-1, 1, 1), -1)])
+def test_a_fit_of_either_hand_takes_the_closer(signs: tuple[int, int, int], determinant: int) -> None:
+    fit = fit_similarity(POINTS, POINTS @ TURN.T * signs, reflected=None)
+    assert np.linalg.det(fit.rotation) == pytest.approx(determinant)
+    assert float(fit.misfit) == pytest.approx(0, abs=1e-12)
+
+
+def test_the_misfit_is_the_disparity_of_scipy() -> None:
+    others = RNG.normal(size=POINTS.shape)
+    assert float(fit_similarity(POINTS, others, reflected=None).misfit) == pytest.approx(
+        procrustes(others, POINTS)[2]
+    )
+    assert np.isnan(fit_similarity(POINTS, np.ones((12, 3))).misfit)
+    assert np.isnan(fit_similarity(np.ones((12, 3)), POINTS).misfit)
+
+
+def test_a_given_rotation_leaves_size_and_place_to_fit() -> None:
+    """The centred points (-1, 0, 0) and (1, 0, 0) go to (-2, -1, 0) and (2, 1, 0): scale 4 / 2."""
+    points, targets = np.array([[0.0, 5, 0], [2, 5, 0]]), np.array([[-2.0, 2, 7], [2, 4, 7]])
+    fit = fit_similarity(points, targets, rotation=np.eye(3))
+    assert float(fit.scale) == 2
+    assert fit.apply(points) == pytest.approx(np.array([[-2.0, 3, 7], [2, 3, 7]]))
+    assert float(fit.error) == 1
+
+
+def test_flat_points_are_laid_in_space() -> None:
+    flat = POINTS[:, :2]
+    targets = 3 * np.column_stack([flat, np.zeros(12)]) @ TURN.T + (4, -1, 2)
+    assert fit_similarity(flat, targets).apply(flat) == pytest.approx(targets)
 
 
 def test_weights_decide_between_two_motions() -> None:

@@ -84,12 +84,12 @@ def test_computed_vertices_are_those_of_table_4_1() -> None:
 
 def test_procrustes_finds_what_was_done() -> None:
     points = RANDOM.normal(size=(3, 9, 2))
-    turn = np.array([[np.cos(0.4), np.sin(0.4)], [-np.sin(0.4), np.cos(0.4)]])
-    found = fit_similarity(points, 2.5 * points @ turn + (4, -1))
+    turn = np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
+    found = fit_similarity(points, 2.5 * points @ turn.T + (4, -1))
     np.testing.assert_allclose(found.scale, 2.5)
     np.testing.assert_allclose(found.rotation, np.broadcast_to(turn, (3, 2, 2)), atol=1e-12)
     np.testing.assert_allclose(found.misfit, 0, atol=1e-12)
-    np.testing.assert_allclose(found.apply(points), 2.5 * points @ turn + (4, -1), atol=1e-12)
+    np.testing.assert_allclose(found.apply(points), 2.5 * points @ turn.T + (4, -1), atol=1e-12)
     flat = fit_similarity(points[0], np.concatenate([points[0], np.zeros((9, 1))], axis=1))  # padded
     np.testing.assert_allclose(flat.apply(points[0])[:, :2], points[0], atol=1e-12)
 

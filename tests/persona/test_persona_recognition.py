@@ -11,7 +11,7 @@ from scipy.optimize import approx_fprime
 from fba.persona import Recogniser
 from fba.persona.points.layout import PARTS
 from fba.persona.recognition import decide, train
-from fba.persona.recognition.component import DIMENSIONS, ENOUGH, UNITS, find_axes, train_component
+from fba.persona.recognition.component import DIMENSIONS, UNITS, WANTED_ACCURACY, find_axes, train_component
 from fba.persona.recognition.network import _loss
 from tools.persona.training import __main__ as training
 from tools.persona.training.classes import class_faps, face_classes, part_classes
@@ -112,7 +112,7 @@ def test_the_default_is_as_good_as_the_source_asks(tmp_path: Path) -> None:
     known = Recogniser.default()
     for part in PARTS:
         component = known.components[part]
-        assert component.share > ENOUGH[part], part
+        assert component.share > WANTED_ACCURACY[part], part
         assert component.axes.shape[0] == DIMENSIONS[part] == {"mouth": 11}.get(part, 5)
         assert component.network.hidden.shape[1] == UNITS[part] == {"mouth": 30}.get(part, 20)
         np.testing.assert_allclose(component.axes @ component.axes.T, np.eye(len(component.axes)), atol=1e-5)

@@ -12,9 +12,10 @@ from fba.body.skeleton import ROOT, Skeleton
 from fba.body.solve.conventions import convention
 from fba.errors import ModelError
 
-HEEL_BEHIND, TOES_AHEAD = 0.054, 0.062
-"""Metres from the ankle's centre back to where the heel touches, and from the metatarsal joint to the tip of
-the toes, for the default body."""
+HEEL_BEHIND = 0.054
+"""Metres from the ankle's centre back to where the heel touches, for the default body."""
+TOES_AHEAD = 0.062
+"""Metres from the metatarsal joint to the tip of the toes, for the default body."""
 HIP_HEIGHT = 0.9364
 """Height of the default body's hips, metres; a body's scale is the height of its hips divided by this."""
 PALMS = ("middle0", "middle1", "index0", "wrist")

@@ -10,8 +10,10 @@ import numpy.typing as npt
 from fba.arrays import Float64
 from fba.rotations import apply, axis_matrices
 
-KNEE, ELBOW = 1.0, -1.0
-"""Sense in which a hinge bends: a knee about +x (backward), an elbow about -x (forward)."""
+KNEE = 1.0
+"""Sense in which a knee bends: about +x, backward."""
+ELBOW = -1.0
+"""Sense in which an elbow bends: about -x, forward."""
 
 
 @dataclass(frozen=True, eq=False)

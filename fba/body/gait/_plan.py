@@ -22,8 +22,8 @@ from fba.errors import ModelError
 from fba.rotations import axis_matrices
 
 KNOTS = np.array([*PHASES, *(phase + 0.5 for phase in PHASES)])
-SHORTEST = 0.1
-"""Metres: the shortest stride."""
+SHORTEST_STRIDE = 0.1
+"""Metres that a stride must have at least, of a body of standard size."""
 _STRAIGHT = 0.9993
 """Share of its length to which a leg may stretch: a knee is never locked."""
 _STRAIN = 0.03
@@ -35,8 +35,8 @@ _SOFT = 0.85
 without a jolt, 0 one at the speed of the swing."""
 _CLEAR = 0.012
 """Smallest height of a swinging foot above the ground, metres."""
-_TINY = 1e-4
-"""A step of phase, for slopes."""
+_PHASE_STEP = 1e-4
+"""Difference of phase, a share of the cycle, over which slopes are measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,11 +263,11 @@ class Plan:
     def _swing(self, side: Side) -> tuple[Float64, Float64, Float64, Float64]:
         """Return the entry of `_swings` for one side."""
         start = 0.0 if side.letter == "r" else 0.5
-        ends = start + np.array([self._toe_off - _TINY, self._toe_off, 1.0, 1.0 + _TINY])
+        ends = start + np.array([self._toe_off - _PHASE_STEP, self._toe_off, 1.0, 1.0 + _PHASE_STEP])
         leg = self.standing_leg(side, ends)
         x, _, z = limb_angles(leg.thigh)
         solved = np.stack([x, z, leg.bend], axis=-1)
-        off, on = (solved[1] - solved[0]) / _TINY, (solved[3] - solved[2]) / _TINY
+        off, on = (solved[1] - solved[0]) / _PHASE_STEP, (solved[3] - solved[2]) / _PHASE_STEP
         knots = np.array([self._toe_off, KNOTS[6], KNOTS[7], 1.0])
         poses = self.character.poses
         landing = -np.degrees(solved[2][0])
@@ -327,4 +327,4 @@ def make_plan(anatomy: Anatomy, character: Character, stride: float, interpolati
     return plan
 
 
-__all__ = ["CYCLE", "KNOTS", "SHORTEST", "Plan", "make_plan"]
+__all__ = ["CYCLE", "KNOTS", "SHORTEST_STRIDE", "Plan", "make_plan"]

@@ -17,8 +17,8 @@ from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver, wrapped
 from fba.parameters import baps
 
-_STILL = 1e-6
-"""Largest change of the entries of a rotation matrix of a joint that counts as still."""
+_STILL_CHANGE = 1e-6
+"""Change of the entries of its rotation matrix up to which a joint counts as still."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) 
     offsets = a[:, :, :3, 3] - b[:, :, :3, 3]
     local = offsets - offsets[:, :1]
     turns = _local_rotations(a, skeleton)
-    moved = np.flatnonzero(np.ptp(turns, axis=0).max(axis=(1, 2)) > _STILL)
+    moved = np.flatnonzero(np.ptp(turns, axis=0).max(axis=(1, 2)) > _STILL_CHANGE)
     if not len(moved):
         moved = np.arange(len(skeleton))
     angles = np.degrees(_angles_between(turns, _local_rotations(b, skeleton)))[:, moved]

@@ -64,7 +64,8 @@ SKULL_ONLY = 0.999
 SKIN = Material("skin", (0.71, 0.47, 0.36), 0.55)
 EYE = Material("eye", (0.75, 0.72, 0.70), 0.2)
 MAX_WEIGHTS = 1 << 20
-RIG_FILE, WEIGHTS_FILE = "default.mhskel", "default_weights.mhw"
+RIG_FILE = "default.mhskel"
+WEIGHTS_FILE = "default_weights.mhw"
 
 
 def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -> BodyModel:

@@ -24,8 +24,8 @@ TAUT = 0.7
 """Share of linear skinning in the armpit."""
 BELOW = (0.03, 0.08)
 """Metres below the shoulder between which linear skinning rises from none to that share."""
-LEAST = 0.02
-"""Vertices whose arm weight is within this distance of 0 or 1 are not in the armpit."""
+MIN_SHARE = 0.02
+"""Weight of the arm, and of the trunk, that a vertex of the armpit has at least."""
 
 
 def find_girdle(
@@ -55,7 +55,7 @@ def find_girdle(
         arms.append(arm / length)
         carried = (weights * np.isin(joints, skeleton.descendants(shoulder))).sum(axis=1)
         depth = bind[shoulder, 1, 3] - vertices[:, 1].astype(np.float64)
-        between = (carried > LEAST) & (carried < 1 - LEAST)
+        between = (carried > MIN_SHARE) & (carried < 1 - MIN_SHARE)
         taut = np.maximum(taut, TAUT * between * smoothstep((depth - BELOW[0]) / (BELOW[1] - BELOW[0])))
     rows = np.flatnonzero(taut)
     return Girdle(

@@ -13,8 +13,8 @@ from fba.cache import load_or_make, make_key
 
 FLATTEST = 0.05
 """Smallest sine of the angle between the two lines across a vertex that still define a normal."""
-LARGE = 4000
-"""Results for meshes of this many vertices or more are cached on disk."""
+CACHED_VERTICES = 4000
+"""Number of vertices from which results for a mesh are cached on disk."""
 CACHE_VERSION = 1
 """Version of cached results; increment when results change."""
 
@@ -26,7 +26,7 @@ def normal_rings(vertices: Float32, normals: Float32, triangles: Integer) -> tup
     the mesh as modelled, and rotated as the mesh is. The neighbours are -1 where they define no normal.
     """
     count = len(vertices)
-    if count < LARGE or not len(triangles):
+    if count < CACHED_VERTICES or not len(triangles):
         return _find_rings(vertices, normals, triangles)
 
     def make() -> list[Array]:

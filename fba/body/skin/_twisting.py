@@ -17,10 +17,10 @@ from fba.easing import smoothstep
 LIMB = ("shoulder", "elbow", "wrist")
 WRIST_FROM = 0.35
 """Share of the forearm, from the elbow, beyond which its skin takes part in the twist of the wrist."""
-LEAST = 0.02
-"""Smallest arm weight of a vertex of the arm."""
-SMALL = 1e-3
-"""Vertices whose shares of both twists are smaller are left out."""
+MIN_ARM_WEIGHT = 0.02
+"""Weight of the arm above which a vertex belongs to it."""
+MIN_TWIST_SHARE = 1e-3
+"""Share of a twist above which a vertex is turned; others are left out."""
 
 
 def find_twists(
@@ -40,12 +40,12 @@ def find_twists(
         shoulder, elbow, wrist = (skeleton.number(name) for name in names)
         carried = [_carried_share(skeleton, number, joints, weights) for number in (shoulder, elbow, wrist)]
         along = [_along(bind, pair, vertices) for pair in ((shoulder, elbow), (elbow, wrist))]
-        arm = carried[0] > LEAST
+        arm = carried[0] > MIN_ARM_WEIGHT
         upper = arm & (along[0] < 1)
         # The shoulder's own twist is not distributed: its skin is wide, and part of it belongs to the trunk.
         own, child = np.zeros(len(vertices)), -carried[1]
         for bone in (upper, arm & ~upper):
-            turned = np.flatnonzero(bone & (np.maximum(np.abs(own), np.abs(child)) > SMALL))
+            turned = np.flatnonzero(bone & (np.maximum(np.abs(own), np.abs(child)) > MIN_TWIST_SHARE))
             rows.append(turned)
             shares.append(np.stack([own[turned], child[turned]], axis=1))
             share_along = np.clip(along[1], 0.0, 1.0)

@@ -34,7 +34,7 @@ class Twisting(NamedTuple):
 
 
 ONE, TWO, HALF = np.float32(1.0), np.float32(2.0), np.float32(0.5)
-TINY = np.float32(1e-30)
+MIN_SQUARE = np.float32(1e-30)
 """Squared length below which a sum has no direction."""
 
 
@@ -230,7 +230,7 @@ def _skin_dual(
             c += share * duals[j, 6]
             d += share * duals[j, 7]
         # 2 / length^2: normalises, and has the factor 2 of the rotation formula
-        factor = TWO / max(w * w + x * x + y * y + z * z, TINY)
+        factor = TWO / max(w * w + x * x + y * y + z * z, MIN_SQUARE)
         px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         # v + 2 q x (q x v + w v)
         ux, uy, uz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
@@ -256,7 +256,7 @@ def _matrices(duals: Float32, rows: Float32) -> None:
     for j in range(len(duals)):
         w, x, y, z = duals[j, 0], duals[j, 1], duals[j, 2], duals[j, 3]
         a, b, c, d = duals[j, 4], duals[j, 5], duals[j, 6], duals[j, 7]
-        factor = TWO / max(w * w + x * x + y * y + z * z, TINY)
+        factor = TWO / max(w * w + x * x + y * y + z * z, MIN_SQUARE)
         rows[j, 0], rows[j, 1], rows[j, 2] = (
             ONE - factor * (y * y + z * z),
             factor * (x * y - w * z),
@@ -312,7 +312,7 @@ def _skin_linear(
             ny = m[4] * px + m[5] * py + m[6] * pz
             nz = m[8] * px + m[9] * py + m[10] * pz
             length = nx * nx + ny * ny + nz * nz
-            factor = ONE / np.sqrt(length) if length > TINY else ONE
+            factor = ONE / np.sqrt(length) if length > MIN_SQUARE else ONE
             normals[i, 0] = nx * factor
             normals[i, 1] = ny * factor
             normals[i, 2] = nz * factor
@@ -342,7 +342,7 @@ def _normals_from_neighbours(
         ny = x * ty + y * uy + z * (tz * ux - tx * uz)
         nz = x * tz + y * uz + z * (tx * uy - ty * ux)
         length = nx * nx + ny * ny + nz * nz
-        factor = ONE / np.sqrt(length) if length > TINY else ONE
+        factor = ONE / np.sqrt(length) if length > MIN_SQUARE else ONE
         normals[i, 0] = nx * factor
         normals[i, 1] = ny * factor
         normals[i, 2] = nz * factor

@@ -14,7 +14,7 @@ INFLUENCES = 4
 """Most joints that a vertex can have."""
 WEIGHT_TOLERANCE = 1e-3
 """Largest error of the sum of a vertex's weights; they are then scaled to a sum of 1."""
-LEAST = 0.012
+WEIGHT_DEDUCTION = 0.012
 """Subtracted from every weight where chains are thinned, so that tiny weights take up no joint."""
 
 
@@ -71,7 +71,7 @@ def strongest_weights(dense: Float64, alike: Sequence[bool] | None = None) -> tu
 
 def _thin_chain(dense: Float64, alike: Bool) -> Float64:
     """Return (V, J) weights with chain joints dropped so that each vertex has at most `INFLUENCES` joints."""
-    dense = np.maximum(dense - LEAST, 0.0)
+    dense = np.maximum(dense - WEIGHT_DEDUCTION, 0.0)
     dense /= np.maximum(dense.sum(axis=1, keepdims=True), 1e-12)
     free = np.clip(INFLUENCES - (dense[:, ~alike] > 0).sum(axis=1), 1, INFLUENCES)
     chain = dense[:, alike]

@@ -27,7 +27,7 @@ from fba.face.authoring.regions.lids import lash_motion, lid_motion, sculpted_sh
 from fba.face.authoring.regions.lips import HANDLES, lip_motions
 from fba.face.authoring.regions.tongue import FAPS as TONGUE_FAPS
 from fba.face.authoring.regions.tongue import tongue_motion
-from fba.face.authoring.surface.attached_parts import LARGEST, NEAR, Anchors, attach
+from fba.face.authoring.surface.attached_parts import ATTACHED_DISTANCE, MAX_ATTACHED_SIZE, Anchors, attach
 from fba.face.authoring.surface.binding import Binding, bind_points, face_size, separate_lips
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks, find_landmarks, weld_skin
@@ -168,12 +168,12 @@ def _attach_parts(marks: Landmarks, parts: tuple[Part, ...], eyes: Mapping[str, 
     for part in parts:
         if part.kind not in CARRIED_KINDS or not len(part.triangles):
             continue
-        if part.kind == "other" and np.ptp(part.vertices, axis=0).max() > LARGEST * es:
+        if part.kind == "other" and np.ptp(part.vertices, axis=0).max() > MAX_ATTACHED_SIZE * es:
             continue
         if part.kind == "other" and _is_in_eyes(part, eyes):
             continue
         anchors = attach(marks.surface, part)
-        if np.median(anchors.distance) < NEAR * es:
+        if np.median(anchors.distance) < ATTACHED_DISTANCE * es:
             result[part.name] = anchors
     return result
 

@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
-from fba.geometry import nearest_rotation, principal_axes
+from fba.geometry import fit_similarity, principal_axes
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of length of files, in metres."""
@@ -98,30 +98,26 @@ def _check(given: Float64, known: Bool) -> None:
 
 
 def _find_pose(here: Float64, there: Float64) -> tuple[Float64, bool]:
-    """((3, 3) rotation from here to there, whether here must first be mirrored by x -> -x)."""
-    plain = _rotation(here, there, 1.0)
-    mirrored = _rotation(here, there, -1.0)
+    """Return the rotation (3, 3) from here to there, and whether here must first be mirrored by x -> -x."""
+    plain = _fit_rotation(here, there)
+    mirrored = _fit_rotation(here, there, reflected=True)
     if mirrored[1] < MIRRORED_FIT * plain[1]:
         return np.diag([-1.0, 1.0, 1.0]) @ mirrored[0], True
     return plain[0], False
 
 
-def _rotation(here: Float64, there: Float64, handed: float) -> tuple[Float64, float]:
-    """(orthogonal matrix of determinant `handed`, median error) with there ~ size * matrix @ here.
+def _fit_rotation(here: Float64, there: Float64, *, reflected: bool = False) -> tuple[Float64, float]:
+    """Return the orthogonal matrix with there ~ size * matrix @ here, and the median error.
 
     Procrustes analysis, iteratively reweighted: distant points count less (Geman-McClure weights).
     """
     weight = np.ones(len(here))
     matrix, error = np.eye(3), np.inf
     for _ in range(30):
-        share = weight / weight.sum()
-        a, b = here - share @ here, there - share @ there
-        matrix = nearest_rotation((b * share[:, None]).T @ a, handed=handed)
-        turned = a @ matrix.T
-        size = float((share @ (turned * b).sum(axis=1)) / (share @ (a**2).sum(axis=1)))
-        away = np.linalg.norm(turned * size - b, axis=1)
-        error = float(np.median(away))
-        weight = _robust_weights(away, b)
+        fit = fit_similarity(here, there, weight, reflected=reflected)
+        away = np.linalg.norm(fit.apply(here) - there, axis=1)
+        matrix, error = fit.rotation, float(np.median(away))
+        weight = _robust_weights(away, there - fit.target)
     return matrix, error
 
 
@@ -140,7 +136,7 @@ def _find_flat_pose(here: Float64, there: Float64) -> Float64:
     poses = []
     for side in (1.0, -1.0):
         plane = flat * (1.0, side, 0.0)
-        matrix, error = _rotation(plane, there * (1.0, 1.0, 0.0), 1.0)
+        matrix, error = _fit_rotation(plane, there * (1.0, 1.0, 0.0))
         poses.append((error, matrix @ np.diag([1.0, side, side]) @ axes))
     best: Float64 = min(poses, key=lambda pair: pair[0])[1]
     return best

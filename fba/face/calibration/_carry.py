@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float64, Floating, Integer
 from fba.face.calibration._align import known_rows
 from fba.face.calibration._eyes import FittedEye, eyeball_weight
-from fba.face.calibration._shape import Shape, fit_similarity
+from fba.face.calibration._shape import Shape, fit_size
 from fba.face.feature_points import row_of
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 LID_FAPS = {19: "left", 20: "right", 21: "left", 22: "right"}
-LEAST = 1e-6
+MEAN_STRETCH_WEIGHT = 1e-6
 """Weight of the average stretch, for directions in which a vertex has no edges."""
 
 
@@ -55,7 +55,7 @@ def carry_tables(
                 moves = np.einsum("vij,vkj->vki", matrices[mesh.vertices], moves)
             if fap.unit == "AU":  # displacements by an angle scale with the part
                 old, new = model.parts[numbers[mesh.part]], parts[numbers[mesh.part]]
-                moves = moves * fit_similarity(old.vertices, new.vertices.astype(np.float64)).size
+                moves = moves * fit_size(old.vertices, new.vertices.astype(np.float64)).scale
             moved[mesh.part] = moves * (units[0] / units[1] if lid else 1.0)
         correction = _point_correction(model, table, moved) if fap.unit != "AU" else None
         meshes = []
@@ -184,8 +184,8 @@ def surface_stretches(part: Part, after: Floating) -> Float64:
     along = [n.astype(np.float64) for n in normals]
     squares += weight[:, None, None] * along[0][:, :, None] * along[0][:, None, :]
     products += (weight * size)[:, None, None] * along[1][:, :, None] * along[0][:, None, :]
-    squares += (LEAST * weight)[:, None, None] * np.eye(3)
-    products += (LEAST * weight * size)[:, None, None] * np.eye(3)
+    squares += (MEAN_STRETCH_WEIGHT * weight)[:, None, None] * np.eye(3)
+    products += (MEAN_STRETCH_WEIGHT * weight * size)[:, None, None] * np.eye(3)
     matrices: Float64 = products @ np.linalg.inv(squares)
     return matrices
 

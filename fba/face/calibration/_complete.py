@@ -87,9 +87,8 @@ def drop_mistakes(points: Float64, expected: Float64) -> Float64:
 
 
 def _asymmetry(points: Float64) -> Float64:
-    """(84,) distance of each point from the mirror image of its mate, metres; 0 without a mate."""
-    normal, offset = symmetry_plane(points)
-    image = points - 2 * np.outer(points @ normal - offset, normal)
+    """Return the distance of each point from the mirror image of its mate, metres (84,); 0 without a mate."""
+    image = _mirror_image(points)
     apart = np.zeros(len(points))
     for name, other in _OTHER.items():
         apart[row_of()[name]] = np.linalg.norm(points[row_of()[name]] - image[row_of()[other]])
@@ -97,22 +96,29 @@ def _asymmetry(points: Float64) -> Float64:
 
 
 def mirror_missing(points: Float64) -> tuple[Float64, tuple[str, ...]]:
-    """(points (84, 3) with those missing on one side mirrored from the other, their names)."""
-    normal, offset = symmetry_plane(points)
+    """Return points (84, 3) with those missing on one side mirrored from the other, and their names."""
+    image = _mirror_image(points)
     full = points.copy()
     added = []
     for name, other in _OTHER.items():
         row, source = row_of()[name], row_of()[other]
         if np.isnan(points[row]).any() and np.isfinite(points[source]).all():
-            full[row] = points[source] - 2 * (points[source] @ normal - offset) * normal
+            full[row] = image[source]
             added.append(name)
     return full, tuple(added)
 
 
-def symmetry_plane(points: Float64) -> tuple[Float64, float]:
-    """(unit normal, offset) of the plane between left and right, normal . x = offset.
+def _mirror_image(points: Float64) -> Float64:
+    """Return points (84, 3) reflected in the plane between left and right."""
+    normal, offset = _symmetry_plane(points)
+    image: Float64 = points - 2 * np.outer(points @ normal - offset, normal)
+    return image
 
-    From the known pairs and midline points; the normal is +x where these do not determine it.
+
+def _symmetry_plane(points: Float64) -> tuple[Float64, float]:
+    """Return unit normal and offset of the plane between left and right, normal . x = offset.
+
+    The pairs and midline points that are given determine it; where they do not, the normal is +x.
     """
     rows = np.array([(row_of()[left], row_of()[right]) for left, right in MIRRORED.items()])
     known = np.isfinite(points[rows]).all(axis=(1, 2))

@@ -25,8 +25,8 @@ BARELY = 1.003
 """Radii from the centre at which a lid is just outside the eyeball."""
 DEEP = 0.0005
 """Metres by which an eyeball may be set back without a warning."""
-LEAST = 0.02
-"""Points of less weight (`eyeball_weight`) are ignored for the eyeball."""
+MIN_WEIGHT = 0.02
+"""Weight (`eyeball_weight`) up to which points are ignored for the eyeball."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,7 @@ def lay_lids_on(
     near = np.linalg.norm(skin - eye.was.centre, axis=1) < REACH * eye.was.radius
     moved[near] = _lay_on(eye, skin[near], fitted[near])
     weight = eyeball_weight(eye, sources)
-    local = weight > LEAST
+    local = weight > MIN_WEIGHT
     if local.any():
         # Errors that are left at the given points are interpolated over the skin between them.
         left = (targets[local] - _lay_on(eye, sources[local], targets[local])) / weight[local, None]

@@ -14,6 +14,7 @@ from fba.face.calibration._eyes import REACH, FittedEye, fit_eye, lay_lids_on
 from fba.face.calibration._field import Field, bump_field
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, eyeballs
 from fba.face.feature_points import names, row_of
+from fba.geometry import Similarity, fit_similarity
 from fba.mesh.meshes import vertex_normals
 from fba.rotations import apply, between_all
 
@@ -54,19 +55,6 @@ class Shape:
     rotations: Mapping[str, Float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Similarity:
-    """A uniform scale and a shift: call it with points (N, 3)."""
-
-    origin: Float64
-    target: Float64
-    size: float
-
-    def __call__(self, points: Floating) -> Float64:
-        moved: Float64 = self.target + self.size * (np.asarray(points, dtype=np.float64) - self.origin)
-        return moved
-
-
 def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: tuple[float, float]) -> Shape:
     """All parts and feature points of a model after a deformation.
 
@@ -89,7 +77,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
             pupil = eye.centre + np.array([0.0, 0.0, eye.radius])
         wanted = targets[row[PUPIL_POINT[side]]]
         wanted = field(pupil[None])[0] if np.isnan(wanted).any() else wanted
-        around = fit_similarity(model.part(eye.part).vertices, vertices[eye.part]).size
+        around = float(fit_size(model.part(eye.part).vertices, vertices[eye.part]).scale)
         eyes[side] = fit_eye(
             eye,
             joined,
@@ -116,7 +104,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
     _snap_to_points(model, vertices, targets)
     teeth, tongue = _fit_teeth_and_tongue(model, field, targets, given)
     for part in model.of_kind("teeth"):
-        vertices[part.name] = teeth[_jaw(model, part)](part.vertices)
+        vertices[part.name] = teeth[_jaw(model, part)].apply(part.vertices)
     for part in model.of_kind("tongue"):
         vertices[part.name] = tongue(part.vertices)
     points = _points(model, vertices, field, targets, teeth, tongue)
@@ -146,12 +134,11 @@ def _surface_points(model: FaceModel, targets: Float64) -> tuple[Float64, Float6
     return model.points[known], targets[known]
 
 
-def fit_similarity(before: Floating, after: Float64) -> Similarity:
-    """The scale and shift that take vertices (N, 3) closest to those after, in least squares."""
-    origin, target = np.asarray(before, dtype=np.float64).mean(axis=0), after.mean(axis=0)
-    a, b = before - origin, after - target
-    squares = float((a**2).sum())
-    return Similarity(origin, target, float((a * b).sum()) / squares if squares > 0 else 1.0)
+def fit_size(before: Floating, after: Float64) -> Similarity:
+    """Return the scale and shift that bring vertices (N, 3) closest to those after; they are not turned."""
+    fit = fit_similarity(before, after, rotation=np.eye(3))
+    scale = fit.scale if np.isfinite(fit.scale) else np.asarray(1.0)
+    return Similarity(fit.rotation, scale, fit.centre, fit.target)
 
 
 def _fit_teeth_and_tongue(
@@ -162,18 +149,18 @@ def _fit_teeth_and_tongue(
     teeth = [part.vertices for part in model.of_kind("teeth")]
     inside = teeth or [part.vertices for part in model.of_kind("tongue")] or [model.vertices]
     vertices = np.concatenate(inside).astype(np.float64)
-    both = fit_similarity(vertices, field(vertices))
+    both = fit_size(vertices, field(vertices))
     both = _behind_lips(model, field, both) if teeth else both
     jaws = {}
     for jaw, (edge, gum) in TEETH.items():
         jaws[jaw] = both
         here, there = model.points[[row[edge], row[gum]]], targets[[row[edge], row[gum]]]
         if np.isfinite(here[0]).all() and np.isfinite(there[0]).all() and given[row[edge]]:
-            size = both.size
+            size = float(both.scale)
             if given[row[gum]] and np.isfinite(here).all() and np.isfinite(there).all():
                 height = float(np.linalg.norm(there[1] - there[0]) / np.linalg.norm(here[1] - here[0]))
-                size = height if 0.7 * both.size < height < 1.4 * both.size else size
-            jaws[jaw] = Similarity(here[0], there[0], size)
+                size = height if 0.7 * size < height < 1.4 * size else size
+            jaws[jaw] = Similarity(both.rotation, np.asarray(size), here[0], there[0])
     wanted = [row[name] for name in TONGUE if given[row[name]] and np.isfinite(model.points[row[name]]).all()]
     return jaws, _fit_tongue(jaws["lower"], model.points[wanted], targets[wanted])
 
@@ -182,14 +169,14 @@ def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarit
     """The map of the teeth, shifted back so that they are as far behind the inner lips as before."""
     known = [row for row in (row_of()[name] for name in LIPS) if np.isfinite(model.points[row]).all()]
     vertices = np.concatenate([part.vertices for part in model.of_kind("teeth")]).astype(np.float64)
-    lips, moved = field(model.points[known]), teeth(vertices)
+    lips, moved = field(model.points[known]), teeth.apply(vertices)
     back = 0.0
     for before, after in zip(model.points[known], lips, strict=True):
         room = before[2] - _foremost_z(vertices, before)
-        wanted = after[2] - teeth.size * room
+        wanted = after[2] - teeth.scale * room
         if np.isfinite(room):
             back = max(back, _foremost_z(moved, after) - wanted)
-    return Similarity(teeth.origin, teeth.target - (0.0, 0.0, max(back, 0.0)), teeth.size)
+    return replace(teeth, target=teeth.target - (0.0, 0.0, max(back, 0.0)))
 
 
 def _foremost_z(points: Float64, point: Float64) -> float:
@@ -201,9 +188,9 @@ def _foremost_z(points: Float64, point: Float64) -> float:
 def _fit_tongue(base: Similarity, here: Float64, there: Float64) -> Map:
     """The map of the tongue, which moves as the lower teeth (`base`), and takes given points to others."""
     if not len(here):
-        return base
-    rest = bump_field(here, there - base(here), TONGUE_WIDTH)
-    return lambda points: base(points) + rest(np.asarray(points, dtype=np.float64))
+        return base.apply
+    rest = bump_field(here, there - base.apply(here), TONGUE_WIDTH)
+    return lambda points: base.apply(points) + rest(np.asarray(points, dtype=np.float64))
 
 
 def _jaw(model: FaceModel, part: Part) -> str:
@@ -244,7 +231,7 @@ def _points(
     points = field(np.nan_to_num(model.points))
     for jaw, group in TEETH.items():
         for name in group:
-            points[row_of()[name]] = teeth[jaw](model.points[row_of()[name]][None])[0]
+            points[row_of()[name]] = teeth[jaw].apply(model.points[row_of()[name]][None])[0]
     for name in TONGUE:
         points[row_of()[name]] = tongue(model.points[row_of()[name]][None])[0]
     known = known_rows(targets)

@@ -24,10 +24,10 @@ EYE_CORNERS = ("3.7", "3.11", "3.8", "3.12")
 CORNER = 0.12
 """Radius about the eye's corners that is not checked, as a share of the eye's width."""
 RIGID = {HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
-LONGEST = 8.0
-"""Edges may grow to this many times their length..."""
-SHORT = 0.3
-"""... or, if shorter than this share of the typical edge, to this many times that share."""
+MAX_STRETCH = 8.0
+"""Factor by which an edge may grow."""
+SHORT_EDGE = 0.3
+"""Share of the typical edge; shorter edges may grow by that factor from this length."""
 SPECK = 0.003
 """Share of the moving surface that may turn over in the folds of skin at the corners of eyes."""
 DEGENERATE = 1e-5
@@ -67,7 +67,8 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
                 yield Finding(
                     entry.label,
                     "no triangle explodes at the limits of its range",
-                    f"{torn} edges of part {part.name!r} more than {LONGEST:g} times as long at {value:g}",
+                    f"{torn} edges of part {part.name!r} more than {MAX_STRETCH:g} times as long "
+                    f"at {value:g}",
                     "none",
                 )
 
@@ -114,7 +115,7 @@ def count_damage(
     over &= not_degenerate
     edges = np.array([[lengths(side[which]) for side in sides] for which in (0, 1)])
     typical = float(np.median(edges[0])) if edges.size else 0.0
-    torn = edges[1] > LONGEST * np.maximum(edges[0], SHORT * typical)
+    torn = edges[1] > MAX_STRETCH * np.maximum(edges[0], SHORT_EDGE * typical)
     share = float(areas[over].sum() / max(areas.sum(), 1e-30))
     return int(over.sum()), int(torn.sum()), share
 

@@ -25,8 +25,8 @@ from fba.face.points import (
 from fba.face.tables import HEAD
 from fba.parameters import faps
 
-SMALL = 10.0
-"""A value that every face can follow."""
+SMALL_VALUE = 10.0
+"""Value of a FAP, in its unit, that every face can follow."""
 SMALL_ANGLE = 5000.0
 """The same for FAPs that count in 1e-5 rad."""
 ACCURACY = 0.05
@@ -60,7 +60,7 @@ def _check_shift(poser: Poser, fap: int) -> Iterator[Finding]:
         yield Finding(entry.label, "its feature point is bound to a vertex", f"{point} is not", "a vertex")
         return
     direction = np.array(DIRECTIONS[entry.positive])
-    for value in (SMALL, -SMALL) if entry.direction == "B" else (SMALL,):
+    for value in (SMALL_VALUE, -SMALL_VALUE) if entry.direction == "B" else (SMALL_VALUE,):
         moved = poser.shift({fap: value})[poser.vertex(point)]
         wanted = value * poser.model.fapu[entry.unit] * direction
         off = np.array([(moved - wanted) @ direction, moved[0]]) if fap in ARC else moved - wanted
@@ -76,7 +76,7 @@ def _check_shift(poser: Poser, fap: int) -> Iterator[Finding]:
         return
     other = EYE_POINT.get(mate) or faps()[mate - 1].feature_points[0]
     if other != point and poser.has(other):
-        moved = poser.shift({fap: SMALL})
+        moved = poser.shift({fap: SMALL_VALUE})
         share = float(np.linalg.norm(moved[poser.vertex(other)]))
         share /= max(float(np.linalg.norm(moved[poser.vertex(point)])), 1e-12)
         if share > MATE:
@@ -148,7 +148,7 @@ def _check_pupil(poser: Poser, fap: int) -> Iterator[Finding]:
     if not len(rim):
         rim = own[front & (distance < 1.5 * radius) & (distance > 1e-6)]
     before = distances_from_axis(poser.neutral[rim], eye.centre, eye.gaze)
-    for value in (6 * SMALL, -6 * SMALL):
+    for value in (6 * SMALL_VALUE, -6 * SMALL_VALUE):
         # Vertices inside the pupil move in proportion to their radius, those outside it less and less.
         grown = distances_from_axis(poser.pose({fap: value})[rim], eye.centre, eye.gaze) - before
         wanted = (

@@ -20,8 +20,8 @@ APART = 0.06
 """How much the gap between lips that move together may widen, as a share of MNS0."""
 OPEN = 400.0
 """Value of open_jaw at which the mouth is checked."""
-STILL = 0.03
-"""Distance that points which should stay may move, as a share of the chin's."""
+MAX_UNWANTED_MOTION = 0.03
+"""Share of the chin's motion by which points may move that should stay."""
 
 
 def check_mouth(poser: Poser) -> Iterator[Finding]:
@@ -74,9 +74,12 @@ def _check_jaw_opening(poser: Poser) -> Iterator[Finding]:
     for name in ("2.2", "2.3", "2.4", "2.5", "8.1", "8.2", "9.8", "9.10"):
         if poser.has(name):
             way = float(np.linalg.norm(shift[poser.vertex(name)]))
-            if way > STILL * chin:
+            if way > MAX_UNWANTED_MOTION * chin:
                 yield Finding(
-                    label, f"{name} stays", f"{way / chin:.1%} of the chin's way", f"under {STILL:.0%}"
+                    label,
+                    f"{name} stays",
+                    f"{way / chin:.1%} of the chin's way",
+                    f"under {MAX_UNWANTED_MOTION:.0%}",
                 )
     for name in ("9.9", "9.11", "6.1", "6.2"):
         if poser.has(name):

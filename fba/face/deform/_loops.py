@@ -20,10 +20,12 @@ from fba.compiled import compiled
 from fba.face.deform.flat_tables import Shifts, Transforms
 from fba.face.deform.normals import Surface
 
-SHORTEST = np.float32(1e-30)
+MIN_SQUARE = np.float32(1e-30)
 """Squared length of a sum of normals below which it has no direction."""
-LONGEST = np.float32(1e30)
-ZERO, ONE = np.float32(0), np.float32(1)
+MAX_SQUARE = np.float32(1e30)
+"""Squared length of a sum of normals above which products with it overflow."""
+ZERO = np.float32(0)
+ONE = np.float32(1)
 
 
 @compiled
@@ -177,7 +179,7 @@ def turn_normals(
     for k in range(len(to_x)):
         x, y, z = from_x[k], from_y[k], from_z[k]
         squared = x * x + y * y + z * z
-        good = (squared > SHORTEST) & (squared < LONGEST)
+        good = (squared > MIN_SQUARE) & (squared < MAX_SQUARE)
         x, y, z = x if good else rest_x[k], y if good else rest_y[k], z if good else rest_z[k]
         nx, ny, nz = xx * x + xy * y + xz * z, yx * x + yy * y + yz * z, zx * x + zy * y + zz * z
         length = np.sqrt(nx * nx + ny * ny + nz * nz)

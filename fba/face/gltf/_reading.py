@@ -28,7 +28,7 @@ MAX_NOTES = 1000
 MAX_BORDERS = 4096
 MAX_TRANSFORMS = 10_000
 INT32 = 2**31 - 1
-LARGEST = float(np.finfo(np.float32).max)
+FLOAT32_MAX = float(np.finfo(np.float32).max)
 
 
 def read_model(document: Document) -> FaceModel:
@@ -110,7 +110,7 @@ def _points(content: Value, parts: tuple[Part, ...]) -> tuple[Float64, Int32]:
         if name not in row_of():
             raise value.error("there is no such feature point")
         row = row_of()[name]
-        points[row] = value.member("position").numbers(3, -LARGEST, LARGEST)
+        points[row] = value.member("position").numbers(3, -FLOAT32_MAX, FLOAT32_MAX)
         vertex = value.get("vertex")
         if vertex is not None:
             part = value.member("part").index(len(parts), "part")
@@ -139,7 +139,7 @@ def _poses(listed: Value, select_names: tuple[str, ...]) -> Float32:
     table = np.zeros((count + 1, FAP_COUNT), dtype=np.float32)
     for select, entry in enumerate(entries, 1):
         for name, value in entry.member("faps").members():
-            table[select, _fap_number(name, value) - 1] = value.number(-LARGEST, LARGEST)
+            table[select, _fap_number(name, value) - 1] = value.number(-FLOAT32_MAX, FLOAT32_MAX)
     return table
 
 

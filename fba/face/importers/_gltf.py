@@ -1,9 +1,13 @@
-"""Imports glTF heads of other makers: surfaces, materials, and morph targets as shapes."""
+"""Imports glTF heads of other makers: surfaces, materials, and morph targets as shapes.
+
+Of VRM avatars, expressions say which morph targets are a blink or an open mouth.
+"""
 
 from __future__ import annotations
 
 import os
 from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,15 +17,14 @@ from fba.arrays import Float32, Float64
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers._both_sides import split_sides
-from fba.face.importers._vrm import expression_targets, looks_backwards, name_shapes
 from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
 from fba.face.importers.assembly.pieces import assemble, guess_kind, part_names
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.repair import repair_tables
 from fba.face.importers.assembly.symmetry import (
-    ALIKE,
-    EXACT,
-    NEARLY,
+    MIRRORED_LIDS,
+    MIRRORED_POINTS,
+    MIRRORED_TABLES,
     asymmetry,
     mirror_faulty_lids,
     mirror_tables,
@@ -29,13 +32,35 @@ from fba.face.importers.assembly.symmetry import (
 )
 from fba.face.importers.points.points_file import given_points, points_beside
 from fba.face.model import FaceModel, Material, Part
+from fba.face.shape_names import canonical_names
 from fba.gltf.part_materials import convert_material
+from fba.gltf.scene import Gltf
+from fba.gltf.values import Value
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh.text_files import MAX_VERTICES
 
 EXTENSION = "FBA_face"
 POINT_FILES = (".points.csv", ".points.json", ".fdp")
 """Endings of files beside a head in which its feature points are sought."""
+VRM_VISEMES = {
+    "a": "viseme aa", "i": "viseme I", "u": "viseme U", "e": "viseme E", "o": "viseme O",
+    "aa": "viseme aa", "ih": "viseme I", "ou": "viseme U", "ee": "viseme E", "oh": "viseme O",
+    "joy": "mood joy", "happy": "mood joy", "angry": "mood anger", "sorrow": "mood sadness",
+    "sad": "mood sadness", "surprised": "mood surprise",
+}  # fmt: skip
+"""Names of visemes and expressions (`assembly/visemes.csv`) by VRM's presets, in lower case."""
+VRM_SHAPES = {
+    "a": "jawOpen",
+    "aa": "jawOpen",
+    "blink": "eyesClosed",
+    "blink_l": "eyeBlinkLeft",
+    "blinkleft": "eyeBlinkLeft",
+    "blink_r": "eyeBlinkRight",
+    "blinkright": "eyeBlinkRight",
+}
+"""ARKit's shapes by VRM's presets, in lower case."""
+MAX_EXPRESSIONS = 4096
+"""Number of expressions that an avatar may have, and of morph targets that an expression may have."""
 
 
 def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
@@ -67,12 +92,12 @@ def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceM
     """A face from pieces whose feature points are to be found."""
     upright, points, uneven, notes = locate(pieces, options)
     model = finish_import(upright, points, {}, replace(options, up="y"), notes, given=False)
-    if uneven >= NEARLY:
+    if uneven >= MIRRORED_TABLES:
         return model
     # the mirror image of a sound motion may fold a triangle that has none on the other side
     note = ("symmetry", "both sides differ a little for {}: left as they are")
-    mirrored = repair_tables(mirror_tables(model, lids=uneven < EXACT), model, note=note)
-    return mirrored if uneven < EXACT else mirror_faulty_lids(mirrored)
+    mirrored = repair_tables(mirror_tables(model, lids=uneven < MIRRORED_LIDS), model, note=note)
+    return mirrored if uneven < MIRRORED_LIDS else mirror_faulty_lids(mirrored)
 
 
 def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Float64, float, dict[str, str]]:
@@ -93,7 +118,7 @@ def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Fl
         assembled = assemble(upright, options.kinds)
         eyes = find_eyes(assembled, path)
     uneven = asymmetry(assembled, eyes["left"][0], eyes["right"][0])
-    points = find_points(assembled, path, symmetric=uneven < ALIKE, exactly=uneven < EXACT)
+    points = find_points(assembled, path, symmetric=uneven < MIRRORED_POINTS, exactly=uneven < MIRRORED_LIDS)
     return upright, points, uneven, notes
 
 
@@ -157,3 +182,73 @@ def _with_gloss(colours: Float32, material: Material) -> Float32:
     result[:, :3] *= np.array(material.colour, dtype=np.float32)
     result[:, 3] = 1.0 - material.roughness
     return result
+
+
+def looks_backwards(gltf: Gltf) -> bool:
+    """Return whether the file is of VRM 0, whose avatars look to -z."""
+    extensions = gltf.document.get("extensions")
+    return extensions is not None and extensions.get("VRM") is not None
+
+
+def expression_targets(gltf: Gltf) -> dict[int, dict[str, list[tuple[int, float]]]]:
+    """Return the morph targets that show a shape of ARKit together: mesh -> name -> (number, weight).
+
+    Raises ModelError where an expression names what does not exist.
+    """
+    result: dict[int, dict[str, list[tuple[int, float]]]] = {}
+    for preset, binds, full in _vrm_expressions(gltf):
+        names = [table[preset.lower()] for table in (VRM_SHAPES, VRM_VISEMES) if preset.lower() in table]
+        if not names:
+            continue
+        for bind in binds:
+            number = bind.member("index").integer(0, MAX_EXPRESSIONS)
+            weight = 1.0 if (share := bind.get("weight")) is None else share.number() / full
+            mesh: int | None
+            if bind.get("node") is not None:
+                mesh = gltf.nodes[bind.member("node").index(len(gltf.nodes), "node")].mesh
+            else:
+                mesh = bind.member("mesh").index(len(gltf.meshes), "mesh")
+            if mesh is not None and number < len(gltf.meshes[mesh].morph_names):
+                for name in names:
+                    result.setdefault(mesh, {}).setdefault(name, []).append((number, weight))
+    return result
+
+
+def name_shapes(
+    morphs: Mapping[str, Float32], names: tuple[str, ...], targets: Mapping[str, list[tuple[int, float]]]
+) -> dict[str, Float32]:
+    """Morph targets of a surface with ARKit's names for the expressions of its mesh.
+
+    morphs: displacements (V, 3) by name. names: those of all targets of the mesh. targets: of
+    `expression_targets`. One target that is an expression is renamed, several are added up; shapes that
+    the file itself names as ARKit's stay.
+    """
+    own = canonical_names(names)
+    result = dict(morphs)
+    for shape, parts in targets.items():
+        moving = [(names[number], weight) for number, weight in parts if names[number] in morphs]
+        if shape in own or not moving:
+            continue
+        single = len(parts) == 1 and parts[0][1] == 1.0 and shape in VRM_SHAPES.values()
+        if single and moving[0][0] in result and moving[0][0] not in own.values():
+            name = moving[0][0]
+            result = {shape if each == name else each: morph for each, morph in result.items()}
+        else:
+            result[shape] = np.sum([morphs[name] * np.float32(weight) for name, weight in moving], axis=0)
+    return result
+
+
+def _vrm_expressions(gltf: Gltf) -> Iterator[tuple[str, list[Value], float]]:
+    """Of each expression of VRM 0 and VRM 1 the preset, the binds to morph targets, and their full weight."""
+    extensions = gltf.document.get("extensions")
+    if extensions is None:
+        return
+    master = None if (vrm := extensions.get("VRM")) is None else vrm.get("blendShapeMaster")
+    for group in [] if master is None else master.elements(MAX_EXPRESSIONS, "blendShapeGroups"):
+        preset = group.get("presetName")
+        if preset is not None:
+            yield preset.text(200), group.elements(MAX_EXPRESSIONS, "binds"), 100.0
+    expressions = None if (vrm := extensions.get("VRMC_vrm")) is None else vrm.get("expressions")
+    presets = None if expressions is None else expressions.get("preset")
+    for name, expression in [] if presets is None else presets.members():
+        yield name, expression.elements(MAX_EXPRESSIONS, "morphTargetBinds"), 1.0

@@ -32,11 +32,11 @@ READERS: Mapping[str, Callable[[str | os.PathLike[str]], Polygons]] = {
     "wfm": read_wfm,
 }
 MAX_PIECES = 1000
-"""Most groups and materials with polygons; a model has as many parts at most."""
+"""Number of groups and materials with polygons, at most; a model has no more parts."""
 MAX_LIBRARIES = 100
-"""Most files of materials that one mesh may name."""
-FEWEST_PAIRS = 8
-"""Fewest points with both a position and a vertex that show the unit of a file of points."""
+"""Number of files of materials that a mesh may name."""
+MIN_PAIRS = 8
+"""Number of points with both a position and a vertex from which the unit of a file of points shows."""
 POINT_FILES = (".points.csv", ".points.json", ".fdp", ".csv", ".json")
 """Endings of files beside a mesh in which its feature points are sought."""
 
@@ -121,7 +121,7 @@ def _in_unit_of_mesh(given: Float64, positions: Float64, bound: list[str], path:
     of given positions that do not agree with their vertices.
     """
     rows = [row_of()[name] for name in bound if np.isfinite(given[row_of()[name]]).all()]
-    if len(rows) < FEWEST_PAIRS:
+    if len(rows) < MIN_PAIRS:
         return positions
     a, b = given[rows], positions[rows]
     # medians: a few that disagree do not pull at the unit

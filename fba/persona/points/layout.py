@@ -24,8 +24,12 @@ import numpy as np
 from fba.arrays import Float64, Int64, Intp
 from fba.face.feature_points import names, neutral_points, row_of
 
-TRACKED, OUTLINE, VERTICES = 64, 16, 86
-"""Points of a tracker, points of the outline, vertices of a mask."""
+TRACKED = 64
+"""Number of points of a tracker."""
+OUTLINE = 16
+"""Number of points of the outline."""
+VERTICES = 86
+"""Number of vertices of a mask."""
 IRIS = 4
 """The last points of a tracker are those of the irises, which the mask has not."""
 SAME = TRACKED - IRIS

@@ -11,8 +11,8 @@ from fba.arrays import Bool, Float64
 from fba.errors import ModelError
 from fba.persona.points.layout import TRACKED
 
-LARGEST = 1e7
-"""Largest coordinate; more is damage."""
+MAX_COORDINATE = 1e7
+"""Coordinate, in pixels or any other unit, above which points are damaged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,8 @@ class TrackedFace:
         object.__setattr__(self, "rate", Fraction(self.rate))
         if self.rate <= 0:
             raise ModelError(f"TrackedFace: the rate must be positive, not {self.rate}")
-        if (np.abs(points) > LARGEST).any():
-            frame, point, axis = np.argwhere(np.abs(points) > LARGEST)[0].tolist()
+        if (np.abs(points) > MAX_COORDINATE).any():
+            frame, point, axis = np.argwhere(np.abs(points) > MAX_COORDINATE)[0].tolist()
             raise ModelError(f"frame {frame}: point {point + 1} is at {points[frame, point, axis]:g}")
         tracked &= np.isfinite(points).all(axis=(1, 2)) & np.isfinite(angles).all(axis=1)
         points[~tracked], angles[~tracked] = np.nan, np.nan

@@ -5,7 +5,6 @@ May use: the points of a Persona, and what reads arrays of numbers.
 
 from fba.persona.recognition.component import Component
 from fba.persona.recognition.network import Network, train
-from fba.persona.recognition.recogniser import Recogniser
-from fba.persona.recognition.rule import Labels, decide
+from fba.persona.recognition.recogniser import Labels, Recogniser, decide
 
 __all__ = ["Component", "Labels", "Network", "Recogniser", "decide", "train"]

@@ -22,7 +22,7 @@ from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_head
 
 HEADER = "header.json"
-MOST_HEADER = 1 << 20
+MAX_HEADER = 1 << 20
 """Bytes of the longest header."""
 MADE = (1980, 1, 1, 0, 0, 0)
 
@@ -53,8 +53,8 @@ def read_archive(
     try:
         with zipfile.ZipFile(path) as archive:
             size = archive.getinfo(HEADER).file_size
-            if size > MOST_HEADER:
-                raise FormatError(f"has a header of {size} bytes; expected {MOST_HEADER} at most", path=path)
+            if size > MAX_HEADER:
+                raise FormatError(f"has a header of {size} bytes; expected {MAX_HEADER} at most", path=path)
             header = json.loads(archive.read(HEADER))
     except KeyError as error:
         raise FormatError(f"is no {kind} file: it has no {HEADER}", path=path) from error

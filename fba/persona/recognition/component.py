@@ -14,7 +14,7 @@ DIMENSIONS = {"mouth": 11, "left_eye": 5, "right_eye": 5, "left_brow": 5, "right
 """Principal components that are kept."""
 UNITS = {"mouth": 30, "left_eye": 20, "right_eye": 20, "left_brow": 20, "right_brow": 20}
 """Hidden units of the networks."""
-ENOUGH = {"mouth": 0.6, "left_eye": 0.9, "right_eye": 0.9, "left_brow": 0.9, "right_brow": 0.9}
+WANTED_ACCURACY = {"mouth": 0.6, "left_eye": 0.9, "right_eye": 0.9, "left_brow": 0.9, "right_brow": 0.9}
 """Share of the validation examples that a network must get right."""
 FLATTEST = 0.4
 """Millimetres: corners of eyes that noise moves by less do not count for more."""
@@ -77,7 +77,7 @@ def train_component(
     learnt, held = used & ~check, used & check
     training = train(
         scores[learnt], targets[learnt], scores[held], targets[held],
-        units=UNITS[part], enough=ENOUGH[part], tries=tries, seed=seed,
+        units=UNITS[part], enough=WANTED_ACCURACY[part], tries=tries, seed=seed,
     )  # fmt: skip
     return Component(part, classes, mean, spread, axes, variance, training.network, training.share)
 

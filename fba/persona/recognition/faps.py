@@ -26,9 +26,11 @@ from fba.persona.recognition.recogniser import JAW_FAPS
 PUPILS = {"3.5": (61, 63), "3.6": (62, 64)}
 """Pupils are between these points."""
 JAW = 3
-UPPER_LIDS, LOWER_LIDS = (18, 19), (20, 21)
-"""Columns of the FAPs of the lids."""
-WIDEST = (-450.0, -150.0)
+UPPER_LIDS = (18, 19)
+"""Columns of the FAPs of the upper lids."""
+LOWER_LIDS = (20, 21)
+"""Columns of the FAPs of the lower lids."""
+MIN_LID_FAPS = (-450.0, -150.0)
 """FAPs of upper and lower lids that are open as far as lids go; narrow eyes at rest would ask for more."""
 LEFT_OUT = frozenset({61, 62, 63, 64})
 """FAPs of the nose, by whose points faces are laid on the mask."""
@@ -126,7 +128,7 @@ def mask_faps(moved: Float64, fapu: Fapu, jaw: Float64) -> Float64:
     values = np.zeros((len(moved), FAP_COUNT))
     for one in told_faps():
         values[:, one.fap - 1] = one.sign * moved[:, one.row, one.axis] / fapu[one.unit]
-    for lids, widest in zip((UPPER_LIDS, LOWER_LIDS), WIDEST, strict=True):
+    for lids, widest in zip((UPPER_LIDS, LOWER_LIDS), MIN_LID_FAPS, strict=True):
         values[:, lids] = np.maximum(values[:, lids], widest)
     part_lids(values)
     values[:, JAW - 1] = np.maximum(values[:, [fap - 1 for fap in JAW_FAPS]] @ jaw, 0.0)

@@ -11,8 +11,10 @@ from fba.arrays import Bool, Float64
 
 DECAY = 1e-4
 """Weight of the squared weights beside the mean squared error."""
-ROUNDS, ROUND = 16, 25
-"""Steps of L-BFGS: after each round the error of the examples for validation is measured."""
+MAX_ROUNDS = 16
+"""Rounds of training, at most; after each the error of the examples for validation is measured."""
+ROUND_STEPS = 25
+"""Steps of L-BFGS in a round."""
 BLOCK = 256
 """Examples multiplied at once: so few that one thread does it; threads of a busy machine wait for others."""
 PATIENCE = 2
@@ -102,10 +104,10 @@ def _train_once(
     wanted, importance = np.where(targets, 1.0, -1.0), _importance(targets)
     checked, check_importance = np.where(check_targets, 1.0, -1.0), _importance(check_targets)
     best, best_error, risen = weights, np.inf, 0
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         found = minimize(
             _loss, weights, args=(sizes, inputs, wanted, importance), jac=True, method="L-BFGS-B",
-            options={"maxiter": ROUND, "maxcor": 20},
+            options={"maxiter": ROUND_STEPS, "maxcor": 20},
         )  # fmt: skip
         weights = found.x
         error = float((check_importance * (_unpack(weights, sizes)(check) - checked) ** 2).sum())
@@ -113,7 +115,7 @@ def _train_once(
             best, best_error, risen = weights, error, 0
         else:
             risen += 1
-        if risen >= PATIENCE or found.nit < ROUND:
+        if risen >= PATIENCE or found.nit < ROUND_STEPS:
             break
     return _unpack(best, sizes)
 

@@ -10,7 +10,7 @@ import pytest
 from fba import Animation, BodyTrack
 from fba.body import gait
 from fba.body.gait import _detection as detection
-from fba.body.gait._signals import Curves
+from fba.body.gait._detection import Curves
 
 RATE = 100
 LEG = 0.8

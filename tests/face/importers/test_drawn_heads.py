@@ -12,7 +12,7 @@ from fba.face.deform.deformer import Deformer
 from fba.face.eyeball import eyeballs, fit_eyeball, flat_width
 from fba.face.feature_points import row_of
 from fba.face.importers._both_sides import split_sides
-from fba.face.importers.assembly._mouth_loop import mouth_points
+from fba.face.importers.assembly._openings import mouth_points
 from fba.face.importers.assembly.definitions import define_by_shapes, named_shapes
 from fba.face.importers.assembly.landmarks import find_eyes
 from fba.face.importers.assembly.pieces import assemble

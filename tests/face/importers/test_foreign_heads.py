@@ -20,9 +20,9 @@ from fba.face.eyeball import eyeballs
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
-from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
 from fba.face.importers.assembly._joining import join_pieces
-from fba.face.importers.assembly._winding import turn_outward
+from fba.face.importers.assembly._openings import find_eye_loop, lid_points_of_loop
+from fba.face.importers.assembly.model import turn_outward
 from fba.face.importers.assembly.pieces import assemble
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.repair import _stopped, repair_tables

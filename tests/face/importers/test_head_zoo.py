@@ -20,7 +20,7 @@ from fba.face.feature_points import MIRRORED, names, row_of
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces, locate
 from fba.face.importers.assembly.model import ImportOptions
-from fba.face.importers.assembly.symmetry import EXACT
+from fba.face.importers.assembly.symmetry import MIRRORED_LIDS
 from fba.face.model import FaceModel
 from fba.parameters import faps
 from mesh_files import write_points
@@ -93,7 +93,7 @@ def test_every_convention_says_the_same(
     which: str, maker: Maker, plain: dict[str, np.ndarray], tmp_path: Path
 ) -> None:
     found, uneven = locate_in_metres(maker, which, tmp_path)
-    assert uneven < EXACT
+    assert uneven < MIRRORED_LIDS
     apart = np.linalg.norm(found - plain[which], axis=1) * 1000
     if set(maker.shapes.values()) & set(ACTIONS) or maker.shapes["jawOpen"].startswith("head_"):
         apart[[row_of()[name] for name in BACK]] = 0

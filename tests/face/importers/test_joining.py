@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fba.face.importers.assembly._atlas import LARGEST, make_atlas
-from fba.face.importers.assembly._joining import join_pieces
+from fba.face.importers.assembly._joining import MAX_PIXELS, join_pieces, make_atlas
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.model import Material, Part
 
@@ -111,7 +110,7 @@ def test_pictures_become_no_larger_than_one_that_cards_can_hold() -> None:
     atlas = make_atlas([piece.part for piece in pieces])
     assert atlas is not None
     with Image.open(io.BytesIO(atlas.texture)) as image:
-        assert max(image.size) <= LARGEST
+        assert max(image.size) <= MAX_PIXELS
     same(shown(join_pieces(pieces, "skin", "skin")), [BLUE] * 4 + [RED] * 4)
     endless = sheet("brick", picture(GREEN), [(0, 0), (50, 0), (0, 50), (50, 50)])
     assert make_atlas([pieces[0].part, endless.part]) is None

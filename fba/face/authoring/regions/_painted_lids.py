@@ -23,8 +23,10 @@ STEPS = 24
 """Distances from the margin at which each is looked at, up to `FURTHEST`."""
 FURTHEST = 2.0
 """Distance from the margin, in distances of the crease, up to which paint is looked for; skin begins at 1."""
-DARK, BRIGHT = 0.5, 0.7
-"""Brightness, as a share of that of the skin beside, below which paint begins and above which it ends."""
+DARK = 0.5
+"""Brightness, as a share of that of the skin beside, below which paint begins."""
+BRIGHT = 0.7
+"""Brightness, as a share of that of the skin beside, above which paint ends."""
 SAMPLES = 12
 """Points across each edge of a triangle at which its colour is read."""
 

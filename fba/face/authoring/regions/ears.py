@@ -20,9 +20,12 @@ EARS = {
     "right": {"top": "10.2", "back": "10.4", "lobe": "10.6", "below": "10.8", "above": "10.10"},
 }
 """Feature points of the ears; "below" and "above" are where they meet the face."""
-RAISE, PULL = {65: "left", 66: "right"}, {67: "left", 68: "right"}
-WHOLE, ROOT = 0.55, 1.15
-"""Shares of the ear's width from its rim: up to the first it moves as one, beyond the second not at all."""
+RAISE = {65: "left", 66: "right"}
+PULL = {67: "left", 68: "right"}
+RIGID_WIDTH = 0.55
+"""Share of the ear's width from its rim up to which it moves as a whole."""
+ROOT_WIDTH = 1.15
+"""Share of the ear's width from its rim beyond which it does not move."""
 AROUND = (1.1, 1.7)
 """Multiples of the ear's size between which the motion of the head around it fades out."""
 WIDER = 1.2
@@ -60,7 +63,7 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
     width = float(np.linalg.norm(back - root))
     rim = _rim(marks, names)
     away = surface.distances(rim, 1.5 * width) / width
-    share = 1 - smoothstep((np.nan_to_num(away, posinf=9.0) - WHOLE) / (ROOT - WHOLE))
+    share = 1 - smoothstep((np.nan_to_num(away, posinf=9.0) - RIGID_WIDTH) / (ROOT_WIDTH - RIGID_WIDTH))
     share = average_with_neighbours(surface, share, SMOOTHINGS)
     centre = ((top + lobe) / 2 + (back + root) / 2) / 2
     half = np.array([np.inf, np.linalg.norm(top - lobe) / 2, abs(back[2] - root[2]) / 2 * WIDER])

@@ -21,10 +21,13 @@ PUPIL_OF_IRIS = 1 / 3
 """Diameter of the pupil relative to the iris on a neutral face."""
 PUPIL_RIM = (0.4, 1.5)
 """An eyeball without vertices this far from its axis, in radii of the pupil, has no pupil to move."""
-SMALLEST_PUPIL, LARGEST_PUPIL = 0.3, 0.9
-"""Radii at which the pupil stops: shares of its neutral radius, and of that of the iris."""
+MIN_PUPIL = 0.3
+"""Radius below which the pupil does not shrink, as a share of its neutral radius."""
+MAX_PUPIL = 0.9
+"""Radius above which the pupil does not grow, as a share of that of the iris."""
 
-YAW, PITCH = ("rotation", (0.0, 1.0, 0.0)), ("rotation", (1.0, 0.0, 0.0))
+YAW = ("rotation", (0.0, 1.0, 0.0))
+PITCH = ("rotation", (1.0, 0.0, 0.0))
 THRUST = ("translation", (0.0, 0.0, 1.0))
 TRANSFORMS = {23: YAW, 24: YAW, 25: PITCH, 26: PITCH, 27: THRUST, 28: THRUST}
 """Kind and amount per unit of the transforms of an eyeball, by FAP."""
@@ -96,7 +99,7 @@ def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -
     iris = unit * 1024 / 2
     pupil = iris * PUPIL_OF_IRIS
     low, high = fap_limits(fap)
-    smallest, largest = SMALLEST_PUPIL * pupil, LARGEST_PUPIL * iris
+    smallest, largest = MIN_PUPIL * pupil, MAX_PUPIL * iris
     # the diameter grows by value x IRISD
     bends = np.array([(smallest - pupil) * 2 / unit, (largest - pupil) * 2 / unit])
     values = np.unique(np.round(np.clip([low, bends[0], 0, bends[1], high], low, high)))

@@ -18,7 +18,7 @@ from fba.face.points import OPEN_JAW
 CHIN = ("2.1", "2.10", "2.11", "2.12")
 EARS = ("10.7", "10.8", "10.9", "10.10")
 """Where the ears meet the face; the hinge lies between them."""
-STILL = (*EARS, "3.9", "3.10", "5.3", "5.4", "8.1", "9.1", "9.2", "9.3", "9.15", "10.5", "10.6")
+UNMOVED_POINTS = (*EARS, "3.9", "3.10", "5.3", "5.4", "8.1", "9.1", "9.2", "9.3", "9.15", "10.5", "10.6")
 """Feature points that the jaw does not move."""
 REACH = 1.5
 """Reach of the jaw's motion into cheeks and neck, in ES0."""
@@ -26,8 +26,8 @@ NECK = 0.1
 """Open edges of the skin further below the chin than this, in ES0, are where the neck was cut."""
 CORNER = 0.6
 """Share of the jaw's rotation that the skin over its corners makes."""
-WIDEST = np.radians(30.0)
-"""Largest opening of the jaw, radians."""
+MAX_OPENING = np.radians(30.0)
+"""Radians by which the jaw opens at most."""
 SLIDE = (0.35, 0.1)
 """Motion of the hinge forwards and down per radian, in ES0: some 11 mm when wide open."""
 INTERVAL = np.radians(3.0)
@@ -81,7 +81,7 @@ def find_jaw(marks: Landmarks) -> Jaw | str:
 def opening_angles(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
     """(values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
     low, high = fap_limits(OPEN_JAW)
-    fine = np.linspace(0, WIDEST, 400)
+    fine = np.linspace(0, MAX_OPENING, 400)
     sunk = -opening_shifts(jaw.chin[None], jaw, fine)[:, 0, 1]
     fine = fine[: int(sunk.argmax()) + 1]
     sunk = np.maximum.accumulate(sunk[: len(fine)])
@@ -186,7 +186,7 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
     lips = marks.on_contours(*LIP_CONTOURS) | marks.lips
     # the neck's lower end joins a body that does not move
     end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - NECK * es)
-    still = np.union1d(np.flatnonzero(lips | end), marks.vertices_of(STILL))
+    still = np.union1d(np.flatnonzero(lips | end), marks.vertices_of(UNMOVED_POINTS))
     inside = marks.inside_mouth
     near, far = surface.distances(source, REACH * es), surface.distances(still, 3 * REACH * es)
     free = reachable_region(near, far, REACH * es) & ~inside & ~lips

@@ -61,7 +61,7 @@ NARROW = 0.4
 """Factor of distances at the corners of the eye."""
 SMOOTHINGS = 4
 """Rounds of averaging shares with those of neighbours."""
-STILL = {
+UNMOVED_POINTS = {
     "left": ("4.1", "4.3", "4.5", "9.7", "9.13", "5.3", "9.12"),
     "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
 }
@@ -211,7 +211,7 @@ def _share(
     """
     surface, es, side = marks.surface, marks.fapu.ES * 1024, eye.side
     stays = np.setdiff1d(other, own)
-    still = marks.vertices_of(STILL[side])
+    still = marks.vertices_of(UNMOVED_POINTS[side])
     away = surface.distances(own, 2 * REACH * es)
     crease = CREASE * es
     if marks.has(FOLD[side, lid]):

@@ -58,7 +58,7 @@ REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
 REACH_INSIDE = 0.3
 """Reach into the mouth, in ES0."""
-STILL = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.8", "3.9", "3.10")
+UNMOVED_POINTS = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.8", "3.9", "3.10")
 """Feature points that the lips do not move."""
 SLACK = 0.25
 """Distance in ES0 beyond which the skin does not overshoot."""
@@ -172,7 +172,7 @@ def _fields(marks: Landmarks) -> _Lips:
     fixed = np.flatnonzero(~np.isnan(values[:, 0]))
     es = marks.fapu.ES * 1024
     near = marks.surface.distances(fixed, limit=2 * REACH * es)
-    far = marks.surface.distances(marks.vertices_of(STILL), limit=4 * REACH * es)
+    far = marks.surface.distances(marks.vertices_of(UNMOVED_POINTS), limit=4 * REACH * es)
     free = reachable_region(near, far, REACH * es)
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
     solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)

@@ -22,14 +22,20 @@ from fba.face.points import DIRECTIONS
 from fba.face.tables import FaceDefTables
 from fba.parameters import faps
 
-OWN, ELSEWHERE, ACROSS = 3.0, 1.0, 0.5
-"""Weights of the points that are to move, of the other points, and of directions across the motion."""
+MOVING_WEIGHT = 3.0
+"""Weight of the points that are to move, along the motion."""
+REST_WEIGHT = 1.0
+"""Weight of the other points."""
+ACROSS_WEIGHT = 0.5
+"""Weight of the points that are to move, across the motion."""
 RIDGE = 0.05
 """Regularisation: a shape at weight 1 costs as much as 5 % of the motion at another point."""
 MOST_WEIGHT = 1.25
 """A shape is used up to this weight for a typical value of the FAP."""
-LEAST_SHARE, LEAST_OF_ONE = 0.5, 0.25
-"""Least shares of their target by which shapes must move a group's points: on average, and each of them."""
+MIN_MEAN_SHARE = 0.5
+"""Share of their target by which shapes must move a group's points on average."""
+MIN_SHARE = 0.25
+"""Share of its target by which shapes must move each point of a group."""
 FULL_WEIGHT = 0.15
 """Weight of the mesh's own tables from which shapes are used in full; they fade out below."""
 GROUPS = (
@@ -189,8 +195,8 @@ class Mixer:
         target = self._steps(group) * sign * value
         length = np.linalg.norm(target, axis=1)
         own = length > 0
-        weight = np.full(target.shape, ELSEWHERE)
-        weight[own] = np.where(np.abs(target[own]) > 0, OWN, ACROSS)
+        weight = np.full(target.shape, REST_WEIGHT)
+        weight[own] = np.where(np.abs(target[own]) > 0, MOVING_WEIGHT, ACROSS_WEIGHT)
         weight /= length.max()
         halves = len(self.shapes.halves)
         system = (self.moves * weight).reshape(halves, -1).T
@@ -203,7 +209,7 @@ class Mixer:
         moved = np.einsum("h,hpk->pk", solution, self.moves)
         outer = [list(self.points).index(faps()[fap - 1].feature_points[0]) for fap in group]
         shares = (moved[outer] * target[outer]).sum(axis=1) / length[outer] ** 2
-        if shares.mean() < LEAST_SHARE or shares.min() < LEAST_OF_ONE:
+        if shares.mean() < MIN_MEAN_SHARE or shares.min() < MIN_SHARE:
             return None
         return np.asarray(solution / (shares.mean() * value) * sign)
 

@@ -18,8 +18,8 @@ from fba.face.model import FaceModel, Part
 
 BLEND = 0.12
 """Half the width over which a shape fades from one side to the other, as a share of ES0."""
-STILL = 1e-3
-"""A half that moves less than this share of its shape is left out."""
+MIN_HALF_MOTION = 1e-3
+"""Share of its shape's motion below which a half is left out."""
 
 Morphs = Mapping[str, Mapping[str, Floating]]
 
@@ -59,11 +59,11 @@ class Shapes:
 
     @cached_property
     def halves(self) -> list[Half]:
-        """The halves that move at least `STILL` of what their shape moves."""
+        """Return the halves that move at least `MIN_HALF_MOTION` of what their shape moves."""
         halves = []
         for shape in self.morphs:
             sizes = np.linalg.norm(self.displacements(shape), axis=1)
-            least = STILL * float(sizes.max(initial=0.0))
+            least = MIN_HALF_MOTION * float(sizes.max(initial=0.0))
             halves += [Half(shape, side) for side in (1, -1) if (sizes * self._side(side)).max() > least]
         return halves
 

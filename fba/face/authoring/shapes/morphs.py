@@ -30,10 +30,10 @@ from fba.parameters import faps
 if TYPE_CHECKING:
     from fba.face.interpolation.table import InterpolationTable
 
-STILL = 1e-7
-"""Metres: shapes that move no vertex further are empty."""
-FEWEST_FAPS = 5
-"""With at least this many shapes named after FAPs, only these are used."""
+EMPTY_SHAPE_MOTION = 1e-7
+"""Metres up to which a shape moves its vertices that counts as empty."""
+MIN_FAPS = 5
+"""Number of shapes named after FAPs from which only these are used."""
 ARCS = frozenset((3, *range(19, 31), *range(43, 51)))
 """FAPs whose points move on arcs: jaw, lids, eyeballs, tongue, head. A shape is straight, and is used for
 these only where the mesh alone gives no table."""
@@ -82,12 +82,15 @@ def add_shapes(base: FaceModel, morphs: Morphs) -> FaceModel:
     moving = {
         shape: moved
         for shape, moved in morphs.items()
-        if any(np.abs(np.asarray(part, dtype=np.float64)).max(initial=0.0) > STILL for part in moved.values())
+        if any(
+            np.abs(np.asarray(part, dtype=np.float64)).max(initial=0.0) > EMPTY_SHAPE_MOTION
+            for part in moved.values()
+        )
     }
     if moving:  # shapes that a converter left empty show nothing
         morphs = moving
     by_fap = {number: shape for shape in morphs if (number := fap_of(shape)) is not None}
-    if len(by_fap) >= FEWEST_FAPS:
+    if len(by_fap) >= MIN_FAPS:
         shapes = check_shapes(base, {shape: morphs[shape] for shape in by_fap.values()})
         return _from_faps(base, shapes, by_fap)
     known = canonical_names(morphs)

@@ -15,10 +15,10 @@ NEIGHBOURS = 8
 """Candidate triangles for the nearest point on the skin."""
 ROOT = 0.3
 """Vertices of a hair up to this much further from the skin than its nearest are roots, in edge lengths."""
-LARGEST = 1.2
-"""Parts of kind "other" are attached if smaller than this, in ES0: a mole, not a shirt."""
-NEAR = 0.1
-"""Parts with most of their vertices this close to the skin, in ES0, are attached to it."""
+MAX_ATTACHED_SIZE = 1.2
+"""Size, in ES0, up to which a part of kind "other" is attached: a mole, not a shirt."""
+ATTACHED_DISTANCE = 0.1
+"""Distance from the skin, in ES0, within which most vertices of a part lie that is attached to it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,8 @@ TOLERANCE = 0.15
 LIP_SLACK = 0.02
 """How much further away than the nearest lip a point's own lip may be, as a share of the face's size."""
 JAW_OF_TEETH = {"9.8": 1, "9.10": 1, "9.9": -1, "9.11": -1}
-UPPER_LIP, LOWER_LIP = ("2.2", "2.6", "2.7"), ("2.3", "2.8", "2.9")
+UPPER_LIP = ("2.2", "2.6", "2.7")
+LOWER_LIP = ("2.3", "2.8", "2.9")
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from fba.face.authoring.surface.surface import Surface, positions_in
 from fba.face.tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
 
-STILL = 2e-6
-"""Metres: vertices that never move further are left out."""
+UNMOVED_DISTANCE = 2e-6
+"""Metres up to which a vertex moves that is left out of the tables."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,11 @@ def build_tables(
 
 
 def _mesh(part: str, motion: Motion, unit: float) -> FaceDefMesh | None:
-    moving = (np.abs(motion.shifts).max(axis=(0, 2)) > STILL) if len(motion.vertices) else np.zeros(0, bool)
+    moving = (
+        (np.abs(motion.shifts).max(axis=(0, 2)) > UNMOVED_DISTANCE)
+        if len(motion.vertices)
+        else np.zeros(0, bool)
+    )
     if not moving.any():
         return None
     borders = np.round(motion.values).astype(np.int64)

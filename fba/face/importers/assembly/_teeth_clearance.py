@@ -14,7 +14,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.easing import smoothstep
 from fba.face.authoring.surface.landmarks import weld_skin
-from fba.face.authoring.surface.motion import STILL
+from fba.face.authoring.surface.motion import UNMOVED_DISTANCE
 from fba.face.authoring.surface.surface import Surface
 from fba.face.checks.fap_checks import check_posed
 from fba.face.checks.posing import Poser
@@ -28,9 +28,9 @@ KNOTS = (-20.0, -80.0, -140.0, -200.0, -260.0, -320.0)
 """Values at which the clearance is measured. Up to the first one, the corners move straight."""
 CELL = 0.0005
 """Metres: spacing of the picture of the teeth's depth."""
-MOST_CELLS = 1 << 20
-ROUND = 0.002
-"""Metres: gaps between teeth narrower than this are closed, and their arch is smoothed by half of it."""
+MAX_CELLS = 1 << 20
+CLOSED_GAP = 0.002
+"""Metres up to which gaps between teeth are closed; their arch is smoothed by half of it."""
 GAP = 0.0008
 """Metres of skin that stay in front of the arch; skin that is nearer at rest keeps its distance."""
 BEHIND = 0.004
@@ -42,12 +42,12 @@ BRIDGINGS = 3
 TRIALS = ((0.7, 1.0), (0.45, 1.0), (0.3, 1.0), (0.7, 0.7), (0.45, 0.7), (0.45, 0.4))
 """How much less the skin comes forward for each metre from where it has to, and share of the way it goes:
 the first pair that turns nothing over is taken."""
-NEARBY = 0.001
-"""Metres: of needs in one square of this size, the largest counts."""
+NEED_SQUARE = 0.001
+"""Metres, side of a square; of the needs in it, the largest counts."""
 FULL = 0.15
 """Share of the largest motion above which skin comes forward in full."""
-LEAST = 2e-4
-"""Metres: skin that gets less far into the teeth is left alone."""
+MIN_OVERLAP = 2e-4
+"""Metres below which skin may get into the teeth without being pushed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ def clear_teeth(model: FaceModel) -> FaceModel:
     before = _count_errors(poser, stretch)
     for slope, share in TRIALS:
         pushes = [share * _push(surface, arch, motion, slope) for motion in motions]
-        if max(float(push.max()) for push in pushes) < LEAST:
+        if max(float(push.max()) for push in pushes) < MIN_OVERLAP:
             return model
         cleared = _with_pushes(model, surface, poser, stretch, pushes)
         if _count_errors(Poser(cleared, like=poser), stretch) <= before:
@@ -119,8 +119,8 @@ def _measure_arch(model: FaceModel) -> Arch | None:
     if not rows:
         return None
     corners = np.concatenate([part.vertices.astype(np.float64)[part.triangles] for part in rows])
-    low, high = corners.min(axis=(0, 1))[:2] - 3 * ROUND, corners.max(axis=(0, 1))[:2] + 3 * ROUND
-    cell = max(CELL, float(np.sqrt(np.prod(high - low) / MOST_CELLS)))
+    low, high = corners.min(axis=(0, 1))[:2] - 3 * CLOSED_GAP, corners.max(axis=(0, 1))[:2] + 3 * CLOSED_GAP
+    cell = max(CELL, float(np.sqrt(np.prod(high - low) / MAX_CELLS)))
     size = np.ceil((high - low) / cell).astype(np.intp) + 1
     depth = np.full((size[1], size[0]), -np.inf)
     longest = float(np.linalg.norm(np.ptp(corners[:, :, :2], axis=1), axis=1).max())
@@ -133,9 +133,9 @@ def _measure_arch(model: FaceModel) -> Arch | None:
             np.maximum.at(depth, (lines, columns), points[:, 2])
     floor = float(corners[:, :, 2].min())
     filled = np.where(np.isfinite(depth), depth, floor)
-    wide = 2 * round(ROUND / cell) + 1
+    wide = 2 * round(CLOSED_GAP / cell) + 1
     closed = grey_closing(filled, size=(wide, wide))
-    smooth = gaussian_filter(closed, ROUND / 2 / cell, mode="nearest")
+    smooth = gaussian_filter(closed, CLOSED_GAP / 2 / cell, mode="nearest")
     return Arch(low, cell, np.maximum(closed, smooth))
 
 
@@ -176,7 +176,7 @@ def _push(surface: Surface, arch: Arch, shifts: Float64, slope: float) -> Float6
 def _thin(needs: Float64) -> Float64:
     """The largest of the needs, rows x, y, metres, of each square of 1 mm."""
     order = np.argsort(-needs[:, 2], kind="stable")
-    cells = np.floor(needs[order, :2] / NEARBY).astype(np.intp)
+    cells = np.floor(needs[order, :2] / NEED_SQUARE).astype(np.intp)
     _, first = np.unique(cells, axis=0, return_index=True)
     return np.asarray(needs[order[first]])
 
@@ -223,7 +223,7 @@ def _with_push(
 def _add_forward(mesh: FaceDefMesh, push: Mapping[float, Float64], unit: float) -> FaceDefMesh:
     """A mesh's motion with one along z, (V,) metres of each vertex of the part by value; constant beyond."""
     values = np.array(sorted(push))
-    pushed = np.flatnonzero(np.max([push[value] for value in values], axis=0) > STILL)
+    pushed = np.flatnonzero(np.max([push[value] for value in values], axis=0) > UNMOVED_DISTANCE)
     vertices = np.union1d(mesh.vertices, pushed).astype(np.int32)
     ways = np.stack([push[value] for value in values])[:, vertices]
     inside = values[(values > mesh.borders[0]) & (values < mesh.borders[-1])].astype(np.int64)

@@ -24,7 +24,9 @@ LOOKS = {
     "eye": Material("eye", (0.80, 0.78, 0.75), 0.1),
 }
 """Materials by kind of part."""
-WHITE, IRIS, PUPIL = (0.80, 0.78, 0.75), (0.16, 0.09, 0.05), (0.004, 0.004, 0.004)
+WHITE = (0.80, 0.78, 0.75)
+IRIS = (0.16, 0.09, 0.05)
+PUPIL = (0.004, 0.004, 0.004)
 GREY = 0.03
 """Light colours whose channels differ by less are programs' defaults, and are replaced."""
 

@@ -28,14 +28,16 @@ ROUNDS = 4
 """Number of times that the rest is measured: motions of the jaw and of lids are not straight."""
 SCALINGS = 3
 """Number of times that a shape is made smaller, until all points reach what it asks for."""
-LARGE, ENOUGH = 0.5, 0.75
-"""Share of the largest motion above which a point counts, and the share of its way that it must reach."""
-LEAST_SCALE = 0.7
+COUNTED_SHARE = 0.5
+"""Share of the largest motion above which a point counts."""
+REACHED_SHARE = 0.75
+"""Share of its motion that such a point must reach."""
+MIN_SCALE = 0.7
 """Least factor by which a shape is made smaller at once."""
-LEAST = 0.004
-"""Least motion of a point, in distances of the pupils, of a shape that shows something."""
-STILL = 0.001
-"""Motions of a point below this, in distances of the pupils, do not count."""
+MIN_MOTION = 0.004
+"""Motion of a point, in distances of the pupils, from which a shape shows something."""
+IGNORED_MOTION = 0.001
+"""Motion of a point, in distances of the pupils, below which it does not count."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 
@@ -93,16 +95,16 @@ def _measure(
     rows = [row_of()[entry.feature_points[0]] for entry in known]
     ways = np.array([DIRECTIONS[entry.positive] for entry in known], dtype=np.float64)
     units = np.array([model.fapu[entry.unit] for entry in known])
-    if not known or np.linalg.norm(moved[rows], axis=1).max() < LEAST * apart:
+    if not known or np.linalg.norm(moved[rows], axis=1).max() < MIN_MOTION * apart:
         return None
     target = np.einsum("ij,ij->i", moved[rows], ways)
-    target[np.abs(target) < STILL * apart] = 0.0
+    target[np.abs(target) < IGNORED_MOTION * apart] = 0.0
     numbers_known = np.array([entry.number for entry in known])
     sides = np.zeros(FAP_COUNT)
     sides[numbers_known - 1] = target
     target = _even(sides)[numbers_known - 1]
     rest = deform.feature_points(np.zeros(FAP_COUNT))[rows]
-    large = np.abs(target) > LARGE * np.abs(target).max()
+    large = np.abs(target) > COUNTED_SHARE * np.abs(target).max()
     if not large.any():  # it moves no point in the direction of any FAP
         return None
     values = np.zeros(FAP_COUNT)
@@ -114,10 +116,10 @@ def _measure(
             values = _within_limits(_even(values))
         now = np.einsum("ij,ij->i", deform.feature_points(values)[rows] - rest, ways)
         reached = float((now[large] / target[large]).min())
-        if reached > ENOUGH:
+        if reached > REACHED_SHARE:
             break
         # where one point stops early, a smaller motion of all keeps the form
-        target *= max(reached, LEAST_SCALE)
+        target *= max(reached, MIN_SCALE)
     return np.round(values)
 
 

@@ -18,8 +18,7 @@ from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, flat_width, sphere
 from fba.face.feature_points import row_of
-from fba.face.importers.assembly._eye_loop import find_eye_loop, lid_points_of_loop
-from fba.face.importers.assembly._mouth_loop import mouth_points
+from fba.face.importers.assembly._openings import find_eye_loop, lid_points_of_loop, mouth_points
 from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._warping import warp_points
 from fba.face.importers.assembly.polygon_parts import Piece
@@ -31,15 +30,18 @@ from fba.parameters import faps
 
 OUTSIDE = 0.2
 """Skin whose normal has a smaller z than this is the inside of the mouth, or an ear."""
-MOST_IN_COLUMN = 3000
-"""Most vertices of one column of the face that are compared with each other."""
+MAX_IN_COLUMN = 3000
+"""Number of vertices, at most, of one column of the face that are compared with each other."""
 PARTED = 0.25
 """Share of the jaw's way by which lips part at least."""
-WIDEST, SLIT_STEP, SLIT_END = 0.7, 0.02, 0.2
-"""Half a mouth at most and the steps along it, in distances of the eyes; and the share of what parts in the
-middle that still parts at the corner."""
-FEWEST_IN_LOOP = 6
-"""Fewest vertices around the opening of an eye."""
+MAX_HALF_MOUTH = 0.7
+"""Width that half a mouth has at most, in distances of the eyes."""
+SLIT_STEP = 0.02
+"""Width of a step along the line between the lips, in distances of the eyes."""
+SLIT_END = 0.2
+"""Share of what lips part in the middle by which they still part at the corner."""
+MIN_LOOP_VERTICES = 6
+"""Number of vertices that the opening of an eye has around it at least."""
 FRONT_TEETH = 0.12
 """Distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils."""
 CORNER_WIDTH = 0.055
@@ -47,13 +49,13 @@ CORNER_WIDTH = 0.055
 UNLIKE = 1.3
 """Ratio of the radii above which two shells are not a pair of eyes."""
 IN_FRONT = 0.7
-"""Least distance of a pupil in front of its eyeball's centre, in radii."""
+"""Distance that a pupil is in front of its eyeball's centre at least, in radii."""
 RIGHT_LID = ("3.2", "3.4", "3.8", "3.12")
 """Points of the right lids' margins and of the corners between them."""
 LIDS_ALIKE = 0.02
-"""Most difference between the heights of both eyes' openings, as a share, of lids that stay as located."""
-FEWEST_FAPS = 20
-"""With at least this many shapes named after FAPs, points are where these move most."""
+"""Share by which the heights of both eyes' openings differ, at most, where lids stay as located."""
+MIN_FAPS = 20
+"""Number of shapes named after FAPs from which points are where these move most."""
 
 
 def find_points(
@@ -72,7 +74,7 @@ def find_points(
         raise ModelError(f"{path}: no part is skin; give the kinds of the parts").with_remedies(POINTS)
     by_fap = {fap: morph for name, morph in skin[0].morphs.items() if (fap := fap_of(name)) is not None}
     vertices = skin[0].part.vertices.astype(np.float64)
-    if len(by_fap) >= FEWEST_FAPS:
+    if len(by_fap) >= MIN_FAPS:
         points = _from_faps(vertices, by_fap) | _lids_by_loops(pieces, eyes)
     else:
         points = _from_arkit(pieces, skin[0], vertices, eyes, path)
@@ -278,7 +280,9 @@ def _lids_by_loops(
     for side, (centre, radius, pupil) in eyes.items():
         loop = find_eye_loop(surface, centre, radius)
         found = (
-            lid_points_of_loop(surface.vertices, loop, float(pupil[0])) if len(loop) >= FEWEST_IN_LOOP else {}
+            lid_points_of_loop(surface.vertices, loop, float(pupil[0]))
+            if len(loop) >= MIN_LOOP_VERTICES
+            else {}
         )
         if found:
             upper, lower = LID_POINTS[side]
@@ -357,9 +361,9 @@ def _end_of_slit(
     """
     first = 0.0
     last: int | None = None
-    for step in np.arange(0.0, WIDEST, SLIT_STEP) * apart:
+    for step in np.arange(0.0, MAX_HALF_MOUTH, SLIT_STEP) * apart:
         column = np.flatnonzero((np.abs(vertices[:, 0] - middle - sign * step) < 0.04 * apart) & near)
-        if not 0 < len(column) <= MOST_IN_COLUMN:
+        if not 0 < len(column) <= MAX_IN_COLUMN:
             continue
         between = np.linalg.norm(vertices[column][:, None] - vertices[column][None], axis=2)
         parted = np.where(between < 0.04 * apart, drop[column][None] - drop[column][:, None], 0.0)
@@ -384,8 +388,8 @@ def _lip_pair(
     column = np.flatnonzero((np.abs(vertices[:, 0] - x) < 0.04 * apart) & ahead)
     if not len(column) or not drop[column].max() > 0:
         return None
-    if len(column) > MOST_IN_COLUMN:  # a very fine mesh: every few vertices are enough
-        column = column[:: len(column) // MOST_IN_COLUMN + 1]
+    if len(column) > MAX_IN_COLUMN:  # a very fine mesh: every few vertices are enough
+        column = column[:: len(column) // MAX_IN_COLUMN + 1]
     positions, falls = vertices[column], drop[column]
     between = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     differs = falls[None] - falls[:, None]

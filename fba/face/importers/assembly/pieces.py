@@ -26,11 +26,12 @@ FREE = ("7.1", "11.5")
 """Feature points that stand on no surface."""
 EYE_ROUND = 0.1
 """Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
-FEWEST_TEETH = 6
-"""Fewest pieces that are single teeth rather than rows."""
-FRONT, SAME_HEIGHT = 0.25, 0.6
-"""Front teeth: share of the depth of a row in which they lie; and the most by which the middles of those of
-one jaw differ, as a share of their height."""
+MIN_SINGLE_TEETH = 6
+"""Number of pieces from which they are single teeth rather than rows."""
+FRONT = 0.25
+"""Share of the depth of a row of teeth in which the front teeth lie."""
+SAME_HEIGHT = 0.6
+"""Share of their height by which the middles of front teeth of one jaw differ at most."""
 PAIR = 1.7
 """Two eyes are together at least this many times as wide as tall; one eye is round."""
 WHITE = re.compile("white|sclera", re.IGNORECASE)
@@ -216,7 +217,7 @@ def _are_one_row(teeth: Sequence[Piece]) -> bool:
             lows.append(float(own[:, 1].min()))
             highs.append(float(own[:, 1].max()))
             fronts.append(float(own[:, 2].max()))
-    if len(lows) < FEWEST_TEETH:
+    if len(lows) < MIN_SINGLE_TEETH:
         return False
     low, high, front = np.array(lows), np.array(highs), np.array(fronts)
     foremost = front > front.max() - FRONT * (front.max() - front.min())

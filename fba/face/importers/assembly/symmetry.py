@@ -17,9 +17,13 @@ from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.parameters import faps
 from fba.rotations import between
 
-ALIKE, NEARLY, EXACT = 0.02, 0.006, 0.003
-"""Distances of 98 % of a face's vertices from the mirror image, in distances of the eyes, below which points
-are mirrored, below which also tables are but those of the lids, and below which all are."""
+MIRRORED_POINTS = 0.02
+"""Asymmetry, up to which 98 % of a face's vertices are off the mirror image, in distances of the eyes, below
+which points are mirrored."""
+MIRRORED_TABLES = 0.006
+"""Asymmetry below which tables are mirrored, too, but those of the lids."""
+MIRRORED_LIDS = 0.003
+"""Asymmetry below which the tables of the lids are mirrored, too."""
 LIDS = ((19, 20), (21, 22))
 """FAPs of the lids, left and right: their rows of vertices are the first that differ."""
 BETTER = 0.5
@@ -28,8 +32,8 @@ ANGLES = np.radians((0.2, 15.0))
 """Angles between the plane of symmetry and the upright one within which a head is turned."""
 POINT_ANGLES = np.radians((2.0, 40.0))
 """The same for points that are given, which are no more exact than a hand."""
-FEWEST_PAIRS = 4
-"""Fewest pairs of points, left and right, that tell how a head is turned."""
+MIN_PAIRS = 4
+"""Number of pairs of points, left and right, from which they tell how a head is turned."""
 AROUND = 1.6
 """Distance from the middle of the eyes, in those of the eyes, within which vertices belong to the face."""
 TOUCHING = 0.1
@@ -55,7 +59,7 @@ def stand_upright(
     before, after = (
         float(np.median(_mirror_distances(vertices, middle, axis))) for axis in (np.eye(3)[0], normal)
     )
-    if after > BETTER * before or after > ALIKE * float(np.linalg.norm(left - right)):
+    if after > BETTER * before or after > MIRRORED_POINTS * float(np.linalg.norm(left - right)):
         return list(pieces), 0.0
     return _turned(pieces, between(normal, np.eye(3)[0]), middle), angle
 
@@ -70,7 +74,7 @@ def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[l
     pairs = pairs[np.isfinite(pairs).all(axis=(1, 2))]
     ways = pairs[:, 0] - pairs[:, 1] if len(pairs) else np.zeros((0, 3))
     wide = np.linalg.norm(ways, axis=1)
-    if len(pairs) < FEWEST_PAIRS or not wide.max() > 0:
+    if len(pairs) < MIN_PAIRS or not wide.max() > 0:
         return list(pieces), points, 0.0
     normal = ways.sum(axis=0) / np.linalg.norm(ways.sum(axis=0))
     angle = float(np.arccos(np.clip(normal[0], -1.0, 1.0)))
