@@ -4,7 +4,7 @@ Bones point in the directions of the source's, but thigh, shank and foot have ot
 up millimetres to centimetres higher or lower than the source's, and slip a little where the source's stand
 still; and the ground of each source is at another height. First the body is raised or lowered as a whole,
 frame by frame, so that the foot on the ground is as high above it as the source's; legs correct the rest
-(`fba.capture.limbs._leg_ik`).
+(`fba.capture.limbs.foot_planting.move_ankle`).
 """
 
 from __future__ import annotations

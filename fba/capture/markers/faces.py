@@ -11,13 +11,12 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64, Intp
-from fba.capture.markers.blinks import opening_by_blinks
+from fba.capture.markers._eyes import find_gaze, opening_by_blinks
 from fba.capture.markers.exchanges import Exchange, undo_exchanges
 from fba.capture.markers.gaps import RARELY, Filled, fill_gaps, warn_of_gaps
 from fba.capture.markers.marker_maps import check_map, find_map
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.neutral import neutral_frames
-from fba.capture.markers.pupils import find_gaze
 from fba.capture.markers.registration import GIVE_MAP, Registration, complete_points, register
 from fba.capture.markers.responses import measure_responses
 from fba.capture.markers.solving import choose_unknowns, solve

@@ -19,7 +19,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton
-from fba.capture.skeleton import MOST_FRAMES, check_memory
+from fba.capture.skeleton import MAX_FRAMES, check_memory
 from fba.errors import FbaWarning, FormatError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
@@ -27,7 +27,7 @@ from fba.source import naming_file, read_whole
 
 MAX_JOINTS = 4096
 MAX_RATE = 10_000
-MAX_LINES = 4 * MOST_FRAMES
+MAX_LINES = 4 * MAX_FRAMES
 LARGEST = 1e12
 """Largest length or angle; more is damage."""
 BATCH_LINES = 4096
@@ -275,9 +275,9 @@ def _numbers(
         counts.append(len(words))
         total += len(words)
         batch += words
-        if total // channels > MOST_FRAMES:
+        if total // channels > MAX_FRAMES:
             raise FormatError(
-                f"more than {MOST_FRAMES} frames; cut the motion into pieces", path=path, line=number + 1
+                f"more than {MAX_FRAMES} frames; cut the motion into pieces", path=path, line=number + 1
             )
         if len(row_lines) % BATCH_LINES == 0:
             blocks.append(_floats(batch, lines, row_lines, path))

@@ -19,7 +19,7 @@ from fba.arrays import Bool, Float64
 from fba.body.skeleton import Skeleton
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.bones import find_bones
-from fba.capture.skeleton import MOST_FRAMES, check_memory
+from fba.capture.skeleton import MAX_FRAMES, check_memory
 from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, key_times
@@ -208,9 +208,9 @@ def _count_frames(
     count = int(seconds * float(frames) + 1e-6) + 1
     what = f"{gltf.file}: animation {clip.name!r}, {seconds:.0f} s at {float(frames):g} frames/s,"
     limits.check_seconds(seconds, what)
-    if count > MOST_FRAMES:
+    if count > MAX_FRAMES:
         raise ModelError(
-            f"{what} has {count} frames, more than {MOST_FRAMES}; give a lower rate, or cut it into pieces"
+            f"{what} has {count} frames, more than {MAX_FRAMES}; give a lower rate, or cut it into pieces"
         )
     return frames, count
 
