@@ -23,14 +23,14 @@ LIMBS = {
 }
 """Words of the three parts of a limb, and the body's joints where they begin."""
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-SHORTEST = 0.3
-"""Length of the shorter of a limb's two bones, relative to the longer, below which it is doubted."""
+MIN_LENGTH_RATIO = 0.3
+"""Smallest plausible ratio of the lengths of a limb's two bones, shorter to longer."""
 HELPER_COST = 3
 """What a joint loses that its name calls a helper, such as "twist"; a certain word counts 2."""
-LONGEST_CHAIN = 16
-"""Joints of a limb that are tried."""
-MOST_ENDS = 32
-"""Hands or feet of one side that are tried."""
+MAX_CHAIN = 16
+"""Largest number of joints of a limb that are tried."""
+MAX_ENDS = 32
+"""Largest number of hands or feet of one side that are tried."""
 
 
 def find(names: Sequence[str], parents: Int64, offsets: Float64, skeleton: Skeleton) -> dict[str, int]:
@@ -93,13 +93,13 @@ def _limb(
         for number, meaning in enumerate(meanings)
         if meaning.side == side and parts[2][0] in meaning.parts and not meaning.helper
     }
-    for end in sorted(last)[:MOST_ENDS]:
+    for end in sorted(last)[:MAX_ENDS]:
         path = _path(parents, end)
         chain = [
             number
             for number in path
             if meanings[number].side in (side, "") and not other & _certain(meanings[number])
-        ][-LONGEST_CHAIN:]
+        ][-MAX_CHAIN:]
         chain = [
             number
             for number in chain
@@ -111,7 +111,7 @@ def _limb(
                 _score(meanings[number], part, side) for number, (part, _) in zip(three, parts, strict=True)
             )
             bones = [reach[b] - reach[a] for a, b in pairwise(three)]
-            if min(bones) < SHORTEST * max(bones):
+            if min(bones) < MIN_LENGTH_RATIO * max(bones):
                 score -= 2
             score += 0.01 * (three[0] - end) / max(len(parents), 1)  # of two hips, the one closer to the knee
             if score > best[0]:

@@ -17,10 +17,10 @@ from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare
 from fba.errors import ModelError
 
-CHUNK = 2048
-"""Frames that are posed at once."""
-CLOSE = 0.01
-"""Height in metres up to which a foot is on the ground; also the largest error that `within` counts."""
+POSED_FRAMES = 2048
+"""Number of frames that are posed at once, which bounds the memory."""
+MAX_GROUND_HEIGHT = 0.01
+"""Largest height, in metres, of a foot on the ground; also the largest error that `within` counts."""
 
 
 @dataclass(frozen=True)
@@ -120,8 +120,8 @@ def retarget_report(
     has_feet = True
     metres = rest_alignment.scale(motion, mapped, skeleton) if scale is None else scale
     source = soles.source_soles(motion, mapped, turned, positions, metres) if metres else None
-    for begin in range(0, count, CHUNK):
-        end = min(begin + CHUNK, count)
+    for begin in range(0, count, POSED_FRAMES):
+        end = min(begin + POSED_FRAMES, count)
         matrices = solver.pose(animation.body.values[begin:end])
         for column, (joint, aim) in enumerate(aims):
             ours = matrices[:, order[aim], :3, 3] - matrices[:, order[joint], :3, 3]
@@ -176,7 +176,7 @@ def _feet(source: soles.Soles, body: Float64, rate: float) -> FeetError | None:
     level = ground.find(source.lowest, middles).under(middles)
     above = soles.settle(source.lowest - level, source.points, rate)[:, : body.shape[1]]
     level = level[:, : body.shape[1]]
-    standing = above < CLOSE
+    standing = above < MAX_GROUND_HEIGHT
     if not standing.any():
         return None
     # the body's ground is at height 0, or at the source's: whichever its feet fit better
@@ -187,5 +187,5 @@ def _feet(source: soles.Soles, body: Float64, rate: float) -> FeetError | None:
         int(standing.sum()),
         float(error.mean()),
         float(error.max()),
-        float((error <= CLOSE).mean()),
+        float((error <= MAX_GROUND_HEIGHT).mean()),
     )

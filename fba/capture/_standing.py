@@ -14,7 +14,7 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.body.skeleton import ROOT
 
-MOST = {
+MAX_ANGLES = {
     "thigh": 45.0,
     "knee": 50.0,
     "back": 40.0,
@@ -28,7 +28,7 @@ MOST = {
 """Largest angles in degrees of a rest pose: thigh from straight down, bend of knees and elbows, back and neck
 from straight up, shoulders against hips, left limbs against the mirrored right ones, toes from ahead,
 clavicles from the side."""
-FREE = {
+FREE_ANGLES = {
     "thigh": 8.0,
     "knee": 8.0,
     "back": 10.0,
@@ -39,12 +39,15 @@ FREE = {
     "toes": 35.0,
     "clavicles": 75.0,
 }
-"""Angles up to which a person stands as well as can be."""
+"""Angles in degrees that count as standing upright."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stance:
-    """How poses stand. up, left: unit (T, 3), of the trunk. angles: what -> (T,), degrees, see `MOST`."""
+    """How poses stand.
+
+    up, left: unit (T, 3), of the trunk. angles: part -> (T,), in degrees,
+    see `MAX_ANGLES`."""
 
     up: Float64
     left: Float64
@@ -55,13 +58,13 @@ class Stance:
         """Whether each pose (T,) could be a rest pose."""
         result: Bool = np.ones(len(self.up), dtype=np.bool_)
         for what, angle in self.angles.items():
-            result &= angle <= MOST[what]
+            result &= angle <= MAX_ANGLES[what]
         return result
 
     @property
     def distance(self) -> Float64:
         """Degrees (T,) by which poses differ from standing straight, as the root of a mean of squares."""
-        parts = [np.maximum(angle - FREE[what], 0.0) for what, angle in self.angles.items()]
+        parts = [np.maximum(angle - FREE_ANGLES[what], 0.0) for what, angle in self.angles.items()]
         result: Float64 = np.sqrt(np.mean(np.square(parts), axis=0)) if parts else np.zeros(len(self.up))
         return result
 
@@ -69,7 +72,7 @@ class Stance:
         """Return what is farthest from standing in a pose: "thigh 87 degrees"."""
         if not self.angles:
             return "nothing"
-        what = max(self.angles, key=lambda key: float(self.angles[key][row]) / MOST[key])
+        what = max(self.angles, key=lambda key: float(self.angles[key][row]) / MAX_ANGLES[key])
         return f"{what} {self.angles[what][row]:.0f} degrees"
 
 

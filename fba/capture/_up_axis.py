@@ -13,20 +13,20 @@ from fba.capture import _standing as standing
 from fba.capture.motion import SkeletonMotion, read_axis
 
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
-CLEAR_UP = 0.75
-"""Length of the mean of upright directions above which the motion says which axis is up."""
-FRAMES = 400
-"""Frames that are asked where the body rests."""
-NEAR = 0.06
+MIN_UP_LENGTH = 0.75
+"""Smallest length of the mean of upright directions, 0 to 1, with which the motion shows which axis is up."""
+SAMPLE_FRAMES = 400
+"""Number of frames in which it is looked for where the body rests."""
+MAX_FLOOR_DISTANCE = 0.06
 """Share of a body's height within which joints above the lowest touch the floor."""
-SLOW = 0.2
-"""Heights of a body a second up to which a joint rests."""
-STEP = 0.1
-"""Seconds between two moments that tell whether a joint rests."""
-BESIDE = 0.15
-"""Share of a body's height by which its middle may be beside what carries it."""
-CARRIED = 0.4
-"""Share of frames in which joints rest on a floor, if there is one."""
+MAX_REST_SPEED = 0.2
+"""Largest speed of a joint at rest, in heights of the body per second."""
+REST_INTERVAL = 0.1
+"""Seconds between the two moments that are compared to see whether a joint rests."""
+MAX_OFF_CENTRE = 0.15
+"""Largest horizontal distance of a body's middle from the joints that carry it, in heights of the body."""
+MIN_CARRIED_SHARE = 0.4
+"""Smallest share of frames in which joints rest on a floor, if there is one."""
 MIDDLE = ("l_hip", "r_hip", "l_shoulder", "r_shoulder")
 LEG = 0.5
 """Share of a body's height that a leg takes."""
@@ -78,13 +78,13 @@ def find_up_axis(
     mean = (stance.up * weight[:, None]).sum(axis=0) / weight.sum()
     axis = nearest_axis(mean)
     clear = float(mean @ axis)
-    stands = bool((stance.angles.get("thigh", np.zeros(1)) <= standing.MOST["thigh"]).any())
-    upright = stands and clear >= CLEAR_UP
+    stands = bool((stance.angles.get("thigh", np.zeros(1)) <= standing.MAX_ANGLES["thigh"]).any())
+    upright = stands and clear >= MIN_UP_LENGTH
     trunk = _name(axis)
     if not bool(at_rest.possible[0]):
         return _find_freely(motion, mapped, trunk, clear, stands)
     own = _name(nearest_axis(at_rest.up[0]))
-    if own == trunk and clear >= CLEAR_UP:
+    if own == trunk and clear >= MIN_UP_LENGTH:
         return Up(own, max(clear, 0.8), (
             f"{own}: people stand along it, as in the rest pose ({100 * clear:.0f} %)"
         ))  # fmt: skip
@@ -92,7 +92,7 @@ def find_up_axis(
     stood = upright and floors[trunk].carries
     if floors[own].carries or (floors[own].touched and not stood):
         doubt = ""
-        if trunk != own and clear >= CLEAR_UP and floors[trunk].touched:
+        if trunk != own and clear >= MIN_UP_LENGTH and floors[trunk].touched:
             doubt = f"joints rest on a floor along it, as in the rest pose, but trunks point along {trunk}"
         return Up(own, 0.8, f"{own}, as in the rest pose: joints rest on a floor along it", doubt, trunk)
     others = [trunk] if upright else []
@@ -116,13 +116,13 @@ def _find_freely(
     """
     if not stands and trunk[1] == "x":
         return Up(trunk, 0.4, f"perhaps {trunk}: trunks point along it, but nobody ever stands")
-    first = [trunk] if clear >= CLEAR_UP and trunk in ("+y", "+z") else []
+    first = [trunk] if clear >= MIN_UP_LENGTH and trunk in ("+y", "+z") else []
     floors = {name: _find_floor(motion, mapped, name) for name in {"+y", "+z", trunk}}
     found = next((name for name in (*first, "+y", "+z") if floors[name].touched), trunk)
     if found != trunk:
         doubt = f"joints rest on a floor along it, but trunks point along {trunk}, and nobody can rest so"
         return Up(found, 0.6, f"{found}: joints rest on a floor along it", doubt, trunk)
-    if clear < CLEAR_UP:
+    if clear < MIN_UP_LENGTH:
         return Up(trunk, clear * 0.6, f"perhaps {trunk}: the body is upright for little of the time")
     doubt = ""
     if trunk != "+y" and floors["+y"].carries:
@@ -134,9 +134,9 @@ def _find_freely(
 
 def _find_floor(motion: SkeletonMotion, mapped: Mapping[str, int], up: str) -> _Floor:
     """Return what joints rest on if an axis points up: the lowest of all that keep their places."""
-    step = max(1, round(STEP * motion.rate))
+    step = max(1, round(REST_INTERVAL * motion.rate))
     last = max(len(motion) - 1 - step, 0)
-    rows = np.unique(np.linspace(0, last, min(last + 1, FRAMES)).astype(np.intp))
+    rows = np.unique(np.linspace(0, last, min(last + 1, SAMPLE_FRAMES)).astype(np.intp))
     places, later = (
         replace(motion, rotations=motion.rotations[some], positions=motion.positions[some]).world()[1]
         for some in (rows, np.minimum(rows + step, len(motion) - 1))
@@ -147,15 +147,19 @@ def _find_floor(motion: SkeletonMotion, mapped: Mapping[str, int], up: str) -> _
     heights = places[:, joints] @ axis
     level = float(np.percentile(heights.min(axis=1), 10))
     moved = np.linalg.norm(later[:, joints] - places[:, joints], axis=2)
-    rests = (heights < level + NEAR * size) & (moved < SLOW * size * step / float(motion.rate))
+    rests = (heights < level + MAX_FLOOR_DISTANCE * size) & (
+        moved < MAX_REST_SPEED * size * step / float(motion.rate)
+    )
     touched = rests.any(axis=1)
     middle = [joints.index(mapped[name]) for name in MIDDLE if name in mapped] or list(range(len(joints)))
     flat = places[:, joints] * (1 - np.abs(axis))
     centre = flat[:, middle].mean(axis=1)
     ends = [np.where(rests[..., None], flat, -sign * np.inf) for sign in (1, -1)]
-    room = BESIDE * size
+    room = MAX_OFF_CENTRE * size
     above = ((centre < ends[0].max(axis=1) + room) & (centre > ends[1].min(axis=1) - room)).all(axis=1)
-    return _Floor(float(touched.mean()) >= CARRIED, float((touched & above).mean()) >= CARRIED)
+    return _Floor(
+        float(touched.mean()) >= MIN_CARRIED_SHARE, float((touched & above).mean()) >= MIN_CARRIED_SHARE
+    )
 
 
 def _height(places: Float64, mapped: Mapping[str, int]) -> float:

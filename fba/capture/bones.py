@@ -32,10 +32,10 @@ LIMBS = tuple(
 BACKWARDS = -0.5
 """Mean cosine to ahead of knees, or of toes where knees hardly bend, above which they point backwards. In
 real files knees have 0.8 to 1, toes 0.15 to 1."""
-BENT = 0.12
-"""Distance of a knee from the line from hip to ankle, in leg lengths, above which it shows the direction."""
-FEWEST = 5
-"""Number of frames with a bent knee that say where knees point."""
+MIN_KNEE_BEND = 0.12
+"""Smallest distance of a bent knee from the line from hip to ankle, in leg lengths."""
+MIN_BENT_FRAMES = 5
+"""Smallest number of frames with a bent knee that show where knees point."""
 
 
 def find_bones(
@@ -189,13 +189,13 @@ def refuse_swapped_sides(motion: SkeletonMotion, mapped: Mapping[str, int]) -> N
         line, thigh = standing.unit(ankle - hip), knee - hip
         off = thigh - line * (thigh * line).sum(axis=1, keepdims=True)
         reach = np.linalg.norm(thigh, axis=1) + np.linalg.norm(ankle - knee, axis=1)
-        bent = np.linalg.norm(off, axis=1) > BENT * reach
+        bent = np.linalg.norm(off, axis=1) > MIN_KNEE_BEND * reach
         knees += (standing.unit(off[bent]) * ahead[bent]).sum(axis=1).tolist()
         if f"{side}_metatarsal" in mapped:
             way = standing.unit(positions[:, mapped[f"{side}_metatarsal"]] - ankle)
             toes += (way * ahead).sum(axis=1).tolist()
     toe = float(np.mean(toes)) if toes else None
-    main = float(np.mean(knees)) if len(knees) >= FEWEST else toe
+    main = float(np.mean(knees)) if len(knees) >= MIN_BENT_FRAMES else toe
     if main is None or main > BACKWARDS or (toe is not None and toe > 0):
         return
     raise ModelError(

@@ -20,12 +20,14 @@ from fba.parameters import joints
 
 REQUIRED = (ROOT,)
 """Joints that every source must have."""
-FEWEST = 5
-"""Least number of names by which a family fits."""
-PREFIX_LENGTH, PREFIX_MARKS = 100, 8
-"""Most characters, and separators, of a shared prefix: "Scene|Bob_Rig|mixamorig:"."""
+MIN_NAMES = 5
+"""Smallest number of names by which a family fits."""
+MAX_PREFIX_LENGTH = 100
+"""Largest number of characters of a shared prefix: "Scene|Bob_Rig|mixamorig:"."""
+MAX_PREFIX_MARKS = 8
+"""Largest number of separators in a shared prefix."""
 PREFIX_NAMES = 8
-"""How many of the first names are tried as beginning of the others: "Bip01", "Bip01 Pelvis"."""
+"""Number of first names that are tried as beginning of the others: "Bip01", "Bip01 Pelvis"."""
 
 
 @cache
@@ -68,7 +70,7 @@ def match(names: Sequence[str]) -> tuple[str, dict[str, int]]:
                     mapped.setdefault(joint, number)
             if len(mapped) > len(best[1]) and all(joint in mapped for joint in REQUIRED):
                 best = (family, mapped)
-    if len(best[1]) < FEWEST:
+    if len(best[1]) < MIN_NAMES:
         first_names = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
         raise ModelError(
             f"no known skeleton family fits these {len(names)} joint names: {first_names}"
@@ -86,8 +88,8 @@ def _shared_prefixes(names: Sequence[str]) -> list[str]:
     """Return the prefixes that at least half of the names share: up to a separator, or a full name."""
     counts: Counter[str] = Counter()
     for name in names:
-        marks = re.finditer(r"[_ .|-]+", name[:PREFIX_LENGTH])
-        counts.update({name[: mark.end()] for mark in islice(marks, PREFIX_MARKS)})
+        marks = re.finditer(r"[_ .|-]+", name[:MAX_PREFIX_LENGTH])
+        counts.update({name[: mark.end()] for mark in islice(marks, MAX_PREFIX_MARKS)})
     counts.update({name: sum(n.startswith(name) for n in names) for name in names[:PREFIX_NAMES]})
     many = [prefix for prefix, count in counts.items() if 2 * count >= len(names) > 1]
     return sorted(many, key=len)

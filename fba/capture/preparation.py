@@ -1,7 +1,7 @@
 """Prepare a captured motion: which joint is which, which way is up, and what the rest pose is.
 
 The result is a motion with y up, whose rest pose is one that a person can take, so that what follows need not
-ask again. Each answer has a confidence; below `LEAST` the motion is refused with what was seen.
+ask again. Each answer has a confidence; below `MIN_CONFIDENCE` the motion is refused with what was seen.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fba import rotations
-from fba.body.skeleton import Skeleton
+from fba.arrays import Float64
+from fba.body.skeleton import ROOT, Skeleton
 from fba.capture import _standing as standing
 from fba.capture import matching
-from fba.capture._rest_choice import choose_rest
 from fba.capture._rest_correction import correct_rest
 from fba.capture._rest_from_motion import rest_from_motion, with_rest
 from fba.capture._up_axis import UPS, find_up_axis, nearest_axis, turn_axes
@@ -24,11 +24,20 @@ from fba.capture.bones import check_extent, find_bones, joints_remedy, refuse_sw
 from fba.capture.motion import SkeletonMotion, read_axis
 from fba.errors import FbaWarning, ModelError, Remedy
 
-LEAST = 0.5
-"""Confidence below which a motion is refused."""
-FRAMES = 400
-"""Frames that are looked at."""
+MIN_CONFIDENCE = 0.5
+"""Smallest confidence, 0 to 1, with which a motion is accepted."""
+SAMPLE_FRAMES = 400
+"""Number of frames, spread evenly over the motion, that are examined."""
 RESTS = ("auto", "file", "first", "motion")
+MAX_POSED_DISTANCE = 3.0
+"""Largest distance from standing, in degrees, of a rest pose that a file may store in any pose."""
+MAX_FIRST_FRAME_DISTANCE = 4.0
+"""Largest distance from standing, in degrees, of a first frame that serves as the rest pose."""
+MAX_POSE_DIFFERENCE = 0.01
+"""Share of the skeleton's size within which a rest pose equals a frame of the motion."""
+MAX_ROW_TURN = {"hip": 25.0, "shoulder": 45.0}
+"""Largest average turn, in degrees, of the row of hips or shoulders from the rest pose, seen from the joint
+above them. In real files hips differ by up to 6, shoulders by up to 8."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +73,8 @@ def prepare(
     rest pose, "first" for its first frame, a number for another frame, "motion" to work it out from the
     motion. up: "auto", or the source's axis that points up, such as "+z".
 
-    ModelError for less confidence than `LEAST`, where no bones are found, and for a frame that is not there;
-    ValueError for other wrong options.
+    Raises ModelError for less confidence than `MIN_CONFIDENCE`, where no bones are found, and for a frame
+    that does not exist; ValueError for other wrong options.
     """
     if isinstance(rest, str) and rest not in RESTS:
         raise ValueError(f"rest must be one of {', '.join(RESTS)} or the number of a frame, not {rest!r}")
@@ -90,7 +99,7 @@ def prepare(
     level = motion if axis == "+y" else turn_axes(motion, turn)
     if joints is None:
         refuse_swapped_sides(few, mapped)
-    chosen, confidence["rest"], reasons["rest"] = choose_rest(
+    chosen, confidence["rest"], reasons["rest"] = _choose_rest(
         motion, quaternions, positions, mapped, at_rest, rest
     )
     if chosen == "motion":
@@ -125,7 +134,7 @@ def rest_on_frame(motion: SkeletonMotion, other: SkeletonMotion, frame: int) -> 
 
 
 def _few(motion: SkeletonMotion) -> SkeletonMotion:
-    rows = np.unique(np.linspace(0, len(motion) - 1, min(len(motion), FRAMES)).astype(np.intp))
+    rows = np.unique(np.linspace(0, len(motion) - 1, min(len(motion), SAMPLE_FRAMES)).astype(np.intp))
     return replace(motion, rotations=motion.rotations[rows], positions=motion.positions[rows])
 
 
@@ -146,8 +155,90 @@ def _refuse_doubt(result: Preparation, given_joints: bool, given_rest: bool, giv
             Remedy("rest", "if a frame shows a T-pose, or somebody who stands, say which with {}", "0"),
         ),
     ):
-        if not given and result.confidence[what] < LEAST:
+        if not given and result.confidence[what] < MIN_CONFIDENCE:
             raise ModelError(
-                f"{finding} (confidence {result.confidence[what]:.2f}, at least {LEAST} is needed): "
+                f"{finding} (confidence {result.confidence[what]:.2f}, at least {MIN_CONFIDENCE} is needed): "
                 f"{result.reasons[what]}"
             ).with_remedies(remedy)
+
+
+def _choose_rest(
+    motion: SkeletonMotion,
+    quaternions: Float64,
+    positions: Float64,
+    mapped: Mapping[str, int],
+    at_rest: standing.Stance,
+    rest: str | int,
+) -> tuple[str, float, str]:
+    """Return the rest pose to use ("file", "first", "motion" or as given), the confidence and a reason.
+
+    quaternions, positions: (T, J, 4), (T, J, 3), of the source in the world.
+    """
+    if rest != "auto":
+        return str(rest), 1.0, "as given"
+    distance = float(at_rest.distance[0])
+    possible = bool(at_rest.possible[0])
+    if possible and motion.posed:
+        relative = motion.rest() - motion.rest()[mapped[ROOT]]
+        size = float(np.ptp(relative, axis=0).max())
+        frames = positions - positions[:, [mapped[ROOT]]]
+        same = (
+            len(frames) > 1
+            and float(np.abs(frames - relative).max(axis=(1, 2)).min()) < MAX_POSE_DIFFERENCE * size
+        )
+        possible = distance <= MAX_POSED_DISTANCE and not same
+        why = "the nodes' own pose is one of the motion"
+    else:
+        why = f"nobody can stand as in the file's rest pose ({at_rest.worst(0)})"
+    if possible:
+        turned = _find_turned_row(motion, quaternions, positions, mapped)
+        if turned is None:
+            return "file", max(0.6, 1.0 - distance / 50.0), "the file's own rest pose is a person's"
+        why = f"the {turned[0]} are {turned[1]:.0f} degrees from the file's rest pose on average"
+    first = standing.measure(positions[:1], mapped)
+    if (
+        bool(first.possible[0])
+        and float(first.distance[0]) <= MAX_FIRST_FRAME_DISTANCE
+        and _arms_out(positions[0], mapped, first)
+    ):
+        return "first", 0.9, f"{why}; the first frame is a T-pose"
+    return "motion", 1.0, why
+
+
+def _find_turned_row(
+    motion: SkeletonMotion, quaternions: Float64, positions: Float64, mapped: Mapping[str, int]
+) -> tuple[str, float] | None:
+    """Return which row, hips or shoulders, is turned from the rest pose, and by how many degrees; else None.
+
+    Rotations fitted to positions of joints may turn the pelvis aside and its hips back. The file's rest
+    pose then says nothing.
+    """
+    at_rest = motion.rest()
+    for joint, most in MAX_ROW_TURN.items():
+        ends = [mapped[name] for name in (f"l_{joint}", f"r_{joint}") if name in mapped]
+        if len(ends) < 2 or (above := _common_parent(motion, *ends)) < 0:
+            continue
+        row = at_rest[ends[0]] - at_rest[ends[1]]
+        frames = rotations.matrices(quaternions[:, above])
+        turn = standing.row_turn(frames, positions[:, ends[0]] - positions[:, ends[1]], row)
+        if turn > most:
+            return f"{joint}s", turn
+    return None
+
+
+def _common_parent(motion: SkeletonMotion, one: int, other: int) -> int:
+    """Return the number of the nearest joint above both joints, or -1."""
+    while one != other:
+        one, other = int(motion.parents[max(one, other)]), min(one, other)
+    return one
+
+
+def _arms_out(positions: Float64, mapped: Mapping[str, int], stance: standing.Stance) -> bool:
+    """Return whether both arms point straight to the sides."""
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        if f"{side}_shoulder" not in mapped or f"{side}_wrist" not in mapped:
+            return False
+        arm = standing.unit(positions[mapped[f"{side}_wrist"]] - positions[mapped[f"{side}_shoulder"]])
+        if float(arm @ stance.left[0]) * sign < np.cos(np.radians(10.0)):
+            return False
+    return True

@@ -33,8 +33,8 @@ FOREARM_SHARE = 0.5
 FOREARM_SPEED = 10.0
 """Radians per second at which a forearm twists at most. Hands that flip faster, as where angles of a capture
 change sides, do so at the wrist."""
-APART = 1e-4
-"""Share of the distance between the hips by which they may be beside where the pelvis has them."""
+MAX_HIP_OFFSET = 1e-4
+"""Largest distance of the hips from their places in the pelvis, as a share of the distance between them."""
 CLAVICLE_SHARE = 0.5
 """Share of the clavicle's turn at the breastbone's joint; the joint at the shoulder blade takes the rest."""
 
@@ -107,7 +107,7 @@ def _turn_pelvis(
     row = at_rest[hips[0]] - at_rest[hips[1]]
     frames = rotations.matrices(quaternions[:, mapped[ROOT]])
     expected, found = frames @ row, positions[:, hips[0]] - positions[:, hips[1]]
-    if np.abs(found - expected).max() <= APART * np.linalg.norm(row):
+    if np.abs(found - expected).max() <= MAX_HIP_OFFSET * np.linalg.norm(row):
         return
     turn = rotations.between_all(expected, found)
     for joint in (ROOT, "sacroiliac"):

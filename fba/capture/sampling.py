@@ -18,8 +18,8 @@ NOMINAL = tuple(
            | {Fraction(n * 1000, 1001) for n in (24, 30, 60)})
 )  # fmt: skip
 """Frame rates, one of which the median step of a capture probably means."""
-NEAR = 0.01
-"""Relative distance from a nominal rate up to which a rate is taken for it."""
+MAX_RATE_ERROR = 0.01
+"""Largest relative difference between a measured rate and the nominal rate that it is taken for."""
 EXACT = 1e-4
 """The same for rates that differ by a thousandth, as 30 and 29.97."""
 GAP = 2.5
@@ -28,7 +28,7 @@ BRIDGED = 0.5
 """Seconds of the longest gap that is filled by a straight line."""
 RETURN = 0.2
 """Seconds before the end of a longer gap in which the face goes over from what it held."""
-SLACK = 1e-6
+TIME_TOLERANCE = 1e-6
 """Share of a frame by which a time may miss a frame's and still be it."""
 CELL_BYTES = 40
 """Memory that resampling takes for each value."""
@@ -44,7 +44,7 @@ def find_rate(times: Float64) -> Fraction:
     rate = 1.0 / float(np.median(np.diff(times)))
     if not 0.1 <= rate <= 10_000:
         raise ModelError(f"the rows are {1 / rate:.3g} s apart, {rate:.3g} frames/s: no times in seconds")
-    for bound in (EXACT, NEAR):
+    for bound in (EXACT, MAX_RATE_ERROR):
         near = min(NOMINAL, key=lambda one: abs(float(one) - rate))
         if abs(float(near) - rate) <= bound * rate:
             return near
@@ -64,8 +64,8 @@ def frame_numbers(times: Float64, rate: Fraction, limits: Limits) -> Int64:
     """
     frames = float(rate)
     limits.check_seconds(float(times[-1] - times[0]), "the capture")
-    first = ceil(float(times[0]) * frames - SLACK)
-    last = max(floor(float(times[-1]) * frames + SLACK), first)
+    first = ceil(float(times[0]) * frames - TIME_TOLERANCE)
+    last = max(floor(float(times[-1]) * frames + TIME_TOLERANCE), first)
     limits.check_frames(last - first + 1, f"the capture, at {frames:g} frames/s,")
     return np.arange(first, last + 1)
 

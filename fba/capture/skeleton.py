@@ -8,12 +8,13 @@ from fractions import Fraction
 
 import numpy as np
 
+from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64, Int32
-from fba.body import BapSolver
+from fba.body import BapSolver, Skeleton
 from fba.body.solve.solver import solve_track
+from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _spine as spines
-from fba.capture import _standard_skeleton as standard_skeleton
 from fba.capture import retarget
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare
@@ -24,16 +25,27 @@ from fba.tracks import BodyTrack
 ORIGINS = ("source", "start", "middle")
 GROUNDS = ("floor", "source", "none")
 SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spines.GROUPS}
-MOST_FRAMES = 500_000
-"""More than an hour at 120 frames/s."""
-FRAME_BYTES, JOINT_BYTES = 2400, 130
-"""Memory that retargeting takes for each frame, and for each joint of the source in it."""
+MAX_FRAMES = 500_000
+"""Frames of the longest motion: more than an hour at 120 frames/s."""
+FRAME_BYTES = 2400
+"""Memory, in bytes, that retargeting takes for each frame."""
+JOINT_BYTES = 130
+"""Memory, in bytes, that retargeting takes for each joint of the source in a frame."""
 LIMBS = tuple(
     tuple(f"{side}_{joint}" for joint in chain)
     for side in "lr"
     for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 )
-"""A source that has a joint of a limb should have them all."""
+"""Joints of each limb: a source that has one of them should have all."""
+MIN_REST_COSINE = np.cos(np.radians(1.0))
+"""Smallest cosine of the angle between a bone of a limb at rest and in the default posture."""
+MAX_SIZE_DIFFERENCE = 1e-4
+"""Share of the body's height by which a joint of the scaled figure may be off its place in the body."""
+LIMB_BONES = tuple(
+    (f"{side}_{upper}", f"{side}_{lower}")
+    for side in "lr"
+    for upper, lower in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
+)
 
 
 def from_skeleton(
@@ -77,7 +89,7 @@ def from_skeleton(
     Bones point in the directions of the source's bones. Where the source turns about an axis that a joint
     lacks, the joint before or after it turns instead. BAPs 181..183 are millimetres from the default standing
     position. Angles are within +-pi; they are not clamped to the standard's ranges. A skeleton of the
-    standard's own joints that rests in the default posture (`fba.capture._standard_skeleton`) is converted
+    standard's own joints that rests in the default posture (see `is_direct`) is converted
     joint for joint, wherever its feet are: ground has no effect, and spine only if it is "simple", "full" or
     a number.
 
@@ -103,9 +115,9 @@ def from_skeleton(
     if not len(motion):
         raise ModelError("the motion has no frames")
     frames = int((len(motion) - 1) * max(rate, Fraction(0)) / motion.rate) + 1  # checked before resampling
-    if frames > MOST_FRAMES:
+    if frames > MAX_FRAMES:
         raise ModelError(
-            f"the motion has {frames} frames at {float(rate):g} frames/s, more than {MOST_FRAMES}; "
+            f"the motion has {frames} frames at {float(rate):g} frames/s, more than {MAX_FRAMES}; "
             "cut it into pieces, or give a lower rate"
         )
     if frames > len(motion):
@@ -117,7 +129,7 @@ def from_skeleton(
         and not motion.declared
         and same_joints
         and (rest, up) == ("auto", "auto")
-        and standard_skeleton.is_direct(motion, solver.skeleton)
+        and is_direct(motion, solver.skeleton)
     )
     mapped: dict[str, int] = {}
     if not direct:
@@ -134,7 +146,7 @@ def from_skeleton(
             stacklevel=2,
         )
     if direct:
-        turned, root = standard_skeleton.direct_targets(motion, solver.skeleton, scale)
+        turned, root = _direct_targets(motion, solver.skeleton, scale)
     else:
         turned, root = retarget.find_targets(
             motion, mapped, solver, groups=groups, with_anchors=same_joints, scale=scale, ground=ground,
@@ -174,3 +186,53 @@ def check_memory(limits: Limits, frames: int, joints: int, what: str, source: in
     """
     limits.check_frames(frames, what)
     limits.check_bytes(frames * (FRAME_BYTES + JOINT_BYTES * joints), what, source=source)
+
+
+def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
+    """Return whether the joints are the standard's, by name and hierarchy, and rest in the default posture.
+
+    Files that this project writes are of this kind, and so is motion of any H-Anim figure that rests in the
+    default posture. Retargeting would move the spine's rotations to other vertebrae, and turn clavicles and
+    forearms as other skeletons need it. A motion without all limbs is not converted directly.
+    """
+    names = motion.names
+    known = len(set(names)) == len(names) and all(name in skeleton for name in names)
+    if not known or names[0] != skeleton.names[0]:
+        return False
+    for number in range(1, len(names)):
+        above = int(skeleton.parents[skeleton.number(names[number])])
+        while above >= 0 and skeleton.names[above] not in names:
+            above = int(skeleton.parents[above])
+        if above < 0 or names[motion.parents[number]] != skeleton.names[above]:
+            return False
+    if not all(upper in names and lower in names for upper, lower in LIMB_BONES):
+        return False
+    for upper, lower in LIMB_BONES:
+        theirs = motion.offsets[names.index(lower)]
+        ours = skeleton.centres[skeleton.number(lower)] - skeleton.centres[skeleton.number(upper)]
+        if not theirs @ ours >= MIN_REST_COSINE * float(np.linalg.norm(theirs) * np.linalg.norm(ours)) > 0:
+            return False
+    return True
+
+
+def _direct_targets(
+    motion: SkeletonMotion, skeleton: Skeleton, scale: float | None
+) -> tuple[dict[str, Float64], Float64]:
+    """Return targets of a motion that `is_direct`, as `fba.capture.retarget.find_targets` does.
+
+    scale: as for `fba.capture.from_skeleton`.
+    """
+    numbers = [skeleton.number(name) for name in motion.names]
+    rest, (turned, _) = motion.rest() - motion.offsets[0], motion.world()
+    targets = {name: rotations.matrices(turned[:, column]) for column, name in enumerate(motion.names)}
+    default = skeleton.centres[numbers] - skeleton.centres[0]
+    metres = scale
+    if metres is None:
+        metres = float((rest * default).sum() / (rest * rest).sum())
+        if float(np.abs(rest * metres - default).max()) >= MAX_SIZE_DIFFERENCE * float(np.ptp(default[:, 1])):
+            mapped = {name: column for column, name in enumerate(motion.names)}
+            metres = rest_alignment.scale(motion, mapped, skeleton) or metres
+    hips = [motion.names.index(f"{side}_hip") for side in "lr"]
+    # a body of other proportions has its hips where the source has them
+    shift = (rest[hips] * metres - default[hips]).mean(axis=0)
+    return targets, motion.positions * metres + shift

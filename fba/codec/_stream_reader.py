@@ -12,7 +12,7 @@ from fba.codec._plane.reader import PlaneReader, Planes
 from fba.codec._stream.buffer import Buffer
 from fba.codec._stream.checksums import CHECK_BYTES, PeriodChecks, find_wrong
 from fba.codec._stream.damage import Damage, DamageLog
-from fba.codec._stream.mark import LONGEST, START, USER_DATA, Mark, bytes_needed
+from fba.codec._stream.mark import MAX_MARK_BYTES, START, USER_DATA, Mark, bytes_needed
 from fba.codec._stream.object_borders import ObjectBorders
 from fba.codec._stream.plane_times import PlaneTimes
 from fba.codec.block import Block
@@ -197,7 +197,7 @@ class StreamReader:
         """Return how many bytes must be there behind a start code, at a byte of the buffer, for a mark."""
         if code != USER_DATA:
             return 0
-        words = self._buffer.data[position + 4 : min(position + 4 + LONGEST, self._buffer.length)]
+        words = self._buffer.data[position + 4 : min(position + 4 + MAX_MARK_BYTES, self._buffer.length)]
         return bytes_needed(words.tobytes(), self.objects.size)
 
     def _compare_checks(self) -> None:

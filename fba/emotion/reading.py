@@ -18,8 +18,10 @@ from fba.tracks import FaceTrack
 
 BASELINES = ("none", "start", "median")
 """What is taken for the face at rest: as the standard has it, the first moments, the middle of each FAP."""
-START, START_SHARE = 0.5, 0.1
-"""Seconds of the first moments, and the most of a recording that they are."""
+START_SECONDS = 0.5
+"""Longest duration of the first moments of a recording, in seconds."""
+START_SHARE = 0.1
+"""Largest share of a recording that its first moments take."""
 SILENT = 1.0
 """Seconds for which a FAP must be 0 throughout to be taken for one that is not sent."""
 CHUNK = 4096
@@ -114,6 +116,6 @@ def find_known_faps(track: FaceTrack) -> Bool:
 def _find_rest(shown: Any, times: Float64, baseline: str) -> Float64 | None:
     if baseline == "none":
         return None
-    first = times <= min(START, START_SHARE * float(times[-1]))
+    first = times <= min(START_SECONDS, START_SHARE * float(times[-1]))
     rest = np.median(shown, axis=0) if baseline == "median" else shown[first].mean(axis=0)
     return np.asarray(rest, dtype=np.float64)

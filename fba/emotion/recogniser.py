@@ -33,13 +33,14 @@ BLINK = 0.5
 """Seconds after which lids that are shut are no blink any more, and count."""
 SHUT = 400
 """An upper lid that is this far down, in IRISD, may belong to a blink."""
-HELD, HELD_SHARE = 2.0, 0.5
-"""Brows that were lower than this share of their height at any time in these seconds may stress a word; those
-that are held show something."""
+STRESS_SECONDS = 2.0
+"""Seconds in which brows that were lower may stress a word; those that are held show something."""
+STRESS_SHARE = 0.5
+"""Share of their height below which brows were lower at any time in these seconds."""
 NEAREST = 3
 """Expressions that a reading lists."""
-LEAST = 0.02
-"""The smallest probability of an expression in a reading's list."""
+MIN_PROBABILITY = 0.02
+"""Smallest probability of an expression in a reading's list."""
 TINY = 1e-12
 
 
@@ -164,12 +165,12 @@ class Recogniser:
         if not heights or not len(values):
             return np.zeros(len(values), dtype=bool)
         height = np.max(heights, axis=0)
-        before = max(1, round(HELD / self._seconds))
+        before = max(1, round(STRESS_SECONDS / self._seconds))
         missing = np.full(before - len(self._heights), height[0])
         every = np.concatenate([missing, self._heights, height])
         self._heights = every[-before:]
         lowest = sliding_window_view(every, before + 1).min(axis=1)
-        accented: Bool = (height > 0) & (lowest < HELD_SHARE * height)
+        accented: Bool = (height > 0) & (lowest < STRESS_SHARE * height)
         return accented
 
     def _advance(self, logs: Float64 | None) -> None:
@@ -210,7 +211,7 @@ class Recogniser:
                     table.names[row], 100 * min(float(strength[row] / shown[row]), 1.0), float(shown[row])
                 )
                 for row in order.tolist()
-                if shown[row] >= LEAST
+                if shown[row] >= MIN_PROBABILITY
             )
         return Reading(label, float(self._state[number]), 100 * min(intensity, 1.0), nearest, *point)
 

@@ -12,11 +12,11 @@ from fba.gltf.document import MAX_ITEMS, Document
 from fba.gltf.scene import Mesh, Node, Skin
 from fba.gltf.values import Value
 
-LARGEST = 1e100
-"""Numbers of transforms to the scene lie below it: squares of larger ones overflow."""
+MAX_NUMBER = 1e100
+"""Bound of the numbers of transforms to the scene: squares of larger ones overflow."""
 
-ROUNDED = 1e-6
-"""Most by which the last row of a matrix may differ from 0 0 0 1, as exporters round it."""
+MAX_ROUNDING = 1e-6
+"""Largest difference of the last row of a matrix from 0 0 0 1, as exporters round it."""
 
 
 def read_nodes(
@@ -39,7 +39,7 @@ def read_nodes(
         own = local[number][3]
         with np.errstate(all="ignore"):
             world[number] = own if parent is None else world[parent] @ own
-        if not (np.abs(world[number]) < LARGEST).all():
+        if not (np.abs(world[number]) < MAX_NUMBER).all():
             raise entries[number].error("the transform to the scene overflows")
         own.flags.writeable = world[number].flags.writeable = False
     highest = [_highest_joint(mesh) for mesh in meshes]
@@ -119,7 +119,7 @@ def _transform(entry: Value) -> tuple[Float64 | None, Float64 | None, Float64 | 
     matrix = entry.get("matrix")
     if matrix is not None:
         numbers = np.array(matrix.numbers(16)).reshape(4, 4).T.copy()  # column by column in the file
-        if not np.allclose(numbers[3], (0, 0, 0, 1), rtol=0, atol=ROUNDED):
+        if not np.allclose(numbers[3], (0, 0, 0, 1), rtol=0, atol=MAX_ROUNDING):
             raise matrix.error(f"its last row is {numbers[3].tolist()}, but must be 0 0 0 1")
         numbers[3] = (0, 0, 0, 1)
         return None, None, None, numbers

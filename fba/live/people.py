@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from math import ceil, floor
@@ -12,10 +12,11 @@ import numpy as np
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64, Intp
+from fba.body import Skeleton
 from fba.capture.blendshapes.shape_table import amounts_of
 from fba.capture.live import LiveBlendshapes, LiveSkeleton
 from fba.capture.motion import SkeletonMotion
-from fba.capture.sampling import GAP, SLACK, find_rate
+from fba.capture.sampling import GAP, TIME_TOLERANCE, find_rate
 from fba.errors import ModelError
 from fba.face.shape_names import arkit_of
 from fba.live.order import Timed
@@ -23,22 +24,21 @@ from fba.live.protocols import unity_bones
 from fba.live.protocols.sample import BoneTurn, Sample
 from fba.live.recording import stream_rate
 from fba.live.summary import Summary
-from fba.live.t_pose import standard_offsets
 from fba.tracks import BodyTrack, FaceTrack
 
 BEGINNING = 1.0
-"""Seconds in which it is found which bones and expressions there are, and how many frames a second."""
-CHUNK = 256
-"""Frames that are made at once."""
-FEWEST_SHAPES = 5
-"""Number of shapes with ARKit's names above which others are left out, which show the same once more."""
+"""Seconds in which the bones, the expressions and the frame rate are determined."""
+CHUNK_FRAMES = 256
+"""Number of frames that are made at once."""
+MIN_SHAPES = 5
+"""Smallest number of shapes with ARKit's names for which others are left out, which show the same again."""
 OLD_NAMES = {
     "a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed",
     "blink_l": "blinkLeft", "blink_r": "blinkRight",
 }  # fmt: skip
 """VRM 1's names of VRM 0's expressions, in small letters."""
-LEAST_OFFSET = 1e-3
-"""Metres above which a bone has a length."""
+MIN_OFFSET = 1e-3
+"""Smallest length of a bone, in metres."""
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 EYES = ("LeftEye", "RightEye")
 
@@ -79,14 +79,14 @@ class PersonConversion:
             return
         rate = float(self._rate)
         if self._before is None and pending:
-            self._next = ceil(pending[0][0] * rate - SLACK)
+            self._next = ceil(pending[0][0] * rate - TIME_TOLERANCE)
         rows = [*([] if self._before is None else [self._before]), *pending]
         for (earlier, _), (later, _) in pairwise(rows):
             if (later - earlier) * rate >= GAP:
                 self._summary.gaps += 1
                 self._summary.longest_gap = max(self._summary.longest_gap, later - earlier)
         if pending:
-            yield from self._frames(rows, floor(rows[-1][0] * rate + SLACK))
+            yield from self._frames(rows, floor(rows[-1][0] * rate + TIME_TOLERANCE))
             self._before = rows[-1]
 
     def finish(self) -> Iterator[Animation]:
@@ -124,7 +124,7 @@ class PersonConversion:
         assert self._rate is not None
         times = np.array([time for time, _ in rows])
         while self._next <= last:
-            index = np.arange(self._next, min(last + 1, self._next + CHUNK))
+            index = np.arange(self._next, min(last + 1, self._next + CHUNK_FRAMES))
             self._next += len(index)
             at = index / float(self._rate)
             after = np.clip(np.searchsorted(times, at), 0, len(times) - 1)
@@ -165,11 +165,11 @@ class _Face:
             if name not in shapes.values()
             and amounts_of(plain := OLD_NAMES.get(name.lower(), name)) is not None
         }
-        if len(shapes) >= FEWEST_SHAPES and others:
+        if len(shapes) >= MIN_SHAPES and others:
             summary.notes.append(
                 f"{len(shapes)} shapes have ARKit's names; {len(others)} other expressions are left out"
             )
-        names = shapes if len(shapes) >= FEWEST_SHAPES else others | shapes
+        names = shapes if len(shapes) >= MIN_SHAPES else others | shapes
         if not names and not (with_head and "Head" in bones):
             return None
         return cls(names, rate, with_head=with_head and "Head" in bones)
@@ -225,7 +225,7 @@ class _Body:
         parents = [self._above(name) for name in self._names]
         offsets = np.array([bones[name].position for name in self._names])
         offsets[0] = 0.0
-        if (np.linalg.norm(offsets[1:], axis=1) < LEAST_OFFSET).sum() * 2 > len(offsets):
+        if (np.linalg.norm(offsets[1:], axis=1) < MIN_OFFSET).sum() * 2 > len(offsets):
             offsets = standard_offsets(self._names, parents)
             summary.notes.append("the bones come without lengths; those of a usual body are taken")
         turns, root = self._pose(first)
@@ -259,3 +259,43 @@ class _Body:
         root, hips = sample.bones.get("", still), sample.bones.get("Hips", still)
         turns[0] = rotations.multiply(root.rotation, hips.rotation)
         return turns, root.position + rotations.matrices(root.rotation) @ hips.position
+
+
+def standard_offsets(names: Sequence[str], parents: Sequence[int]) -> Float64:
+    """Return offsets (J, 3) of bones from the bones above them, metres, y up, in a T-pose.
+
+    They are those of the standard's own skeleton, for senders that give no lengths.
+    names: of Unity's bones, the hips first. parents: number of the bone above each, -1 for the hips.
+    """
+    skeleton = Skeleton.default()
+
+    def centre(bone: str) -> Float64:
+        joint = unity_bones.joint_of(bone)
+        assert joint is not None  # the caller takes bones of a body only
+        result: Float64 = skeleton.centres[skeleton.number(joint)]
+        return result
+
+    raised = {
+        side: rotations.between(
+            centre(f"{side}LowerArm") - centre(f"{side}UpperArm"), np.array([way, 0.0, 0.0])
+        )
+        for side, way in (("Left", 1.0), ("Right", -1.0))
+    }
+    offsets = np.zeros((len(names), 3))
+    for number, (name, parent) in enumerate(zip(names, parents, strict=True)):
+        if parent < 0:
+            continue
+        offsets[number] = centre(name) - centre(names[parent])
+        side = "Left" if name.startswith("Left") else "Right"
+        if _below_arm(names[parent], side):
+            offsets[number] = raised[side] @ offsets[number]
+    return offsets
+
+
+def _below_arm(bone: str, side: str) -> bool:
+    """Whether a bone turns with the upper arm of a side, or is it."""
+    while bone:
+        if bone == f"{side}UpperArm":
+            return True
+        bone = unity_bones.parents()[bone]
+    return False

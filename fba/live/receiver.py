@@ -17,18 +17,20 @@ from typing import Any
 from fba.errors import FbaError
 from fba.live.capture import Capture
 
-LONGEST = 65_536
-"""Bytes of the longest datagram that there can be."""
+MAX_DATAGRAM = 65_536
+"""Bytes of the longest possible datagram."""
 BUFFER = 4 << 20
 """Bytes that the system is asked to keep while we are busy."""
 WAIT = 0.1
 """Seconds after which it is checked whether to stop."""
 AT_ONCE = 256
 """Datagrams that are taken before that is checked again."""
-MOST_UNREAD = 1 << 16
-"""Datagrams that are counted at the end: more than a buffer holds, fewer than a flood sends."""
-SO_MEMINFO, DROPS = 55, 8
-"""Linux's option for a socket's counts, 32 bits each, and which of them is that of dropped datagrams."""
+MAX_UNREAD = 1 << 16
+"""Largest number of datagrams counted at the end: more than a buffer holds, fewer than a flood sends."""
+SO_MEMINFO = 55
+"""Linux's option for a socket's counts, 32 bits each."""
+DROPS = 8
+"""Index, in these counts, of that of dropped datagrams."""
 
 
 class Receiver:
@@ -102,7 +104,7 @@ class Receiver:
                 select.select([self._socket], [], [], left)
             self.drain()
         self.drain()
-        self.capture.summary.unread += sum(1 for _ in self._arrived(MOST_UNREAD))
+        self.capture.summary.unread += sum(1 for _ in self._arrived(MAX_UNREAD))
 
     def drain(self) -> None:
         """Take what has arrived, without waiting; the player does so before each picture."""
@@ -124,7 +126,7 @@ class Receiver:
             if opened is None:
                 return
             try:
-                yield opened.recvfrom(LONGEST)
+                yield opened.recvfrom(MAX_DATAGRAM)
             except ConnectionError:  # what we asked is not there: Windows says so here
                 continue
             except OSError:

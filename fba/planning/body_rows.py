@@ -22,8 +22,8 @@ from fba.body.stance import SIDES, find_stance, sole_points
 from fba.compiled import compiled
 from fba.planning.tolerance import Tolerance
 
-BLOCK = 1024
-"""Frames posed at once."""
+BLOCK_FRAMES = 1024
+"""Number of frames that are posed at once."""
 DIRECTIONS = 48
 """Directions in which the outermost points of a rigid part count."""
 
@@ -105,8 +105,8 @@ def all_rows(skeleton: Skeleton) -> BodyRows:
 
 
 def blocks(count: int) -> list[slice]:
-    """Return slices of about `BLOCK` frames, none of them much shorter."""
-    ends = np.linspace(0, count, max(count // BLOCK, 1) + 1).astype(int)
+    """Return slices of about `BLOCK_FRAMES` frames, none of them much shorter."""
+    ends = np.linspace(0, count, max(count // BLOCK_FRAMES, 1) + 1).astype(int)
     return [slice(int(start), int(end)) for start, end in pairwise(ends)]
 
 
@@ -217,8 +217,8 @@ def free_room(
     return room
 
 
-FLAT = 1e-16
-"""Square of a slope, in shares of the tolerance for a step of 1, below which a BAP moves a point nowhere."""
+MIN_SLOPE_SQUARE = 1e-16
+"""Square of a slope, in shares of the tolerance for a step of 1, below which a BAP does not move a point."""
 
 
 @compiled
@@ -231,7 +231,7 @@ def _interval(steep: Float64, along: Float64, length: Float64, allowed: float) -
     low, high, steepest = -1e9, 1e9, 0.0
     for k in range(len(steep)):
         square = float(steep[k])
-        if square < FLAT:
+        if square < MIN_SLOPE_SQUARE:
             continue
         steepest = max(steepest, square)
         inside = float(along[k]) * float(along[k]) - square * (float(length[k]) - allowed)
@@ -249,14 +249,14 @@ def _shortest_longest(steep: Float64, along: Float64, length: Float64) -> float:
     """Return the change with the shortest longest error: the longest is convex, so halves are left out."""
     low, high = 0.0, 0.0
     for k in range(len(steep)):
-        if steep[k] >= FLAT:
+        if steep[k] >= MIN_SLOPE_SQUARE:
             own = -float(along[k]) / float(steep[k])
             low, high = min(low, own), max(high, own)
     for _ in range(40):
         one, other = low + (high - low) / 3, high - (high - low) / 3
         longest_one, longest_other = 0.0, 0.0
         for k in range(len(steep)):
-            if steep[k] < FLAT:
+            if steep[k] < MIN_SLOPE_SQUARE:
                 continue
             base, rise, curve = float(length[k]), 2 * float(along[k]), float(steep[k])
             longest_one = max(longest_one, base + one * (rise + curve * one))

@@ -11,13 +11,13 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32
 from fba.body import Skeleton
 from fba.body.displacement import displacements
+from fba.body.solve.conventions import NO_BAP
 from fba.codec import EncoderOptions, EncoderStatistics, decode, encode_with_statistics, step_scale
 from fba.codec.settings import QUANT_MAX
 from fba.errors import RangeError
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_steps, baps
-from fba.planning.body_rows import BodyTarget
+from fba.planning.body_rows import BodyTarget, all_rows, blocks
 from fba.planning.body_search import HOPELESS, BodyEffort, FoundBaps, search_baps
-from fba.planning.joint_reduction import reduce_joints
 from fba.planning.plan import encode_planned
 from fba.planning.tolerance import Tolerance
 from fba.tracks import BodyTrack, hold
@@ -40,6 +40,8 @@ SPARE = 0.15
 """Share of the tolerance that is left for quantisers where frames are left out."""
 FRAMES_SEARCHED = 1600
 """Frames, times searches: longer streams are searched less often."""
+REDUCTION_FRAMES = 160
+"""Number of frames by which the joints to turn are chosen; the choice is then checked at all frames."""
 
 
 @dataclass(frozen=True)
@@ -266,3 +268,57 @@ def beyond_body(nearest: BodyErrors, tolerance: Tolerance) -> RangeError:
         f"{nearest.largest * 1000:.2f} mm off, and a foot {nearest.foot * 1000:.2f} mm; allow that much",
         frame=nearest.frame,
     )
+
+
+def reduce_joints(target: BodyTarget, share: float) -> Float64:
+    """Return BAPs (T, 296) that turn as few joints as can be, within a share of the tolerance at every frame.
+
+    What is left out is made up for by the joints below: a spine bends at a few vertebrae instead of all.
+    """
+    solver = target.solver
+    rows = all_rows(solver.skeleton)
+    rules = solver.convention
+    moved = np.asarray(target.values.any(axis=0))
+    used = [
+        joint
+        for joint, columns in zip(rules.joints, rules.bap, strict=True)
+        if joint in solver.skeleton and moved[columns[columns != NO_BAP]].any()
+    ]
+    frames = np.unique(np.linspace(0, len(target.values) - 1, REDUCTION_FRAMES).astype(int))
+    matrices = solver.pose(target.values[frames])
+    wanted, weights = rows.points(matrices), target.weights(rows)[frames]
+
+    def off_without(joint: str) -> float:
+        solved = solver.solve(matrices, [one for one in kept if one != joint], target.values[0])
+        apart = rows.points(solver.pose(solved)) - wanted
+        return float((np.linalg.norm(apart, axis=2) * weights).max())
+
+    root = solver.skeleton.names[0]
+    kept, dropped = list(used), []
+    candidates = [joint for joint in used if joint != root]
+    while candidates:
+        off = {joint: off_without(joint) for joint in candidates}
+        candidates = [joint for joint in candidates if off[joint] <= share]
+        if candidates:
+            best = min(candidates, key=lambda joint: off[joint])
+            candidates.remove(best)
+            kept.remove(best)
+            dropped.append(best)
+    while dropped:
+        reduced = _solve_joints(target, kept)
+        if target.longest(reduced, rows).max(initial=0.0) <= share:
+            return reduced
+        kept.append(dropped.pop())
+    return target.values
+
+
+def _solve_joints(target: BodyTarget, joints: list[str]) -> Float64:
+    """Return BAPs (T, 296) of the same poses that turn only these joints."""
+    result = np.zeros_like(target.values)
+    previous = target.values[0]
+    for block in blocks(len(result)):
+        matrices = target.solver.pose(target.values[block])
+        result[block] = target.solver.solve(matrices, joints, previous)
+        previous = result[block.stop - 1]
+    result[:, 186:] = target.values[:, 186:]
+    return result

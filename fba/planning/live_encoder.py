@@ -23,12 +23,12 @@ from fba.tracks import BodyTrack, FaceTrack
 FACE, BODY = "face", "body"
 WIDER = 2
 """How much further ranges reach than the largest change so far, up or down."""
-FAR = 0.9
-"""Part of what an I plane can carry above which no more I planes are planned: later ones might not."""
+MAX_INTRA_SHARE = 0.9
+"""Share of what an I plane can carry above which no more I planes are planned: later ones might not fit."""
 FAR_STEPS = 240
 """Quantiser steps that ranges then reach at least."""
-MANY = 1 << 20
-"""More steps than any range holds."""
+MAX_STEPS = 1 << 20
+"""Number of steps that exceeds every range."""
 
 
 class LiveEncoder:
@@ -228,7 +228,7 @@ class _Learnt:
         self._begun = False
         self._options = options
         self._scale = step_scale(options, body=isinstance(track, BodyTrack))
-        self._widest = range_limit(MANY, self._scale)
+        self._widest = range_limit(MAX_STEPS, self._scale)
         self._far = False
         self._away = np.zeros(count, dtype=np.bool_)  # what goes away for good: bodies, but not their angles
         if isinstance(track, BodyTrack):
@@ -242,7 +242,7 @@ class _Learnt:
         self._last = now
         begun, self._begun = self._begun, True
         reach = np.abs(now) / self._widest
-        if not self._far and (reach[self._away] > FAR).any():
+        if not self._far and (reach[self._away] > MAX_INTRA_SHARE).any():
             self._far = True
             return False
         beyond = self._far or bool((reach > 1)[self._sent].any())  # the encoder knows which plane is nearer

@@ -25,10 +25,10 @@ DRAWN = 1500
 MOST_AT_ONCE = 8
 """FAPs that are off in one of them."""
 
-NEAR = 0.5
+NEAR_BORDER = 0.5
 """Share of the tolerance within which a border of intervals counts as near."""
-ALIKE = 0.05
-"""Slopes that differ by less than this share of the steepest are the same."""
+MAX_SLOPE_DIFFERENCE = 0.05
+"""Largest difference of equal slopes, as a share of the steepest."""
 
 TRANSLATION, ROTATION = (KIND_ORDER.index(kind) for kind in ("translation", "rotation"))
 
@@ -92,7 +92,7 @@ class ErrorBasis:
         lowest, highest = np.full(len(values), -np.inf), np.full(len(values), np.inf)
         for place, track in enumerate(tracks):
             own = values[:, self._shifts.column[track]]
-            margin = NEAR / max(self._lengths[self._range(track)].max(), 1e-9)
+            margin = NEAR_BORDER / max(self._lengths[self._range(track)].max(), 1e-9)
             near = np.stack([self._intervals(track, own + off) for off in (-margin, 0.0, margin)])
             intervals[:, place] = near[self._lengths[near].argmax(axis=0), np.arange(len(own))]
             lowest = np.maximum(lowest, self._lowest[near[0]])
@@ -127,7 +127,9 @@ class ErrorBasis:
         for track in range(len(self._shifts.column)):
             own = self._range(track)
             change = np.linalg.norm(np.diff(self._slopes[own], axis=0), axis=2).max(axis=1, initial=0.0)
-            borders = self._shifts.upper[own.start : own.stop - 1][change > ALIKE * self._lengths[own].max()]
+            borders = self._shifts.upper[own.start : own.stop - 1][
+                change > MAX_SLOPE_DIFFERENCE * self._lengths[own].max()
+            ]
             ends = np.concatenate([[-np.inf], borders, [np.inf]])
             inside = np.append(self._shifts.upper[own.start : own.stop - 1], np.inf)
             at = np.searchsorted(borders, inside, side="left")

@@ -45,8 +45,8 @@ FRAMES_SEARCHED = 18_000
 """Frames, times searches: longer streams are searched less often."""
 INTRA_BITS = 2000
 """What an I plane counts: differences take less than half of what they do if all is kept."""
-LONGEST = 3000
-"""Frames of a segment: limits the memory of a search."""
+MAX_SEGMENT_FRAMES = 3000
+"""Frames of the longest segment, which bounds the memory of a search."""
 
 
 @dataclass(frozen=True)
@@ -249,8 +249,8 @@ def _segments(source: _Source, plan: Plan) -> list[tuple[slice, Segment]]:
     consecutive &= ~track.mask[:, :2].any(axis=1) & source.may_skip
     result = []
     for whole in plan.segments:
-        for start in range(whole.start, whole.stop, LONGEST):
-            frames = slice(start, min(start + LONGEST, whole.stop))
+        for start in range(whole.start, whole.stop, MAX_SEGMENT_FRAMES):
+            frames = slice(start, min(start + MAX_SEGMENT_FRAMES, whole.stop))
             groups = _groups(track.mask[start], known[start] & shown_by_sent[start])
             gaps = consecutive[frames].copy()
             gaps[[0, -1]] = False

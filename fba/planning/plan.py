@@ -28,8 +28,14 @@ from fba.errors import FbaWarning
 from fba.face.resolve import FaceSettings, known_faps, resolve
 from fba.limits import Limits
 from fba.parameters import FAP_COUNT, fap_steps
-from fba.planning.derived_faps import Choice, choose_faps, interpolated_faps, related_faps
-from fba.planning.fit_faps import find_fit_faps, table_columns
+from fba.planning.derived_faps import (
+    Choice,
+    choose_faps,
+    find_fit_faps,
+    interpolated_faps,
+    related_faps,
+    table_columns,
+)
 from fba.planning.segments import Cuts, cheapest_segments, find_cuts
 from fba.presets import PLANNED, REFERENCE
 from fba.tracks import BodyTrack, FaceTrack

@@ -8,9 +8,10 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Int64
 
-MOST_CUTS = 48
-"""Where a segment may begin, and the end: the time to weigh them grows with the square of their number."""
-SHORTEST = 5
+MAX_CUTS = 48
+"""Largest number of places where a segment may begin, with the end: the time to weigh them grows with its
+square."""
+MIN_SEGMENT_FRAMES = 5
 """Frames between two places where a segment may begin. An I plane costs as much as a few P planes."""
 
 
@@ -36,10 +37,10 @@ def find_cuts(needed: Bool) -> Cuts | None:
     """
     count = len(needed)
     forced = np.union1d(np.flatnonzero(needed), [0])
-    if len(forced) >= MOST_CUTS:
+    if len(forced) >= MAX_CUTS:
         return None
-    spare = MOST_CUTS - len(forced)
-    even = np.arange(0, count, max(SHORTEST, -(-count // spare)))
+    spare = MAX_CUTS - len(forced)
+    even = np.arange(0, count, max(MIN_SEGMENT_FRAMES, -(-count // spare)))
     frames = np.union1d(np.union1d(forced, even), [count]).astype(np.int64)
     return Cuts(frames, np.isin(frames, forced))
 

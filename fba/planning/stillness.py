@@ -26,13 +26,17 @@ from fba.tracks import BodyTrack, hold
 
 CHANGE = 1.0
 """What a change of level costs: as much as a BAP that is off by a step in one frame."""
-STANDING, SWINGING = 5e5, 5e4
-"""What the square of a sole's error counts, per square metre, where that of a BAP counts per square step:
-of soles that rest, and of others."""
-STIR = 6e6
-"""The same for a change of that error from one frame to the next, while a sole rests."""
-REST_SPEED, REST_SECONDS = 0.06, 0.2
-"""Metres per second, over this number of seconds, below which the point of a foot that stands rests."""
+STANDING_WEIGHT = 5e5
+"""Weight of the square of a resting sole's error, per square metre; that of a BAP counts 1 per
+square step."""
+SWINGING_WEIGHT = 5e4
+"""The same for soles that do not rest."""
+STIR_WEIGHT = 6e6
+"""Weight of the squared change of a resting sole's error from one frame to the next, per square metre."""
+REST_SPEED = 0.06
+"""Speed, in metres per second, below which the point of a foot that stands rests."""
+REST_SECONDS = 0.2
+"""Seconds over which that speed is measured."""
 SMOOTHED = 0.25
 """Seconds over which the place of a sole that rests is averaged: captured roots come in whole millimetres."""
 SWEEPS = 3
@@ -192,7 +196,7 @@ def _find_path(wanted: Float64, first: float, errors: Float64, slopes: Float64, 
                 continue
             cost = off * off
             for point in range(points):
-                weight = STANDING if rests[frame, point] else SWINGING
+                weight = STANDING_WEIGHT if rests[frame, point] else SWINGING_WEIGHT
                 for axis in range(3):
                     error = errors[frame, point, axis] + slopes[frame, point, axis] * off
                     cost += weight * error * error
@@ -210,7 +214,7 @@ def _find_path(wanted: Float64, first: float, errors: Float64, slopes: Float64, 
                             moved = errors[frame, point, axis] + slopes[frame, point, axis] * off
                             moved -= errors[frame - 1, point, axis]
                             moved -= slopes[frame - 1, point, axis] * (before - wanted[frame - 1])
-                            way += STIR * moved * moved
+                            way += STIR_WEIGHT * moved * moved
                 if way < least:
                     least = way
                     came_from[frame, one] = other

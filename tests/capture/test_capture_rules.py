@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fba.body import BapSolver, Skeleton, ground
 from fba.capture import matching, retarget
-from fba.capture.limbs import _leg_ik as leg_ik
-from fba.capture.limbs import hinges, soles
+from fba.capture.limbs import foot_planting, hinges, soles
 from fba.capture.limbs.foot_planting import turn_foot
 from fba.capture.limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion
@@ -199,12 +198,12 @@ def test_a_leg_makes_its_share_of_a_change_of_length() -> None:
     bends = np.radians([20.0, 30.0, 60.0, 90.0, 120.0])
     hip, knee = np.zeros((5, 3)), np.tile([0.0, -0.4, 0.0], (5, 1))
     shank = 0.4 * np.stack([0.0 * bends, -np.cos(bends), -np.sin(bends)], axis=1)
-    leg = leg_ik.Leg(hip, knee, knee + shank, np.tile([1.0, 0.0, 0.0], (5, 1)))
+    leg = foot_planting.Leg(hip, knee, knee + shank, np.tile([1.0, 0.0, 0.0], (5, 1)))
     move = np.tile([0.0, 0.05, 0.0], (5, 1))
-    thigh, lower = leg_ik.reach(leg, move)
+    thigh, lower = foot_planting.move_ankle(leg, move)
     moved = (thigh @ knee[..., None] + lower @ shank[..., None])[..., 0]
     length, wanted = (np.linalg.norm(end, axis=1) for end in (knee + shank, knee + shank + move))
-    goal = length + leg_ik.pliancy(leg) * (wanted - length)
+    goal = length + foot_planting.length_share(leg) * (wanted - length)
     np.testing.assert_allclose(np.linalg.norm(moved, axis=1), goal, atol=2e-4)
 
 

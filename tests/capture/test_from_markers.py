@@ -12,12 +12,12 @@ import pytest
 
 from fba.capture import MarkerMotion, from_markers
 from fba.capture.markers import stabilisation
-from fba.capture.markers.blinks import opening_by_blinks
+from fba.capture.markers._eyes import opening_by_blinks
 from fba.capture.markers.faces import MarkerFace, find_face
 from fba.capture.markers.gaps import fill_gaps
-from fba.capture.markers.jaws import jaw_curves
 from fba.capture.markers.marker_maps import change_map, find_map, marker_sets, read_map, write_map
 from fba.capture.markers.responses import JAW_VALUES
+from fba.capture.markers.solving import jaw_curves
 from fba.capture.markers.summary import summarise
 from fba.capture.markers.targets import RIGID
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError

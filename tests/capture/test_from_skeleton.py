@@ -18,8 +18,7 @@ from fba.body.footing import GroundedPoser, lowest_sole
 from fba.body.model import BodyModel
 from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
 from fba.capture.comparison.figure import find_up, result_figure, source_figure
-from fba.capture.comparison.measurement import source_scale
-from fba.capture.comparison.soles import sole_heights
+from fba.capture.comparison.measurement import sole_heights, source_scale
 from fba.capture.comparison.standing import find_floor, find_standing
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.bvh import reader

@@ -14,8 +14,7 @@ from fba.body import BapSolver, Skeleton, ground
 from fba.body.footing import lowest_sole
 from fba.body.model import BodyModel
 from fba.capture import SkeletonMotion, from_skeleton, retarget_report
-from fba.capture.limbs import _leg_ik as leg_ik
-from fba.capture.limbs import soles
+from fba.capture.limbs import foot_planting, soles
 from fba.parameters import bap_numbers
 
 THIGH, SHANK = 0.36, 0.54
@@ -158,9 +157,9 @@ def test_leg_reaches_by_the_law_of_cosines() -> None:
     bend = np.radians(80)
     hip, knee = np.zeros((1, 3)), np.array([[0.0, -0.43, 0.0]])
     ankle = knee + 0.42 * np.array([[0.0, -np.cos(bend), -np.sin(bend)]])
-    leg = leg_ik.Leg(hip, knee, ankle, np.array([[1.0, 0.0, 0.0]]))
+    leg = foot_planting.Leg(hip, knee, ankle, np.array([[1.0, 0.0, 0.0]]))
     move = np.array([[0.01, 0.015, -0.02]])
-    thigh, shank = leg_ik.reach(leg, move)
+    thigh, shank = foot_planting.move_ankle(leg, move)
     reached = (thigh @ knee[0]) + (shank @ (ankle - knee)[0])
     np.testing.assert_allclose(reached[0], (ankle + move)[0], atol=5e-4)
 
@@ -216,12 +215,12 @@ def test_straight_leg_is_not_broken_for_a_millimetre() -> None:
     bend = np.radians(np.array([1.0, 0.5, 0.0, -0.5, -1.0]))
     hip, knee = np.zeros((5, 3)), np.tile([0.0, -0.43, 0.0], (5, 1))
     ankle = knee + 0.42 * np.stack([0 * bend, -np.cos(bend), -np.sin(bend)], axis=1)
-    leg = leg_ik.Leg(hip, knee, ankle, np.tile([1.0, 0.0, 0.0], (5, 1)))
-    thigh, shank = leg_ik.reach(leg, np.tile([0.0, 0.005, 0.0], (5, 1)))
+    leg = foot_planting.Leg(hip, knee, ankle, np.tile([1.0, 0.0, 0.0], (5, 1)))
+    thigh, shank = foot_planting.move_ankle(leg, np.tile([0.0, 0.005, 0.0], (5, 1)))
     turned = np.degrees(Rotation.from_matrix(shank).magnitude())
     assert turned.max() < 2.0
     assert np.degrees(Rotation.from_matrix(thigh).magnitude()).max() < 1.0
-    assert leg_ik.pliancy(leg).max() < 0.05
+    assert foot_planting.length_share(leg).max() < 0.05
 
 
 def test_heights_of_no_person_have_a_level_ground() -> None:

@@ -108,7 +108,7 @@ def test_triangles_of_vertices_that_are_not_there_are_refused(vertex: int) -> No
 
 
 def test_influences_beyond_the_memory_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fba.capture.virtual_markers.influence.MOST_SHARES", 100)
+    monkeypatch.setattr("fba.capture.virtual_markers.influence.MAX_SHARES", 100)
     with pytest.raises(ModelError, match="the first 2 virtual markers move 162 vertices together"):
         WalkedMesh(*grid(8, 8)).walk([(40, 50.0, 50.0), (41, 50.0, 50.0)])
 

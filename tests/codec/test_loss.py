@@ -15,8 +15,7 @@ from fba import Animation, BitstreamError, Decoder, Encoder, EncoderOptions, Fba
 from fba.codec import Damage, FrameRate, PlaneSettings, RangeLists, TimeCode, encode_planes
 from fba.codec._stream.clock import StreamClock
 from fba.codec._stream.damage import DamageLog
-from fba.codec._stream.plane_times import PlaneTimes
-from fba.codec._stream.restart_points import RestartPoints
+from fba.codec._stream.plane_times import PlaneTimes, RestartPoints
 from fba_conformance import _motion as motion
 
 EVERY_SECOND = EncoderOptions(intra_period=1, start_codes=True, mark=False)

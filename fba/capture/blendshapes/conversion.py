@@ -21,9 +21,10 @@ from fba.tracks import FaceTrack
 
 RADIAN = 1e5
 """Units of the FAPs that are angles."""
-LARGEST = 1 << 30
+MAX_FAP = 1 << 30
+"""Largest magnitude of a FAP value."""
 FRAME_BYTES = 1500
-"""Memory that a frame takes: its FAPs in several kinds of numbers."""
+"""Memory, in bytes, that a frame takes: its FAPs in several number types."""
 HEAD = ("head_pitch", "head_yaw", "head_roll")
 EYES = ("yaw_l_eyeball", "yaw_r_eyeball", "pitch_l_eyeball", "pitch_r_eyeball")
 
@@ -80,7 +81,7 @@ def convert_rows(
     values += amounts
     part_lids(values)
     limit_gaze(values)
-    rounded = np.rint(np.clip(values, -LARGEST, LARGEST)).astype(np.int32)
+    rounded = np.rint(np.clip(values, -MAX_FAP, MAX_FAP)).astype(np.int32)
     sent = with_mates(moved | turned)
     return FaceTrack(rounded, np.broadcast_to(sent, rounded.shape))
 

@@ -9,26 +9,26 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture.blendshapes._weight_loops import find_weights
 from fba.capture.blendshapes.combination import CLOSED, JAW
 from fba.capture.blendshapes.conversion import EYES, HEAD, RADIAN
 from fba.capture.blendshapes.motion import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
+from fba.compiled import compiled
 from fba.errors import ModelError
 from fba.face.fapu import Fapu
 from fba.face.feature_points import neutral_points
 from fba.face.resolve import resolve
 from fba.parameters import FAP_COUNT, fap_numbers, faps
 
-EYEBALL = 0.012
-"""Radius of an eyeball, metres: how far a turn moves what one sees of it."""
-SWEEPS = 200
-"""Times that every weight is set to its best value for the others, at most."""
-SETTLED = 1e-4
-"""Largest change of a weight in a sweep at which that ends."""
-SHARED = 5e-4
-"""Metres that count as much as a weight of 1: of shapes that do nearly the same, all are used a little, as
-real faces do, and none is used for what is next to nothing."""
+EYEBALL_RADIUS = 0.012
+"""Radius of an eyeball, in metres: a turn of one radian moves the pupil this far."""
+MAX_SWEEPS = 200
+"""Largest number of sweeps, in each of which every weight is set to its best value for the others."""
+MAX_CHANGE = 1e-4
+"""The sweeps end when no weight changes by more than this."""
+SHARED_WEIGHT = 5e-4
+"""Metres of error that count as much as a weight of 1. It divides a movement among shapes that are nearly
+alike, as real faces do, and keeps shapes out of movements too small to see."""
 
 
 def to_blendshapes(animation: Animation, names: tuple[str, ...] = ARKIT_ORDER) -> ShapeMotion:
@@ -58,8 +58,8 @@ def to_blendshapes(animation: Animation, names: tuple[str, ...] = ARKIT_ORDER) -
 
 def _solve(shapes: Float64, wanted: Float64) -> Float64:
     """Return weights (T, N), 0 to 1, of shapes (N, 68) that add up to what is wanted (T, 68), in metres."""
-    products = shapes @ shapes.T + SHARED**2 * np.eye(len(shapes))
-    return find_weights(products, wanted @ shapes.T, SWEEPS, SETTLED)
+    products = shapes @ shapes.T + SHARED_WEIGHT**2 * np.eye(len(shapes))
+    return find_weights(products, wanted @ shapes.T, MAX_SWEEPS, MAX_CHANGE)
 
 
 @cache
@@ -83,7 +83,7 @@ def _metres(names: tuple[str, ...]) -> Float64:
     fapu = Fapu.measure(neutral_points())
     metres = np.array([fapu[fap.unit] if fap.unit and fap.unit != "AU" else 0.0 for fap in faps()])
     for name in EYES:
-        metres[fap_numbers()[name] - 1] = EYEBALL / RADIAN
+        metres[fap_numbers()[name] - 1] = EYEBALL_RADIUS / RADIAN
     moved = np.zeros(FAP_COUNT, dtype=bool)
     for name in names:
         amounts = amounts_of(name)
@@ -94,3 +94,36 @@ def _metres(names: tuple[str, ...]) -> Float64:
 def _angles(shown: Float64, names: tuple[str, ...]) -> Float64:
     """Return angles (T, n), radians, of FAPs."""
     return shown[:, [fap_numbers()[name] - 1 for name in names]] / RADIAN
+
+
+@compiled
+def find_weights(products: Float64, goals: Float64, sweeps: int, settled: float) -> Float64:
+    """Turn goals (T, N) into weights (T, N) of 0 to 1 that solve least squares; return them.
+
+    products: (N, N), of all shapes with each other, goals: of what is wanted with each shape. Each weight in
+    turn is set to its best value for the others, up to `sweeps` times, until none changes by more than
+    `settled`. A frame starts from the weights of the one before it. The loop is compiled, see `fba.compiled`.
+
+    Bounds: indices run over the shape of goals, the array that is written; products is checked against it.
+    """
+    frames, shapes = goals.shape
+    if products.shape[0] < shapes or products.shape[1] < shapes:
+        raise IndexError("fewer products than shapes")
+    for frame in range(frames):
+        row = goals[frame].copy()
+        weights = goals[frame]
+        for shape in range(shapes):
+            weights[shape] = goals[frame - 1, shape] if frame else 0.0
+        for _ in range(sweeps):
+            change = 0.0
+            for shape in range(shapes):
+                rest = row[shape]
+                for other in range(shapes):
+                    rest -= products[shape, other] * weights[other]
+                better = weights[shape] + rest / products[shape, shape]
+                better = min(max(better, 0.0), 1.0)
+                change = max(change, abs(better - weights[shape]))
+                weights[shape] = better
+            if change < settled:
+                break
+    return goals

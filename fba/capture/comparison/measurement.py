@@ -4,37 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from fba.animation import Animation
-from fba.arrays import Float64
-from fba.body import BapSolver
+from fba.arrays import Array, Float64
+from fba.body import BapSolver, Skeleton
+from fba.body.footing import GroundedPoser
+from fba.body.model import BodyModel, BodyPart
 from fba.capture.comparison import figure, path_measures, pose_measures
-from fba.capture.comparison.figure import Figure
+from fba.capture.comparison.figure import SIDES, Figure
 from fba.capture.comparison.pose_measures import Row
-from fba.capture.comparison.soles import sole_heights
 from fba.capture.comparison.standing import Floor, find_floor, find_standing
 from fba.capture.comparison.verdict import Comparison, Difference, bounds, in_order
-from fba.capture.comparison.wringing import wringing
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 from fba.parameters import BAP_COUNT
 
-PIECE = 8192
-"""Frames that are compared at once, which bounds the memory; each piece is measured by itself."""
-RUNS = 4
-"""Runs of frames that stand for a long motion."""
+PIECE_FRAMES = 8192
+"""Number of frames that are compared at once, which bounds the memory; each piece is measured by itself."""
+RUN_COUNT = 4
+"""Number of runs of frames that represent a long motion."""
 UNKNOWN_UNIT = 0.01
 """Metres in one unit of a source whose size no limb tells, as for `from_skeleton`."""
-MOVES = 10.0
-"""Degrees that a joint turns to count as moving."""
+MIN_MOTION = 10.0
+"""Degrees that a joint must turn to count as moving."""
 LIMBS = {
     "left arm": ("l_shoulder", "l_elbow"), "right arm": ("r_shoulder", "r_elbow"),
     "left leg": ("l_hip", "l_knee"), "right leg": ("r_hip", "r_knee"), "head": ("skullbase", "vc7"),
 }  # fmt: skip
-"""Limbs, and joints without which they do not move."""
+"""Joints that each limb needs to move."""
+SOLE_THICKNESS = 0.02
+"""Metres above the lowest vertex of a shoe within which its vertices belong to the sole."""
+SKINNED_FRAMES = 1024
+"""Number of frames whose soles are skinned at once, which bounds the memory."""
 
 
 def compare(
@@ -66,7 +71,7 @@ def compare(
     count = min(len(motion), len(animation))
     if not count:
         raise ModelError("the motion and the animation have no frame in common")
-    first = rows_of(motion, slice(0, min(count, PIECE)))
+    first = rows_of(motion, slice(0, min(count, PIECE_FRAMES)))
     up = figure.find_up(first, mapped) if up is None else up
     neutral = figure.result_figure(solver, np.zeros((1, BAP_COUNT), dtype=np.int32))
     metres = source_scale(motion, mapped, neutral, up) if scale is None else scale
@@ -101,10 +106,11 @@ def compare(
 def _pieces(count: int, most: int | None) -> list[slice]:
     """Return the frames to be compared, in pieces."""
     if most is None or count <= most:
-        return [slice(begin, min(begin + PIECE, count)) for begin in range(0, count, PIECE)]
-    length = most // RUNS
+        return [slice(begin, min(begin + PIECE_FRAMES, count)) for begin in range(0, count, PIECE_FRAMES)]
+    length = most // RUN_COUNT
     return [
-        slice(begin, begin + length) for begin in np.linspace(0, count - length, RUNS).astype(int).tolist()
+        slice(begin, begin + length)
+        for begin in np.linspace(0, count - length, RUN_COUNT).astype(int).tolist()
     ]
 
 
@@ -135,7 +141,7 @@ def _measure(
     yield from path_measures.floors(source, soles, standing, level, floor.ground)
     yield from path_measures.slips(source, result, standing, rate)
     yield from path_measures.jumps(source, result)
-    yield from wringing(result)
+    yield from pose_measures.leg_twists(result)
 
 
 def _difference(row: Row, rate: float, begin: int) -> Difference:
@@ -154,7 +160,9 @@ def _unmatched(motion: SkeletonMotion, mapped: Mapping[str, int]) -> list[Differ
     used = set(mapped.values())
     from_first = np.abs((motion.rotations * motion.rotations[:1]).sum(axis=-1)).min(axis=0)
     turned = np.degrees(2 * np.arccos(np.clip(from_first, 0.0, 1.0)))
-    moving = [number for number in range(len(motion.names)) if number not in used and turned[number] > MOVES]
+    moving = [
+        number for number in range(len(motion.names)) if number not in used and turned[number] > MIN_MOTION
+    ]
     return [
         Difference("unmatched", limb, float(len(moving)), float(len(moving)), 0)
         for limb, joints in LIMBS.items()
@@ -171,3 +179,43 @@ def rest_figure(motion: SkeletonMotion, mapped: Mapping[str, int], up: Float64, 
 def rows_of(motion: SkeletonMotion, rows: slice) -> SkeletonMotion:
     """Return some frames of a motion."""
     return replace(motion, rotations=motion.rotations[rows], positions=motion.positions[rows])
+
+
+def sole_heights(solver: BapSolver, baps: Array) -> dict[str, Float64]:
+    """Return, by side, the heights (T,) in metres of the lowest point of the default person's shoe.
+
+    The heights are those of the mesh, not of joints. baps: (T, 296). Empty unless the skeleton is the
+    default body's.
+    """
+    model = _sole_model()
+    if solver.skeleton is not Skeleton.default():
+        return {}
+    shown = GroundedPoser(model.skeleton, solver.convention.name)  # as players show it
+    left = model.vertices[:, 0] > 0
+    result = {side: np.empty(len(baps)) for side in SIDES}
+    for begin in range(0, len(baps), SKINNED_FRAMES):
+        rows = slice(begin, begin + SKINNED_FRAMES)
+        heights = model.skin(shown.pose(baps[rows]))[..., 1]
+        result["l"][rows] = heights[:, left].min(axis=1)
+        result["r"][rows] = heights[:, ~left].min(axis=1)
+    return result
+
+
+@cache
+def _sole_model() -> BodyModel:
+    """Return the default person reduced to the soles, which have few vertices to skin."""
+    model = BodyModel.default()
+    parts = []
+    for part in model.parts:
+        if part.kind == "shoe":
+            kept = np.flatnonzero(part.vertices[:, 1] < part.vertices[:, 1].min() + SOLE_THICKNESS)
+            parts.append(_keep_vertices(part, kept))
+    return replace(model, parts=tuple(parts))
+
+
+def _keep_vertices(part: BodyPart, kept: Array) -> BodyPart:
+    """Return a part with these vertices only, and a single triangle, which is never drawn."""
+    return BodyPart(
+        part.name, part.kind, part.vertices[kept], np.array([[0, 1, 2]], dtype=np.int32),
+        part.joints[kept], part.weights[kept],
+    )  # fmt: skip

@@ -16,10 +16,12 @@ from fba.capture.comparison.standing import foot_points
 
 HINGED = {"shoulder": ("shoulder", "elbow", "wrist"), "hip": ("hip", "knee", "ankle")}
 """The joints of limbs whose middle one is a hinge, by the first."""
-SLIGHT_BEND = 0.12
-"""Sine of the bend of an elbow or a knee above which its plane is known."""
-TEAR, TEAR_SPEED = 0.5, 20.0
-"""Metres, and metres a second, that hips do not move from one frame to the next."""
+MIN_BEND = 0.12
+"""Smallest sine of the bend of an elbow or a knee at which its plane is defined."""
+TEAR_DISTANCE = 0.5
+"""Metres that hips do not move from one frame to the next."""
+TEAR_SPEED = 20.0
+"""Metres per second that hips do not reach."""
 
 
 def paths(source: Figure, result: Figure) -> Iterator[Row]:
@@ -102,7 +104,7 @@ def find_tears(root: Float64, rate: float) -> tuple[Bool, Float64]:
     the capture. root: (T, 3), its path in metres.
     """
     leaps = np.linalg.norm(np.diff(root, axis=0, prepend=root[:1]), axis=1)
-    torn = (leaps > TEAR) & (leaps * rate > TEAR_SPEED)
+    torn = (leaps > TEAR_DISTANCE) & (leaps * rate > TEAR_SPEED)
     part = np.cumsum(torn)
     lost: Bool = (part != int(np.bincount(part).argmax())) | torn
     return lost, np.where(torn, leaps, 0.0)
@@ -137,6 +139,6 @@ def _plane_steps(source: Figure, joint: str) -> Float64:
         return np.zeros(len(source.frames[joint]))
     first, middle, last = (source.points[name] for name in names)
     normal = np.cross(unit(middle - first), unit(last - middle))  # as long as the sine of the bend
-    bent = np.linalg.norm(normal, axis=1) > SLIGHT_BEND
+    bent = np.linalg.norm(normal, axis=1) > MIN_BEND
     steps = np.where(bent[1:] & bent[:-1], degrees_between(normal[1:], normal[:-1]), 0.0)
     return np.concatenate([[0.0], steps])

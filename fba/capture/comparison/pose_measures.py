@@ -24,8 +24,10 @@ from fba.capture.comparison.figure import (
 
 MOST_PAIRS = 4
 """Pairs of joints, left and right, that show whether a pose is its own mirror image."""
-MIRRORED, STRAIGHT = 0.05, 0.9
-"""Share of the legs' length by which they may differ, and least cosine of trunk and legs to straight up."""
+MAX_ASYMMETRY = 0.05
+"""Share of the legs' length by which pairs of joints may differ in a pose that is its own mirror image."""
+MIN_STRAIGHTNESS = 0.9
+"""Smallest cosine of the angle between trunk or legs and straight up in a pose that stands."""
 WORDS = {"l": "left", "r": "right"}
 LIMBS = (
     ("upper arm", "shoulder", "elbow"),
@@ -51,8 +53,10 @@ MOST_ROW_TURN = 25.0
 head looks."""
 STEEP = 0.85
 """Cosine of the angle between a foot's bone and straight down beyond which it points nowhere."""
-MOST_WRUNG = 100.0
+MAX_WRUNG = 100.0
 """Degrees to either side by which forearm and wrist of a person turn the palm."""
+LEG_PARTS = (("thigh", "sacroiliac", "{}_hip"), ("shank", "{}_hip", "{}_knee"))
+"""Parts of the leg, the joint above each, and its own joint."""
 
 
 class Row(NamedTuple):
@@ -123,7 +127,7 @@ def palms(source: Figure, result: Figure, rest: Figure) -> Iterator[Row]:
             at_rest = rest.frames[f"{side}_wrist"][0].T @ raised @ inwards
             yield Row("palm", part, degrees_between(source.frames[f"{side}_wrist"] @ at_rest, own))
         else:
-            yield Row("palm", part, np.maximum(_wringing(result, side, own) - MOST_WRUNG, 0.0))
+            yield Row("palm", part, np.maximum(_wringing(result, side, own) - MAX_WRUNG, 0.0))
 
 
 def _wringing(result: Figure, side: str, palm: Float64) -> Float64:
@@ -277,7 +281,7 @@ def _standing_axes(rest: Figure) -> Float64 | None:
     mirrored = ends[:, 0] - 2 * (ends[:, 0] @ normal)[:, None] * normal
     off = np.linalg.norm(mirrored - ends[:, 1], axis=1).max()
     upright = min(float(trunk[0, 1]), float(unit(middle - foot)[0, 1]))
-    if off > MIRRORED * size or upright < STRAIGHT:
+    if off > MAX_ASYMMETRY * size or upright < MIN_STRAIGHTNESS:
         return None
     up = np.array([0.0, 1.0, 0.0])
     side = _along(left, up[None])[0]
@@ -307,3 +311,23 @@ def _hand_axes(figure: Figure, side: str, fingers: tuple[str, ...]) -> Float64:
 def _along(vectors: Float64, normal: Float64) -> Float64:
     """Return unit vectors (T, 3) without their part along normals (T, 3)."""
     return unit(vectors - normal * (vectors * normal).sum(axis=-1, keepdims=True))
+
+
+def leg_twists(result: Figure) -> Iterator[Row]:
+    """Yield the twist, in degrees, of thighs and shanks about their length, against pelvis and thigh.
+
+    Directions of bones do not show it: a thigh turned round, with a shank turned back, points the right way,
+    and the skin between is twisted like a cloth.
+    """
+    for side in SIDES:
+        for part, above, joint in LEG_PARTS:
+            upper, lower = (result.frames[name.format(side)] for name in (above, joint))
+            yield Row("wrung", f"{WORDS[side]} {part}", _twists(np.swapaxes(upper, -1, -2) @ lower))
+
+
+def _twists(turns: Float64) -> Float64:
+    """Return the angles (T,), in degrees, of the turns about +y closest to rotations (T, 3, 3)."""
+    sine = turns[:, 0, 2] - turns[:, 2, 0]
+    cosine = turns[:, 0, 0] + turns[:, 2, 2]
+    result: Float64 = np.abs(np.degrees(np.arctan2(sine, cosine)))
+    return result

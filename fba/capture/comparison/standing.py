@@ -10,13 +10,13 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.capture.comparison.figure import SIDES, Figure
 
-STILL = 0.25
-"""Metres a second up to which a foot stands."""
-LOW = 0.05
-"""Metres above the lowest heights up to which a foot stands."""
+MAX_STANDING_SPEED = 0.25
+"""Largest speed of a standing foot, in metres per second."""
+MAX_STANDING_HEIGHT = 0.05
+"""Largest height of a standing foot above the lowest heights, in metres."""
 
-RAISED = 0.3
-"""Metres by which one foot may stand above the other; one that is always higher is in the air."""
+MAX_HEIGHT_DIFFERENCE = 0.3
+"""Largest height, in metres, of a standing foot above the other: one that is always higher is in the air."""
 
 
 class Floor(NamedTuple):
@@ -43,9 +43,9 @@ def find_floor(sources: Iterable[Figure], rate: float) -> Floor:
                 lowest[side].append(np.min([point[:, 1] for point in points], axis=0))
     known = [side for side in SIDES if ends[side]]
     heights = {side: np.concatenate(ends[side]) for side in known}
-    lows = {side: float(np.percentile(heights[side], 5)) + LOW for side in known}
+    lows = {side: float(np.percentile(heights[side], 5)) + MAX_STANDING_HEIGHT for side in known}
     lowest_of_both = min(lows.values(), default=0.0)
-    lows = {side: min(low, lowest_of_both + RAISED) for side, low in lows.items()}
+    lows = {side: min(low, lowest_of_both + MAX_HEIGHT_DIFFERENCE) for side, low in lows.items()}
     stands = {side: np.concatenate(still[side]) & (heights[side] < lows[side]) for side in known}
     standing = [np.concatenate(lowest[side])[stands[side]] for side in known]
     together = np.concatenate(standing) if standing else np.zeros(0)
@@ -70,5 +70,7 @@ def _still(points: Sequence[Float64], rate: float) -> Bool:
     """Return bool (T,): whether any of the points (T, 3) hardly moves."""
     result = np.zeros(len(points[0]), dtype=np.bool_)
     for point in points:
-        result |= np.linalg.norm(np.diff(point, axis=0, append=point[-1:]), axis=1) * rate < STILL
+        result |= (
+            np.linalg.norm(np.diff(point, axis=0, append=point[-1:]), axis=1) * rate < MAX_STANDING_SPEED
+        )
     return result

@@ -53,7 +53,7 @@ def find_sticks(
     solver = BapSolver(BodyModel.default().skeleton)  # of the person that is drawn
     assert animation.body is not None
     motion = motion.resample(animation.rate)
-    begin = measurement.rows_of(motion, slice(0, measurement.PIECE))
+    begin = measurement.rows_of(motion, slice(0, measurement.PIECE_FRAMES))
     up = figure.find_up(begin, mapped) if up is None else up
     neutral = figure.result_figure(solver, np.zeros((1, BAP_COUNT), dtype=np.int32))
     metres = measurement.source_scale(motion, mapped, neutral, up) if scale is None else scale

@@ -19,31 +19,37 @@ from fba.compiled import compiled, inlined
 STATES = 48
 """Values of the grid: every 7.5 degrees."""
 TURN = 2.0 * math.pi
-SLACK = 0.03
-"""Error in radians, sideways, that costs 1 per second."""
-BOUND = 0.05
-"""Error that costs another 1 per second, growing by the sixth power: it keeps errors below 5 degrees."""
-WRONG = 0.6
-"""Bending the wrong way, in radians, that costs 1 per second: makers overstretch limbs a little, and half a
-turn about the bone costs more than 20 degrees."""
-SPEED = 2.0
+SIDEWAYS_ERROR = 0.03
+"""Sideways error, in radians, that costs 1 per second."""
+STEEP_ERROR = 0.05
+"""Error, in radians, that costs another 1 per second. The cost grows by the sixth power, which keeps errors
+below 5 degrees."""
+WRONG_BEND = 0.6
+"""Bend the wrong way, in radians, that costs 1 per second: makers overstretch limbs a little, and half a turn
+about the bone costs more than 20 degrees."""
+TURNING_SPEED = 2.0
 """Speed of turning, in radians per second, that costs 1 per second."""
-LOYAL = 5.0
+USUAL_DISTANCE = 5.0
 """Distance from the usual turn, in radians, that costs 1 per second."""
-STEPS = 12
-"""Most iterations of Newton's method."""
-LEAP = 0.2
+MAX_ITERATIONS = 12
+"""Largest number of iterations of Newton's method."""
+MAX_STEP = 0.2
 """Largest change of a turn in one iteration, in radians."""
-SETTLED = 1e-4
+MAX_CHANGE = 1e-4
 """Change in radians below which the iteration ends."""
 
 
 @inlined
 def _cost(sideways: float, natural: float, away: float) -> float:
     """Return the cost per second: see the constants above."""
-    wrong = max(0.0, -natural) / WRONG
-    square = (sideways / BOUND) ** 2
-    return (sideways / SLACK) ** 2 + square * square * square + wrong * wrong + (away / LOYAL) ** 2
+    wrong = max(0.0, -natural) / WRONG_BEND
+    square = (sideways / STEEP_ERROR) ** 2
+    return (
+        (sideways / SIDEWAYS_ERROR) ** 2
+        + square * square * square
+        + wrong * wrong
+        + (away / USUAL_DISTANCE) ** 2
+    )
 
 
 @inlined
@@ -89,7 +95,7 @@ def _search(
         cosines[state] = math.cos(state * step)
         away[state] = _away(state * step, usual)
         steps = min(state, STATES - state)
-        change[state] = (steps * step / SPEED) ** 2 / period
+        change[state] = (steps * step / TURNING_SPEED) ** 2 / period
     origin = np.zeros((count, STATES), dtype=np.uint8)
     cost = np.zeros(STATES)
     twice = np.zeros(2 * STATES)
@@ -130,12 +136,12 @@ def _refine(
     `follow`.
     """
     count = path.shape[0]
-    stiff = 2.0 / (SPEED * SPEED * period)
+    stiff = 2.0 / (TURNING_SPEED * TURNING_SPEED * period)
     own = np.zeros(count)
     right = np.zeros(count)
     move = np.zeros(count)
     bonds = stiff * ease[1:]
-    for _ in range(STEPS):
+    for _ in range(MAX_ITERATIONS):
         for t in range(count):
             c = math.cos(path[t])
             s = math.sin(path[t])
@@ -143,14 +149,20 @@ def _refine(
             slope = sideways[t, 2] * c - sideways[t, 1] * s
             bent = natural[t, 0] + natural[t, 1] * c + natural[t, 2] * s
             bending = natural[t, 2] * c - natural[t, 1] * s
-            square = (missed / BOUND) ** 2
-            pull = 2.0 * missed * slope / (SLACK * SLACK) + 6.0 * square * square * missed * slope / BOUND**2
-            curve = 2.0 * slope * slope / (SLACK * SLACK) + 30.0 * square * square * slope * slope / BOUND**2
+            square = (missed / STEEP_ERROR) ** 2
+            pull = (
+                2.0 * missed * slope / (SIDEWAYS_ERROR * SIDEWAYS_ERROR)
+                + 6.0 * square * square * missed * slope / STEEP_ERROR**2
+            )
+            curve = (
+                2.0 * slope * slope / (SIDEWAYS_ERROR * SIDEWAYS_ERROR)
+                + 30.0 * square * square * slope * slope / STEEP_ERROR**2
+            )
             if bent < 0.0:
-                pull += 2.0 * bent * bending / (WRONG * WRONG)
-                curve += 2.0 * bending * bending / (WRONG * WRONG)
-            pull += 2.0 * (path[t] - centre) / (LOYAL * LOYAL)
-            curve += 2.0 / (LOYAL * LOYAL)
+                pull += 2.0 * bent * bending / (WRONG_BEND * WRONG_BEND)
+                curve += 2.0 * bending * bending / (WRONG_BEND * WRONG_BEND)
+            pull += 2.0 * (path[t] - centre) / (USUAL_DISTANCE * USUAL_DISTANCE)
+            curve += 2.0 / (USUAL_DISTANCE * USUAL_DISTANCE)
             own[t] = period * curve
             right[t] = -period * pull
             if t > 0:
@@ -161,6 +173,6 @@ def _refine(
         largest = 0.0
         for t in range(count):
             largest = max(largest, abs(move[t]))
-            path[t] += min(max(move[t], -LEAP), LEAP)
-        if largest < SETTLED:
+            path[t] += min(max(move[t], -MAX_STEP), MAX_STEP)
+        if largest < MAX_CHANGE:
             break

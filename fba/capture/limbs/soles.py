@@ -4,7 +4,7 @@ Bones point in the directions of the source's, but thigh, shank and foot have ot
 up millimetres to centimetres higher or lower than the source's, and slip a little where the source's stand
 still; and the ground of each source is at another height. First the body is raised or lowered as a whole,
 frame by frame, so that the foot on the ground is as high above it as the source's; legs correct the rest
-(`fba.capture.limbs._leg_ik`).
+(`fba.capture.limbs.foot_planting.move_ankle`).
 """
 
 from __future__ import annotations
@@ -25,45 +25,50 @@ from fba.capture.motion import SkeletonMotion
 
 LEVEL_SECONDS = 0.2
 """Seconds over which the height of the ground under feet that stand is averaged."""
-FRONT = 0.05
-"""Metres from an ankle ahead up to which a source's foot has no front."""
-ANKLE_HEIGHT, BALL = 0.076, 0.15
-"""Metres from the default skeleton's ankle down to the ground, and ahead to the ball."""
+MIN_FOOT_LENGTH = 0.05
+"""Smallest distance, in metres, from an ankle ahead to the front of a source's foot."""
+ANKLE_HEIGHT = 0.076
+"""Height of the default skeleton's ankle above the ground, in metres."""
+BALL_DISTANCE = 0.15
+"""Distance from the default skeleton's ankle ahead to the ball of the foot, in metres."""
 ON_GROUND = 0.015
 """Height in metres at which the influence of a foot on the height of the body falls to 1/e."""
 SETTLED = 0.02
 """Weight of the usual height, which counts while no foot is on the ground."""
-SMOOTH = 0.02
+SMOOTHING = 0.02
 """Seconds over which corrections are averaged."""
-WITHIN = 0.012
-"""Height in metres up to which a leg moves its foot all the way."""
-TOLERATED, SUNK = 0.004, 0.003
-"""Metres by which a sole may be too high, and too low, before its leg moves: the body rises by the latter."""
+MAX_FULL_CORRECTION = 0.012
+"""Height above the ground, in metres, below which a leg moves its foot by the whole error."""
+MAX_SOLE_HEIGHT = 0.004
+"""Largest height of a sole above its target, in metres, at which its leg does not move."""
+MAX_SOLE_DEPTH = 0.003
+"""Largest depth of a sole below its target, in metres, at which the body rises and its leg does not move."""
 PITCH_SHARE = 0.9
 """Share of the height correction of a foot on its ball that its own pitch makes."""
-MOST_PITCH = np.radians(6.0)
+MAX_PITCH = np.radians(6.0)
 """Largest change of a foot's pitch, in radians."""
-MOST_AIR_PITCH = np.radians(6.0)
-"""The same of a foot in the air, whose toes would be under the ground."""
-TIPTOE = 0.02
-"""Metres from ball up to heel at which a foot stands mostly on its ball."""
-LEVER = 0.1
-"""Least horizontal distance in metres from heel to ball that is assumed."""
-FARTHEST = 0.03
-"""Most metres by which a leg moves its foot."""
-FARTHEST_UP = 0.025
-"""The same upwards: knees bend more for it."""
-FARTHEST_DIP = 0.015
-"""The same for a foot in the air that would be under the ground; the body as a whole rises by the rest."""
-UNDER = 0.002
-"""Metres under the ground that nobody sees."""
-SWING = 0.002
+MAX_AIR_PITCH = np.radians(6.0)
+"""Largest change, in radians, of the pitch of a foot in the air whose toes would be under the ground."""
+MIN_TIPTOE_HEIGHT = 0.02
+"""Smallest height of the heel above the ball, in metres, of a foot that stands mostly on its ball."""
+MIN_LEVER = 0.1
+"""Smallest horizontal distance, in metres, that is assumed from heel to ball."""
+MAX_MOVE = 0.03
+"""Largest distance, in metres, by which a leg moves its foot."""
+MAX_RISE = 0.025
+"""Largest distance, in metres, by which a leg lifts its foot: knees bend more for it."""
+MAX_AIR_RISE = 0.015
+"""Largest distance, in metres, by which a leg lifts a foot in the air that would be under the ground. The
+body as a whole rises by the rest."""
+MAX_UNSEEN_DEPTH = 0.002
+"""Largest depth under the ground, in metres, that nobody sees."""
+AIR_WEIGHT = 0.002
 """Weight of a foot in the air moving as it did, relative to one on the ground not slipping."""
-RETURN = 0.3
+RETURN_WEIGHT = 0.3
 """Weight, per second squared, of the position without correction: a foot in the air comes back to it within
 a sixth of a second, one on the ground drifts back over seconds."""
-RETURN_BODY = 1.0
-"""The same for the body as a whole."""
+BODY_RETURN_WEIGHT = 1.0
+"""Weight, per second squared, of the uncorrected position of the body as a whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,15 +115,15 @@ def source_soles(
         ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
         along = [float(point @ ahead) * metres for point in at_rest]
         depth = min(float(point[1]) for point in at_rest)
-        if max(along) < FRONT:  # a foot that ends at the ankle: the front is where the body's is
+        if max(along) < MIN_FOOT_LENGTH:  # a foot that ends at the ankle: the front is where the body's is
             depth = min(depth, -ANKLE_HEIGHT / metres)
             turn = rotations.matrices(turned[:, ankle])
             left = rest[mapped["l_ankle"]] - rest[mapped["r_ankle"]]
             ahead = np.cross(left, [0.0, 1.0, 0.0])
             ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
-            point = np.array([0.0, depth, 0.0]) + ahead * (BALL / metres)
+            point = np.array([0.0, depth, 0.0]) + ahead * (BALL_DISTANCE / metres)
             at_rest.append(point)
-            along.append(BALL)
+            along.append(BALL_DISTANCE)
             moving.append(positions[:, ankle] + turn @ point)
         if min(along) < -HEEL / 2:
             heel = moving[int(np.argmin(along))]
@@ -256,7 +261,7 @@ def _levels(height: Float64, stands: Bool, rate: float) -> Float64:
     if not stands.any():
         return np.zeros_like(height)
     frames = np.arange(len(height))
-    return smooth(np.interp(frames, frames[stands], height[stands]), rate * LEVEL_SECONDS / SMOOTH)
+    return smooth(np.interp(frames, frames[stands], height[stands]), rate * LEVEL_SECONDS / SMOOTHING)
 
 
 def grounded(above: Float64) -> Float64:
@@ -272,11 +277,11 @@ def heights(above: Float64, body: Float64, rate: float, done: Float64 | float = 
     been raised before.
     """
     lacking = above - body
-    needed = np.maximum(lacking - SUNK, 0.0) - np.maximum(-lacking - TOLERATED, 0.0)
-    moves = np.array([smooth(foot, rate) for foot in needed * grounded(above - WITHIN)])
+    needed = np.maximum(lacking - MAX_SOLE_DEPTH, 0.0) - np.maximum(-lacking - MAX_SOLE_HEIGHT, 0.0)
+    moves = np.array([smooth(foot, rate) for foot in needed * grounded(above - MAX_FULL_CORRECTION)])
     dips = np.array([rise_above(foot, rate) for foot in -body])
-    moves = np.clip(done + moves, -FARTHEST, FARTHEST_UP) - done
-    dips = np.minimum(done + dips, np.maximum(done, FARTHEST_DIP)) - done
+    moves = np.clip(done + moves, -MAX_MOVE, MAX_RISE) - done
+    dips = np.minimum(done + dips, np.maximum(done, MAX_AIR_RISE)) - done
     result: Float64 = moves + np.maximum(dips - np.maximum(moves, 0.0), 0.0)
     return result
 
@@ -286,7 +291,7 @@ def rise_above(depth: Float64, rate: float) -> Float64:
 
     0 or more, whatever is above the ground; a little before and after, so that it does not start abruptly.
     """
-    needed = np.maximum(depth - UNDER, 0.0)
+    needed = np.maximum(depth - MAX_UNSEEN_DEPTH, 0.0)
     return np.maximum(needed, smooth(needed, rate))
 
 
@@ -297,8 +302,8 @@ def pitches(body: Float64, ups: Float64, above: Float64) -> Float64:
     above: (2, T), target heights: in the air, feet pitch further.
     """
     sole = body[:, 1] - body[:, 0]
-    length = np.maximum(np.hypot(sole[..., 0], sole[..., 2]), LEVER)
-    most = MOST_AIR_PITCH + (MOST_PITCH - MOST_AIR_PITCH) * grounded(above)
+    length = np.maximum(np.hypot(sole[..., 0], sole[..., 2]), MIN_LEVER)
+    most = MAX_AIR_PITCH + (MAX_PITCH - MAX_AIR_PITCH) * grounded(above)
     angle = np.clip(PITCH_SHARE * tiptoe(body) * ups / length, -most, most)
     across = np.stack([-sole[..., 2], np.zeros_like(length), sole[..., 0]], axis=-1)
     across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
@@ -307,7 +312,7 @@ def pitches(body: Float64, ups: Float64, above: Float64) -> Float64:
 
 def tiptoe(body: Float64) -> Float64:
     """Return (2, T): 0 for feet on their heels, 1 on their balls. body: (2, 2, T, 3), points of the soles."""
-    result: Float64 = 0.5 - 0.5 * np.tanh((body[:, 1, :, 1] - body[:, 0, :, 1]) / TIPTOE)
+    result: Float64 = 0.5 - 0.5 * np.tanh((body[:, 1, :, 1] - body[:, 0, :, 1]) / MIN_TIPTOE_HEIGHT)
     return result
 
 
@@ -323,9 +328,9 @@ def slips(source: Float64, body: Float64, level: Float64, rate: float) -> tuple[
     contact = np.minimum(contact[..., 1:], contact[..., :-1])
     drift = -(contact[..., None] * np.diff(body - source, axis=2)[..., [0, 2]]).sum(axis=1)
     firm = contact.sum(axis=1)
-    common = _course(drift.sum(axis=0), firm.sum(axis=0), RETURN_BODY, rate)
+    common = _course(drift.sum(axis=0), firm.sum(axis=0), BODY_RETURN_WEIGHT, rate)
     remaining = drift - firm[..., None] * np.diff(common, axis=0)
-    return common, np.array([_course(remaining[foot], firm[foot], RETURN, rate) for foot in range(2)])
+    return common, np.array([_course(remaining[foot], firm[foot], RETURN_WEIGHT, rate) for foot in range(2)])
 
 
 def _course(aim: Float64, firm: Float64, back: float, rate: float) -> Float64:
@@ -335,7 +340,7 @@ def _course(aim: Float64, firm: Float64, back: float, rate: float) -> Float64:
     weight of 0.
     """
     count = len(firm) + 1
-    bonds = (firm + SWING) * rate
+    bonds = (firm + AIR_WEIGHT) * rate
     result = np.zeros((2, count))
     for axis in range(2):
         pull = np.zeros(count)
@@ -344,13 +349,13 @@ def _course(aim: Float64, firm: Float64, back: float, rate: float) -> Float64:
         chain(np.full(count, back / rate), bonds, pull, result[axis])
     course = result.T
     length = np.linalg.norm(course, axis=1, keepdims=True)
-    bounded: Float64 = course * (FARTHEST * np.tanh(length / FARTHEST) / np.maximum(length, 1e-12))
+    bounded: Float64 = course * (MAX_MOVE * np.tanh(length / MAX_MOVE) / np.maximum(length, 1e-12))
     return bounded
 
 
 def smooth(values: Float64, rate: float) -> Float64:
     """Return values (T,) smoothed by a moving average, applied twice."""
-    half = max(1, round(SMOOTH * rate))
+    half = max(1, round(SMOOTHING * rate))
     for _ in range(2):
         sums = np.concatenate([[0.0], np.cumsum(np.pad(values, half, mode="edge"))])
         values = (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1)

@@ -12,7 +12,7 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture.blendshapes.conversion import EYES, HEAD, RADIAN, convert_rows
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of, largest_amounts
-from fba.capture.sampling import SLACK, interpolate
+from fba.capture.sampling import TIME_TOLERANCE, interpolate
 from fba.limits import DEFAULT_LIMITS
 from fba.parameters import FAP_COUNT, fap_numbers
 from fba.tracks import FaceTrack
@@ -68,7 +68,7 @@ class LiveBlendshapes:
         self._note_angles(head, eyes)
         frames = float(self.rate)
         if self._before is None:
-            self._next = ceil(time * frames - SLACK)
+            self._next = ceil(time * frames - TIME_TOLERANCE)
         last = floor(time * frames) + 1
         while last / frames > time:
             last -= 1
@@ -78,7 +78,7 @@ class LiveBlendshapes:
     def finish(self) -> Iterator[Animation]:
         """Yield the frames at the end that are only complete when no other row comes: one at most."""
         if self._before is not None:
-            last = floor(self._before[0] * float(self.rate) + SLACK)
+            last = floor(self._before[0] * float(self.rate) + TIME_TOLERANCE)
             yield from self._frames(self._before, last if self._frames_made else max(last, self._next))
 
     def show(self, weights: Float64, head: Float64, eyes: Float64) -> FaceTrack:

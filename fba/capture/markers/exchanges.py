@@ -8,16 +8,17 @@ import numpy as np
 
 from fba.arrays import Float64
 
-JUMP = 0.05
+MIN_JUMP = 0.05
 """Share of the face's size by which a marker jumps, relative to the others, when it takes another's name."""
-EXCHANGED = 0.4
-"""Two markers are exchanged if they come this much nearer to each other's last places than to their own."""
-MOST_AT_ONCE = 20
-"""Markers that jump in a frame; more are a cut, or another take."""
-SAMPLES = 100
-"""Frames, about, that tell the face's size."""
-MOST = 200
-"""Exchanges that are undone; more are noise."""
+EXCHANGED_RATIO = 0.4
+"""Two markers are exchanged if they come nearer to each other's last places than this share of the distances
+to their own."""
+MAX_JUMPS = 20
+"""Largest number of markers that jump in a frame; more are a cut, or another take."""
+SAMPLE_FRAMES = 100
+"""Approximate number of frames from which the face's size is measured."""
+MAX_EXCHANGES = 200
+"""Largest number of exchanges that are undone; more are noise."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,14 @@ def undo_exchanges(names: tuple[str, ...], positions: Float64) -> tuple[Float64,
 
     positions: NaN for gaps, in any unit of length.
     """
-    limit = JUMP * _size(positions[:: max(1, len(positions) // SAMPLES)])
+    limit = MIN_JUMP * _size(positions[:: max(1, len(positions) // SAMPLE_FRAMES)])
     steps = np.diff(positions, axis=0)
     far = (steps**2).sum(axis=2) > limit**2  # not where a step is NaN
     fixed, found = positions, []
     for frame in np.flatnonzero(far.sum(axis=1) >= 2).tolist():
         usual = np.nanmedian(steps[frame], axis=0)  # the head's own motion
         rows = np.flatnonzero(np.linalg.norm(steps[frame] - usual, axis=1) > limit)
-        if not 2 <= len(rows) <= MOST_AT_ONCE:
+        if not 2 <= len(rows) <= MAX_JUMPS:
             continue
         before, after = fixed[frame, rows] + usual, fixed[frame + 1, rows]
         apart = np.linalg.norm(after[:, None] - before[None], axis=2)
@@ -50,13 +51,17 @@ def undo_exchanges(names: tuple[str, ...], positions: Float64) -> tuple[Float64,
         together[np.diag_indices(len(rows))] = np.inf
         for a in range(len(rows)):
             b = int(together[a].argmin())
-            if b > a and together[a, b] < EXCHANGED * (own[a] + own[b]) and int(together[b].argmin()) == a:
+            if (
+                b > a
+                and together[a, b] < EXCHANGED_RATIO * (own[a] + own[b])
+                and int(together[b].argmin()) == a
+            ):
                 if fixed is positions:
                     fixed = positions.copy()
                 one, other = int(rows[a]), int(rows[b])
                 fixed[frame + 1 :, [one, other]] = fixed[frame + 1 :, [other, one]]
                 found.append(Exchange(frame + 1, names[one], names[other]))
-                if len(found) > MOST:
+                if len(found) > MAX_EXCHANGES:
                     return positions, []
     return fixed, found
 

@@ -11,13 +11,12 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64, Intp
-from fba.capture.markers.blinks import opening_by_blinks
+from fba.capture.markers._eyes import find_gaze, opening_by_blinks
 from fba.capture.markers.exchanges import Exchange, undo_exchanges
 from fba.capture.markers.gaps import RARELY, Filled, fill_gaps, warn_of_gaps
 from fba.capture.markers.marker_maps import check_map, find_map
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.neutral import neutral_frames
-from fba.capture.markers.pupils import find_gaze
 from fba.capture.markers.registration import GIVE_MAP, Registration, complete_points, register
 from fba.capture.markers.responses import measure_responses
 from fba.capture.markers.solving import choose_unknowns, solve
@@ -37,10 +36,12 @@ PATH = (181, 182, 183)
 """BAPs that move the body up, to its left, and to its front, millimetres."""
 Neutral = str | int | tuple[float, float] | slice
 GAZES = ("none", "camera")
-MOST_FRAMES = 1_000_000
-"""More than two hours at 120 frames/s."""
-FRAME_BYTES, MARKER_BYTES = 6000, 400
-"""Memory for each frame, and for each marker in it."""
+MAX_FRAMES = 1_000_000
+"""Frames of the longest capture: more than two hours at 120 frames/s."""
+FRAME_BYTES = 6000
+"""Memory, in bytes, for each frame."""
+MARKER_BYTES = 400
+"""Memory, in bytes, for each marker in a frame."""
 LIDS = {"3.1": "3.3", "3.2": "3.4"}
 """Upper lids, and the lower lid of the same eye."""
 
@@ -177,8 +178,8 @@ def find_face(
         raise OptionError(f"gaze must be one of {', '.join(GAZES)}, not {gaze!r}")
     if not len(motion):
         raise ModelError("the capture has no frames")
-    if len(motion) > MOST_FRAMES:
-        raise ModelError(f"the capture has {len(motion)} frames, more than {MOST_FRAMES}; cut it into pieces")
+    if len(motion) > MAX_FRAMES:
+        raise ModelError(f"the capture has {len(motion)} frames, more than {MAX_FRAMES}; cut it into pieces")
     limits.check_bytes(
         len(motion) * (FRAME_BYTES + MARKER_BYTES * len(motion.names)),
         "the capture",

@@ -17,10 +17,10 @@ from fba.name_maps import change_known_names, read_names, write_names
 from fba.source import Path
 
 TABLE = "markers"
-FEWEST = 8
-"""Least number of names by which a set of markers fits."""
-SHARE = 0.6
-"""Share of a set's names that must be there."""
+MIN_NAMES = 8
+"""Smallest number of names by which a set of markers fits."""
+MIN_SHARE = 0.6
+"""Smallest share of a set's names that must be present."""
 
 
 @cache
@@ -44,14 +44,14 @@ def match_names(names: Sequence[str]) -> tuple[str, dict[str, str]]:
     Names that are feature points ("2.1", "FDP_2.1", "fp8_3"), "head" or a tragion mean these.
     """
     direct = {name: target for name in names if (target := _named_point(name))}
-    if len(direct) >= FEWEST:
+    if len(direct) >= MIN_NAMES:
         return "feature points", direct
     simple = {name: simplify(name) for name in names}
     best: tuple[str, dict[str, str]] = ("", {})
     for family, members in marker_sets().items():
         found = {name: members[short] for name, short in simple.items() if short in members}
         used = {name: target for name, target in found.items() if target}
-        if len(found) >= SHARE * len(members) and len(used) >= FEWEST and len(used) > len(best[1]):
+        if len(found) >= MIN_SHARE * len(members) and len(used) >= MIN_NAMES and len(used) > len(best[1]):
             best = family, used
     return best
 

@@ -14,9 +14,10 @@ from fba.errors import ModelError
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "dm": 0.1, "in": 0.0254, "ft": 0.3048}
 """Units of length, in metres."""
-MOST_MARKERS = 2000
-"""More are damage: the largest captures of faces have some hundred, those of crowds a thousand."""
-LARGEST = 1e6
+MAX_MARKERS = 2000
+"""Largest number of markers; more are damage. Captures of faces have a few hundred, those of crowds a
+thousand."""
+MAX_COORDINATE = 1e6
 """Largest coordinate, metres; more is damage."""
 
 
@@ -52,8 +53,8 @@ class MarkerMotion:
                 f"MarkerMotion: {count} names need positions (T, {count}, 3) and times (T,), not "
                 f"{positions.shape} and {times.shape}"
             )
-        if not 0 < count <= MOST_MARKERS:
-            raise ModelError(f"a capture needs 1 to {MOST_MARKERS} markers, not {count}")
+        if not 0 < count <= MAX_MARKERS:
+            raise ModelError(f"a capture needs 1 to {MAX_MARKERS} markers, not {count}")
         if len(set(self.names)) != count:
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise ModelError(f"two markers are called {twice!r}")
@@ -71,7 +72,7 @@ class MarkerMotion:
             )
         # a marker is seen with all three coordinates, or not at all
         positions[np.isnan(positions).any(axis=2)] = np.nan
-        beyond = np.abs(positions) > LARGEST
+        beyond = np.abs(positions) > MAX_COORDINATE
         if beyond.any():
             frame, marker, axis = (int(index) for index in np.argwhere(beyond)[0])
             raise ModelError(

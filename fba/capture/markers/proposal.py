@@ -12,27 +12,27 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture.markers.motion import MarkerMotion
-from fba.capture.markers.registration import FACTORS, GIVE_MAP, SIZES
+from fba.capture.markers.registration import GIVE_MAP, SIZE_RANGE, UNIT_FACTORS
 from fba.capture.markers.targets import HEAD, PUPILS, target_points
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.geometry import fit_similarity
 from fba.rotations import axis_matrices
 
-FEWEST = 12
-"""Markers whose shape tells a face."""
-TURNS = 12
-"""Directions about the vertical from which the cloud is laid onto the head."""
-ROUNDS = 25
-"""Steps of each fit."""
-BEST = 6
-"""Fits that are taken to the end."""
-NEAR = 0.014
-"""Metres within which a marker is at a feature point."""
-PLACED = 0.4
-"""Share of the markers that must be near feature points."""
-FITS = 0.006
-"""Root mean square distance, metres, up to which a cloud is a face's."""
+MIN_MARKERS = 12
+"""Smallest number of markers whose shape identifies a face."""
+DIRECTIONS = 12
+"""Number of directions about the vertical from which the cloud is laid onto the head."""
+ITERATIONS = 25
+"""Number of iterations of each fit."""
+FULL_FITS = 6
+"""Number of best fits that are completed."""
+MAX_POINT_DISTANCE = 0.014
+"""Largest distance of a marker from its feature point, in metres."""
+MIN_PLACED = 0.4
+"""Smallest share of the markers that must be near feature points."""
+MAX_ERROR = 0.006
+"""Largest root mean square distance, in metres, of a cloud that is a face's."""
 SELDOM = (*(f"2.{n}" for n in range(2, 10)), *(f"3.{n}" for n in range(7, 15)), "8.9", "8.10", "9.4", "9.5",
           "9.6", "9.7", "9.13", "9.14", "11.4", "11.6")  # fmt: skip
 """Points that hardly anybody marks, beside others that many do: inside the lips, corners of the eyes."""
@@ -48,7 +48,7 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
     usual = seen.mean(axis=0) > 0.5
     frame = int(seen[:, usual].sum(axis=1).argmax()) if usual.any() else 0
     rows = np.flatnonzero(seen[frame])
-    if len(rows) < FEWEST:
+    if len(rows) < MIN_MARKERS:
         raise ModelError(
             f"no built-in set has the names of these markers, and {len(rows)} are too few to find a face by "
             "its shape"
@@ -56,7 +56,7 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
     model = FaceModel.default()
     cloud = motion.positions[frame, rows]
     laid, error = _lay_onto(cloud, model, motion.up)
-    if error > FITS:
+    if error > MAX_ERROR:
         raise ModelError(
             "no built-in set has the names of these markers, and their shape is not that of a face "
             f"(best fit {1000 * error:.0f} mm off)"
@@ -64,11 +64,13 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
     places = _skin_points(model)
     names = [name for name in places if name not in SELDOM]
     apart = np.linalg.norm(laid[:, None] - np.array([places[name] for name in names])[None], axis=2)
-    markers, targets = linear_sum_assignment(np.minimum(apart, NEAR))
+    markers, targets = linear_sum_assignment(np.minimum(apart, MAX_POINT_DISTANCE))
     result = {
-        motion.names[rows[m]]: names[t] for m, t in zip(markers, targets, strict=True) if apart[m, t] < NEAR
+        motion.names[rows[m]]: names[t]
+        for m, t in zip(markers, targets, strict=True)
+        if apart[m, t] < MAX_POINT_DISTANCE
     }
-    if len(result) < max(FEWEST, PLACED * len(rows)):
+    if len(result) < max(MIN_MARKERS, MIN_PLACED * len(rows)):
         raise ModelError(
             "no built-in set has the names of these markers, and their shape is not that of a face: only "
             f"{len(result)} of {len(rows)} would be where a face has feature points"
@@ -95,21 +97,24 @@ def _lay_onto(cloud: Float64, model: FaceModel, up: str) -> tuple[Float64, float
     key = np.array(list(_skin_points(model).values()))
     size = float(np.sqrt(((cloud - cloud.mean(axis=0)) ** 2).sum(axis=1).mean()))
     usual = float(np.sqrt(((key - key.mean(axis=0)) ** 2).sum(axis=1).mean()))
-    if not SIZES[0] * usual < max(FACTORS) * size or not min(FACTORS) * size < SIZES[1] * usual:
+    if (
+        not SIZE_RANGE[0] * usual < max(UNIT_FACTORS) * size
+        or not min(UNIT_FACTORS) * size < SIZE_RANGE[1] * usual
+    ):
         raise ModelError(
             "no built-in set has the names of these markers, and their shape is not that of a face: they "
             f"spread over {size:.2g} m in no unit of length that a face has"
         ).with_remedies(GIVE_MAP)
-    factor = min((1.0, *FACTORS), key=lambda each: abs(np.log(each * size / usual)))
+    factor = min((1.0, *UNIT_FACTORS), key=lambda each: abs(np.log(each * size / usual)))
     starts = []
     for axis in _up_axes(up):
-        for turn in range(TURNS):
+        for turn in range(DIRECTIONS):
             upright = _turn_up(axis)
-            starts.append(axis_matrices(1, 2 * np.pi * turn / TURNS) @ upright)
+            starts.append(axis_matrices(1, 2 * np.pi * turn / DIRECTIONS) @ upright)
     fits = sorted(
         (_fit(cloud * factor, start, tree, skin, key, 6) for start in starts), key=lambda fit: fit[1]
-    )[:BEST]
-    done = [_fit(laid, np.eye(3), tree, skin, key, ROUNDS, moved=True) for laid, _ in fits]
+    )[:FULL_FITS]
+    done = [_fit(laid, np.eye(3), tree, skin, key, ITERATIONS, moved=True) for laid, _ in fits]
     return min(done, key=lambda fit: fit[1])
 
 
@@ -150,7 +155,7 @@ def _fit(
         distance, nearest = tree.query(laid)
         weight = 1 / (1 + (distance / (2 * max(float(np.median(distance)), 1e-4))) ** 2)
         fit = fit_similarity(laid, skin[nearest], weight)
-        scale = np.clip(fit.scale, SIZES[0] / size, SIZES[1] / size)
+        scale = np.clip(fit.scale, SIZE_RANGE[0] / size, SIZE_RANGE[1] / size)
         size *= float(scale)
         laid = replace(fit, scale=scale).apply(laid)
     distance, _ = tree.query(laid)

@@ -13,29 +13,29 @@ from fba.errors import ModelError, Remedy
 from fba.face.feature_points import MIRRORED, row_of
 from fba.geometry import fit_similarity, principal_axes
 
-SIZES = (0.6, 1.6)
-"""Sizes of a face that are believed, relative to the adult's whose points are known."""
-FACTORS = (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
-"""What corrects a wrong unit: metres, centimetres, millimetres taken for each other."""
+SIZE_RANGE = (0.6, 1.6)
+"""Smallest and largest size of a face that is accepted, relative to the adult's whose points are known."""
+UNIT_FACTORS = (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
+"""Factors that correct a wrong unit: metres, centimetres and millimetres taken for each other."""
 MIRROR = 0.5
 """Markers are mirrored if their mirror image leaves less than this share of the error."""
-MIRROR_LEAST = 0.004
-"""... and if the error is larger than this, metres: flat sets of markers do not tell."""
-UPRIGHT = np.radians(8.0)
-"""A head is upright if it deviates from an axis of the capture by less than this."""
-SWAPPED = -0.5
-"""Two markers are swapped if their line points against that between their places: cosine."""
-APART = 0.008
-"""Metres that they must be apart at least."""
-ASTRAY = 0.03
-"""Metres from its place, on a face of the actor's size, from which a marker is somewhere else."""
-IRIS = 0.0117
-"""Width of the iris of adults, metres, hardly different between them."""
-FEWEST = 6
-"""Markers at known places that are needed to find a face."""
+MIN_MIRROR_ERROR = 0.004
+"""... and if the error is larger than this, in metres: flat sets of markers do not show it."""
+MAX_TILT = np.radians(8.0)
+"""Largest angle, in radians, of an upright head from an axis of the capture."""
+MAX_SWAPPED_COSINE = -0.5
+"""Two markers are swapped if the cosine between their line and that of their places is below this."""
+MIN_DISTANCE = 0.008
+"""Smallest distance, in metres, between two markers that are tested for being swapped."""
+MAX_DISTANCE = 0.03
+"""Largest distance of a marker from its place, in metres, on a face of the actor's size."""
+IRIS_WIDTH = 0.0117
+"""Width of the iris of adults, in metres, which is nearly the same in all."""
+MIN_MARKERS = 6
+"""Smallest number of markers at known places from which a face is found."""
 GIVE_MAP = Remedy("markers", "say which marker is where with {}", "{'Chin': '2.1', 'Cap1': 'head'}")
-LEAST_SPREAD = 0.05
-"""Share of their length by which markers must spread sideways."""
+MIN_SPREAD = 0.05
+"""Smallest sideways spread of markers, as a share of their length."""
 PAIRS = {**MIRRORED, "l_tragion": "r_tragion"}
 MIRROR_IMAGE = np.array([-1.0, 1.0, 1.0])
 
@@ -72,20 +72,20 @@ def register(
     places = target_points(template)
     whole: Bool = ~np.isnan(neutral[:, 0])
     rows = [n for n, name in enumerate(names) if markers.get(name) in places and whole[n]]
-    if len(rows) < FEWEST:
+    if len(rows) < MIN_MARKERS:
         raise ModelError(
-            f"{len(rows)} markers have a place on the face, but {FEWEST} are needed to find one"
+            f"{len(rows)} markers have a place on the face, but {MIN_MARKERS} are needed to find one"
         ).with_remedies(GIVE_MAP)
     found = neutral[rows]
     there = np.array([places[markers[names[n]]] for n in rows])
     labels = [names[n] for n in rows]
     _, spread = principal_axes(found)
-    if not spread[1] > LEAST_SPREAD * spread[0]:
+    if not spread[1] > MIN_SPREAD * spread[0]:
         raise ModelError("the markers of the face are all on one line, or in one place")
     mirrored = False
     _, error, scale = _align(found, there)
     _, error_turned, _ = _align(found * MIRROR_IMAGE, there)
-    if error_turned < MIRROR * error and error > MIRROR_LEAST:
+    if error_turned < MIRROR * error and error > MIN_MIRROR_ERROR:
         mirrored, found = True, found * MIRROR_IMAGE
     swapped = _find_swaps(labels, found, there)
     for one, other in swapped:
@@ -116,7 +116,7 @@ def _find_swaps(labels: list[str], found: Float64, there: Float64) -> list[tuple
         for b in range(a):
             line, should = placed[a] - placed[b], goal[a] - goal[b]
             lengths = np.linalg.norm(line), np.linalg.norm(should)
-            if min(lengths) > APART and line @ should < SWAPPED * lengths[0] * lengths[1]:
+            if min(lengths) > MIN_DISTANCE and line @ should < MAX_SWAPPED_COSINE * lengths[0] * lengths[1]:
                 before = np.linalg.norm(placed[a] - goal[a]) + np.linalg.norm(placed[b] - goal[b])
                 after = np.linalg.norm(placed[b] - goal[a]) + np.linalg.norm(placed[a] - goal[b])
                 if after < MIRROR * before:
@@ -134,12 +134,12 @@ def _find_astray(labels: list[str], found: Float64, there: Float64) -> list[str]
     """Return the markers that are far from their places, the farthest first."""
     kept = list(range(len(labels)))
     result: list[str] = []
-    while len(kept) > FEWEST:
+    while len(kept) > MIN_MARKERS:
         rotation, _, scale = _align(found[kept], there[kept])
         placed = scale * (found[kept] - found[kept].mean(axis=0)) @ rotation.T
         off = np.linalg.norm(placed - (there[kept] - there[kept].mean(axis=0)), axis=1)
         worst = int(off.argmax())
-        if off[worst] < max(ASTRAY, 4 * float(np.median(off))):
+        if off[worst] < max(MAX_DISTANCE, 4 * float(np.median(off))):
             break
         result.append(labels[kept.pop(worst)])
     return result
@@ -150,10 +150,10 @@ def _find_factor(size: float) -> float:
 
     size: of the actor's face, relative to a known one, if coordinates were metres.
     """
-    if SIZES[0] < size < SIZES[1]:
+    if SIZE_RANGE[0] < size < SIZE_RANGE[1]:
         return 1.0
-    for factor in FACTORS:
-        if SIZES[0] < size * factor < SIZES[1]:
+    for factor in UNIT_FACTORS:
+        if SIZE_RANGE[0] < size * factor < SIZE_RANGE[1]:
             return factor
     raise ModelError(
         f"the face would be {size:.3g} times as large as an adult's, and no unit of length explains that; "
@@ -174,13 +174,13 @@ def _upright(rotation: Float64, pairs: Float64) -> Float64:
     up = rotation[1]
     nearest = np.zeros(3)
     nearest[np.abs(up).argmax()] = np.sign(up[np.abs(up).argmax()])
-    if np.arccos(np.clip(up @ nearest, -1, 1)) < UPRIGHT:
+    if np.arccos(np.clip(up @ nearest, -1, 1)) < MAX_TILT:
         up = nearest
     left = rotation[0]
     if len(pairs):
         across = pairs.sum(axis=0)
         across /= np.linalg.norm(across)
-        left = across if across @ left > np.cos(2 * UPRIGHT) else left
+        left = across if across @ left > np.cos(2 * MAX_TILT) else left
     front = np.cross(left, up)
     front /= np.linalg.norm(front)
     return np.stack([left, np.cross(front, left), front])
@@ -231,6 +231,6 @@ def _open_lids(points: Float64, known: Mapping[str, Float64]) -> None:
     for upper, lower in (("3.1", "3.3"), ("3.2", "3.4")):
         if upper in known and lower in known:
             continue
-        opening = (points[rows[upper], 1] - points[rows[lower], 1] + IRIS) / 2
+        opening = (points[rows[upper], 1] - points[rows[lower], 1] + IRIS_WIDTH) / 2
         held, other, sign = (upper, lower, -1.0) if upper in known else (lower, upper, 1.0)
         points[rows[other], 1] = points[rows[held], 1] + sign * opening

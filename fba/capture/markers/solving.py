@@ -1,7 +1,9 @@
 """Displacements of markers to FAPs: a least-squares solution within bounds, with the responses of a face.
 
 Each feature point is looked at along the directions of its own FAPs, and of those of the lip contour beside
-it. The jaw moves on an arc whose shape depends on the skull, so its depth is fitted to the take.
+it. The jaw moves on an arc whose shape depends on the skull, so its depth is fitted to the take. It
+turns about its joint, in front of the ears, which slides forward as it does. How far the chin goes back for
+each millimetre that it sinks differs by a third between faces, and follows from where chin and ears are.
 """
 
 from __future__ import annotations
@@ -12,24 +14,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.capture.markers.jaws import jaw_curves
 from fba.capture.markers.responses import JAW, JAW_VALUES, Responses
 from fba.face import Fapu
+from fba.face.authoring.regions.jaw import CHIN, EARS, Jaw, opening_angles, opening_shifts
 from fba.face.feature_points import row_of
 from fba.face.points import DIRECTIONS
 from fba.parameters import FAP_COUNT, faps
 
-RIDGE = 1e-4
+RIDGE_WEIGHT = 1e-4
 """Weight of small values, relative to that of the displacements."""
-ROUNDS = 3
-"""Solutions, each with the jaw's arc at the values of the one before."""
-SWEEPS = 8
-"""Rounds in which values are held at a bound or let go."""
+JAW_ROUNDS = 3
+"""Number of solutions, each with the jaw's arc at the values of the previous one."""
+BOUND_ROUNDS = 8
+"""Largest number of rounds in which values are fixed at a bound or released."""
 JAW_STEP = 2
 """Row of `JAW_VALUES` that is the first guess of how far the jaw moves what."""
 BESIDE_CHIN = ("2.11", "2.12")
 """Points without a FAP of their own, which go up, down, forward and back with the jaw."""
-INNER = {"8.1": "2.2", "8.2": "2.3", "8.3": "2.4", "8.4": "2.5", "8.5": "2.6", "8.6": "2.7", "8.7": "2.8",
+INNER_LIP = {"8.1": "2.2", "8.2": "2.3", "8.3": "2.4", "8.4": "2.5", "8.5": "2.6", "8.6": "2.7", "8.7": "2.8",
          "8.8": "2.9"}  # fmt: skip
 """The point of the inner lip beside each of the outer lip."""
 
@@ -57,7 +59,7 @@ def choose_unknowns(points: Sequence[str], depth: bool = True, untold: Collectio
     for fap in faps()[2:]:
         axis = _axis(fap.positive)
         owner = next((point for point in fap.feature_points if point in given), None)
-        inner = next((outer for outer, point in INNER.items() if point in fap.feature_points), None)
+        inner = next((outer for outer, point in INNER_LIP.items() if point in fap.feature_points), None)
         if axis is None or fap.unit == "AU" or (axis == 2 and not depth) or fap.number in untold:
             continue
         if owner is not None:
@@ -98,11 +100,11 @@ def solve(moved: Float64, still: Float64, fapu: Fapu, unknowns: Unknowns, respon
     if jaw is not None:
         matrix[jaw] = curve[JAW_STEP] / JAW_VALUES[JAW_STEP]
     size = float(np.linalg.norm(matrix, axis=1).mean()) or 1.0
-    inverse = np.linalg.inv(matrix @ matrix.T + RIDGE * size**2 * np.eye(len(columns)))
+    inverse = np.linalg.inv(matrix @ matrix.T + RIDGE_WEIGHT * size**2 * np.eye(len(columns)))
     one_way = np.flatnonzero([faps()[c].direction == "U" for c in columns])
     values = _solve_bounded(inverse, seen @ matrix.T, one_way)
     if jaw is not None:
-        for _ in range(ROUNDS):
+        for _ in range(JAW_ROUNDS):
             opened = values[:, jaw]
             arc = np.stack([np.interp(opened, JAW_VALUES, curve[:, r]) for r in range(len(points))], axis=1)
             bent = seen - arc + np.outer(opened, matrix[jaw])
@@ -123,7 +125,7 @@ def _solve_bounded(inverse: Float64, right: Float64, one_way: Intp) -> Float64:
     free: Float64 = right @ inverse
     held = free[:, one_way] < 0
     values = free
-    for _ in range(SWEEPS):
+    for _ in range(BOUND_ROUNDS):
         values, pull = free.copy(), np.zeros(held.shape)
         codes = held @ (1 << np.arange(len(one_way)))
         for code in np.unique(codes[codes > 0]):
@@ -145,3 +147,17 @@ def _solve_bounded(inverse: Float64, right: Float64, one_way: Intp) -> Float64:
 def _axis(word: str) -> int | None:
     """Return the axis of the standard's word for a motion; None for turns and growth."""
     return int(np.argmax(np.abs(DIRECTIONS[word]))) if word in DIRECTIONS else None
+
+
+def jaw_curves(points: Float64, fapu: Fapu) -> dict[int, Float64]:
+    """Return shifts (J, 3) in MNS at `JAW_VALUES` of each feature point on the chin, by its row.
+
+    points: float64 (84, 3), the actor's neutral feature points, metres, along the standard's axes.
+    """
+    rows = [row_of()[name] for name in CHIN]
+    hinge = points[[row_of()[name] for name in EARS]].mean(axis=0)[1:]
+    none = np.zeros(0)
+    jaw = Jaw(none, none, hinge, points[row_of()["2.1"]], fapu.ES * 1024)
+    values, angles = opening_angles(jaw, fapu.MNS)
+    shifts = opening_shifts(points[rows], jaw, np.interp(JAW_VALUES, values, angles)) / fapu.MNS
+    return {row: shifts[:, n] for n, row in enumerate(rows)}

@@ -10,13 +10,13 @@ from fba.errors import ModelError
 from fba.geometry import nearest_rotation, principal_axes
 
 PASSES = 4
-"""Fits, each with less weight for markers that the one before left far off."""
-LEAST_SCALE = 2e-4
-"""Metres by which every marker may be off without losing weight: the noise of good cameras."""
-SAMPLES = 300
-"""Frames, about, that tell the average."""
-SPREAD = 0.005
-"""Metres that markers must spread in two directions, so that a rotation can be found."""
+"""Number of fits, each with less weight for markers that the previous one left far off."""
+MIN_SCALE = 2e-4
+"""Error, in metres, that no marker loses weight for: the noise of good cameras."""
+SAMPLE_FRAMES = 300
+"""Approximate number of frames from which the average is made."""
+MIN_SPREAD = 0.005
+"""Smallest spread of markers in two directions, in metres, at which a rotation is defined."""
 
 
 def fit_poses(reference: Float64, positions: Float64) -> tuple[Float64, Float64, Float64]:
@@ -45,7 +45,7 @@ def fit_poses(reference: Float64, positions: Float64) -> tuple[Float64, Float64,
         shift = there - np.einsum("tcd,td->tc", rotation, own)
         off = known - np.einsum("tcd,kd->tkc", rotation, body) - shift[:, None]
         left = np.where(seen, np.sqrt((off**2).sum(axis=2)), np.nan)
-        scale = np.maximum(_median(left, seen), LEAST_SCALE)
+        scale = np.maximum(_median(left, seen), MIN_SCALE)
         weights = np.where(seen, 1 / (1 + (np.nan_to_num(left) / (2 * scale[:, None])) ** 2) ** 2, 0.0)
     rotation[~usable], shift[~usable], left[~usable] = np.nan, np.nan, np.nan
     return rotation, shift, left
@@ -56,7 +56,7 @@ def refine_reference(reference: Float64, positions: Float64) -> Float64:
 
     reference: a first guess, such as the markers of one frame; a missing one is filled in.
     """
-    positions = positions[:: max(1, len(positions) // SAMPLES)]
+    positions = positions[:: max(1, len(positions) // SAMPLE_FRAMES)]
     for _ in range(2):
         rotation, shift, _ = fit_poses(reference, positions)
         back = np.einsum("tdc,tkd->tkc", rotation, positions - shift[:, None])
@@ -124,7 +124,7 @@ def _has_spread(points: Float64) -> bool:
     """Whether there are three points at least that are not on a line."""
     if len(points) < 3:
         return False
-    return bool(principal_axes(points)[1][1] > SPREAD)
+    return bool(principal_axes(points)[1][1] > MIN_SPREAD)
 
 
 def _median(values: Float64, seen: Bool) -> Float64:

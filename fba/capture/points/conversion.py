@@ -13,6 +13,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64, Intp
 from fba.capture.markers.faces import MarkerFace, Traits, find_face, from_markers
 from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers.stabilisation import fit_poses, refine_reference
 from fba.capture.markers.targets import HEAD, target_points
 from fba.capture.points.lifting import lift
 from fba.capture.points.motion import PointMotion
@@ -25,21 +26,24 @@ from fba.capture.points.places import (
     point_places,
     take_points,
 )
-from fba.capture.points.sizes import even_sizes
 from fba.capture.sampling import find_gaps, interpolate
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
 
 Neutral = str | int | tuple[float, float]
-GUESSED = frozenset({14})
-"""FAPs that a depth which a tracker guesses does not tell: the jaw's thrust is lost in the chin's arc."""
-MISFIT = 0.02
-"""Metres by which half of the points are off a known face at most; those of real faces are 5 mm off."""
-SAMPLES = 60
-"""Frames, about, that tell whether points are those of a face."""
-FRAME_BYTES = 400
-"""Memory for each point in each frame."""
+GUESSED_DEPTH_FAPS = frozenset({14})
+"""FAPs that a depth guessed by a tracker does not show: the jaw's thrust is lost in the chin's arc."""
+MAX_MISFIT = 0.02
+"""Largest median distance, in metres, of the points from a known face; those of real faces are 5 mm off."""
+SAMPLE_FRAMES = 60
+"""Approximate number of frames that are tested for being a face."""
+POINT_BYTES = 400
+"""Memory, in bytes, for each point in each frame."""
+SIZE_ROUNDS = 2
+"""Number of fits of the size, each with the rotations of the previous one."""
+MEDIAN_REACH = 1
+"""Number of frames before and behind whose median is the size: heads approach slowly, trackers tremble."""
 
 
 def from_points(
@@ -120,7 +124,7 @@ def prepare(
     if not seen.any():
         raise ModelError(f"no face is seen in any of the {len(motion)} frames; there is nothing to encode")
     _tell_unseen(motion)
-    limits.check_bytes(FRAME_BYTES * len(motion) * len(places), "the capture", source=motion.positions.nbytes)
+    limits.check_bytes(POINT_BYTES * len(motion) * len(places), "the capture", source=motion.positions.nbytes)
     points = take_points(motion.positions[seen], tuple(places))
     common: Bool = np.asarray(np.isfinite(points[..., 0]).any(axis=0))
     points = points[:, common]
@@ -134,7 +138,7 @@ def prepare(
     if motion.flat:
         points = lift(points, places, template, motion.times[seen], model)
     elif not motion.metric:
-        points = even_sizes(points, template, fixed)
+        points = _even_sizes(points, template, fixed)
     _check_face(points, template)
     rests: dict[str, Intp] = {}
     raised: dict[str, float] = {}
@@ -151,7 +155,7 @@ def prepare(
         raise OptionError(f"neutral: frame {neutral} has no face")
     points = _bridge(points, motion, limits)
     taken = MarkerMotion(names, points, motion.times, motion.rate, "m", "+y", motion.name)
-    untold = frozenset() if motion.metric or motion.flat else GUESSED
+    untold = frozenset() if motion.metric or motion.flat else GUESSED_DEPTH_FAPS
     traits = Traits(
         still=still,
         depth=not motion.flat,
@@ -168,9 +172,9 @@ def _check_face(points: Float64, template: Float64) -> None:
     """Raise ModelError for points (T, M, 3) that do not lie as on a face, template (M, 3)."""
     known = ~np.isnan(template[:, 0])
     whole = ~np.isnan(points[:, known]).any(axis=(1, 2))
-    some = points[whole][:: max(1, int(whole.sum()) // SAMPLES)][:, known]
+    some = points[whole][:: max(1, int(whole.sum()) // SAMPLE_FRAMES)][:, known]
     off = face_misfit(some, template[known]) if len(some) else 0.0
-    if off > MISFIT:
+    if off > MAX_MISFIT:
         raise ModelError(
             f"the points do not lie as those of a face: they are {1000 * off:.0f} mm off; are they "
             "another tracker's, or in another order?"
@@ -206,3 +210,57 @@ def _tell_unseen(motion: PointMotion) -> None:
         f"{int((~seen).sum())} of {len(seen)} frames have no face; they are bridged, {longest:.2f} s at most",
         FbaWarning, stacklevel=4,
     )  # fmt: skip
+
+
+def _even_sizes(points: Float64, template: Float64, still: list[int]) -> Float64:
+    """Return points of one size, metres, as large as an adult's face.
+
+    Points in units of a picture are larger where the head comes nearer.
+
+    points: float64 (T, M, 3), in one unit within each frame. template: (M, 3), where they are on an adult's
+    face, NaN where unknown. still: numbers of those that the face does not move.
+    """
+    fixed = points[:, still]
+    middle = np.nanmean(fixed, axis=1, keepdims=True)
+    size = np.sqrt(np.nanmean((fixed - middle) ** 2, axis=(1, 2)))
+    seen: Bool = np.isfinite(size) & (size > 0)
+    usual = _adult_size(points[seen] / size[seen, None, None], template)
+    sizes = np.where(seen, size, np.nan) * usual
+    for _ in range(SIZE_ROUNDS):
+        even = fixed / sizes[:, None, None]
+        first = int((~np.isnan(even[..., 0])).sum(axis=1).argmax())
+        reference = refine_reference(even[first].copy(), even)
+        rotation, _, off = fit_poses(reference, even)
+        weights = 1 / (1 + (off / (2 * np.nanmedian(off))) ** 2) ** 2
+        weights = np.nan_to_num(weights * (~np.isnan(even[..., 0])))
+        sizes *= _size_ratios(reference, even, rotation, weights)
+    return points / _smooth_sizes(sizes)[:, None, None]
+
+
+def _adult_size(points: Float64, template: Float64) -> float:
+    """Return the number by which points (T, M, 3) are larger than a template (M, 3)."""
+    known = ~np.isnan(template[:, 0])
+    usual = np.nanmedian(points[:, known], axis=0)
+    lines = np.linalg.norm(usual[:, None] - usual[None], axis=2)
+    should = np.linalg.norm(template[known][:, None] - template[known][None], axis=2)
+    return float(np.nansum(lines) / should.sum())
+
+
+def _size_ratios(reference: Float64, even: Float64, rotation: Float64, weights: Float64) -> Float64:
+    """Return the ratio of each frame's size to the reference's: float64 (T,), NaN where nothing is seen."""
+    known = np.nan_to_num(even)
+    total = np.maximum(weights.sum(axis=1), 1e-12)[:, None]
+    own = (weights @ reference) / total
+    there = np.einsum("tk,tkc->tc", weights, known) / total
+    turned = np.einsum("tdc,tkc->tkd", rotation, reference[None] - own[:, None])
+    top = np.einsum("tk,tkc,tkc->t", weights, known - there[:, None], turned)
+    bottom = np.einsum("tk,tkc,tkc->t", weights, turned, turned)
+    return np.asarray(top / np.where(bottom > 0, bottom, np.nan))
+
+
+def _smooth_sizes(sizes: Float64) -> Float64:
+    """Return the moving median of sizes (T,), NaN where they are."""
+    padded = np.pad(sizes, MEDIAN_REACH, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * MEDIAN_REACH + 1)
+    steady = np.nanmedian(windows, axis=1)
+    return np.asarray(np.where(np.isnan(sizes), np.nan, steady))

@@ -22,26 +22,26 @@ from fba.face import FaceModel
 from fba.face.feature_points import row_of
 from fba.parameters import faps
 
-FEWEST = 5
-"""Still points that tell a pose."""
-ROUNDS = 10
-"""Times that shape and poses are found, each from the other."""
-SAMPLES = 60
-"""Frames, about, that tell the shape."""
-USUAL = {"MNS": 150.0, "MW": 100.0, "ENS": 120.0, "ES": 60.0, "IRISD": 400.0}
-"""How far FAPs of each unit go, root mean square, thousandths of the unit."""
-GAZE = (0.004, 0.003)
-"""Metres by which eyes move their pupils aside, and up and down."""
+MIN_STILL_POINTS = 5
+"""Smallest number of still points that define a pose."""
+ITERATIONS = 10
+"""Number of iterations in which shape and poses are computed, each from the other."""
+SAMPLE_FRAMES = 60
+"""Approximate number of frames from which the shape is computed."""
+USUAL_FAPS = {"MNS": 150.0, "MW": 100.0, "ENS": 120.0, "ES": 60.0, "IRISD": 400.0}
+"""Usual size of FAPs of each unit, root mean square, in thousandths of the unit."""
+GAZE_SHIFT = (0.004, 0.003)
+"""Metres by which eyes move their pupils sideways, and up and down."""
 NOISE = 4e-4
-"""Metres by which trackers are off."""
-OTHER = np.array([0.005, 0.005, 0.004])
-"""Metres by which points of another face of the same size are elsewhere, sideways, up and in depth."""
-REACH = 0.015
-"""Metres over which such errors are alike."""
-ALONE = 0.0015
-"""Metres by which single points are elsewhere than those around them."""
-PER_SECOND = 2.0
-"""Frames in a second that tell something new of the shape."""
+"""Error of trackers, in metres."""
+FACE_DIFFERENCE = np.array([0.005, 0.005, 0.004])
+"""Distance of points between faces of one size, in metres: sideways, up and in depth."""
+CORRELATION_LENGTH = 0.015
+"""Distance, in metres, over which such differences are alike."""
+POINT_DIFFERENCE = 0.0015
+"""Distance, in metres, by which single points differ from those around them."""
+INDEPENDENT_RATE = 2.0
+"""Number of frames per second that carry new information about the shape."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,17 +71,17 @@ def lift(
     """
     known = _know(list(places.values()), template, model)
     spread = np.sqrt(np.diag(known.motion).reshape(-1, 3).sum(axis=1))
-    if (spread < NOISE).sum() < FEWEST:
+    if (spread < NOISE).sum() < MIN_STILL_POINTS:
         raise ModelError(
             f"{int((spread < NOISE).sum())} points without depth are at places that the face does not move; "
-            f"{FEWEST} are needed to tell how the head turns"
+            f"{MIN_STILL_POINTS} are needed to tell how the head turns"
         )
     trust = NOISE**2 / (NOISE**2 + spread**2)
-    some = slice(None, None, max(1, len(points) // SAMPLES))
+    some = slice(None, None, max(1, len(points) // SAMPLE_FRAMES))
     few = points[some]
-    share = min(1.0, PER_SECOND * float(times[-1] - times[0] + 0.5) / len(few))
+    share = min(1.0, INDEPENDENT_RATE * float(times[-1] - times[0] + 0.5) / len(few))
     shape = template.copy()
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         poses = fit_poses(shape, few, trust)
         shape = _refine(shape, few, poses, known, share)
     poses = fit_poses(shape, points, trust)
@@ -95,18 +95,18 @@ def _know(places: list[str], template: Float64, model: FaceModel) -> Knowledge:
     each = measure_responses(model).each
     moves = np.zeros((len(each), len(places), 3))
     for fap in faps()[2:]:
-        if fap.unit in USUAL:
-            size = USUAL[fap.unit] * model.fapu[fap.unit]
+        if fap.unit in USUAL_FAPS:
+            size = USUAL_FAPS[fap.unit] * model.fapu[fap.unit]
             for n, row in enumerate(rows):
                 if row is not None and places[n] not in RIGID:
                     moves[fap.number - 1, n] = each[fap.number - 1, row] * size
     pupils = [n for n, place in enumerate(places) if place in PUPILS]
     looks = np.zeros((2, len(places), 3))
-    looks[0, pupils, 0], looks[1, pupils, 1] = GAZE
+    looks[0, pupils, 0], looks[1, pupils, 1] = GAZE_SHIFT
     flat = np.concatenate([moves, looks]).reshape(-1, 3 * len(places))
     apart = np.linalg.norm(template[:, None] - template[None], axis=2)
-    alike = np.exp(-((apart / REACH) ** 2) / 2)
-    shape = np.kron(alike, np.diag(OTHER**2)) + ALONE**2 * np.eye(3 * len(places))
+    alike = np.exp(-((apart / CORRELATION_LENGTH) ** 2) / 2)
+    shape = np.kron(alike, np.diag(FACE_DIFFERENCE**2)) + POINT_DIFFERENCE**2 * np.eye(3 * len(places))
     return Knowledge(template, np.asarray(np.linalg.inv(shape)), np.asarray(flat.T @ flat))
 
 
@@ -154,8 +154,8 @@ def _in_head(points: Float64, shape: Float64, poses: Poses, known: Knowledge) ->
     seen = _seen(points, poses)
     off = (seen - np.einsum("tac,nc->tna", rows, shape)).reshape(len(rows), -1)
     deep = np.empty(points.shape[:2])
-    for first in range(0, len(points), SAMPLES):
-        part = slice(first, first + SAMPLES)
+    for first in range(0, len(points), SAMPLE_FRAMES):
+        part = slice(first, first + SAMPLE_FRAMES)
         some = Poses(poses.scale[part], poses.rotation[part], poses.shift[part])
         shows, inverse = _inverse(some, known)
         moved = shows @ (inverse @ off[part, :, None])

@@ -20,7 +20,7 @@ OTHERS = {
     194: "HELEN", 543: "MediaPipe Holistic, a face of which is 468", 553: "MediaPipe Holistic",
 }  # fmt: skip
 """Who else marks a face with how many points."""
-LARGEST = 1e7
+MAX_COORDINATE = 1e7
 """Largest coordinate; more is damage."""
 
 
@@ -68,8 +68,8 @@ class PointMotion:
         if self.aspect is not None and not 0.1 <= self.aspect <= 10:
             raise ModelError(f"a picture {self.aspect:g} times as wide as high is impossible")
         positions[np.isnan(positions).any(axis=2)] = np.nan
-        if (np.abs(positions) > LARGEST).any():
-            frame, point, axis = np.argwhere(np.abs(positions) > LARGEST)[0].tolist()
+        if (np.abs(positions) > MAX_COORDINATE).any():
+            frame, point, axis = np.argwhere(np.abs(positions) > MAX_COORDINATE)[0].tolist()
             raise ModelError(f"frame {frame}: point {point} is at {positions[frame, point, axis]:g}")
         eyes = None if self.eyes is None else np.array(self.eyes, dtype=np.float64)
         if eyes is not None and eyes.shape != (len(times), 4):

@@ -19,7 +19,7 @@ WINDOW = 0.1
 """Seconds whose median is the neutral face."""
 LID_SHARE = 75
 """Percentile of the openings of eyes that is usual for eyes that are open."""
-SPREAD = {
+SPREADS = {
     "gap": 0.04, "width": 0.07, "corners": 0.03, "jaw": 0.12, "lids": 0.15, "brows": 0.045, "apart": 0.05,
 }  # fmt: skip
 """How far measures of neutral faces are from those of a known one, in distances of the eyes."""
@@ -27,13 +27,18 @@ WIDTH = 0.8
 """Width of mouths at rest, in distances of the eyes: that of the known face is at the broad end."""
 BROWS = 0.017
 """How much higher brows rest than those of the known face, in distances of the eyes."""
-CROWD, NEAR = 4.0, 0.02
-"""Cost of a height of the brows for each factor e by which fewer frames have it; how near is the same."""
+CROWD_COST = 4.0
+"""Cost of a height of the brows for each factor e by which fewer frames have it."""
+SAME_HEIGHT = 0.02
+"""Difference of heights of the brows, in distances of the eyes, that count as the same."""
 HIGHEST = 2.0
 """Spreads by which brows rest higher or lower than usual at most: those that always do are held so."""
-HELD, MUCH, SURE = 0.06, 0.15, 6.0
-"""Distance between brows at rest and held ones, share of frames in which that matters, and the lead in cost
-that a rest has where it is beyond doubt."""
+HELD_DISTANCE = 0.06
+"""Distance between brows at rest and held ones, in distances of the eyes."""
+HELD_SHARE = 0.15
+"""Share of frames in which held brows matter."""
+SURE_LEAD = 6.0
+"""Lead in cost that a rest has where it is beyond doubt."""
 NEEDED = ("3.7", "3.8", "3.11", "3.12", "9.15")
 """Places without which nothing is measured."""
 AHEAD = 3.0
@@ -114,8 +119,8 @@ def _crowd_costs(heights: Float64, turned: Float64) -> Float64:
     """Return what frames (T,) cost for being few of their height of brows. turned: cost of turns (T,)."""
     ahead = np.isfinite(heights) & (turned < AHEAD)
     ordered = np.sort(heights[ahead] if ahead.any() else heights[np.isfinite(heights)])
-    first, last = (np.searchsorted(ordered, heights + side * NEAR) for side in (-1, 1))
-    return np.asarray(CROWD * np.log(len(ordered) / np.maximum(last - first, 1)))
+    first, last = (np.searchsorted(ordered, heights + side * SAME_HEIGHT) for side in (-1, 1))
+    return np.asarray(CROWD_COST * np.log(len(ordered) / np.maximum(last - first, 1)))
 
 
 def _judge_brows(
@@ -126,9 +131,9 @@ def _judge_brows(
     heights: (T,), above those of usual faces. cost: (T,), of frames as rests. eyes: their distance, metres.
     """
     there = float(np.nanmedian(heights[rest]))
-    excess = float(there - np.clip(there, -HIGHEST * SPREAD["brows"], HIGHEST * SPREAD["brows"]))
+    excess = float(there - np.clip(there, -HIGHEST * SPREADS["brows"], HIGHEST * SPREADS["brows"]))
     ahead = turned < AHEAD
-    others = ahead & (np.abs(heights - there) > HELD)
+    others = ahead & (np.abs(heights - there) > HELD_DISTANCE)
     at = f"{float(times[rest].mean() - times[0]):.1f} s"
     said = []
     if excess:
@@ -136,11 +141,11 @@ def _judge_brows(
             f"brows are {1000 * abs(there) * eyes:.1f} mm {_way(excess)} than they usually rest, even then: "
             f"{1000 * abs(excess) * eyes:.1f} mm of that are shown, the other as this face's own"
         )
-    if others.sum() > MUCH * ahead.sum():
+    if others.sum() > HELD_SHARE * ahead.sum():
         apart = float(np.median(heights[others])) - there
         share = f"{100 * others.sum() / ahead.sum():.0f} % of the film"
         text = f"for {share} they are held {1000 * abs(apart) * eyes:.0f} mm {_way(apart)}"
-        if float(np.nanmin(cost[others])) - float(np.nanmin(cost[rest])) < SURE:
+        if float(np.nanmin(cost[others])) - float(np.nanmin(cost[rest])) < SURE_LEAD:
             text += ", or it is the other way round, which is hard to tell"
         said.append(text)
     if said:
@@ -182,8 +187,8 @@ def _shape_costs(points: Float64, template: Float64, where: Mapping[str, int]) -
     if "brows" in usual:
         usual["brows"] = usual["brows"] + BROWS
     for name, values in _measures(points, where).items():
-        off = (values - usual[name]) / SPREAD[name]
-        moving = np.abs(np.gradient(values)) / SPREAD[name] if len(values) > 1 else np.zeros(len(values))
+        off = (values - usual[name]) / SPREADS[name]
+        moving = np.abs(np.gradient(values)) / SPREADS[name] if len(values) > 1 else np.zeros(len(values))
         result[name] = off**2 + (moving / MOVING) ** 2
     return result
 

@@ -22,8 +22,8 @@ from fba.source import Path
 
 PARTS = {68: (68,), 70: (68, 70), 468: (468,), 478: (468, 478)}
 """Rows of the table that count for each number of points."""
-MOST = 8
-"""Most points whose middle is a place."""
+MAX_POINTS = 8
+"""Largest number of points whose middle is a place."""
 TABLE = "markers"
 
 
@@ -69,7 +69,7 @@ def numbers_of(points: str, count: int) -> tuple[int, ...]:
     if not re.fullmatch(r"\d{1,4}(\+\d{1,4})*", points, re.ASCII):
         raise OptionError(f"{points!r} is no point; expected a number, or several as in 37+38")
     numbers = tuple(map(int, points.split("+")))
-    if max(numbers) >= count or len(numbers) > MOST:
+    if max(numbers) >= count or len(numbers) > MAX_POINTS:
         raise OptionError(f"there is no point {points}; the tracker has points 0 to {count - 1}")
     return numbers
 

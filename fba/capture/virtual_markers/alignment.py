@@ -10,13 +10,14 @@ from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.geometry import principal_axes
 
-FEWEST = 3
-SPREAD = 0.02
-"""Share of their length by which points must spread sideways."""
+MIN_POINTS = 3
+"""Smallest number of points that define an alignment."""
+MIN_SPREAD = 0.02
+"""Smallest sideways spread of points, as a share of their length."""
 MIRRORED = 0.5
 """Points are mirrored if their mirror image leaves less than this share of the error."""
-CLEAR = 0.05
-"""... and if the error is larger than this share of their size: flat sets of markers do not tell."""
+MIN_MIRROR_ERROR = 0.05
+"""... and if the error is larger than this share of their size: flat sets of markers do not show it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +50,21 @@ def align(points: Float64, places: Float64) -> Alignment:
 
     ModelError for fewer than three points, or points on one line.
     """
-    if len(points) < FEWEST:
+    if len(points) < MIN_POINTS:
         raise ModelError(
-            f"{len(points)} markers with a vertex cannot be laid onto a head: {FEWEST} at least are needed"
+            f"{len(points)} markers with a vertex cannot be laid onto a head: "
+            f"{MIN_POINTS} at least are needed"
         )
     for what, cloud in (("markers", points), ("vertices of the virtual markers", places)):
         _, spread = principal_axes(cloud)
-        if not spread[1] > SPREAD * spread[0]:
+        if not spread[1] > MIN_SPREAD * spread[0]:
             raise ModelError(f"the {what} are all on one line, or in one place")
     plain = _fit(points, places, np.ones(3))
     turned = _fit(points, places, np.array([-1.0, 1.0, 1.0]))
     size = float(np.sqrt(((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
-    return turned if turned.error < MIRRORED * plain.error and plain.error > CLEAR * size else plain
+    return (
+        turned if turned.error < MIRRORED * plain.error and plain.error > MIN_MIRROR_ERROR * size else plain
+    )
 
 
 def _fit(points: Float64, places: Float64, mirror: Float64) -> Alignment:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
@@ -13,27 +13,43 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64, Int32, Intp
-from fba.capture.virtual_markers.followers import find_followers
 from fba.capture.virtual_markers.influence import WalkedMesh
 from fba.errors import ModelError
+from fba.face.authoring.surface.attached_parts import attach
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface
+from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import names, row_of
 from fba.face.importers import import_model, sniff
 from fba.face.importers.assembly.model import metres_per_unit
 from fba.face.importers.head_surface import HeadSurface, read_head_surface
-from fba.face.model import FaceModel, Part
+from fba.face.model import FaceModel, Part, point_row
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import feature_points
+from fba.parameters import FAP_COUNT, feature_points
 
 BUILT_IN = "built-in head"
-HEIGHT = 0.26
-"""Metres that a head of no known unit is taken to be high."""
-OUTER = ("2", "4", "5", "8", "9", "11")
+DEFAULT_HEIGHT = 0.26
+"""Height, in metres, that is assumed of a head whose unit is unknown."""
+OUTER_GROUPS = ("2", "4", "5", "8", "9", "11")
 """Groups of feature points on the outer skin of a face."""
-DIGITS = 16
+DIGEST_DIGITS = 16
 """Hexadecimal digits of a digest that tell meshes apart."""
+ON_SKIN = ("brow", "lash")
+"""Kinds of parts that go with the skin around their roots."""
+IN_MOUTH = ("teeth", "tongue")
+"""Kinds of parts that go with the chin, as far as the jaw's FAP moves them."""
+OPEN_JAW = 3
+"""Number of the FAP that opens the jaw."""
+OPEN_JAW_VALUE = 300
+"""Value of that FAP, in MNS, at which the movement of teeth and tongue is measured."""
+CHIN_POINTS = ("2.1", "2.10")
+MAX_PIECE_DISTANCE = 0.006
+"""Largest distance from the skin, in metres, of all vertices of a piece that goes with it."""
+MAX_PIECE_SIZE = 0.08
+"""Largest extent, in metres, of a piece that goes with the skin."""
+Followed = tuple[Intp, Intp, Float64]
+"""Vertices of the head, vertices of the skin that they go with, and the shares of its movement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +112,9 @@ class MarkedHead:
         component = self.skin.component
         number = self.skin.number
         used = np.unique(self.triangles)
-        outside = [row for row, point in enumerate(feature_points()) if point.name.split(".")[0] in OUTER]
+        outside = [
+            row for row, point in enumerate(feature_points()) if point.name.split(".")[0] in OUTER_GROUPS
+        ]
         bound = self.bound[outside]
         known = number[bound[bound >= 0]] if (bound >= 0).any() else number[used]
         main = int(np.bincount(component[known]).argmax())
@@ -105,12 +123,12 @@ class MarkedHead:
     @cached_property
     def connectivity(self) -> str:
         """A digest of the triangles: two meshes with the same one have the same vertex numbers."""
-        return sha256(np.ascontiguousarray(self.triangles, dtype="<i4").tobytes()).hexdigest()[:DIGITS]
+        return sha256(np.ascontiguousarray(self.triangles, dtype="<i4").tobytes()).hexdigest()[:DIGEST_DIGITS]
 
     @cached_property
     def shape(self) -> str:
         """A digest of where the vertices are, in single precision."""
-        return sha256(np.ascontiguousarray(self.vertices, dtype="<f4").tobytes()).hexdigest()[:DIGITS]
+        return sha256(np.ascontiguousarray(self.vertices, dtype="<f4").tobytes()).hexdigest()[:DIGEST_DIGITS]
 
     def nearest(self, place: Float64) -> tuple[int, float]:
         """Return the vertex of the face that is nearest to a place (3,), and how far away it is."""
@@ -151,7 +169,7 @@ def head_of_surface(surface: HeadSurface) -> MarkedHead:
     try:
         metres = metres_per_unit(points)[0]
     except ModelError:  # no eyes are known
-        metres = HEIGHT / max(float(np.ptp(used[:, 1])), 1e-30)
+        metres = DEFAULT_HEIGHT / max(float(np.ptp(used[:, 1])), 1e-30)
     return MarkedHead(Path(surface.path).name, tuple(parts), tuple(rows), vertices, points, bound, metres)
 
 
@@ -179,3 +197,88 @@ def read_head(
     if surface.origin == "of the model":
         return head_of_model(FaceModel.load(path, limits=limits), name)
     return head_of_surface(surface)
+
+
+def find_followers(
+    parts: Sequence[Part], rows: Sequence[Intp], skin: Surface, metres: float, model: FaceModel | None
+) -> Any:
+    """Return the share of each skin vertex's movement that each vertex of a head makes: sparse (N, S).
+
+    parts, rows, metres, model: as of `MarkedHead`. skin: whose `number` has N vertices. A vertex of the skin
+    goes with itself. Of a face model, brows and lashes go with the skin around their roots, teeth and tongue
+    with the chin as far as FAP 3 moves them. Of another head, small pieces close to the skin go with it.
+    """
+    from scipy.sparse import csr_array
+
+    if model is None:
+        found = _small_pieces(skin, metres)
+    else:
+        found = []
+        opened = _jaw_opening(model)
+        for part, own in zip(parts, rows, strict=True):
+            if part.kind in ON_SKIN and len(part.triangles):
+                found.append(_follow_skin(skin, part, own))
+            elif part.kind in IN_MOUTH:
+                found += _follow_jaw(model, skin, part, own, opened)
+    alone = np.ones(len(skin.number), dtype=bool)
+    for each, _, _ in found:
+        alone[each] = False
+    themselves = np.flatnonzero(alone)
+    every = np.concatenate([themselves, *(each for each, _, _ in found)])
+    goes_with = np.concatenate([skin.number[themselves], *(each for _, each, _ in found)])
+    values = np.concatenate([np.ones(len(themselves)), *(each for _, _, each in found)])
+    return csr_array((values, (every, goes_with)), shape=(len(skin.number), len(skin)))
+
+
+def _follow_skin(skin: Surface, part: Part, rows: Intp) -> Followed:
+    anchors = attach(skin, part)
+    corners = skin.triangles[anchors.triangles]
+    return np.repeat(rows, 3), corners.ravel(), anchors.shares.ravel()
+
+
+def _follow_jaw(model: FaceModel, skin: Surface, part: Part, rows: Intp, opened: Float64) -> list[Followed]:
+    """Return how a part goes with the chin, as far as the jaw moves it; empty if it does not.
+
+    opened: float64 (N, 3), how far each vertex moves when the jaw opens.
+    """
+    chin = next((int(model.bound[point_row(name)]) for name in CHIN_POINTS), -1)
+    whole = float(np.linalg.norm(opened[chin])) if chin >= 0 else 0.0
+    if not whole > 0:
+        return []
+    share = np.minimum(np.linalg.norm(opened[rows], axis=1) / whole, 1.0)
+    moved = np.flatnonzero(share)
+    return [(rows[moved], np.full(len(moved), skin.number[chin]), share[moved])]
+
+
+def _jaw_opening(model: FaceModel) -> Float64:
+    """Return how far each vertex moves when the jaw opens: float64 (N, 3), metres."""
+    faps = np.zeros(FAP_COUNT, dtype=np.float32)
+    deformer = Deformer(model)
+    rest = deformer.local(faps).astype(np.float64)
+    faps[OPEN_JAW - 1] = OPEN_JAW_VALUE
+    return np.asarray(deformer.local(faps) - rest)
+
+
+def _small_pieces(skin: Surface, metres: float) -> list[Followed]:
+    """Return how small connected pieces go with the largest one, if they lie on it."""
+    from scipy.spatial import cKDTree
+
+    used = np.unique(skin.triangles)
+    sizes = np.bincount(skin.component[used])
+    if (sizes > 0).sum() < 2:
+        return []
+    largest = int(sizes.argmax())
+    main = used[skin.component[used] == largest]
+    others = used[skin.component[used] != largest]
+    away, nearest = cKDTree(skin.vertices[main]).query(skin.vertices[others])
+    piece = skin.component[others]
+    farthest = np.zeros(len(sizes))
+    np.maximum.at(farthest, piece, away)
+    low, high = np.full((len(sizes), 3), np.inf), np.full((len(sizes), 3), -np.inf)
+    np.minimum.at(low, piece, skin.vertices[others])
+    np.maximum.at(high, piece, skin.vertices[others])
+    lies = (farthest * metres < MAX_PIECE_DISTANCE) & ((high - low).max(axis=1) * metres < MAX_PIECE_SIZE)
+    goes_with = np.full(len(skin), -1)
+    goes_with[others[lies[piece]]] = main[nearest[lies[piece]]]
+    vertices = np.flatnonzero(goes_with[skin.number] >= 0)
+    return [(vertices, goes_with[skin.number[vertices]], np.ones(len(vertices)))]

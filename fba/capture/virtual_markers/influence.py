@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from fba.arrays import Float64, Int64, Integer, Intp
-from fba.capture.virtual_markers._walk_loops import list_triangles, walk_from
+from fba.compiled import compiled
 from fba.errors import ModelError
 
-MOST_SHARES = 30_000_000
-"""Vertices of all virtual markers together; 16 bytes each."""
+MAX_SHARES = 30_000_000
+"""Largest total number of vertices that virtual markers move; each takes 16 bytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,15 +78,15 @@ class WalkedMesh:
                 raise ModelError(f"there is no vertex {centre}: the mesh has {count}, counted from 0")
             if not (0 < radius < np.inf and 0 < depth < np.inf):
                 raise ModelError(f"radius and depth must be positive numbers, not {radius:g} and {depth:g}")
-            size = walk_from(
+            size = _walk_from(
                 centre, float(radius), float(depth), number, self.vertices, self.triangles, starts, listed,
                 tested, found, away, levels,
             )  # fmt: skip
             total += size
-            if total > MOST_SHARES:
+            if total > MAX_SHARES:
                 raise ModelError(
                     f"the first {number + 1} virtual markers move {total} vertices together, more than "
-                    f"{MOST_SHARES}; give them smaller radii"
+                    f"{MAX_SHARES}; give them smaller radii"
                 )
             inside = found[:size].astype(np.intp)
             result.append(Influence(inside, away[:size].copy(), levels[:size].astype(np.intp), float(radius)))
@@ -96,7 +96,7 @@ class WalkedMesh:
     def _listed(self) -> tuple[Int64, Int64]:
         starts = np.zeros(len(self.vertices) + 1, dtype=np.int64)
         listed = np.empty(self.triangles.size, dtype=np.int64)
-        list_triangles(self.triangles, starts, listed)
+        _list_triangles(self.triangles, starts, listed)
         return starts, listed
 
 
@@ -134,3 +134,75 @@ def give_to_nearest(influences: Sequence[Influence]) -> list[Influence]:
         )
         for each, mine in zip(influences, np.split(kept, ends), strict=True)
     ]
+
+
+@compiled
+def _list_triangles(triangles: Int64, starts: Int64, listed: Int64) -> None:
+    """List the triangles of each vertex, in their order.
+
+    triangles: (F, 3). starts: (V + 1,), zeros, becomes where each vertex begins in `listed`: (3 F,).
+
+    Bounds: `WalkedMesh` checks that corners are below V; `listed` has a place for each of them.
+    """
+    count = len(starts) - 1
+    for triangle in range(len(triangles)):
+        for corner in range(3):
+            starts[triangles[triangle, corner] + 1] += 1
+    for vertex in range(count):
+        starts[vertex + 1] += starts[vertex]
+    filled = starts[:count].copy()
+    for triangle in range(len(triangles)):
+        for corner in range(3):
+            vertex = triangles[triangle, corner]
+            listed[filled[vertex]] = triangle
+            filled[vertex] += 1
+
+
+@compiled
+def _walk_from(
+    centre: int,
+    radius: float,
+    depth: float,
+    number: int,
+    vertices: Float64,
+    triangles: Int64,
+    starts: Int64,
+    listed: Int64,
+    tested: Int64,
+    found: Int64,
+    away: Float64,
+    levels: Int64,
+) -> int:
+    """Walk from a centre over the triangles as long as vertices are inside its cylinder; return how many are.
+
+    number: differs in each call with the same `tested`, (V,), which notes the vertices met. found, away,
+    levels: (V,), the vertices inside in the order in which they are met, their distances from the centre, and
+    the steps to them, 1 for the centre itself.
+
+    Bounds: the centre and corners are below V, as `WalkedMesh` checks. A vertex is found once, as it is
+    tested first: no more than V are.
+    """
+    x, y, z = vertices[centre, 0], vertices[centre, 1], vertices[centre, 2]
+    tested[centre] = number
+    found[0], away[0], levels[0] = centre, 0.0, 1
+    count, visited = 1, 0
+    while visited < count:
+        vertex = found[visited]
+        level = levels[visited] + 1
+        visited += 1
+        for entry in range(starts[vertex], starts[vertex + 1]):
+            triangle = listed[entry]
+            for corner in range(3):
+                other = triangles[triangle, corner]
+                if tested[other] == number:
+                    continue
+                tested[other] = number
+                right, up = vertices[other, 0] - x, vertices[other, 1] - y
+                front = vertices[other, 2] - z
+                beside = right * right + up * up
+                if beside < radius * radius and abs(front) <= depth:
+                    found[count] = other
+                    away[count] = np.sqrt(beside + front * front)
+                    levels[count] = level
+                    count += 1
+    return count

@@ -18,10 +18,12 @@ from fba.errors import ModelError
 from fba.face.feature_points import row_of
 from fba.face.gaze import LARGEST_GAZE
 
-UPPER_ROWS, LOWER_ROWS = (1.0, 0.9, 0.7), (1.0, 0.9)
-"""By how much rows of a lid go with its marker, from the margin on, in equal steps to the height of the lid,
-where nothing moves. The source has those of the upper lid, and says of the lower that they are alike."""
-SPREAD = 0.5
+UPPER_ROWS = (1.0, 0.9, 0.7)
+"""Shares of its marker's movement that rows of an upper lid make, from the margin on, in equal steps to the
+height of the lid, where nothing moves."""
+LOWER_ROWS = (1.0, 0.9)
+"""The same for a lower lid; the source says that they are alike, without numbers."""
+LID_DEVIATION = 0.5
 """Standard deviation of the Gaussian along a lid, as a share of the way from its middle to a corner. The
 source does not say; this is how the margins of lids move that shut along their whole length."""
 HEIGHT = 0.55
@@ -92,7 +94,7 @@ def find_rows(head: MarkedHead, vertex: int, height: float) -> Influence:
     far = away[:, 0] / height
     rows = UPPER_ROWS if "upper" in lid else LOWER_ROWS
     factor = np.interp(far, np.linspace(0, 1, len(rows) + 1), (*rows, 0.0))
-    shares = factor * np.exp(-0.5 * (at / SPREAD) ** 2)
+    shares = factor * np.exp(-0.5 * (at / LID_DEVIATION) ** 2)
     nearer = far < cKDTree(places[opposite]).query(places[reached])[0] / height
     kept = (shares > 0) & (nearer | np.isin(reached, own))
     order = np.argsort(reached[kept] != start, kind="stable")  # the centre first

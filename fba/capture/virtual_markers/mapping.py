@@ -15,7 +15,7 @@ OVERLAPS = ("match", "add")
 GAZES = ("none", "camera")
 MOST_SHARE = 10.0
 """Largest share by which one marker goes with another."""
-LARGEST = 1e9
+MAX_SIZE = 1e9
 """Largest radius or depth, in the unit of the head."""
 
 
@@ -58,7 +58,7 @@ class VirtualMarker:
         if self.vertex < 0:
             raise OptionError(f"vertices are counted from 0, and there is no vertex {self.vertex}")
         for what, size in (("radius", self.radius), ("depth", self.depth)):
-            if not (math.isfinite(size) and 0 < size <= LARGEST):
+            if not (math.isfinite(size) and 0 < size <= MAX_SIZE):
                 raise OptionError(f"the {what} must be a positive number, not {size:g}")
 
 

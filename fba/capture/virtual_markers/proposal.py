@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -11,22 +11,23 @@ from fba.capture.markers.marker_maps import find_map
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.markers.targets import HEAD, RIGID, target_points
 from fba.capture.virtual_markers.alignment import align
-from fba.capture.virtual_markers.companions import find_companions
 from fba.capture.virtual_markers.heads import MarkedHead
 from fba.capture.virtual_markers.lids import lid_at, lid_height
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
 from fba.errors import ModelError
 from fba.face.feature_points import row_of
 
-FEWEST = 6
-"""Markers whose places the head has, from which others are placed."""
-NEAR = 0.015
-"""Metres from its feature point up to which a vertex is at it: a mask has no ears."""
-ASTRAY = 0.03
-"""Metres from the skin at which a marker without a place is left out."""
-NEIGHBOURS, REACH = 3, 1.2
-"""The radius reaches this much beyond this number of nearest other markers."""
-RADII = (0.010, 0.045)
+MIN_PLACES = 6
+"""Smallest number of markers whose places the head has, from which others are placed."""
+MAX_POINT_DISTANCE = 0.015
+"""Largest distance of a vertex from its feature point, in metres: a mask has no ears."""
+MAX_SKIN_DISTANCE = 0.03
+"""Distance from the skin, in metres, at which a marker without a place is left out."""
+NEIGHBOURS = 3
+"""Number of nearest other markers that a virtual marker reaches."""
+REACH = 1.2
+"""Ratio of the radius to the distance of the farthest of these neighbours."""
+RADIUS_RANGE = (0.010, 0.045)
 """Smallest and largest radius that is proposed, metres on a head of natural size."""
 FIRST_RADIUS = 0.03
 """Metres, on a head of natural size, that the first virtual marker reaches."""
@@ -36,6 +37,12 @@ EYE_CORNERS = ("3.7", "3.11", "3.12", "3.8")
 LID_REACH = 0.8
 """Share of the way to the nearer corner of the eye that a lid's radius is: a walk that reaches the corner
 goes on to the other lid."""
+INNER_LIPS = {"2.2": "8.1", "2.3": "8.2", "2.6": "8.5", "2.7": "8.6", "2.8": "8.7", "2.9": "8.8"}
+"""Feature points of the inner lips, and those of the outer lips that they follow."""
+LIP_RADIUS = 0.012
+"""Radius of virtual markers on inner lips, in metres."""
+LIP_DEPTH = 0.004
+"""Depth of virtual markers on inner lips, in metres: a deeper walk would reach the other lip."""
 
 
 def propose_mapping(
@@ -46,7 +53,7 @@ def propose_mapping(
     places: marker -> place on the face, as of `fba.capture.from_markers`; None to find them by names, or by
     the cloud's shape. A marker at a feature point that the head has gets its vertex; one that the face does
     not move is fixed. Others are laid onto the nearest skin between them, and some
-    virtual markers follow captured ones, see `find_companions`. The radius reaches just beyond the
+    virtual markers on inner lips follow captured ones. The radius reaches just beyond the
     third nearest of the other markers; lids move by their rows, see `lids.find_rows`.
 
     Raises ModelError where too few places are known.
@@ -54,18 +61,18 @@ def propose_mapping(
     places = find_map(motion)[0] if places is None else dict(places)
     targets = _known_targets(head)
     at = {name: targets[place] for name, place in places.items() if place in targets}
-    if len(at) < FEWEST:
+    if len(at) < MIN_PLACES:
         raise ModelError(
             f"no mapping can be proposed: of {len(places)} markers with a place on the face, {head.name} has "
-            f"the feature points of {len(at)}, and {FEWEST} are needed. Choose vertices by hand, or give the "
-            "head's feature points"
+            f"the feature points of {len(at)}, and {MIN_PLACES} are needed. Choose vertices by hand, or give "
+            "the head's feature points"
         )
     rows = row_of()
     vertices: dict[str, int] = {}
     for name, place in at.items():
         bound = int(head.bound[rows[places[name]]]) if places[name] in rows else -1
         vertex, away = (bound, 0.0) if bound >= 0 and _on_skin(head, bound) else head.nearest(place)
-        if vertex not in vertices.values() and away < NEAR / head.metres:
+        if vertex not in vertices.values() and away < MAX_POINT_DISTANCE / head.metres:
             vertices[name] = vertex
     fixed = {name for name, place in places.items() if place in RIGID}
     others = [name for name in motion.names if name not in vertices and name not in fixed]
@@ -82,7 +89,7 @@ def propose_mapping(
             lid = lid_at(head, vertices[name]) if places.get(name) in LIDS else ""
             radius = round(lid_height(head, lid), 6) if lid else radii[name]
             markers[name] = VirtualMarker(vertices[name], radius, radius, name in fixed, lid=bool(lid))
-    markers |= find_companions(head, vertices, places, motion.names)
+    markers |= _find_companions(head, vertices, places, motion.names)
     # what is on a cap, or where this head has no skin, still tells how the head moves
     markers |= {
         name: VirtualMarker(None, fixed=True) for name in motion.names if name in fixed - set(vertices)
@@ -109,7 +116,7 @@ def _lay_others(
     cloud = dict(zip(motion.names, motion.positions[frame], strict=True))
     known = [name for name in vertices if np.isfinite(cloud[name]).all()]
     others = [name for name in others if np.isfinite(cloud[name]).all()]
-    if not others or len(known) < FEWEST:
+    if not others or len(known) < MIN_PLACES:
         return {}
     there = head.vertices[[vertices[name] for name in known]]
     own = np.array([cloud[name] for name in known])
@@ -121,7 +128,7 @@ def _lay_others(
     result: dict[str, int] = {}
     for name, place in zip(others, wanted, strict=True):
         vertex, away = head.nearest(place)
-        if away < ASTRAY / head.metres and vertex not in (*vertices.values(), *result.values()):
+        if away < MAX_SKIN_DISTANCE / head.metres and vertex not in (*vertices.values(), *result.values()):
             result[name] = vertex
     return result
 
@@ -139,7 +146,7 @@ def _radii(head: MarkedHead, vertices: Mapping[str, int], places: Mapping[str, s
     names = list(vertices)
     at = head.vertices[list(vertices.values())]
     away = cKDTree(at).query(at, k=min(NEIGHBOURS + 1, len(names)))[0]
-    low, high = (size / head.metres for size in RADII)
+    low, high = (size / head.metres for size in RADIUS_RANGE)
     corners = head.points[[row_of()[name] for name in EYE_CORNERS]]
     corners = corners[np.isfinite(corners).all(axis=1)]
     result = {}
@@ -155,3 +162,32 @@ def usual_radius(mapping: MarkerMapping, head: MarkedHead) -> float:
     """Return the radius that a new virtual marker gets, in the head's unit: the middle one of all."""
     radii = [marker.radius for marker in mapping.centres.values()]
     return float(np.median(radii)) if radii else FIRST_RADIUS / head.metres
+
+
+def _find_companions(
+    head: MarkedHead, vertices: Mapping[str, int], places: Mapping[str, str], names: Collection[str]
+) -> dict[str, VirtualMarker]:
+    """Return virtual markers that follow captured ones where no marker can be, by new names.
+
+    vertices: of captured markers on the head. places: marker -> place on the face. names: of all captured
+    markers. Inner lips go as far as the outer ones, unless captured markers are there.
+    """
+    at = {place: name for name, place in places.items() if name in vertices}
+    found = _inner_lips(head, at) if not set(INNER_LIPS) & set(places.values()) else {}
+    taken = set(vertices.values())
+    result: dict[str, VirtualMarker] = {}
+    for name, marker in found.items():
+        if name not in names and marker.vertex not in taken:
+            taken.add(marker.vertex or 0)
+            result[name] = marker
+    return result
+
+
+def _inner_lips(head: MarkedHead, at: Mapping[str, str]) -> dict[str, VirtualMarker]:
+    radius, depth = (round(size / head.metres, 6) for size in (LIP_RADIUS, LIP_DEPTH))
+    found = {}
+    for inner, outer in INNER_LIPS.items():
+        vertex = int(head.bound[row_of()[inner]])
+        if outer in at and vertex >= 0 and np.isin(vertex, head.face):
+            found[f"{at[outer]} inner"] = VirtualMarker(vertex, radius, depth, follows=at[outer])
+    return found

@@ -41,7 +41,7 @@ _SIMILAR = re.compile(rb"fba |bap_steps=|crc32=")
 _BEFORE_OBJECT = re.compile(
     re.escape(_SEQUENCE_HEADER[:4]) + rb"." + re.escape(START + _NAME) + rb"[^\0]{0,48}", re.DOTALL
 )
-LONGEST = 64
+MAX_MARK_BYTES = 64
 """Bytes of user data within which the words of a mark are complete."""
 
 
@@ -98,7 +98,7 @@ def bytes_needed(content: bytes, most: int) -> int:
     """
     words, count = _words(content)[1:]
     if count is None:
-        return LONGEST
+        return MAX_MARK_BYTES
     return words + CHECK_BYTES * (count + 1) if count <= most else words
 
 
@@ -107,7 +107,7 @@ def read_mark(content: bytes) -> MarkContent | None:
 
     Gives an FbaWarning where a mark names a table that is not known here.
     """
-    head = content[:LONGEST].partition(_PREFIX)[0]
+    head = content[:MAX_MARK_BYTES].partition(_PREFIX)[0]
     if not (_NAME.startswith(head[: len(_NAME)]) or _SIMILAR.search(head)):
         return None
     table, end, count = _words(content)
@@ -142,7 +142,7 @@ def _words(content: bytes) -> tuple[str | None, int, int | None]:
     table, position, count = None, 0, None
     if content.startswith(_NAME):
         at = len(_NAME)
-        while count is None and (field := _FIELD.match(content, at, LONGEST)) is not None:
+        while count is None and (field := _FIELD.match(content, at, MAX_MARK_BYTES)) is not None:
             at = position = field.end()
             if field[1] == b"bap_steps":
                 table = table or field[2].decode("latin-1")
@@ -160,7 +160,7 @@ def find_marks(data: bytes | bytearray | memoryview) -> tuple[Mark, ...]:
     position, begin = 0, 0
     while (position := content.find(_END_CODE + START, position)) >= 0:
         start = position + len(_END_CODE) + len(START)
-        table, words, _ = _words(content[start : start + LONGEST])
+        table, words, _ = _words(content[start : start + MAX_MARK_BYTES])
         if table in BAP_STEP_TABLES:
             found = max(content.rfind(code, begin, position) for code in _OBJECT_CODES)
             marks.append(Mark(table, max(found, begin), start + words))

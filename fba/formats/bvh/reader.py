@@ -19,7 +19,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton
-from fba.capture.skeleton import MOST_FRAMES, check_memory
+from fba.capture.skeleton import MAX_FRAMES, check_memory
 from fba.errors import FbaWarning, FormatError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
@@ -27,8 +27,8 @@ from fba.source import naming_file, read_whole
 
 MAX_JOINTS = 4096
 MAX_RATE = 10_000
-MAX_LINES = 4 * MOST_FRAMES
-LARGEST = 1e12
+MAX_LINES = 4 * MAX_FRAMES
+MAX_NUMBER = 1e12
 """Largest length or angle; more is damage."""
 BATCH_LINES = 4096
 """Lines that are parsed at once."""
@@ -46,8 +46,9 @@ STRETCH = 1e-3
 CARRIED = 5.0
 """How many times as far as the joints below it a joint moves that carries the body: in files of markers
 all joints move relative to their parents."""
-FEW = 3
-"""Joints below it that must move, too, for that comparison: faces and toys move by themselves."""
+MIN_MOVING_JOINTS = 3
+"""Smallest number of joints below it that must move, too, for that comparison: faces and toys move by
+themselves."""
 
 
 @dataclass
@@ -275,9 +276,9 @@ def _numbers(
         counts.append(len(words))
         total += len(words)
         batch += words
-        if total // channels > MOST_FRAMES:
+        if total // channels > MAX_FRAMES:
             raise FormatError(
-                f"more than {MOST_FRAMES} frames; cut the motion into pieces", path=path, line=number + 1
+                f"more than {MAX_FRAMES} frames; cut the motion into pieces", path=path, line=number + 1
             )
         if len(row_lines) % BATCH_LINES == 0:
             blocks.append(_floats(batch, lines, row_lines, path))
@@ -309,12 +310,12 @@ def _numbers(
             stacklevel=4,
         )
     values = np.concatenate(blocks)[: frames * channels]
-    wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
+    wrong = np.flatnonzero(~(np.abs(values) <= MAX_NUMBER))
     if len(wrong):
         ends = np.cumsum(counts)
         row = int(np.searchsorted(ends, wrong[0], side="right"))
         raise FormatError(
-            f"the values of channels must be finite numbers of at most {LARGEST:g}",
+            f"the values of channels must be finite numbers of at most {MAX_NUMBER:g}",
             path=path,
             line=row_lines[row] + 1,
             token=lines[row_lines[row]].split()[int(wrong[0] - ends[row])],
@@ -334,12 +335,12 @@ def _floats(batch: list[str], lines: list[str], row_lines: list[int], path: str 
 
 
 def _number(word: str, path: str | Path | None, line: int, any_size: bool = False) -> float:
-    """Return a number; FormatError for other words. line: 0-based. any_size: allow more than `LARGEST`."""
+    """Return a number; FormatError for other words. line: 0-based. any_size: allow more than `MAX_NUMBER`."""
     try:
         value = float(word)
     except ValueError:
         value = math.nan
-    if not (any_size or abs(value) <= LARGEST) or math.isnan(value):
+    if not (any_size or abs(value) <= MAX_NUMBER) or math.isnan(value):
         raise FormatError("expected a number", path=path, line=line + 1, token=word)
     return value
 
@@ -461,7 +462,7 @@ def _moving_body(parents: list[int], moved: dict[int, Float64]) -> int:
         size[parents[joint]] += size[joint]
     for joint in moved:
         below = [reach[other] for other in _subtree(parents, joint)[1:] if other in reach]
-        usual = float(np.median(below)) if len(below) >= FEW else 0.0
+        usual = float(np.median(below)) if len(below) >= MIN_MOVING_JOINTS else 0.0
         if size[joint] >= MOST_OF_BODY * len(parents) and reach[joint] > CARRIED * usual:
             return joint
     return 0

@@ -14,7 +14,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.arrays import Array, Float64, to_float64
-from fba.capture.markers.motion import METRES, MOST_MARKERS, MarkerMotion, regular_times
+from fba.capture.markers.motion import MAX_MARKERS, METRES, MarkerMotion, regular_times
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.c3d._parameters import BLOCK, KEY, Parameters, read_parameters
 from fba.formats.markers.encoding import read_face
@@ -78,8 +78,8 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
     frames = min(frames, there)
     limits.check_frames(frames, f"{path}: a capture")
     limits.check_bytes(frames * points * 3 * 8 * 2, f"{path}: a capture", source=len(data))
-    if points > MOST_MARKERS:
-        raise FormatError(f"has {points} markers, more than the {MOST_MARKERS} that are read", path=path)
+    if points > MAX_MARKERS:
+        raise FormatError(f"has {points} markers, more than the {MAX_MARKERS} that are read", path=path)
     values = _positions(data, start, frames, points, analogue, scale, parameters)
     labels = unique_names(_labels(parameters, points), points)
     kept = _kept(parameters, labels)

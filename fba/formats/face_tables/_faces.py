@@ -25,8 +25,10 @@ USUAL = 30
 """Rate of a single picture."""
 FILMS = (24, 25, 30, 48, 50, 60, 120)
 """Rates of films."""
-LARGEST_TURN, MOST = 2.0, 99
-"""Radians that heads and eyes of tracked faces do not reach, and the percentage of angles that tell."""
+MAX_TURN = 2.0
+"""Angle, in radians, that heads and eyes of tracked faces do not reach."""
+TURN_PERCENTILE = 99
+"""Percentile of the angles that is compared with it."""
 PICTURES = 500
 """Rows a second above which a column does not hold times."""
 UPRIGHT = np.diag([1.0, -1.0, -1.0])
@@ -160,10 +162,10 @@ def _are_pictures(table: Table, seconds: int) -> bool:
 def angle_unit(angles: Float64) -> tuple[float, list[str]]:
     """Return what angles (T, N) of heads and eyes must be multiplied by to be radians, and what is odd.
 
-    Faces that are tracked do not look backwards: in radians, they turn less than `LARGEST_TURN`.
+    Faces that are tracked do not look backwards: in radians, they turn less than `MAX_TURN`.
     """
     known = np.abs(angles[~np.isnan(angles)])
-    if not len(known) or np.percentile(known, MOST) <= LARGEST_TURN:
+    if not len(known) or np.percentile(known, TURN_PERCENTILE) <= MAX_TURN:
         return 1.0, []
     return float(np.radians(1.0)), [
         "angles of head and eyes are taken as degrees: in radians, it would face away"

@@ -26,8 +26,8 @@ RATE = 60
 """Records that the app sends in a second; they hold no times."""
 BREAK = re.compile(r"[\r\n\0]+|___iFacialMocap")
 PAIR = re.compile(r"([A-Za-z][A-Za-z0-9_]*?)[-&](-?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)")
-FEWEST = 5
-LARGEST = 400.0
+MIN_SHAPES = 5
+MAX_NUMBER = 400.0
 TURNS = {"head": 6, "rightEye": 3, "leftEye": 3}
 """Numbers of each part that turns."""
 STATUS = "trackingStatus"
@@ -41,7 +41,7 @@ def sniff(head: bytes, suffix: str) -> bool:
     """Whether a file begins with a record: several of ARKit's names with numbers, between bars."""
     words = head[:4000].decode("utf-8", errors="replace").split("|")
     found = [PAIR.fullmatch(word.strip().lstrip("=")) for word in words]
-    return sum(pair is not None and shape_of(pair[1]) is not None for pair in found) >= FEWEST
+    return sum(pair is not None and shape_of(pair[1]) is not None for pair in found) >= MIN_SHAPES
 
 
 def read(
@@ -88,9 +88,9 @@ def find_shapes(records: list[Record], path: Path) -> list[str]:
     """Return the names of the shapes of which records have weights. Raises FormatError for too few."""
     names = dict.fromkeys(name for record in records for name in record if name not in TURNS)
     shapes = [name for name in names if name != STATUS]
-    if len(shapes) < FEWEST:
+    if len(shapes) < MIN_SHAPES:
         raise FormatError(
-            f"{len(shapes)} blendshapes in the records; expected at least {FEWEST} of ARKit's", path=path
+            f"{len(shapes)} blendshapes in the records; expected at least {MIN_SHAPES} of ARKit's", path=path
         )
     return shapes
 
@@ -180,6 +180,6 @@ def _read_word(word: str, line: int, path: Path) -> tuple[str, list[float]]:
         raise FormatError(
             "this is no weight; expected jawOpen-12 or jawOpen&12", path=path, line=line, token=word
         )
-    if not abs(float(pair[2])) <= LARGEST and shape_of(pair[1]) is not None:
+    if not abs(float(pair[2])) <= MAX_NUMBER and shape_of(pair[1]) is not None:
         raise FormatError("the weight is beyond 100 percent by far", path=path, line=line, token=word)
     return pair[1], [float(pair[2])]

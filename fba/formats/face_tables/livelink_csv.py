@@ -36,8 +36,9 @@ from fba.formats.time_codes import read_time_codes
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
-FEWEST = 5
-"""Shapes with ARKit's names or synonyms that make a table one of blendshapes; beside times, one is enough."""
+MIN_SHAPES = 5
+"""Smallest number of shapes with ARKit's names or synonyms in a table of blendshapes; beside times, one is
+enough."""
 TIME_CODE = ("timecode",)
 SECONDS = ("time", "timestamp", "seconds", "times", "timesec", "timeseconds", "timestampms", "timems", "t")
 FRAMES = ("frame", "framenumber", "frameid", "frameidx", "frameindex")
@@ -131,7 +132,7 @@ class _Times(NamedTuple):
 
 def _are_enough(names: Sequence[str]) -> bool:
     """Whether columns with these names are a table of blendshapes: several, or ARKit's own beside times."""
-    if sum(shape_of(name) is not None for name in names) >= FEWEST:
+    if sum(shape_of(name) is not None for name in names) >= MIN_SHAPES:
         return True
     timed = any(key_of(name) in (*TIME_CODE, *SECONDS, *FRAMES, *COUNT) for name in names)
     return timed and any(name[:1].lower() + name[1:] in arkit_names() for name in names)
@@ -156,7 +157,7 @@ def _find_columns(table: Table) -> _Columns:
             strange.append(name)
     if not _are_enough(table.names):
         raise FormatError(
-            f"{len(shapes)} of {len(table.names)} columns are blendshapes; expected at least {FEWEST} of "
+            f"{len(shapes)} of {len(table.names)} columns are blendshapes; expected at least {MIN_SHAPES} of "
             f"ARKit's, such as EyeBlinkLeft and JawOpen; it has {named(list(table.names))}",
             path=table.path, line=1,
         )  # fmt: skip

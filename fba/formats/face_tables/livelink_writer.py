@@ -18,8 +18,10 @@ ANGLES = (
 )  # fmt: skip
 COUNTED = (24, 25, 30, 48, 50, 60, 120)
 """Rates that time codes count in; for others they count 60 frames a second, and parts of these."""
-SLOWEST, USUAL = 10, 30
-"""Slower animations are resampled: from few frames, nobody can tell what their time codes count."""
+MIN_RATE = 10
+"""Lowest rate, in frames per second, that is written: the time codes of slower animations are ambiguous."""
+DEFAULT_RATE = 30
+"""Rate, in frames per second, to which slower animations are resampled."""
 BATCH_FRAMES = 1024
 DAY = 86_400
 
@@ -30,8 +32,8 @@ def write(path: Path, animation: Animation) -> None:
     Columns have ARKit's order, and left is the performer's left everywhere. Time codes are those of the
     animation, with midnight as its time 0. Raises FormatError without a face.
     """
-    if animation.rate < SLOWEST:
-        animation = animation.resample(USUAL)
+    if animation.rate < MIN_RATE:
+        animation = animation.resample(DEFAULT_RATE)
     try:
         motion = to_blendshapes(animation)
     except ModelError as error:

@@ -26,8 +26,8 @@ from fba.source import Path
 
 AXIS_FIRST = re.compile(r"(?:(.*?)[ _.\-]*)??([xyzXYZ])[ _.\-\[(]*(\d{1,4})[\])]?")
 AXIS_LAST = re.compile(r"(.*?)[ _.\-\[(]*(\d{1,4})[\])]?[ _.\-]*([xyzXYZ])")
-FEWEST = 5
-"""Points that make a table one of points; fewer are markers."""
+MIN_POINTS = 5
+"""Smallest number of points in a table of points; fewer are markers."""
 TIMES = ("timestamp", "time", "seconds", "time_s", "timestamp_s", "t")
 MILLISECONDS = ("timestamp_ms", "time_ms", "timestampms", "milliseconds", "ms")
 FRAMES = ("frame", "frame_id", "frame_number", "frame_idx", "frame_index", "framenum", "image_id")
@@ -64,7 +64,7 @@ def sniff(head: bytes, suffix: str) -> bool:
     if _long_columns(names) is not None or _plain_columns(names) is not None:
         return True
     sets = _find_sets(names)
-    return any(len(columns.get("x", columns.get("X", {}))) >= FEWEST for columns in sets.values())
+    return any(len(columns.get("x", columns.get("X", {}))) >= MIN_POINTS for columns in sets.values())
 
 
 def read_points(

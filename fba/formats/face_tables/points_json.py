@@ -31,8 +31,10 @@ b'"landmarks"',
 BEGINNINGS = (b"[[[", b'[[{"x"', b'[{"x"', b'{"0":[')
 """How files without such names begin, apart from blanks."""
 LISTS = ("frames", "results", "data", "records", "samples")
-FEWEST = 5
-DEEPEST = 6
+MIN_POINTS = 5
+"""Smallest number of points in a list of points."""
+MAX_DEPTH = 6
+"""Levels of lists and objects that are searched."""
 VALUE_BYTES = 80
 """Memory of a value while it is read."""
 
@@ -58,7 +60,7 @@ def read_points(
     document = _read(path, limits)
     frames = _frames(document)
     limits.check_frames(len(frames), f"{path}: the recording")
-    faces = [list(_point_sets(frame, DEEPEST)) for frame in frames]
+    faces = [list(_point_sets(frame, MAX_DEPTH)) for frame in frames]
     sets = [_choose(found, number, face, path) for number, found in enumerate(faces)]
     known = [one for one in sets if one is not None]
     if not known:
@@ -120,7 +122,7 @@ def _frames(document: Any) -> list[Any]:
 
 
 def _has_points(frame: Any) -> bool:
-    return next(_point_sets(frame, DEEPEST), None) is not None
+    return next(_point_sets(frame, MAX_DEPTH), None) is not None
 
 
 def _point_sets(value: Any, levels: int) -> Iterator[Float64]:
@@ -148,7 +150,7 @@ def _point_sets(value: Any, levels: int) -> Iterator[Float64]:
 
 def _as_points(value: Any) -> Any:
     """Return a list as points (N, 2 or 3); None for other lists."""
-    if not isinstance(value, list) or len(value) < FEWEST:
+    if not isinstance(value, list) or len(value) < MIN_POINTS:
         return None
     first = value[0]
     if isinstance(first, dict) and {"x", "y"} <= set(first):

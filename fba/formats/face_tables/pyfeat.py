@@ -1,8 +1,8 @@
 """Read tables (CSV) of py-feat: blendshapes or action units of tracked faces.
 
 Version 2 and MPDetector write MediaPipe's blendshapes, which say how far a face moves, and which are read.
-Action units, all that older versions have, are how likely each of them is to be there, 0 to 1: of `PRESENT`
-and less, nothing is shown, and what is there for sure is shown as strong as it usually is.
+Action units, all that older versions have, are probabilities, 0 to 1. Up to `MIN_PROBABILITY` nothing is
+shown; a unit that is certain is shown as strong as it usually is.
 
 Versions differ in unit and signs of the head's pose. That of version 2's own model, which gives a mesh, too,
 is in radians; otherwise the pose is found from the face's points.
@@ -41,14 +41,15 @@ SCORE = "FaceScore"
 POSE = ("Pitch", "Yaw", "Roll")
 OWN_POSE = ("mesh_x_0", "gaze_yaw", *POSE)
 """Columns of version 2's own model, whose pose is in radians: down, to the right, to the right."""
-FEWEST = 5
+MIN_UNITS = 5
+"""Smallest number of action units in a table of action units."""
 POINTS = (68, 478)
 LAYOUT = UnitLayout("Identity", "approx_time", strongest=1.0, largest=5.0)
-PRESENT = 0.5
-"""Probability up to which an action unit is rather absent than there."""
+MIN_PROBABILITY = 0.5
+"""Probability above which an action unit is present."""
 USUAL_STRENGTH = 0.6
-"""Intensity of action units that are there: C, the middle of FACS's five, as a share of the strongest."""
-WHOLE = (43, 45)
+"""Intensity of action units that are present: C, the middle of FACS's five, as a share of the strongest."""
+CLOSING_UNITS = (43, 45)
 """Action units that have no intensity: eyes are closed or not."""
 
 
@@ -58,7 +59,7 @@ def sniff(head: bytes, suffix: str) -> bool:
     if not {BOX[0], SCORE} <= set(names):
         return False
     shown = (UNIT.fullmatch(name) is not None or shape_of(name) is not None for name in names)
-    return sum(shown) >= FEWEST
+    return sum(shown) >= MIN_UNITS
 
 
 def read(
@@ -97,15 +98,15 @@ def read_face(
     shapes = {shape: column[name] for name in column if (shape := shape_of(name)) is not None}
     columns = {int(found[1]): column[name] for name in column if (found := UNIT.fullmatch(name))}
     ids = _identities(table, column)
-    if len(shapes) >= FEWEST:
+    if len(shapes) >= MIN_UNITS:
         return _read_shapes(table, column, shapes, ids, face, fps)
     rows = read_unit_rows(table, columns, LAYOUT, face, fps, ids)
     head, how = _find_head(table, rows.numbers, rows.times, rows.rate)
     findings = rows.findings + find_missing(rows.intensities, rows.times, rows.rate)
     findings.append(
         "its action units are how likely each is to be there, not how strong it is: up to "
-        f"{PRESENT:g} nothing is shown, at 1 what is usual ({USUAL_STRENGTH:g} of the strongest); if it has "
-        "points, these tell more: read it as the format 'points'"
+        f"{MIN_PROBABILITY:g} nothing is shown, at 1 what is usual ({USUAL_STRENGTH:g} of the strongest); if it "
+        "has points, these tell more: read it as the format 'points'"
     )
     if POSE[0] in column:
         findings.append(how)
@@ -144,9 +145,9 @@ def _read_shapes(
 
 def _usual_strengths(rows: UnitRows) -> Float64:
     """Return intensities (T, N) of action units, 0 to 1, of how likely each is to be there."""
-    sure = np.where(np.isnan(rows.intensities), np.nan, np.maximum(rows.intensities - PRESENT, 0.0))
-    strongest = [1.0 if unit in WHOLE else USUAL_STRENGTH for unit in rows.units]
-    return np.asarray(sure / (1 - PRESENT) * strongest)
+    sure = np.where(np.isnan(rows.intensities), np.nan, np.maximum(rows.intensities - MIN_PROBABILITY, 0.0))
+    strongest = [1.0 if unit in CLOSING_UNITS else USUAL_STRENGTH for unit in rows.units]
+    return np.asarray(sure / (1 - MIN_PROBABILITY) * strongest)
 
 
 def _identities(table: Table, column: dict[str, int]) -> Sequence[str]:

@@ -13,7 +13,7 @@ from fba.errors import FormatError
 from fba.face.shape_names import arkit_names, arkit_of
 from fba.source import Path
 
-LARGEST = 4.0
+MAX_WEIGHT = 4.0
 """Largest weight; more is no share of a shape."""
 
 
@@ -32,7 +32,7 @@ def check_weights(
     weights: Float64, names: Sequence[str], path: Path, lines: Sequence[int] | None = None
 ) -> None:
     """Raise FormatError for weights (T, N) that are no shares of 1. lines: (T,), where the file has lines."""
-    far = np.abs(weights) > LARGEST
+    far = np.abs(weights) > MAX_WEIGHT
     if not far.any():
         return
     row, column = np.argwhere(far)[0]

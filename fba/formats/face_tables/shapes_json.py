@@ -28,20 +28,21 @@ from fba.formats.face_tables._times import seconds_of
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_whole
 
-FEWEST = 5
-"""Synonyms of ARKit's names that make an object or a list one of blendshapes; of its own, one is enough."""
+MIN_SHAPES = 5
+"""Smallest number of synonyms of ARKit's names in an object or a list of blendshapes; of its own names,
+one is enough."""
 CATEGORIES = ("categoryName", "category_name", "displayName", "name")
 SCORES = ("score", "value", "weight")
 TIMES = ("time", "timestamp", "timestampms", "timems", "timestampseconds", "seconds", "t", "ts")
 NONE = (*TIMES, "neutral", "frame", "index", "id")
 """Names of numbers beside shapes that need not be mentioned, without case and other signs."""
 LISTS = ("frames", "results", "data", "records", "samples", "blendshapes")
-DEEPEST = 6
+MAX_DEPTH = 6
 """Levels of lists and objects in a frame that are searched."""
 VALUE_BYTES = 60
 """Memory of a value while it is read."""
-MOST_PARTS = 64
-"""Longer lists in a frame are points and the like, not faces."""
+MAX_PARTS = 64
+"""Longest list in a frame that may be a face; longer ones are points and the like."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -132,7 +133,7 @@ def _frames(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], l
     frames = _list_of_frames(document)
     if frames is None:
         raise FormatError("holds no list of frames with scores of blendshapes", path=path)
-    found, others = zip(*(next(_scores(frame, DEEPEST), ({}, [])) for frame in frames), strict=True)
+    found, others = zip(*(next(_scores(frame, MAX_DEPTH), ({}, [])) for frame in frames), strict=True)
     names = list(dict.fromkeys(name for scores in found for name in scores))
     strange = list(dict.fromkeys(name for each in others for name in each if key_of(name) not in NONE))
     _check_names(names, path)
@@ -150,7 +151,7 @@ def _list_of_frames(document: Any) -> list[Any] | None:
         candidates = [document[name] for name in LISTS if name in document]
         candidates += [value for value in document.values() if isinstance(value, list)]
     for frames in candidates:
-        if isinstance(frames, list) and any(next(_scores(frame, DEEPEST), None) for frame in frames[:100]):
+        if isinstance(frames, list) and any(next(_scores(frame, MAX_DEPTH), None) for frame in frames[:100]):
             return frames
     return None
 
@@ -174,7 +175,7 @@ def _scores(value: Any, levels: int) -> Iterator[tuple[dict[str, Any], list[str]
         if _are_enough(listed, listed):
             yield listed, []
             return
-        parts = value if len(value) <= MOST_PARTS else []
+        parts = value if len(value) <= MAX_PARTS else []
     else:
         return
     for part in parts:
@@ -183,7 +184,7 @@ def _scores(value: Any, levels: int) -> Iterator[tuple[dict[str, Any], list[str]
 
 def _are_enough(shapes: Mapping[str, Any], names: Iterable[str]) -> bool:
     """Whether shapes, found under these names, are those of a face: several, or one of ARKit's own names."""
-    return len(shapes) >= FEWEST or bool(shapes and set(arkit_names()).intersection(names))
+    return len(shapes) >= MIN_SHAPES or bool(shapes and set(arkit_names()).intersection(names))
 
 
 def _is_other(name: str, score: Any) -> bool:

@@ -17,9 +17,9 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 Steps = tuple[tuple[int, Float64], ...]
 
-SQUARE = 1e-6
+MAX_PERPENDICULAR = 1e-6
 """Largest cosine of two axes that count as perpendicular."""
-LARGEST = 1e6
+MAX_COORDINATE = 1e6
 """Largest coordinate that a note may have."""
 
 
@@ -77,7 +77,7 @@ class FapJoint:
         if not (lengths > 1e-12).all():
             return False
         axes = axes / lengths[:, None]
-        if np.abs(axes @ axes.T - np.eye(len(axes))).max(initial=0) > SQUARE:
+        if np.abs(axes @ axes.T - np.eye(len(axes))).max(initial=0) > MAX_PERPENDICULAR:
             return False
         offsets = np.array([offset for _, offset in self.shifts]).reshape(-1, 3)
         return bool(not len(offsets) or np.linalg.matrix_rank(offsets) == len(offsets))
@@ -115,7 +115,7 @@ class FapJoint:
         """Return the joint that a note describes; ModelError if it is invalid. nodes: number of nodes."""
         joint = cls(
             note.member("node").index(nodes, "node"),
-            np.array(note.member("place").numbers(3, -LARGEST, LARGEST)),
+            np.array(note.member("place").numbers(3, -MAX_COORDINATE, MAX_COORDINATE)),
             np.array(note.member("rest").numbers(9, -1.01, 1.01)).reshape(3, 3),
             _read_steps(note.member("turns")),
             _read_steps(note.member("shifts")),
@@ -141,7 +141,7 @@ def _read_steps(note: Value) -> Steps:
         if len(pair) != 2:
             raise entry.error("expected a FAP and its axis")
         fap = pair[0].integer(FIRST_LOW_LEVEL_FAP, FAP_COUNT)
-        steps.append((fap, np.array(pair[1].numbers(3, -LARGEST, LARGEST))))
+        steps.append((fap, np.array(pair[1].numbers(3, -MAX_COORDINATE, MAX_COORDINATE))))
     return tuple(steps)
 
 

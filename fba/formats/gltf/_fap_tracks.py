@@ -27,9 +27,9 @@ from fba.gltf.values import Value
 from fba.gltf.writer import Builder
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
-CLOSE = 0.25
+MAX_ERROR = 0.25
 """Largest error, in steps, of a FAP computed from motion: rounding then gives the exact value."""
-LARGEST = 2.0**31
+MAX_FAP = 2.0**31
 """Bound of FAP values."""
 MOST_TARGETS = 1 << 12
 LOW_LEVEL = slice(FIRST_LOW_LEVEL_FAP - 1, FAP_COUNT)
@@ -72,7 +72,7 @@ def face_note(
 
 def _close(values: Float64, shown: Float32) -> bool:
     """Whether values (T,) round to those shown (T,)."""
-    return bool(np.abs(values - shown).max(initial=0) < CLOSE)
+    return bool(np.abs(values - shown).max(initial=0) < MAX_ERROR)
 
 
 def _sent(track: FaceTrack, shown: Float32, model: FaceModel) -> Bool:
@@ -108,8 +108,8 @@ def read_face(gltf: Gltf, clip: Clip, note: Value, times: Float64) -> FaceTrack:
             stacklevel=6,
         )
     values = np.rint(values)
-    if values.size and not np.abs(values).max() < LARGEST:
-        wrong = int(np.argwhere(~(np.abs(values) < LARGEST))[0, 1]) + 1
+    if values.size and not np.abs(values).max() < MAX_FAP:
+        wrong = int(np.argwhere(~(np.abs(values) < MAX_FAP))[0, 1]) + 1
         raise note.error(f"the animation gives FAP {wrong} values that do not fit 32 bits")
     sent = np.zeros(FAP_COUNT, dtype=bool)
     sent[[_fap(entry) - 1 for entry in note.member("sent").elements(FAP_COUNT)]] = True
@@ -129,7 +129,7 @@ def _add_targets(
         pair = entry.elements(2)
         if len(pair) != 2 or len(wanted) >= MOST_TARGETS:
             raise entry.error("expected a FAP and its value at weight 1")
-        wanted[name] = _fap(pair[0]), pair[1].number(-LARGEST, LARGEST)
+        wanted[name] = _fap(pair[0]), pair[1].number(-MAX_FAP, MAX_FAP)
     channels = {channel.node: channel for channel in clip.channels if channel.path == "weights"}
     seen: set[int] = set()
     for number, node in enumerate(gltf.nodes):

@@ -13,8 +13,8 @@ from fba.gltf.writer import Builder
 from fba.rotations import quaternions
 from fba.source import Path
 
-STILL = 1e-7
-"""Numbers that change by no more count as still: 32-bit floats are not more exact."""
+MAX_STILL_CHANGE = 1e-7
+"""Largest change of numbers that count as still: 32-bit floats are not more exact."""
 
 
 @dataclass(eq=False)
@@ -66,9 +66,9 @@ def move(
     if not np.array_equal(np.round(turned[0], 9), (0, 0, 0, 1)):
         entry["rotation"] = turned[0].tolist()
     entry["translation"] = (shifts[0] + 0.0).tolist()
-    if always or float(np.ptp(turned, axis=0).max()) > STILL:
+    if always or float(np.ptp(turned, axis=0).max()) > MAX_STILL_CHANGE:
         clip.animate(node, "rotation", turned)
-    if always or float(np.ptp(shifts, axis=0).max()) > STILL:
+    if always or float(np.ptp(shifts, axis=0).max()) > MAX_STILL_CHANGE:
         clip.animate(node, "translation", shifts)
 
 

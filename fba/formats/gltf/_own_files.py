@@ -25,9 +25,9 @@ from fba.gltf import Channel, Gltf
 from fba.gltf.values import Value, optional_member
 
 VERSION = 1
-MOST_INDEX = 1 << 62
+MAX_INDEX = 1 << 62
 """Bound of frame numbers."""
-LARGEST = 1e6
+MAX_COORDINATE = 1e6
 """Largest coordinate that a note may have."""
 
 
@@ -55,7 +55,7 @@ def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
         rate: Fraction = parse_rate(text.text(100))
     except FormatError as error:
         raise text.error(str(error)) from None
-    first = note.member("first").integer(-MOST_INDEX, MOST_INDEX)
+    first = note.member("first").integer(-MAX_INDEX, MAX_INDEX)
     nodes: dict[str, int] = {}
     channels: Sequence[Channel] = clip.channels
     if note.get("root") is not None:
@@ -64,7 +64,7 @@ def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
         channels = [channel for channel in clip.channels if channel.node in inside]
     times = _times(channels, note)
     steps = np.rint(times * float(rate))
-    if not (steps[-1] < MOST_INDEX and (len(steps) < 2 or (np.diff(steps) > 0).all())):
+    if not (steps[-1] < MAX_INDEX and (len(steps) < 2 or (np.diff(steps) > 0).all())):
         raise text.error("some keys of the animation are less than a frame apart at this rate")
     body = _body(gltf, channels, note, nodes, times) if nodes else None
     face = read_face(gltf, clip, face_note, times) if (face_note := note.get("face")) is not None else None
@@ -84,7 +84,7 @@ def _body(
 ) -> BodyTrack:
     """Return the body track at times (T,). nodes: joint of the standard -> node."""
     axes = note.member("axes").choice(*convention_names())
-    centre = np.array(note.member("centre").numbers(3, -LARGEST, LARGEST))
+    centre = np.array(note.member("centre").numbers(3, -MAX_COORDINATE, MAX_COORDINATE))
     standard = Skeleton.default()
 
     def matrices(rows: slice) -> Float64:

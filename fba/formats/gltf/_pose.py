@@ -14,8 +14,8 @@ from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.gltf import Channel, Gltf
 
-ALIKE = 0.05
-"""Radians within which joints agree on how the bind pose is turned in the scene."""
+MAX_DISAGREEMENT = 0.05
+"""Largest angle, in radians, by which joints disagree on how the bind pose is turned in the scene."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +224,7 @@ def _to_scene(gltf: Gltf, bound: dict[int, Float64]) -> tuple[Float64, float]:
     size = float(np.median(sizes))
     first = turns[0]
     differences = [np.arccos(np.clip((np.trace(first.T @ turn) - 1) / 2, -1, 1)) for turn in turns]
-    if np.median(differences) < ALIKE:
+    if np.median(differences) < MAX_DISAGREEMENT:
         return first, size
     best = max(_axis_turns(), key=lambda turn: float(np.trace(turn.T @ first)))
     return best, size

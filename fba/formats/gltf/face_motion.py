@@ -26,7 +26,8 @@ from fba.gltf import Gltf
 from fba.gltf.values import Value, optional_member
 from fba.parameters import FAP_COUNT, fap_numbers
 
-LARGEST = 1 << 30
+MAX_FAP = 1 << 30
+"""Largest magnitude of a FAP value."""
 RADIAN = 1e5
 """Units of the FAPs that turn eyeballs."""
 JAW_OPEN = np.radians(20.0)
@@ -39,8 +40,8 @@ EYES = {
 """What the names of bones of eyes contain, in small letters."""
 JAW = re.compile("(^|_)(lower)?jaw(bone|root|_?master)?$")
 LIMBS = {"leftUpperArm", "rightUpperArm", "leftUpperLeg", "rightUpperLeg"}
-NAMED = 6
-"""Most names in a message."""
+MAX_NAMES = 6
+"""Largest number of names in a message."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +79,7 @@ def read_face_motion(gltf: Gltf, clip: Clip, times: Float64, *, head: bool = Fal
         return None
     part_lids(values)
     limit_gaze(values)
-    rounded = np.rint(np.clip(values, -LARGEST, LARGEST)).astype(np.int32)
+    rounded = np.rint(np.clip(values, -MAX_FAP, MAX_FAP)).astype(np.int32)
     return FaceTrack(rounded, np.broadcast_to(with_mates(sent), rounded.shape))
 
 
@@ -143,7 +144,7 @@ def _weights(gltf: Gltf, clip: Clip, times: Float64) -> dict[str, Float64]:
     if strange:
         warnings.warn(
             f"{gltf.file}: {len(strange)} animated morph targets are left out, as their names say no FAP: "
-            f"{', '.join(strange[:NAMED])}{', ...' if len(strange) > NAMED else ''}",
+            f"{', '.join(strange[:MAX_NAMES])}{', ...' if len(strange) > MAX_NAMES else ''}",
             FbaWarning,
             stacklevel=6,
         )

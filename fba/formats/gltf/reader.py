@@ -19,7 +19,7 @@ from fba.arrays import Bool, Float64
 from fba.body.skeleton import Skeleton
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.bones import find_bones
-from fba.capture.skeleton import MOST_FRAMES, check_memory
+from fba.capture.skeleton import MAX_FRAMES, check_memory
 from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, key_times
@@ -31,17 +31,17 @@ from fba.gltf import Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 
-CHUNK = 200_000
-"""Joints times frames that are sampled at once."""
+SAMPLED_JOINTS = 200_000
+"""Number of joints times frames that are sampled at once, which bounds the memory."""
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 DEFAULT_RATE = Fraction(30)
-MANY = 10
-"""Number of turning joints of skins above which they are more than a head's."""
+MAX_HEAD_JOINTS = 10
+"""Largest number of turning joints of a skin that is a head."""
 FACE_BYTES = 2500
 """Memory that a frame of a face takes."""
 HALF_TURN = (-1, 1, -1)
 """What half a turn about +y multiplies vectors by, and the last three numbers of quaternions."""
-MOST_APART = 1.5
+MAX_KEY_INTERVAL = 1.5
 """Frames at the lowest usual rate between keys that were sampled, not set by hand."""
 STRETCH = 0.01
 """Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
@@ -103,7 +103,7 @@ def read(
             person = _moves_person(gltf, clip, rate, limits)  # whose pose is not clear
             if person or joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
                 raise
-            if _count_turning(face_clip, gltf) >= MANY:
+            if _count_turning(face_clip, gltf) >= MAX_HEAD_JOINTS:
                 text = f"{gltf.file}: no body is read, the face alone: {error.finding}"
                 warnings.warn(FbaWarning(text).with_remedies(*error.remedies), stacklevel=2)
             return _read_face_alone(gltf, face_clip, rate, limits)
@@ -208,9 +208,9 @@ def _count_frames(
     count = int(seconds * float(frames) + 1e-6) + 1
     what = f"{gltf.file}: animation {clip.name!r}, {seconds:.0f} s at {float(frames):g} frames/s,"
     limits.check_seconds(seconds, what)
-    if count > MOST_FRAMES:
+    if count > MAX_FRAMES:
         raise ModelError(
-            f"{what} has {count} frames, more than {MOST_FRAMES}; give a lower rate, or cut it into pieces"
+            f"{what} has {count} frames, more than {MAX_FRAMES}; give a lower rate, or cut it into pieces"
         )
     return frames, count
 
@@ -233,7 +233,7 @@ def _sample(
     motion = replace(joints.resting(gltf), rate=frames, name=chosen.name)
     turns, root = np.empty((count, len(used), 4)), np.empty((count, 3))
     stretched = np.zeros(len(used), dtype=np.bool_)
-    at_once = min(max(CHUNK // len(nodes), 1), count)
+    at_once = min(max(SAMPLED_JOINTS // len(nodes), 1), count)
     for start in range(0, count, at_once):
         rows = np.arange(start, min(start + at_once, count))
         sampler = Sampler(gltf, channels, first + rows / float(frames))
@@ -301,7 +301,7 @@ def _rate(times: Float64) -> Fraction:
     if not len(steps):
         return DEFAULT_RATE
     shortest = float(np.percentile(steps, 25))
-    by_hand = shortest > MOST_APART / USUAL_RATES[0]
+    by_hand = shortest > MAX_KEY_INTERVAL / USUAL_RATES[0]
     for rate in (int(DEFAULT_RATE), *USUAL_RATES) if by_hand else USUAL_RATES:
         frames = steps * rate
         if rate * shortest > 0.9 and (np.abs(frames - np.rint(frames)) < 0.02).mean() > 0.95:

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers.motion import MOST_MARKERS, MarkerMotion, regular_times
+from fba.capture.markers.motion import MAX_MARKERS, MarkerMotion, regular_times
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.markers.names import unique_names
 from fba.limits import Limits
@@ -19,7 +19,7 @@ MISSING = ("", "nan", "null", "none", "-", "na", "n/a")
 """Words, in lower case, that stand for a number that is not there."""
 REGULAR = 0.1
 """Times that are off those of a constant rate by less than this share of a frame were rounded."""
-MOST_COLUMNS = 20 * MOST_MARKERS
+MOST_COLUMNS = 20 * MAX_MARKERS
 
 
 def read_lines(path: Path, what: str) -> list[str]:

@@ -11,8 +11,10 @@ from fba.errors import FormatError, Remedy
 from fba.formats.text.frame_rates import parse_rate
 from fba.source import Path
 
-LEAST, MOST = 0.001, 100_000
-"""Frames per second below and beyond which a rate is damage."""
+MIN_RATE = 0.001
+"""Lowest rate, in frames per second; a lower one is damage."""
+MAX_RATE = 100_000
+"""Highest rate, in frames per second; a higher one is damage."""
 GIVE_RATE = Remedy("fps", "give one with {}", "100")
 
 
@@ -29,8 +31,8 @@ def file_rate(stored: float | str, fps: Fraction | None, path: Path) -> Fraction
         if fps is None:
             raise FormatError("has no frame rate", path=path).with_remedies(GIVE_RATE)
         return Fraction(fps)
-    if not LEAST <= number <= MOST:
-        raise FormatError(f"its frame rate must be {LEAST} to {MOST}", path=path, token=str(stored))
+    if not MIN_RATE <= number <= MAX_RATE:
+        raise FormatError(f"its frame rate must be {MIN_RATE} to {MAX_RATE}", path=path, token=str(stored))
     return parse_rate(f"{number:.6f}".rstrip("0").rstrip("."))
 
 

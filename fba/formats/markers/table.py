@@ -15,7 +15,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers.motion import METRES, MOST_MARKERS, MarkerMotion, regular_times
+from fba.capture.markers.motion import MAX_MARKERS, METRES, MarkerMotion, regular_times
 from fba.errors import FormatError
 from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines
 from fba.formats.markers.encoding import read_face
@@ -27,10 +27,10 @@ TIMES = ("time", "times", "timestamp", "t", "seconds", "sec", "time (s)", "time 
 FRAMES = ("frame", "frames", "frame#", "index", "")
 NAMES = ("marker", "name", "label", "marker_name")
 AXIS = re.compile(r"(.+?)[ _.:\-]?([xyz])(?:\s*[\[(](m|cm|mm)[\])])?", re.IGNORECASE)
-SHARE = 0.5
-"""Share of the columns that are markers'; tables of something else have columns x, y, z, too."""
-FEWEST = 3
-"""Markers that a wide table needs."""
+MIN_SHARE = 0.5
+"""Smallest share of the columns that are markers'; tables of something else have columns x, y, z, too."""
+MIN_MARKERS = 3
+"""Smallest number of markers in a wide table."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -41,7 +41,7 @@ def sniff(head: bytes, suffix: str) -> bool:
     except UnicodeDecodeError:
         return False
     count = len(_triples(cells))
-    return _is_long(cells) or (count >= FEWEST and 3 * count >= SHARE * len(cells))
+    return _is_long(cells) or (count >= MIN_MARKERS and 3 * count >= MIN_SHARE * len(cells))
 
 
 def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
@@ -138,10 +138,8 @@ def _read_long(
             owner.append(names.setdefault(row[label].strip().strip('"'), len(names)))
             row[label] = ""
         body.append(delimiter.join(row))
-    if len(names) > MOST_MARKERS:
-        raise FormatError(
-            f"names {len(names)} markers, more than the {MOST_MARKERS} that are read", path=path
-        )
+    if len(names) > MAX_MARKERS:
+        raise FormatError(f"names {len(names)} markers, more than the {MAX_MARKERS} that are read", path=path)
     rows, numbers = parse_rows(body, 1, delimiter, len(cells), path, limits)
     if not len(rows):
         raise FormatError("holds no frames", path=path)

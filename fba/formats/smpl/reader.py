@@ -40,14 +40,16 @@ SMPL, SMPL_H, SMPL_X = 72, 156, 165
 """Numbers of a pose: 24 joints, 52 with fingers, 55 with jaw and eyes as well."""
 JAW_OPEN = np.radians(20.0)
 """Angle of the jaw at which the mouth is as open as by a shape "jawOpen" of weight 1."""
-SLOWEST, FASTEST = 0.1, 10_000
-"""Frames per second below and beyond which a rate is damage."""
-MOST_TURN = 1000.0
+MIN_RATE = 0.1
+"""Lowest rate, in frames per second; a lower one is damage."""
+MAX_RATE = 10_000
+"""Highest rate, in frames per second; a higher one is damage."""
+MAX_TURN = 1000.0
 """Largest number of a rotation vector, radians; more is damage."""
-FARTHEST = 1e6
+MAX_COORDINATE = 1e6
 """Largest coordinate of the root's path, metres; more is damage."""
-UPRIGHT = 0.6
-"""Least share of the mean direction of heads along an axis for that axis to be up."""
+MIN_UPRIGHT = 0.6
+"""Smallest share of the mean direction of heads along an axis for that axis to be up."""
 
 
 class _Motion(NamedTuple):
@@ -111,8 +113,8 @@ def _read(path: Path, fps: Fraction | int | str | None, limits: Limits) -> _Moti
     path_of_root = arrays.get("trans", np.zeros((count, 3)))
     if path_of_root.shape != (count, 3):
         raise FormatError(f"trans has the shape {path_of_root.shape}, not ({count}, 3)", path=path)
-    _check_sizes(path, MOST_TURN, "rad", {"poses": poses, "pose_jaw": jaw, "pose_eye": eyes})
-    _check_sizes(path, FARTHEST, "m", {"trans": path_of_root})
+    _check_sizes(path, MAX_TURN, "rad", {"poses": poses, "pose_jaw": jaw, "pose_eye": eyes})
+    _check_sizes(path, MAX_COORDINATE, "m", {"trans": path_of_root})
     rate = _rate(arrays, fps, path)
     turns = poses.reshape(count, -1, 3)
     return _Motion(turns, path_of_root, jaw, None if eyes is None else eyes.reshape(count, 2, 3), rate)
@@ -138,8 +140,8 @@ def _rate(arrays: dict[str, Any], fps: Fraction | int | str | None, path: Path) 
                 Remedy("fps", "give one with {}", "120")
             )
         return Fraction(fps)
-    if not SLOWEST <= (rate := float(stored.ravel()[0])) <= FASTEST:
-        raise FormatError(f"its frame rate must be {SLOWEST} to {FASTEST:g}", path=path, token=f"{rate:g}")
+    if not MIN_RATE <= (rate := float(stored.ravel()[0])) <= MAX_RATE:
+        raise FormatError(f"its frame rate must be {MIN_RATE} to {MAX_RATE:g}", path=path, token=f"{rate:g}")
     return find_rate(np.array([0.0, 1.0 / rate]))
 
 
@@ -192,9 +194,9 @@ def _to_y_up(root: Float64) -> Rotation:
     """Return what brings up to +y. root: quaternions (T, 4) of the pelvis, whose own y points to the head."""
     heads = Rotation.from_quat(np.roll(root, -1, axis=1)).apply([0.0, 1.0, 0.0]).mean(axis=0)
     axis = int(np.abs(heads).argmax())
-    if axis == 1 and heads[1] > UPRIGHT:
+    if axis == 1 and heads[1] > MIN_UPRIGHT:
         return Rotation.identity()
-    if axis == 1 and heads[1] < -UPRIGHT:  # the axes of a camera: y down, z away
+    if axis == 1 and heads[1] < -MIN_UPRIGHT:  # the axes of a camera: y down, z away
         return Rotation.from_rotvec([np.pi, 0.0, 0.0])
     return Rotation.from_rotvec([-np.pi / 2, 0.0, 0.0])  # AMASS
 

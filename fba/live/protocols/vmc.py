@@ -18,11 +18,11 @@ from fba.live.protocols.ifacialmocap import SteadyClock
 from fba.live.protocols.sample import BoneTurn, DatagramError, Sample
 
 PREFIX = "/VMC/"
-MOST_NAMES = 400
-"""Expressions of an avatar that are looked at."""
-FARTHEST = 1e4
-"""Metres."""
-LARGEST = 4.0
+MAX_NAMES = 400
+"""Largest number of expressions of an avatar; others are ignored."""
+MAX_COORDINATE = 1e4
+"""Largest coordinate of a bone, in metres."""
+MAX_VALUE = 4.0
 """Largest value of an expression; more is no share of one."""
 USUAL_PERIOD = 1 / 60
 NOTHING = "nothing of VMC"
@@ -79,9 +79,9 @@ class VmcReader:
         elif address == "/VMC/Ext/Blend/Val":
             name = arguments[0] if arguments else None
             (value,) = _numbers(arguments[1:2], 1)
-            if not isinstance(name, str) or abs(value) > LARGEST:
+            if not isinstance(name, str) or abs(value) > MAX_VALUE:
                 raise DatagramError(WRONG)
-            if name in self._expressions or len(self._expressions) < MOST_NAMES:
+            if name in self._expressions or len(self._expressions) < MAX_NAMES:
                 self._expressions[name] = value
                 self._sent.add(f"/{name}")
         return []
@@ -111,6 +111,6 @@ def _turn(arguments: Sequence[Argument]) -> BoneTurn:
     """Return the position and the rotation behind the name of a bone."""
     numbers = np.array(_numbers(arguments[1:8], 7))
     rotation = unity_bones.rotation(numbers[3:])
-    if rotation is None or np.abs(numbers[:3]).max() > FARTHEST:
+    if rotation is None or np.abs(numbers[:3]).max() > MAX_COORDINATE:
         raise DatagramError(WRONG)
     return BoneTurn(unity_bones.position(numbers[:3]), rotation)

@@ -16,8 +16,8 @@ from fba.errors import FormatError
 from fba.formats.face_tables.shape_weights import check_weights, shape_of
 from fba.live.protocols.sample import DatagramError, Sample
 
-FEWEST = 5
-"""Shapes with ARKit's names that make an object one of a face."""
+MIN_SHAPES = 5
+"""Smallest number of shapes with ARKit's names in an object that is a face."""
 NO_OBJECTS = "no objects of VTube Studio"
 LARGEST_ANGLE = 360.0
 LARGEST_TIME = 1e15
@@ -71,7 +71,7 @@ def _weights(entries: Any) -> dict[str, float]:
         shape = shape_of(name) if isinstance(name, str) and len(name) < 100 else None
         if shape is not None:
             weights[shape] = _number(entry.get("v"))
-    if len(weights) < FEWEST:
+    if len(weights) < MIN_SHAPES:
         raise DatagramError(NO_OBJECTS)
     try:
         check_weights(np.array([list(weights.values())]), list(weights), "the object")

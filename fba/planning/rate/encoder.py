@@ -26,15 +26,18 @@ CHANGE_BITS = 6.0
 """Bits of a change beyond those of none, about: what makes a price of a tolerance."""
 DEARER = 4.0
 """Factor between the prices that are tried until a plane fits."""
-CHEAPEST, DEAREST = 1e-4, 1e9
+MIN_PRICE = 1e-4
+"""Lowest price of a bit that is tried."""
+MAX_PRICE = 1e9
+"""Highest price of a bit that is tried."""
 HOLD = math.inf
 """A price at which nothing changes."""
 FULL = 0.5
 """Part of the buffer above which frames are left out, where planes without a change take too much."""
 STILL_SHARE = 2.0
 """A plane's share of the rate, in planes without a change, that frames are left out for."""
-LONGEST_GAP = 0.2
-"""Seconds between two planes, unless the buffer is full."""
+MAX_GAP = 0.2
+"""Longest time between two planes, in seconds, unless the buffer is full."""
 SPARE = 96
 """Bits that always stay free: for the end of the stream, and for start codes that keep planes apart; a mark
 behind the end takes more.
@@ -241,7 +244,7 @@ class RateEncoder:
             bits = plane.bits(levels)
             if bits <= room or price == HOLD:
                 break
-            price = max(price, CHEAPEST) * DEARER if price < DEAREST else HOLD
+            price = max(price, MIN_PRICE) * DEARER if price < MAX_PRICE else HOLD
         self.statistics.over += bits > room
         self.bucket.add(bits)
         self._plan_gap(frame, plane.bits(plane.levels(weights, HOLD)))
@@ -258,7 +261,7 @@ class RateEncoder:
         """Set from which frame on a plane may come. still: bits of a plane without a change."""
         bucket, period = self.bucket, float(1 / frame.rate)
         need = still + LEARNING + self._spare + SKIP_BITS
-        longest = max(1, math.floor(LONGEST_GAP / period + 1e-9))
+        longest = max(1, math.floor(MAX_GAP / period + 1e-9))
         gap = 1
         while gap < longest and (
             gap * period * bucket.rate < STILL_SHARE * still

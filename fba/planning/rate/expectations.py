@@ -12,8 +12,10 @@ from fba.arrays import Float64, Int32, Int64
 from fba.parameters import BAP_COUNT, FAP_COUNT, Bap, Fap, bap_steps, baps, fap_steps, faps
 from fba.tracks import BodyTrack, FaceTrack
 
-SLOW, FAST = 1.0, 0.06
-"""Seconds from one end of a parameter to the other at the fastest; lids, eyes and tongue are fast."""
+SLOW_SECONDS = 1.0
+"""Shortest time, in seconds, in which most parameters go from one end to the other."""
+FAST_SECONDS = 0.06
+"""The same for lids, eyes and tongue."""
 FAST_FAPS = [*range(18, 26), *range(42, 47)]
 LIMB_SECONDS = 0.3
 """The same for the angles of a body; those of a shoulder may all jump at once, and the pose hardly moves."""
@@ -35,13 +37,13 @@ def expected_motion(frame: Animation, extremes: Animation | None = None) -> Anim
     it does not move. What goes faster than this lags behind by a frame or two.
     """
     rate = min(float(frame.rate), 1 / GAP)
-    turn = math.ceil(SLOW * rate)
+    turn = math.ceil(SLOW_SECONDS * rate)
     index = np.arange(2 * (turn + 1))
     face: FaceTrack | None = None
     body: BodyTrack | None = None
     if frame.face is not None:
-        seconds = np.full(FAP_COUNT, SLOW)
-        seconds[FAST_FAPS] = FAST
+        seconds = np.full(FAP_COUNT, SLOW_SECONDS)
+        seconds[FAST_FAPS] = FAST_SECONDS
         ends = _ends(None if extremes is None else extremes.face, faps(), fap_steps())
         values = _there_and_back(*ends, seconds * rate, turn)
         values[:, :2] = 0
@@ -49,7 +51,7 @@ def expected_motion(frame: Animation, extremes: Animation | None = None) -> Anim
     if frame.body is not None:
         ends = _ends(None if extremes is None else extremes.body, baps(), bap_steps("iso"))
         seconds = np.full(BAP_COUNT, LIMB_SECONDS)
-        seconds[SHOULDERS] = FAST
+        seconds[SHOULDERS] = FAST_SECONDS
         values = _there_and_back(*ends, seconds * rate, turn)
         body = BodyTrack(values, np.broadcast_to(frame.body.mask[0], values.shape))
     return Animation(frame.rate, index, face, body)

@@ -20,7 +20,7 @@ IMPORTANCE = {2: 1.5, 3: 1.5, 8: 1.5}
 """By group of FAPs: mouth, eyes and lids, and outer lips are looked at most."""
 BODY_IMPORTANCE = 0.1
 """Bodies are seen from ten times as far as faces."""
-LEAST = 0.01
+MIN_VISIBILITY = 0.01
 """Millimetres for a table step of what moves nothing on the built-in models: it may on others."""
 OFF_JOINTS = 0.03
 """Metres from a joint to the points of a body that are measured."""
@@ -57,7 +57,7 @@ def fap_millimetres() -> Float64:
     neutral = deformer.local(np.zeros(FAP_COUNT))
     largest = np.array([np.linalg.norm(deformer.local(both) - neutral, axis=2).max() for both in moves])
     result = MILLIMETRES * largest / (STEPS * steps)
-    result = np.maximum(result, LEAST / steps)
+    result = np.maximum(result, MIN_VISIBILITY / steps)
     result[HEAD_TURNS] = HEAD_RADIANS
     for group, importance in IMPORTANCE.items():
         result[np.array(fap_groups()[group - 1]) - 1] *= importance
@@ -75,5 +75,5 @@ def bap_millimetres() -> Float64:
     posed = np.asarray(solver.pose(moves.astype(np.int32))) @ offsets.T
     rest = np.asarray(solver.pose(np.zeros(BAP_COUNT, np.int32))) @ offsets.T
     distances = np.linalg.norm((posed - rest)[:, :, :3], axis=2).max(axis=(1, 2))
-    result: Float64 = np.maximum(MILLIMETRES * distances / (STEPS * steps), LEAST / steps)
+    result: Float64 = np.maximum(MILLIMETRES * distances / (STEPS * steps), MIN_VISIBILITY / steps)
     return result
