@@ -25,7 +25,7 @@ from bench.bitrate.page import picture_names
 from bench.bitrate.rivals import missing_packages
 from fba.cli import options
 from fba.cli.clamped_values import bring_near
-from fba.cli.inputs import EXISTING, read_input
+from fba.cli.inputs import EXISTING, Reading, read_file
 from fba.cli.outputs import Output, Outputs
 from fba.errors import FbaError
 from fba.limits import Limits
@@ -128,10 +128,10 @@ def _measure(
 
 def _subjects_of(path: Path, only: str | None, bap_steps: str, limits: Limits) -> list[Subject]:
     """Return the face and the body of a file, if they move and are asked for."""
-    tables: list[str] = []
-    animation = read_input(path, bap_steps=bap_steps, limits=limits, tables=tables)
-    steps = tables[0] if tables else FINE if bap_steps == BAP_STEPS_AUTO else bap_steps
-    if not tables:
+    read = read_file(path, Reading(bap_steps=bap_steps, limit=limits))
+    animation = read.animation
+    steps = read.table or (FINE if bap_steps == BAP_STEPS_AUTO else bap_steps)
+    if read.table is None:
         animation = bring_near(animation, steps, 1)
     found = split_subjects(path.name, animation, steps)
     if not found:

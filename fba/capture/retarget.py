@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -39,23 +40,29 @@ CLAVICLE_SHARE = 0.5
 """Share of the clavicle's turn at the breastbone's joint; the joint at the shoulder blade takes the rest."""
 
 
+@dataclass(frozen=True)
+class Retargeting:
+    """How a body follows a source.
+
+    groups: number of groups of vertebrae that share the spine's rotations, 0 for only the joints of the
+    source. with_anchors: the source's joints turn, too. scale, ground, plant: as for
+    `fba.capture.from_skeleton`.
+    """
+
+    groups: int
+    with_anchors: bool
+    scale: float | None
+    ground: str
+    plant: bool
+
+
 def find_targets(
-    motion: SkeletonMotion,
-    mapped: dict[str, int],
-    solver: BapSolver,
-    *,
-    groups: int,
-    with_anchors: bool,
-    scale: float | None,
-    ground: str,
-    plant: bool,
+    motion: SkeletonMotion, mapped: dict[str, int], solver: BapSolver, how: Retargeting
 ) -> tuple[dict[str, Float64], Float64]:
     """Return targets of the body's joints and its root, in world axes.
 
     They are joint -> rotations (T, 3, 3), and the positions of the root (T, 3) in metres. mapped: joint of
-    the body -> number of the source's joint. groups: number of groups of vertebrae that share the spine's
-    rotations, 0 for only the joints of the source. with_anchors: the source's joints turn, too.
-    scale, ground, plant: as for `fba.capture.from_skeleton`. motion: as `fba.capture.preparation` leaves it.
+    the body -> number of the source's joint. motion: as `fba.capture.preparation` leaves it.
     """
     skeleton = solver.skeleton
     alignment = rest_alignment.align(motion, mapped, skeleton)
@@ -66,9 +73,9 @@ def find_targets(
         turned[joint] = rotations.matrices(source_rotations[:, source]) @ correction
     _turn_pelvis(motion, mapped, source_rotations, source_positions, turned)
     anchors = [joint for joint in spine.joints(skeleton) if joint in mapped]
-    if groups and len(anchors) > 1:
+    if how.groups and len(anchors) > 1:
         positions = {joint: source_positions[:, mapped[joint]] for joint in anchors}
-        spine.spread(skeleton, turned, positions, anchors, groups, with_anchors)
+        spine.spread(skeleton, turned, positions, anchors, how.groups, how.with_anchors)
     feet = {
         side: turned[f"{side}_ankle"]
         for side in "lr"
@@ -85,10 +92,10 @@ def find_targets(
         turn_foot(targets, side)
         for finger in FINGERS:
             _curl_finger(targets, f"{side}_{finger}")
-    metres = _metres_per_unit(targets) if scale is None else scale
+    metres = _metres_per_unit(targets) if how.scale is None else how.scale
     root = _root_positions(targets, metres)
-    if ground != "none":
-        root = plant_feet(targets, root, metres, ground, plant)
+    if how.ground != "none":
+        root = plant_feet(targets, root, metres, how.ground, how.plant)
     return targets.rotations, root
 
 
@@ -126,7 +133,7 @@ def _metres_per_unit(targets: Targets) -> float:
     text = "the source has neither whole legs nor whole arms: its unit is unknown; taken as centimetres"
     warnings.warn(
         FbaWarning(text).with_remedies(Remedy("scale", "give another, in metres, with {}", "0.001")),
-        stacklevel=4,
+        stacklevel=5,
     )
     return 0.01
 

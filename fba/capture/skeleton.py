@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -101,17 +102,61 @@ def from_skeleton(
     (FbaWarning) of missing joints of a limb: they stay in the default posture.
     `fba.capture.retarget_report` measures how close the result comes.
     """
-    if origin not in ORIGINS:
-        raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {origin!r}")
-    if ground not in GROUNDS:
-        raise ValueError(f"ground must be one of {', '.join(GROUNDS)}, not {ground!r}")
-    groups = SPINES.get(spine, spine) if isinstance(spine, str) else spine
-    if not isinstance(groups, int) or not 0 <= groups <= spines.GROUPS:
-        raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {spine!r}")
-    if scale is not None and not (np.isfinite(scale) and scale > 0):
-        raise ValueError(f"scale must be a positive number, not {scale}")
+    options = _Options(joints, scale, origin, ground, plant, spine, rest, up)
     solver = solver if solver is not None else BapSolver()
     rate = motion.rate if rate is None else Fraction(rate)
+    _check_frames(motion, rate, limits)
+    return _retarget(motion, rate, options, solver, limits)
+
+
+@dataclass(frozen=True)
+class _Options:
+    """Options of `from_skeleton`."""
+
+    joints: Mapping[str, str] | None
+    scale: float | None
+    origin: str
+    ground: str
+    plant: bool
+    spine: str | int
+    rest: str | int
+    up: str
+
+    def __post_init__(self) -> None:
+        if self.origin not in ORIGINS:
+            raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {self.origin!r}")
+        if self.ground not in GROUNDS:
+            raise ValueError(f"ground must be one of {', '.join(GROUNDS)}, not {self.ground!r}")
+        if not 0 <= self.groups <= spines.GROUPS:
+            raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {self.spine!r}")
+        if self.scale is not None and not (np.isfinite(self.scale) and self.scale > 0):
+            raise ValueError(f"scale must be a positive number, not {self.scale}")
+
+    @property
+    def groups(self) -> int:
+        """Groups of vertebrae that share the spine's rotations; -1 for what is no choice."""
+        if isinstance(self.spine, str):
+            return SPINES.get(self.spine, -1)
+        return self.spine if isinstance(self.spine, int) else -1
+
+    @property
+    def turns_same_joints(self) -> bool:
+        """Whether the joints of the source's spine turn, too."""
+        return self.spine in ("spread", "joints")
+
+    def is_direct(self, motion: SkeletonMotion, solver: BapSolver) -> bool:
+        """Whether a motion is of the standard's own joints and needs no retargeting."""
+        return (
+            self.joints is None
+            and not motion.declared
+            and self.turns_same_joints
+            and (self.rest, self.up) == ("auto", "auto")
+            and is_direct(motion, solver.skeleton)
+        )
+
+
+def _check_frames(motion: SkeletonMotion, rate: Fraction, limits: Limits) -> None:
+    """Raise ModelError or LimitError for a motion that has too many frames at a rate, or none."""
     if not len(motion):
         raise ModelError("the motion has no frames")
     frames = int((len(motion) - 1) * max(rate, Fraction(0)) / motion.rate) + 1  # checked before resampling
@@ -123,17 +168,16 @@ def from_skeleton(
     if frames > len(motion):
         own_bytes = motion.rotations.nbytes + motion.positions.nbytes
         check_memory(limits, frames, len(motion.names), f"the motion at {float(rate):g} frames/s", own_bytes)
-    same_joints = spine in ("spread", "joints")
-    direct = (
-        joints is None
-        and not motion.declared
-        and same_joints
-        and (rest, up) == ("auto", "auto")
-        and is_direct(motion, solver.skeleton)
-    )
+
+
+def _retarget(
+    motion: SkeletonMotion, rate: Fraction, options: _Options, solver: BapSolver, limits: Limits
+) -> Animation:
+    """Return the BAPs of a motion at a rate."""
+    direct = options.is_direct(motion, solver)
     mapped: dict[str, int] = {}
     if not direct:
-        ready = prepare(motion, solver.skeleton, joints=joints, rest=rest, up=up)
+        ready = prepare(motion, solver.skeleton, joints=options.joints, rest=options.rest, up=options.up)
         motion, mapped = ready.motion, ready.mapped
     motion = motion.resample(rate, limits=limits)
     missing = [
@@ -143,19 +187,18 @@ def from_skeleton(
         warnings.warn(
             f"the source has no joints for {', '.join(missing)}; they stay as they are",
             FbaWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
     if direct:
-        turned, root = _direct_targets(motion, solver.skeleton, scale)
+        turned, root = _direct_targets(motion, solver.skeleton, options.scale)
     else:
-        turned, root = retarget.find_targets(
-            motion, mapped, solver, groups=groups, with_anchors=same_joints, scale=scale, ground=ground,
-            plant=plant,
-        )  # fmt: skip
-    if origin != "source":
-        centre = root[0] if origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
+        how = retarget.Retargeting(
+            options.groups, options.turns_same_joints, options.scale, options.ground, options.plant
+        )
+        turned, root = retarget.find_targets(motion, mapped, solver, how)
+    if options.origin != "source":
+        centre = root[0] if options.origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
         root[:, [0, 2]] -= (centre - solver.skeleton.centres[0])[[0, 2]]
-
     track = solve_targets(turned, root, solver)
     return Animation(motion.rate, np.arange(len(root)), None, track, motion.name)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fba.animation import Animation
+from fba.cli.inputs import Reading
 from fba.cli.printing import colour_grade
 from fba.errors import FbaError, FbaWarning
 from fba.parameters import baps
@@ -74,25 +75,31 @@ def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str
     return animation, {"limits": rows, "limits_clamped": limits == "clamp"}
 
 
+@dataclass(frozen=True, eq=False)
+class CodedBody:
+    """A captured body before coding and after.
+
+    clamped: what the encoder clamped. lead: frames of the capture that are before the first one.
+    """
+
+    before: Animation
+    after: Animation
+    clamped: Mapping[str, ClampedParameter]
+    lead: int = 0
+
+
 def compare_captures(
     captures: Sequence[Path],
-    animation: Animation,
-    decoded: Animation,
-    clamped: Mapping[str, ClampedParameter],
+    body: CodedBody,
+    options: Mapping[str, Any],
+    reading: Reading,
     *,
-    ground: str,
     detailed: bool,
-    format: str | None = None,
-    clip: str | None = None,
-    options: Mapping[str, Any] | None = None,
-    lead: int = 0,
 ) -> list[CaptureReport]:
     """Return reports of captures.
 
-    animation, decoded: before coding and after. clamped: what the encoder clamped. ground: the value of
-    `--ground`. detailed: compare all frames, and bones before coding. clip: the animation that was read of a
-    file with several, by name or number. options: those with which captures were read, of which joints, rest,
-    up and scale count. lead: frames of a capture that are before the animation's first one.
+    options: those with which captures were read, of which ground, joints, rest, up and scale count. detailed:
+    compare all frames, and bones before coding.
     """
     from fba import rotations
     from fba.body import Skeleton
@@ -103,37 +110,35 @@ def compare_captures(
     from fba.capture.preparation import prepare
     from fba.formats import format_of
 
-    given = {
-        name: value for name, value in (options or {}).items() if name in ("joints", "rest", "scale", "up")
-    }
+    given = {name: options[name] for name in ("joints", "rest", "scale", "up")}
     asked = {name: value for name, value in given.items() if name != "scale"}
     reports = []
     for path in captures:
-        reader = format_of(path, format)
+        reader = format_of(path, reading.format)
         assert reader.read_motion is not None  # the caller names captures only
         try:
-            motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": clip}))
+            motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": reading.clip}))
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", FbaWarning)  # the reader has said it
                 ready = prepare(motion, Skeleton.default(), **asked)
-            if lead:
-                motion = rows_of(motion.resample(animation.rate), slice(lead, None))
+            if body.lead:
+                motion = rows_of(motion.resample(body.before.rate), slice(body.lead, None))
         except FbaError:  # the file has a face alone, and the body comes from another
             if detailed:
                 raise
             continue
-        level = 0.0 if ground == "floor" else None
+        level = 0.0 if options["ground"] == "floor" else None
         up = rotations.between(read_axis(ready.up), np.array([0.0, 1.0, 0.0]))
         most = None if detailed else SAMPLE
-        scale = (options or {}).get("scale")
-        comparison = compare(motion, decoded, ready.mapped, scale=scale, up=up, level=level, most=most)
-        comparison = comparison.with_more(_clamped_differences(clamped))
+        scale = options["scale"]
+        comparison = compare(motion, body.after, ready.mapped, scale=scale, up=up, level=level, most=most)
+        comparison = comparison.with_more(_clamped_differences(body.clamped))
         bones = None
         if detailed:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", FbaWarning)
-                bones = asdict(retarget_report(motion, animation, **given))
-        reports.append(CaptureReport(path, motion, ready.mapped, decoded, comparison, bones, up, scale))
+                bones = asdict(retarget_report(motion, body.before, **given))
+        reports.append(CaptureReport(path, motion, ready.mapped, body.after, comparison, bones, up, scale))
     return reports
 
 

@@ -8,6 +8,7 @@ import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -118,84 +119,108 @@ def renamed(path: Path, name: str) -> Iterator[None]:
             warnings.warn(message, warning.category, stacklevel=3)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How files are read: options that most commands share.
+
+    format: name of the format; None where content and suffix show it. clip: of several animations in a file,
+    the one to read, by name or number; without effect where the format holds one. bap_steps: "auto" prints
+    which table a stream is decoded with, and why; a table warns if the stream names another one or, where it
+    names none, if its BAPs look wrong with these steps. salvage: read what is undamaged.
+    """
+
+    format: str | None = None
+    clip: str | None = None
+    bap_steps: str = BAP_STEPS_AUTO
+    salvage: bool = False
+    limit: Limits = DEFAULT_LIMITS
+
+
+@dataclass(frozen=True, eq=False)
+class ReadFile:
+    """An animation, and what else its file says.
+
+    format: of the file. rate: of the file, before it was resampled. table: of BAP steps, of a stream with a
+    body; else None. doubt: the warning that this table looks wrong; None without.
+    """
+
+    animation: Animation
+    format: Format
+    rate: Fraction
+    table: str | None = None
+    doubt: str | None = None
+
+
 def read_input(
     path: Path,
+    reading: Reading,
     *,
-    bap_steps: str = BAP_STEPS_AUTO,
     fps: Fraction | None = None,
     header_fps: Fraction | None = None,
     name: str | None = None,
-    salvage: bool = False,
-    capture: Mapping[str, object] | None = None,
-    doubts: list[str] | None = None,
-    tables: list[str] | None = None,
-    readers: list[Format] | None = None,
-    rates: list[Fraction] | None = None,
-    format: str | None = None,
-    clip: str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
-    """Return the animation of a file of any format, or of the one that `format` names.
+    """Return the animation of a file; see `read_file`."""
+    return read_file(path, reading, fps=fps, header_fps=header_fps, name=name).animation
 
-    bap_steps: "auto" prints which table a stream is decoded with, and why; otherwise warns if the stream says
-    another one or, where it says nothing, if its BAPs look wrong with these steps.
+
+def read_file(
+    path: Path,
+    reading: Reading,
+    *,
+    fps: Fraction | None = None,
+    header_fps: Fraction | None = None,
+    name: str | None = None,
+    capture: Mapping[str, object] | None = None,
+) -> ReadFile:
+    """Return the animation of a file of any format, or of the one that `reading` names.
 
     fps resamples the animation, and motion capture before it is retargeted. It, or header_fps, and name
-    replace a header that a file lacks. capture: options for the readers of motion capture. doubts: that
-    warning is appended to it. clip: of several animations in the file, the one to read, by name or number;
-    without effect where the format holds one. tables: the table of a stream with a body is appended to it.
-    readers: the format is appended to it, which of standard input nothing else says. rates: the rate before
-    it was resampled is appended to it.
+    replace a header that a file lacks. capture: options for the readers of motion capture.
     """
     from fba.codec import marked_table
     from fba.formats import read
 
-    options: dict[str, object] = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name}
-    options |= {"salvage": salvage or None, "rate": fps, "limits": limits, "clip": clip}
-    options |= capture or {}
-    marked = None
+    limits, table = reading.limit, reading.bap_steps
+    marked: str | None = None
+    doubt: str | None = None
     with input_file(path) as file:
-        reader = _find_format(file, format)
-        if reader.name == "fba":
+        reader = _find_format(file, reading.format)
+        is_stream = reader.name == "fba"
+        if is_stream:
             data = read_whole(file)
             marked = marked_table(data)
-            options["bap_steps"] = step_tables.table_to_read(path, data, bap_steps, limits)
+            table = step_tables.table_to_read(path, data, table, limits)
+        options: dict[str, object] = {
+            "bap_steps": table,
+            "fps": fps or header_fps,
+            "name": name,
+            "salvage": reading.salvage or None,
+            "rate": fps,
+            "limits": limits,
+            "clip": reading.clip,
+            **(capture or {}),
+        }
         animation = read(file, format=reader.name, **_taken(reader, options))
-    if readers is not None:
-        readers.append(reader)
-    if reader.name == "fba" and animation.body is not None:
-        (tables if tables is not None else []).append(str(options["bap_steps"]))
-        if bap_steps != BAP_STEPS_AUTO:
-            doubt = step_tables.warn_of_doubt(path, animation, bap_steps, marked)
-            if doubt is not None and doubts is not None:
-                doubts.append(doubt)
-    if rates is not None:
-        rates.append(animation.rate)
-    if fps is not None and animation.rate != fps:
+    has_table = is_stream and animation.body is not None
+    if has_table and reading.bap_steps != BAP_STEPS_AUTO:
+        doubt = step_tables.warn_of_doubt(path, animation, table, marked)
+    rate = animation.rate
+    if fps is not None and rate != fps:
         animation = animation.resample(fps, limits=limits)
-    return animation
+    return ReadFile(animation, reader, rate, table if has_table else None, doubt)
 
 
-def probe_input(
-    path: Path,
-    *,
-    fps: Fraction | None,
-    format: str | None,
-    salvage: bool,
-    clip: str | None = None,
-    face: str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> StreamInfo:
+def probe_input(path: Path, reading: Reading, *, fps: Fraction | None, face: str | None = None) -> StreamInfo:
     """Return what a file of any format holds.
 
-    fps: the rate of a file that has none. clip: see `read_input`. face: the one to read of several.
+    fps: the rate of a file that has none. face: the one to read of several.
     """
     from fba.formats import probe
 
-    reader = _find_format(path, format)
-    given = {"fps": fps, "salvage": salvage or None, "clip": clip, "face": face}
+    reader = _find_format(path, reading.format)
+    given = {"fps": fps, "salvage": reading.salvage or None, "clip": reading.clip, "face": face}
     options = {} if reader.name == "fba" else _taken(reader, given)
-    return probe(path, format=reader.name, limits=limits, **options)
+    return probe(path, format=reader.name, limits=reading.limit, **options)
 
 
 def list_clips(path: Path, format: str | None, limits: Limits) -> tuple[ClipInfo, ...]:
@@ -210,11 +235,11 @@ def describe_person(path: Path, format: str | None, limits: Limits) -> PersonInf
     return None if reader.describe_person is None else reader.describe_person(path, limits=limits)
 
 
-def check_clip(clip: str | None, files: Iterable[Path], format: str | None) -> None:
+def check_clip(reading: Reading, files: Iterable[Path]) -> None:
     """Raise click.UsageError for `--clip` without a file whose format holds several animations."""
-    if clip is None:
+    if reading.clip is None:
         return
-    formats = {_find_format(file, format) for file in files if str(file) != "-"}
+    formats = {_find_format(file, reading.format) for file in files if str(file) != "-"}
     if formats and all(entry.list_clips is None for entry in formats):
         names = " and ".join(sorted(entry.name.upper() for entry in formats))
         raise click.UsageError(f"--clip is for glTF, which may hold several animations, not for {names}")
@@ -245,30 +270,22 @@ def has_markers(path: Path, format: str | None) -> bool:
 
 
 def read_face(
-    path: Path,
-    fps: Fraction | None,
-    format: str | None,
-    limits: Limits,
-    capture: Mapping[str, object] | None = None,
+    path: Path, fps: Fraction | None, reading: Reading, capture: Mapping[str, object] | None = None
 ) -> tuple[str, FaceCapture] | None:
     """Return the name of the format and the captured face as it is in a file; None for other files.
 
     fps: of a file without times. capture: further options of the readers of captures.
     """
-    reader = _find_format(path, format)
+    reader = _find_format(path, reading.format)
     if reader.read_face is None:
         return None
     given: dict[str, Any] = {"fps": fps, **(capture or {})}
     options = {name: given[name] for name in given if name in reader.face_options and given[name] is not None}
-    return reader.name, reader.read_face(path, limits=limits, **options)
+    return reader.name, reader.read_face(path, limits=reading.limit, **options)
 
 
 def read_face_quietly(
-    path: Path,
-    fps: Fraction | None,
-    format: str | None,
-    limits: Limits,
-    capture: Mapping[str, object] | None = None,
+    path: Path, fps: Fraction | None, reading: Reading, capture: Mapping[str, object] | None = None
 ) -> FaceCapture | None:
     """Return the same face without the warnings that reading it again would repeat.
 
@@ -278,18 +295,18 @@ def read_face_quietly(
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        found = read_face(path, fps, format, limits, capture)
+        found = read_face(path, fps, reading, capture)
     return None if found is None else found[1]
 
 
-def check_capture_options(given: Mapping[str, str], files: Iterable[Path], format: str | None) -> None:
+def check_capture_options(given: Mapping[str, str], files: Iterable[Path], reading: Reading) -> None:
     """Raise click.UsageError for options of captures that no reader of the files takes.
 
     given: those that were typed, by the readers' name for them.
     """
     from fba.formats import formats
 
-    readers = {_find_format(file, format) for file in files if str(file) != "-"}
+    readers = {_find_format(file, reading.format) for file in files if str(file) != "-"}
     for option, flag in given.items():
         if readers and not any(option in reader.read_options for reader in readers):
             able = [one.name.upper() for one in formats() if one.is_capture and option in one.read_options]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli.command import Decorated
-from fba.cli.inputs import input_file
+from fba.cli.inputs import Reading, input_file
 from fba.cli.outputs import OutputType
 from fba.cli.program import as_typed
 from fba.errors import OptionError
@@ -96,18 +96,14 @@ def map_options(*, out: bool) -> Callable[[Decorated], Decorated]:
 
 
 def read_joints(
-    maps: Sequence[Path | Pair],
-    captures: Sequence[Path],
-    format: str | None,
-    clip: str | None,
-    limits: Limits,
+    maps: Sequence[Path | Pair], captures: Sequence[Path], reading: Reading
 ) -> dict[str, str] | None:
     """Return the map that `--map` gives, None without; click.UsageError where there is nothing to map."""
     if not maps:
         return None
     if not captures:
         raise click.UsageError("--map goes with motion capture: joints of a body, or markers on a face")
-    return _combine(maps, limits, lambda: read_capture(captures[0], format, clip, limits))
+    return _combine(maps, reading.limit, lambda: read_capture(captures[0], reading))
 
 
 def read_body_joints(maps: Sequence[Path | Pair], body: Path | None, limits: Limits) -> dict[str, str] | None:
@@ -145,20 +141,17 @@ def _combine(
         raise click.UsageError(f"--map: {error}") from error
 
 
-def write_joints(
-    target: Path, joints: dict[str, str] | None, capture: Path, format: str | None, clip: str | None,
-    limits: Limits,
-) -> int:  # fmt: skip
+def write_joints(target: Path, joints: dict[str, str] | None, capture: Path, reading: Reading) -> int:
     """Write the map that was used for a capture; return the number of its joints."""
     from fba.capture.joint_maps import find_map, write_map
 
-    motion = read_capture(capture, format, clip, limits)
+    motion = read_capture(capture, reading)
     used = find_map(motion, joints)
     write_map(target, used, motion)
     return len(used)
 
 
-def read_capture(path: Path, format: str | None, clip: str | None, limits: Limits) -> SkeletonMotion:
+def read_capture(path: Path, reading: Reading) -> SkeletonMotion:
     """Return the motion of a capture, without the warnings that reading it a second time would repeat."""
     import warnings
 
@@ -167,7 +160,7 @@ def read_capture(path: Path, format: str | None, clip: str | None, limits: Limit
 
     with input_file(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        reader = format_of(file, format)
+        reader = format_of(file, reading.format)
         assert reader.read_motion is not None  # the caller names captures only
-        options: dict[str, Any] = {} if reader.list_clips is None else {"clip": clip}
-        return reader.read_motion(file, limits=limits, **options)
+        options: dict[str, Any] = {} if reader.list_clips is None else {"clip": reading.clip}
+        return reader.read_motion(file, limits=reading.limit, **options)

@@ -12,10 +12,9 @@ import click
 
 from fba.cli import options
 from fba.cli.command import Decorated
-from fba.cli.inputs import input_file
+from fba.cli.inputs import Reading, input_file
 from fba.cli.joint_options import Pair
 from fba.errors import FbaWarning, OptionError
-from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.capture.markers.motion import MarkerMotion
@@ -98,7 +97,7 @@ def marker_options(command: Decorated) -> Decorated:
 
 
 def read_places(
-    maps: Sequence[Path | Pair], captures: Sequence[Path], format: str | None, limits: Limits
+    maps: Sequence[Path | Pair], captures: Sequence[Path], reading: Reading
 ) -> dict[str, str] | None:
     """Return the places of markers that `--map` gives, None without; click.UsageError for wrong ones."""
     if not maps:
@@ -111,11 +110,11 @@ def read_places(
     pairs = dict(each for each in maps if not isinstance(each, Path))
     if len(saved) > 1:
         raise click.UsageError("--map: give one file of markers at most; pairs change what it says")
-    base = read_map(saved[0], limits=limits) if saved else None
+    base = read_map(saved[0], limits=reading.limit) if saved else None
     if not pairs:
         return base
     try:
-        capture = read_capture(captures[0], format, limits)
+        capture = read_capture(captures[0], reading)
         if isinstance(capture, PointMotion):
             return change_places(capture.count, base, pairs)
         changed = change_map(capture, base, pairs)
@@ -125,15 +124,13 @@ def read_places(
     return changed
 
 
-def write_used_places(
-    target: Path, places: dict[str, str] | None, capture: Path, format: str | None, limits: Limits
-) -> int:
+def write_used_places(target: Path, places: dict[str, str] | None, capture: Path, reading: Reading) -> int:
     """Write the map that was used for a capture; return the number of its markers or points."""
     from fba.capture.markers.marker_maps import find_map, write_map
     from fba.capture.points import PointMotion
     from fba.capture.points.places import point_places, write_places
 
-    motion = read_capture(capture, format, limits)
+    motion = read_capture(capture, reading)
     if isinstance(motion, PointMotion):
         taken = point_places(motion.count) if places is None else places
         write_places(target, taken, motion.count)
@@ -143,7 +140,7 @@ def write_used_places(
     return len(used)
 
 
-def read_capture(path: Path, format: str | None, limits: Limits) -> MarkerMotion | PointMotion:
+def read_capture(path: Path, reading: Reading) -> MarkerMotion | PointMotion:
     """Return the markers or points of a capture, without warnings, which reading it again would repeat."""
     from fba.capture.markers.motion import MarkerMotion
     from fba.capture.points import PointMotion
@@ -151,8 +148,8 @@ def read_capture(path: Path, format: str | None, limits: Limits) -> MarkerMotion
 
     with input_file(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        reader = format_of(file, format)
+        reader = format_of(file, reading.format)
         assert reader.read_face is not None  # the caller names captures of markers and points only
-        motion = reader.read_face(file, limits=limits)
+        motion = reader.read_face(file, limits=reading.limit)
         assert isinstance(motion, MarkerMotion | PointMotion)
         return motion

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import fields
@@ -18,6 +19,26 @@ from fba.parameters import BAP_STEP_TABLES, BAP_STEPS_AUTO
 RATES = (Fraction(1, 3600), Fraction(10_000))
 """Smallest and largest frame rate that can be asked for, as in BVH files."""
 LARGEST_LIMIT = 10**18
+
+
+def gather(**groups: type) -> Callable[[Decorated], Decorated]:
+    """Return a decorator that hands a command its options as dataclasses, by the names of their fields.
+
+    groups: name of the command's argument -> the dataclass; a field with a default may have no option.
+    """
+
+    def decorate(command: Decorated) -> Decorated:
+        @functools.wraps(command)
+        def gathering(**values: Any) -> Any:
+            made = {
+                name: kind(**{one.name: values.pop(one.name) for one in fields(kind) if one.name in values})
+                for name, kind in groups.items()
+            }
+            return command(**made, **values)
+
+        return gathering  # type: ignore[return-value]
+
+    return decorate
 
 
 class RateType(click.ParamType[Fraction]):

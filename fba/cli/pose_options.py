@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -16,13 +17,28 @@ MOST = 2
 LARGEST = 2**31 - 1
 
 
-def still_animation(
-    faps: tuple[str, ...], visemes: tuple[str, ...], expressions: tuple[str, ...]
-) -> Animation:
-    """Return an animation of one frame that sends these FAPs, visemes and expressions and nothing else.
+@dataclass(frozen=True)
+class Pose:
+    """A face as it is typed; a name may be a number.
 
-    faps: NAME=VALUE. visemes: NAME or NAME=BLEND. expressions: NAME or NAME=INTENSITY. A name may be a
-    number. Raises click.UsageError, which suggests similar names.
+    faps: NAME=VALUE. visemes: NAME or NAME=BLEND. expressions: NAME or NAME=INTENSITY.
+    """
+
+    faps: tuple[str, ...] = ()
+    visemes: tuple[str, ...] = ()
+    expressions: tuple[str, ...] = ()
+
+    @property
+    def given(self) -> list[str]:
+        """The options that were used."""
+        used = {"--fap": self.faps, "--viseme": self.visemes, "--expression": self.expressions}
+        return [option for option, values in used.items() if values]
+
+
+def still_animation(pose: Pose) -> Animation:
+    """Return an animation of one frame that sends the FAPs, visemes and expressions of a pose, nothing else.
+
+    Raises click.UsageError, which suggests similar names.
     """
     import numpy as np
 
@@ -32,19 +48,19 @@ def still_animation(
 
     values = np.zeros((1, FAP_COUNT), dtype=np.int32)
     mask = np.zeros((1, FAP_COUNT), dtype=bool)
-    for text in faps:
+    for text in pose.faps:
         number, value = _parse_fap(text)
         if mask[0, number - 1]:
             raise click.UsageError(f"--fap {text}: FAP {number} is given twice")
         values[0, number - 1], mask[0, number - 1] = value, True
     viseme, expression = np.zeros((1, 4), dtype=np.int16), np.zeros((1, 6), dtype=np.int16)
-    if visemes:
-        pairs = _parse_selects("viseme", visemes)
+    if pose.visemes:
+        pairs = _parse_selects("viseme", pose.visemes)
         viseme[0, : len(pairs)] = [select for select, _ in pairs]
         viseme[0, 2] = _blend([share for _, share in pairs])
         mask[0, 0] = True
-    if expressions:
-        for number, (select, intensity) in enumerate(_parse_selects("expression", expressions)):
+    if pose.expressions:
+        for number, (select, intensity) in enumerate(_parse_selects("expression", pose.expressions)):
             expression[0, 2 * number] = select
             expression[0, 2 * number + 1] = INTENSITY_MAX if intensity is None else intensity
         mask[0, 1] = True

@@ -7,6 +7,7 @@ import os
 import stat
 import sys
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -29,36 +30,18 @@ STREAMS = (b"\0\0\1\xba", b"\0\0\1\x01", b"\0\0\1\xb0", b"\0\0\1\xb5")
 """How an FBA stream begins: the object, or the layers around it."""
 
 
-Opened = tuple["Animation | LiveAnimation", bool]
-"""The animation of a file, and whether it is a stream that grows."""
+def open_file(file: Path, how: SceneOptions) -> inputs.ReadFile | LiveAnimation:
+    """Return what a file holds, or an FBA stream on standard input or in a FIFO, whose animation grows.
 
-
-def open_file(
-    file: Path, how: SceneOptions, doubts: list[str] | None = None, tables: list[str] | None = None
-) -> Opened:
-    """Return a file's animation, and whether it grows: that of an FBA stream on standard input or in a FIFO.
-
-    Other formats are read to their end first. doubts, tables: see `inputs.read_input`.
-    Raises click.UsageError if standard input is a terminal, and what `inputs.read_input` and
+    Other formats are read to their end first.
+    Raises click.UsageError if standard input is a terminal, and what `inputs.read_file` and
     `LiveAnimation.wait` raise.
     """
-    bap_steps, fps, salvage = how.bap_steps, how.fps, how.salvage
     name = "standard input" if str(file) == "-" else file.name
     if str(file) == "-" and sys.stdin.isatty():
         raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):
-        animation = inputs.read_input(
-            file,
-            bap_steps=bap_steps,
-            header_fps=fps,
-            salvage=salvage,
-            doubts=doubts,
-            tables=tables,
-            format=how.format,
-            clip=how.clip,
-            limits=how.limit,
-        )
-        return animation, False
+        return inputs.read_file(file, how, header_fps=how.fps)
     with contextlib.ExitStack() as stack:
         source: BinaryIO = sys.stdin.buffer if str(file) == "-" else stack.enter_context(_fifo(file))
         head = b""
@@ -67,15 +50,15 @@ def open_file(
         if not head:
             raise FormatError("is empty", path=name)
         if not head.startswith(STREAMS):
-            return _read_other(head, source, name, how), False
+            return _read_other(head, source, name, how)
         from fba_player.playback.live import LiveAnimation, wait_for
 
         close = stack.pop_all().close
-        live = LiveAnimation(source, head=head, name=name, bap_steps=bap_steps, at_end=close)  # type: ignore[arg-type]
+        live = LiveAnimation(source, head=head, name=name, bap_steps=how.bap_steps, at_end=close)  # type: ignore[arg-type]
     wait_for(live, lambda text: click.echo(f"fba: {text}", err=True))
     if live.steps_explanation:
         click.echo(f"fba: {name}: BAP steps {live.steps_explanation}", err=True)
-    return live, True
+    return live
 
 
 def is_pipe(file: Path) -> bool:
@@ -87,11 +70,17 @@ def is_pipe(file: Path) -> bool:
     return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
 
 
-def build_scene(opened: list[Opened], names: list[str], how: SceneOptions, *, over: bool = False) -> Any:
-    """Return one scene of opened files. over: draws them over each other unless `--arrange` is given."""
+def build_scene(
+    animations: Sequence[Animation | LiveAnimation],
+    names: list[str],
+    how: SceneOptions,
+    *,
+    over: bool = False,
+) -> Any:
+    """Return one scene of animations. over: draws them over each other unless `--arrange` is given."""
     joints = read_body_joints(how.maps, how.body, how.limit)
     face, figure = inputs.read_model(how.model), inputs.read_body(how.body, joints)
-    scenes = [_build_one(animation, growing, face, figure, how) for animation, growing in opened]
+    scenes = [_build_one(animation, face, figure, how) for animation in animations]
     result: Any = scenes[0]
     if len(scenes) > 1:
         from fba_player.scene.compare import CompareScene
@@ -146,7 +135,6 @@ def _choose_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) ->
 
 def _build_one(
     animation: Animation | LiveAnimation,
-    growing: bool,
     model: FaceModel | None,
     body: BodyModel | None,
     how: SceneOptions,
@@ -154,13 +142,13 @@ def _build_one(
     from fba_player.scene.scene import Scene
 
     given: dict[str, Any] = {"body": body, "axes": how.axes, "view": how.view}
-    if not growing:
-        return Scene(animation, model, **given)  # type: ignore[arg-type]
+    if isinstance(animation, Animation):
+        return Scene(animation, model, **given)
     from fba.face.model import FaceModel
     from fba_player.playback.live import LiveTimeline
 
     face = model or FaceModel.default()
-    timeline = LiveTimeline(animation, face)  # type: ignore[arg-type]
+    timeline = LiveTimeline(animation, face)
     return Scene(animation, face, timeline=timeline, **given)  # type: ignore[arg-type]
 
 
@@ -169,11 +157,10 @@ def _fifo(file: Path) -> BinaryIO:
     return open(file, "rb")
 
 
-def _read_other(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> Animation:
+def _read_other(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> inputs.ReadFile:
     """Return what a pipe holds that carries no FBA stream. head: what was read from it before."""
     with inputs.spooled(source, name, head) as path:
-        animation = inputs.read_input(
-            path, bap_steps=how.bap_steps, header_fps=how.fps, name=name, salvage=how.salvage,
-            format=how.format, clip=how.clip, limits=how.limit,
-        )  # fmt: skip
-    return replace(animation, name=name) if animation.name == path.name else animation
+        found = inputs.read_file(path, how, header_fps=how.fps, name=name)
+    if found.animation.name != path.name:
+        return found
+    return replace(found, animation=replace(found.animation, name=name))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,32 +12,26 @@ import click
 
 from fba.cli import inputs, options
 from fba.cli.command import Decorated
-from fba.cli.inputs import EXISTING, ExistingPath
+from fba.cli.inputs import EXISTING, ExistingPath, Reading
 from fba.cli.joint_options import Pair, body_map_option
-from fba.limits import Limits
 
 MOST = 8
 """Files shown at once."""
 
 
-@dataclass(frozen=True)
-class SceneOptions:
-    """How files are shown: the options' values."""
+@dataclass(frozen=True, kw_only=True)
+class SceneOptions(Reading):
+    """How files are read and shown: the options' values."""
 
     model: Path | None
     body: Path | None
     maps: tuple[Path | Pair, ...]
     arrange: str | None
     fps: Fraction | None
-    format: str | None
-    clip: str | None
     camera: str | None
     view: str
     shows: tuple[tuple[str, object], ...]
     axes: str
-    bap_steps: str
-    salvage: bool
-    limit: Limits
 
 
 @dataclass(frozen=True)
@@ -153,7 +146,7 @@ def check_files(files: tuple[Path, ...], how: SceneOptions, sound: SoundOptions,
         raise click.UsageError("--audio and --no-audio contradict each other")
     if sound.audio_offset and sound.no_audio:
         raise click.UsageError("--audio-offset and --no-audio contradict each other")
-    inputs.check_clip(how.clip, files, how.format)
+    inputs.check_clip(how, files)
     if len(files) > MOST:
         raise click.UsageError(f"{len(files)} files are too many for one {what}; at most {MOST}")
     if len(files) < 2 and how.arrange is not None:
@@ -167,14 +160,8 @@ def _gathered(
     """Return a decorator that adds options whose values reach the command as one object of a kind."""
 
     def decorate(command: Decorated) -> Decorated:
-        @functools.wraps(command)
-        def gathering(**values: Any) -> Any:
-            own = {field.name: values.pop(field.name) for field in fields(kind)}
-            return command(**{name: kind(**own)}, **values)
-
-        decorated: Any = gathering
-        for option in reversed(given):
-            decorated = option(decorated)
-        return decorated  # type: ignore[no-any-return]
+        for option in (options.gather(**{name: kind}), *reversed(given)):
+            command = option(command)
+        return command
 
     return decorate

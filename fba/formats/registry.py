@@ -12,7 +12,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -128,125 +127,128 @@ class Format:
         return () if self.write is None else _option_names(self.write)
 
 
-@cache
+def _lazy(module: str, name: str) -> Lazy:
+    return Lazy(f"fba.formats.{module}:{name}")
+
+
+_FORMATS = (
+    Format(
+        "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
+        _lazy("fba", "sniff_fba"), _lazy("fba", "read_fba"), _lazy("fba", "write_fba"),
+    ),
+    Format(
+        "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
+        _lazy("text.fap", "sniff_fap"), _lazy("text.fap", "read_fap"), _lazy("text.fap", "write_fap"),
+        ("face",),
+        written="ASCII face animation parameters, version 2.2",
+    ),
+    Format(
+        "bap", (".bap",), "ASCII body animation parameters, versions 3.1 and 3.2",
+        _lazy("text.bap", "sniff_bap"), _lazy("text.bap", "read_bap"), _lazy("text.bap", "write_bap"),
+        ("body",),
+        written="ASCII body animation parameters, version 3.2",
+    ),
+    Format(
+        "epf", (".epf",), "encoder parameter file: how to encode an animation; contains none itself",
+        _lazy("epf.epf", "sniff_epf"), _lazy("epf.epf", "read_animation"), None, (),
+    ),
+    Format(
+        "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
+        _lazy("bvh.reader", "sniff"), _lazy("bvh.reader", "read"), _lazy("bvh.writer", "write"), ("body",),
+        read_motion=_lazy("bvh.reader", "read_motion"),
+    ),
+    Format(
+        "vrma", (".vrma",), "VRM animation: read as glTF; written, the expressions of a face",
+        _lazy("gltf.vrma", "sniff"), _lazy("gltf.reader", "read"), _lazy("gltf.vrma", "write"), ("face",),
+        written="VRM animation, the expressions of a face",
+    ),
+    Format(
+        "gltf", (".glb", ".gltf", ".vrma"),
+        "glTF 2.0: read, an animated skeleton; written, a skinned person",
+        _lazy("gltf.reader", "sniff"), _lazy("gltf.reader", "read"), _lazy("gltf.writer", "write"),
+        read_motion=_lazy("gltf.reader", "read_motion"), list_clips=_lazy("gltf.clips", "list_clips"),
+        describe_person=_lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
+    ),
+    Format(
+        "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
+        _lazy("smpl.reader", "sniff"), _lazy("smpl.reader", "read"), None,
+        read_motion=_lazy("smpl.reader", "read_motion"),
+    ),
+    Format(
+        "openface", (".csv",), "action units, pose and gaze of OpenFace",
+        _lazy("face_tables.openface", "sniff"), _lazy("face_tables.openface", "read"), None, ("face",),
+        read_face=_lazy("face_tables.openface", "read_face"),
+    ),
+    Format(
+        "pyfeat", (".csv",), "blendshapes or action units of py-feat",
+        _lazy("face_tables.pyfeat", "sniff"), _lazy("face_tables.pyfeat", "read"), None, ("face",),
+        read_face=_lazy("face_tables.pyfeat", "read_face"),
+    ),
+    Format(
+        "livelink", (".csv",), "table of blendshapes: Live Link Face's, or with ARKit's names",
+        _lazy("face_tables.livelink_csv", "sniff"), _lazy("face_tables.livelink_csv", "read"),
+        _lazy("face_tables.livelink_writer", "write"), ("face",),
+        written="table of blendshapes as Live Link Face's",
+        read_face=_lazy("face_tables.livelink_csv", "read_face"),
+    ),
+    Format(
+        "livelink-udp", (".udp",), "recorded datagrams of Live Link Face",
+        _lazy("face_tables.livelink_udp", "sniff"), _lazy("face_tables.livelink_udp", "read"), None,
+        ("face",), read_face=_lazy("face_tables.livelink_udp", "read_face"),
+    ),
+    Format(
+        "ifacialmocap", (".txt",), "records of iFacialMocap and Facemotion3d",
+        _lazy("face_tables.ifacialmocap", "sniff"), _lazy("face_tables.ifacialmocap", "read"), None,
+        ("face",), read_face=_lazy("face_tables.ifacialmocap", "read_face"),
+    ),
+    Format(
+        "shapes-json", (".json",), "blendshapes in JSON: MediaPipe's scores, BEAT",
+        _lazy("face_tables.shapes_json", "sniff"), _lazy("face_tables.shapes_json", "read"), None,
+        ("face",), read_face=_lazy("face_tables.shapes_json", "read_face"),
+    ),
+    Format(
+        "points", (".csv", ".json", ".npz", ".npy", ".jsonl"),
+        "points of a tracked face: MediaPipe's 478, iBUG's 68; tables, JSON, NumPy's arrays",
+        _lazy("face_tables.points", "sniff"), _lazy("face_tables.points", "read"), None,
+        read_face=_lazy("face_tables.points", "read_points"),
+    ),
+    Format(
+        "c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face",
+        _lazy("c3d.reader", "sniff"), _lazy("c3d.reader", "read"), None,
+        read_face=_lazy("c3d.reader", "read_markers"),
+    ),
+    Format(
+        "trc", (".trc",), "TRC (track row column): markers of a face",
+        _lazy("markers.trc", "sniff"), _lazy("markers.trc", "read"), None,
+        read_face=_lazy("markers.trc", "read_markers"),
+    ),
+    Format(
+        "motive", (".csv",), "OptiTrack Motive's CSV export: markers of a face",
+        _lazy("markers.motive", "sniff"), _lazy("markers.motive", "read"), None,
+        read_face=_lazy("markers.motive", "read_markers"),
+    ),
+    Format(
+        "nexus", (".csv",), "Vicon Nexus' CSV export: markers of a face",
+        _lazy("markers.nexus", "sniff"), _lazy("markers.nexus", "read"), None,
+        read_face=_lazy("markers.nexus", "read_markers"),
+    ),
+    Format(
+        "qualisys", (".tsv",), "Qualisys Track Manager's TSV export: markers of a face",
+        _lazy("markers.qualisys", "sniff"), _lazy("markers.qualisys", "read"), None,
+        read_face=_lazy("markers.qualisys", "read_markers"),
+    ),
+    Format(
+        "markers", (".csv", ".tsv"), "table of a face's markers, wide or long",
+        _lazy("markers.table", "sniff"), _lazy("markers.table", "read"), None,
+        read_face=_lazy("markers.table", "read_markers"),
+    ),
+)  # fmt: skip
+"""In the order in which they are tried on a content: those quick to import first."""
+
+
 def formats() -> tuple[Format, ...]:
     """Return all formats, in the order in which they are tried on a content: those quick to import first."""
-
-    def lazy(module: str, name: str) -> Lazy:
-        return Lazy(f"fba.formats.{module}:{name}")
-
-    return (
-        Format(
-            "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
-            lazy("fba", "sniff_fba"), lazy("fba", "read_fba"), lazy("fba", "write_fba"),
-        ),
-        Format(
-            "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
-            lazy("text.fap", "sniff_fap"), lazy("text.fap", "read_fap"), lazy("text.fap", "write_fap"),
-            ("face",),
-            written="ASCII face animation parameters, version 2.2",
-        ),
-        Format(
-            "bap", (".bap",), "ASCII body animation parameters, versions 3.1 and 3.2",
-            lazy("text.bap", "sniff_bap"), lazy("text.bap", "read_bap"), lazy("text.bap", "write_bap"),
-            ("body",),
-            written="ASCII body animation parameters, version 3.2",
-        ),
-        Format(
-            "epf", (".epf",), "encoder parameter file: how to encode an animation; contains none itself",
-            lazy("epf.epf", "sniff_epf"), lazy("epf.epf", "read_animation"), None, (),
-        ),
-        Format(
-            "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
-            lazy("bvh.reader", "sniff"), lazy("bvh.reader", "read"), lazy("bvh.writer", "write"), ("body",),
-            read_motion=lazy("bvh.reader", "read_motion"),
-        ),
-        Format(
-            "vrma", (".vrma",), "VRM animation: read as glTF; written, the expressions of a face",
-            lazy("gltf.vrma", "sniff"), lazy("gltf.reader", "read"), lazy("gltf.vrma", "write"), ("face",),
-            written="VRM animation, the expressions of a face",
-        ),
-        Format(
-            "gltf", (".glb", ".gltf", ".vrma"),
-            "glTF 2.0: read, an animated skeleton; written, a skinned person",
-            lazy("gltf.reader", "sniff"), lazy("gltf.reader", "read"), lazy("gltf.writer", "write"),
-            read_motion=lazy("gltf.reader", "read_motion"), list_clips=lazy("gltf.clips", "list_clips"),
-            describe_person=lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
-        ),
-        Format(
-            "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
-            lazy("smpl.reader", "sniff"), lazy("smpl.reader", "read"), None,
-            read_motion=lazy("smpl.reader", "read_motion"),
-        ),
-        Format(
-            "openface", (".csv",), "action units, pose and gaze of OpenFace",
-            lazy("face_tables.openface", "sniff"), lazy("face_tables.openface", "read"), None, ("face",),
-            read_face=lazy("face_tables.openface", "read_face"),
-        ),
-        Format(
-            "pyfeat", (".csv",), "blendshapes or action units of py-feat",
-            lazy("face_tables.pyfeat", "sniff"), lazy("face_tables.pyfeat", "read"), None, ("face",),
-            read_face=lazy("face_tables.pyfeat", "read_face"),
-        ),
-        Format(
-            "livelink", (".csv",), "table of blendshapes: Live Link Face's, or with ARKit's names",
-            lazy("face_tables.livelink_csv", "sniff"), lazy("face_tables.livelink_csv", "read"),
-            lazy("face_tables.livelink_writer", "write"), ("face",),
-            written="table of blendshapes as Live Link Face's",
-            read_face=lazy("face_tables.livelink_csv", "read_face"),
-        ),
-        Format(
-            "livelink-udp", (".udp",), "recorded datagrams of Live Link Face",
-            lazy("face_tables.livelink_udp", "sniff"), lazy("face_tables.livelink_udp", "read"), None,
-            ("face",), read_face=lazy("face_tables.livelink_udp", "read_face"),
-        ),
-        Format(
-            "ifacialmocap", (".txt",), "records of iFacialMocap and Facemotion3d",
-            lazy("face_tables.ifacialmocap", "sniff"), lazy("face_tables.ifacialmocap", "read"), None,
-            ("face",), read_face=lazy("face_tables.ifacialmocap", "read_face"),
-        ),
-        Format(
-            "shapes-json", (".json",), "blendshapes in JSON: MediaPipe's scores, BEAT",
-            lazy("face_tables.shapes_json", "sniff"), lazy("face_tables.shapes_json", "read"), None,
-            ("face",), read_face=lazy("face_tables.shapes_json", "read_face"),
-        ),
-        Format(
-            "points", (".csv", ".json", ".npz", ".npy", ".jsonl"),
-            "points of a tracked face: MediaPipe's 478, iBUG's 68; tables, JSON, NumPy's arrays",
-            lazy("face_tables.points", "sniff"), lazy("face_tables.points", "read"), None,
-            read_face=lazy("face_tables.points", "read_points"),
-        ),
-        Format(
-            "c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face",
-            lazy("c3d.reader", "sniff"), lazy("c3d.reader", "read"), None,
-            read_face=lazy("c3d.reader", "read_markers"),
-        ),
-        Format(
-            "trc", (".trc",), "TRC (track row column): markers of a face",
-            lazy("markers.trc", "sniff"), lazy("markers.trc", "read"), None,
-            read_face=lazy("markers.trc", "read_markers"),
-        ),
-        Format(
-            "motive", (".csv",), "OptiTrack Motive's CSV export: markers of a face",
-            lazy("markers.motive", "sniff"), lazy("markers.motive", "read"), None,
-            read_face=lazy("markers.motive", "read_markers"),
-        ),
-        Format(
-            "nexus", (".csv",), "Vicon Nexus' CSV export: markers of a face",
-            lazy("markers.nexus", "sniff"), lazy("markers.nexus", "read"), None,
-            read_face=lazy("markers.nexus", "read_markers"),
-        ),
-        Format(
-            "qualisys", (".tsv",), "Qualisys Track Manager's TSV export: markers of a face",
-            lazy("markers.qualisys", "sniff"), lazy("markers.qualisys", "read"), None,
-            read_face=lazy("markers.qualisys", "read_markers"),
-        ),
-        Format(
-            "markers", (".csv", ".tsv"), "table of a face's markers, wide or long",
-            lazy("markers.table", "sniff"), lazy("markers.table", "read"), None,
-            read_face=lazy("markers.table", "read_markers"),
-        ),
-    )  # fmt: skip
+    return _FORMATS
 
 
 def format_of(path: Path, format: str | None = None) -> Format:

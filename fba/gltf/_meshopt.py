@@ -50,7 +50,7 @@ def unpack_view(data: memoryview, entry: Value, budget: Budget) -> memoryview:
         failed = unpack_attributes(packed, rows)
         result = rows if failed else _filtered(rows, entry)
     else:
-        state, last = np.zeros(2, np.int64), np.zeros(2, np.int64)
+        state, last = np.zeros(5, np.int64), np.zeros(2, np.int64)
         indices = np.zeros(count, np.uint32)
         if mode == "TRIANGLES":
             memory = np.zeros((16, 2), np.int64), np.zeros(16, np.int64)

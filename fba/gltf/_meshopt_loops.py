@@ -1,8 +1,8 @@
 """The loops of the meshopt decoder, compiled. They check every index, and return -1 for damaged data.
 
 Bounds: results have the counts that `unpack_view` was given: rows and columns run over their own shape. The
-decoder's memory of FIFO entries is reached by remainders, which Python and numba keep from 0 up; `state` and
-`last` have two numbers. Bytes are read before `tail` or `end` only, which leave room for the 16 to 256 bytes
+decoder's memory of FIFO entries is reached by remainders, which Python and numba keep from 0 up; `state` has
+five numbers, `last` two. Bytes are read before `tail` or `end` only, which leave room for the 16 to 256 bytes
 behind.
 """
 
@@ -16,6 +16,9 @@ GROUP = 16
 FIFO = 16
 """Edges and vertices that the decoder of triangles remembers."""
 END = 0xFFFFFFFF
+POSITION, LAST, NEXT, VERTICES, EDGES = range(5)
+"""What `state` counts: bytes read, the last explicit index, the next new vertex, vertices and edges that went
+into the FIFOs."""
 
 
 @compiled
@@ -65,13 +68,13 @@ def unpack_attributes(data: UInt8, out: UInt8) -> int:
 
 @inlined
 def _read_number(data: UInt8, state: Int64, end: int) -> int:
-    """The number of 7 bits a byte at state[0], which moves on; -1 where the data end within it."""
+    """The number of 7 bits a byte at state[POSITION], which moves on; -1 where the data end within it."""
     result = 0
     for shift in range(0, 35, 7):
-        if state[0] >= end:
+        if state[POSITION] >= end:
             return -1
-        byte = int(data[state[0]])
-        state[0] += 1
+        byte = int(data[state[POSITION]])
+        state[POSITION] += 1
         result |= (byte & 127) << shift
         if byte < 128:
             return result & END
@@ -80,114 +83,123 @@ def _read_number(data: UInt8, state: Int64, end: int) -> int:
 
 @inlined
 def _read_index(data: UInt8, state: Int64, end: int) -> int:
-    """An index as its difference from the last explicit one, state[1]; -1 where the data end within it."""
+    """An index as its difference from the last explicit one, state[LAST]; -1 where the data end within it."""
     number = _read_number(data, state, end)
     if number < 0:
         return -1
-    state[1] = (int(state[1]) + ((number >> 1) ^ -(number & 1))) & END
-    return int(state[1])
+    state[LAST] = (int(state[LAST]) + ((number >> 1) ^ -(number & 1))) & END
+    return int(state[LAST])
+
+
+@inlined
+def _new_vertex(state: Int64) -> int:
+    """The next vertex that no triangle had before."""
+    vertex = int(state[NEXT])
+    state[NEXT] += 1
+    return vertex
+
+
+@inlined
+def _remember_vertex(vertices: Int64, state: Int64, vertex: int) -> None:
+    vertices[state[VERTICES] % FIFO] = vertex
+    state[VERTICES] += 1
+
+
+@inlined
+def _remember_edge(edges: Int64, state: Int64, a: int, b: int) -> None:
+    edges[state[EDGES] % FIFO, 0], edges[state[EDGES] % FIFO, 1] = a, b
+    state[EDGES] += 1
+
+
+@inlined
+def _third_corner(data: UInt8, vertices: Int64, state: Int64, end: int, code: int) -> int:
+    """The corner of a triangle that shares an edge; -1 where the data end within it."""
+    if 0 < code < 13:
+        return int(vertices[(state[VERTICES] - 1 - code) % FIFO])
+    if code == 0:
+        corner = _new_vertex(state)
+    elif code < 15:
+        corner = (int(state[LAST]) + (1 if code == 14 else -1)) & END
+        state[LAST] = corner
+    else:
+        corner = _read_index(data, state, end)
+    _remember_vertex(vertices, state, corner)
+    return corner
+
+
+@inlined
+def _free_corner(data: UInt8, vertices: Int64, state: Int64, end: int, code: int) -> int:
+    """The second or third corner of a triangle that shares no edge; -1 where the data end within it."""
+    if code == 0:
+        return _new_vertex(state)
+    if code == 15:
+        return _read_index(data, state, end)
+    return int(vertices[(state[VERTICES] - code) % FIFO])
+
+
+@inlined
+def _free_corners(data: UInt8, vertices: Int64, state: Int64, end: int, code: int) -> tuple[int, int, int]:
+    """The corners of a triangle that shares no edge; one is -1 where the data do not fit."""
+    if code < 14:
+        pair = int(data[end + code])
+    else:
+        if int(state[POSITION]) >= end:
+            return -1, -1, -1
+        pair = int(data[state[POSITION]])
+        state[POSITION] += 1
+        if pair == 0:
+            state[NEXT] = 0
+    second, third = pair >> 4, pair & 15
+    if code < 14 and (second == 15 or third == 15):
+        return -1, -1, -1
+    a = _read_index(data, state, end) if code == 15 else _new_vertex(state)
+    b = _free_corner(data, vertices, state, end, second)
+    c = _free_corner(data, vertices, state, end, third)
+    _remember_vertex(vertices, state, a)
+    if second in (0, 15):
+        _remember_vertex(vertices, state, b)
+    if third in (0, 15):
+        _remember_vertex(vertices, state, c)
+    return a, b, c
 
 
 @compiled
 def unpack_triangles(data: UInt8, edges: Int64, vertices: Int64, state: Int64, out: UInt32) -> int:
     """Write the decoded corners to out (triangles, 3); 0, or -1 where the data do not fit.
 
-    edges: (16, 2), vertices: (16,), state: (2,), all 0: the decoder's memory.
+    edges: (16, 2), vertices: (16,), state: (5,), all 0: the decoder's memory.
     """
     count = out.shape[0]
     end = len(data) - 16
-    state[0] = 1 + count
-    following, edge_top, vertex_top = 0, 0, 0
-    if int(state[0]) > end:
+    state[POSITION] = 1 + count
+    if int(state[POSITION]) > end:
         return -1
     for row in range(count):
         code = int(data[1 + row])
         high, low = code >> 4, code & 15
         if high < 15:
-            edge = (edge_top - 1 - high) % FIFO
+            edge = (int(state[EDGES]) - 1 - high) % FIFO
             a, b = int(edges[edge, 0]), int(edges[edge, 1])
-            remember = low == 0 or low >= 13
-            if low == 0:
-                c = following
-                following += 1
-            elif low < 13:
-                c = int(vertices[(vertex_top - 1 - low) % FIFO])
-            elif low < 15:
-                c = (int(state[1]) + (1 if low == 14 else -1)) & END
-                state[1] = c
-            else:
-                c = _read_index(data, state, end)
-                if c < 0:
-                    return -1
-            if remember:
-                vertices[vertex_top % FIFO] = c
-                vertex_top += 1
+            c = _third_corner(data, vertices, state, end, low)
         else:
-            if low < 14:
-                pair = int(data[end + low])
-            else:
-                if int(state[0]) >= end:
-                    return -1
-                pair = int(data[state[0]])
-                state[0] += 1
-                if pair == 0:
-                    following = 0
-            second, third = pair >> 4, pair & 15
-            if low == 15:
-                a = _read_index(data, state, end)
-                if a < 0:
-                    return -1
-            else:
-                a = following
-                following += 1
-            if second == 0:
-                b = following
-                following += 1
-            elif second == 15:
-                if low < 14:
-                    return -1
-                b = _read_index(data, state, end)
-                if b < 0:
-                    return -1
-            else:
-                b = int(vertices[(vertex_top - second) % FIFO])
-            if third == 0:
-                c = following
-                following += 1
-            elif third == 15:
-                if low < 14:
-                    return -1
-                c = _read_index(data, state, end)
-                if c < 0:
-                    return -1
-            else:
-                c = int(vertices[(vertex_top - third) % FIFO])
-            vertices[vertex_top % FIFO] = a
-            vertex_top += 1
-            if second in (0, 15):
-                vertices[vertex_top % FIFO] = b
-                vertex_top += 1
-            if third in (0, 15):
-                vertices[vertex_top % FIFO] = c
-                vertex_top += 1
-            edges[edge_top % FIFO, 0], edges[edge_top % FIFO, 1] = b, a
-            edge_top += 1
-        edges[edge_top % FIFO, 0], edges[edge_top % FIFO, 1] = c, b
-        edge_top += 1
-        edges[edge_top % FIFO, 0], edges[edge_top % FIFO, 1] = a, c
-        edge_top += 1
+            a, b, c = _free_corners(data, vertices, state, end, low)
+            _remember_edge(edges, state, b, a)
+        if min(a, b, c) < 0:
+            return -1
+        _remember_edge(edges, state, c, b)
+        _remember_edge(edges, state, a, c)
         out[row, 0], out[row, 1], out[row, 2] = a & END, b & END, c & END
-    return 0 if int(state[0]) == end else -1
+    return 0 if int(state[POSITION]) == end else -1
 
 
 @compiled
 def unpack_indices(data: UInt8, state: Int64, last: Int64, out: UInt32) -> int:
     """Write the decoded indices to out (count,); 0, or -1 where the data do not fit.
 
-    state, last: (2,), all 0: the decoder's memory.
+    state: (5,), last: (2,), all 0: the decoder's memory.
     """
     end = len(data) - 4
-    state[0] = 1
+    state[POSITION] = 1
     for row in range(len(out)):
         number = _read_number(data, state, end)
         if number < 0:
@@ -196,4 +208,4 @@ def unpack_indices(data: UInt8, state: Int64, last: Int64, out: UInt32) -> int:
         number >>= 1
         last[baseline] = (int(last[baseline]) + ((number >> 1) ^ -(number & 1))) & END
         out[row] = int(last[baseline])
-    return 0 if int(state[0]) == end else -1
+    return 0 if int(state[POSITION]) == end else -1

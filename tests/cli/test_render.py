@@ -19,7 +19,7 @@ from PIL import Image
 import fba
 from fba import Animation
 from fba.body import gait
-from fba.cli.pose_options import still_animation
+from fba.cli.pose_options import Pose, still_animation
 from started_programs import started
 
 Run = Callable[..., tuple[int, str, str]]
@@ -35,7 +35,7 @@ def pixels(path: Path) -> np.ndarray:
 
 
 def test_faps_by_name_and_number() -> None:
-    track = still_animation(("open_jaw=800", "49=-2000"), (), ()).face
+    track = still_animation(Pose(("open_jaw=800", "49=-2000"))).face
     assert track is not None
     assert np.flatnonzero(track.mask[0]).tolist() == [2, 48]
     assert (track.values[0, 2], track.values[0, 48]) == (800, -2000)
@@ -56,7 +56,7 @@ def test_faps_by_name_and_number() -> None:
     ],
 )
 def test_visemes(visemes: tuple[str, ...], fields: tuple[int, int, int]) -> None:
-    track = still_animation((), visemes, ()).face
+    track = still_animation(Pose(visemes=visemes)).face
     assert track is not None
     assert tuple(track.viseme[0]) == (*fields, 0)
     assert track.mask[0, 0]
@@ -64,7 +64,7 @@ def test_visemes(visemes: tuple[str, ...], fields: tuple[int, int, int]) -> None
 
 
 def test_expressions() -> None:
-    track = still_animation((), (), ("joy=50", "2")).face
+    track = still_animation(Pose(expressions=("joy=50", "2"))).face
     assert track is not None
     assert tuple(track.expression[0]) == (1, 50, 2, 63, 0, 0)
     assert np.flatnonzero(track.mask[0]).tolist() == [1]
@@ -91,7 +91,7 @@ def test_expressions() -> None:
 )
 def test_mistakes_are_explained(given: tuple[tuple[str, ...], ...], text: str) -> None:
     with pytest.raises(click.UsageError) as error:
-        still_animation(*given)  # type: ignore[arg-type]
+        still_animation(Pose(*given))
     assert text in str(error.value)
 
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.body.model import BodyModel
-from fba.cli.pose_options import still_animation
+from fba.cli.pose_options import Pose, still_animation
 from fba.face.model import FaceModel, point_row
 from fba.parameters import BAP_COUNT, bap_numbers
 from fba.player import Camera, Offscreen, Scene
@@ -59,7 +59,7 @@ class Case:
 
     def animation(self) -> Animation:
         """One frame."""
-        found = still_animation(self.faps or ("open_jaw=0",), self.visemes, self.expressions)
+        found = still_animation(Pose(self.faps or ("open_jaw=0",), self.visemes, self.expressions))
         if self.content == "face":
             return found
         values = np.zeros((1, BAP_COUNT), dtype=np.int32)

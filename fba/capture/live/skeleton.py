@@ -17,6 +17,8 @@ from fba.tracks import BodyTrack
 
 CONTEXT = 8
 """Frames before the new ones that are looked at again, so that joints go on as they went."""
+FOLLOWING = retarget.Retargeting(SPINES["spread"], with_anchors=True, scale=None, ground="none", plant=False)
+"""Poses that come one after the other: nothing is known of the ground."""
 
 
 class LiveSkeleton:
@@ -52,10 +54,7 @@ class LiveSkeleton:
             positions = np.concatenate([self._context[1], positions])
         self._context = rotations[-CONTEXT:], positions[-CONTEXT:]
         poses = replace(self._source, rotations=rotations, positions=positions, rate=rate)
-        turned, root = retarget.find_targets(
-            self._at_rest(poses), self._mapped, self._solver, groups=SPINES["spread"], with_anchors=True,
-            scale=None, ground="none", plant=False,
-        )  # fmt: skip
+        turned, root = retarget.find_targets(self._at_rest(poses), self._mapped, self._solver, FOLLOWING)
         last = {joint: rows[-new:] for joint, rows in turned.items()}
         track = solve_targets(last, root[-new:], self._solver, self._previous)
         self._previous = track.values[-1]

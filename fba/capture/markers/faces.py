@@ -176,6 +176,29 @@ def find_face(
     """
     if gaze not in GAZES:
         raise OptionError(f"gaze must be one of {', '.join(GAZES)}, not {gaze!r}")
+    _check_size(motion, limits)
+    model = FaceModel.default() if model is None else model
+    places, found_by = _find_places(motion, markers)
+    places = _without_rare(motion, places)
+    actor = _find_actor(motion, places, neutral, model, traits)
+    points, moved = _measure_points(actor, motion.times, model, traits)
+    try:
+        fapu = Fapu.measure(points)
+    except ModelError as error:
+        raise ModelError(f"the neutral face: {error.finding}").with_remedies(GIVE_MAP) from error
+    values, sent = _solve_features(actor, moved, points, fapu, model, traits)
+    sent += _turn_head(values, actor, fapu, traits)
+    sent += _turn_eyes(values, actor, moved, points, fapu, gaze)
+    spine = points[row_of()["7.1"]]
+    path = np.einsum("tcd,d->tc", actor.rotation, spine) + actor.shift - spine
+    return MarkerFace(
+        actor.places, found_by, actor.where, (actor.rest.start, actor.rest.stop), points, fapu, actor.filled,
+        values, tuple(sorted(sent)), path,
+    )  # fmt: skip
+
+
+def _check_size(motion: MarkerMotion, limits: Limits) -> None:
+    """Raise ModelError for no frames or too many, LimitError for a capture beyond the limits."""
     if not len(motion):
         raise ModelError("the capture has no frames")
     if len(motion) > MAX_FRAMES:
@@ -185,16 +208,44 @@ def find_face(
         "the capture",
         source=motion.positions.nbytes,
     )
-    model = FaceModel.default() if model is None else model
-    places, found_by = (dict(markers), "given") if markers is not None else find_map(motion)
-    if markers is not None:
-        check_map(places)
-        missing = [name for name in places if name not in motion.names]
-        if missing:
-            raise OptionError(
-                f"the capture has no marker {list_names(missing)}; it has {list_names(motion.names)}"
-            )
-    places = _without_rare(motion, places)
+
+
+def _find_places(motion: MarkerMotion, markers: Mapping[str, str] | None) -> tuple[dict[str, str], str]:
+    """Return the places of markers, by name, and what says so. Raises OptionError for a map that is wrong."""
+    if markers is None:
+        return find_map(motion)
+    places = dict(markers)
+    check_map(places)
+    missing = [name for name in places if name not in motion.names]
+    if missing:
+        raise OptionError(
+            f"the capture has no marker {list_names(missing)}; it has {list_names(motion.names)}"
+        )
+    return places, "given"
+
+
+@dataclass(frozen=True, eq=False)
+class _Actor:
+    """Markers in the actor's axes, in metres, and the motion of the head.
+
+    places: marker -> place. where: the face in the capture. rest: frames of the neutral face. local: float64
+    (T, M, 3), the markers relative to the head, without gaps. rotation, shift: float64 (T, 3, 3) and (T, 3),
+    the head's, from the neutral face. filled: gaps.
+    """
+
+    places: dict[str, str]
+    where: Registration
+    rest: slice
+    local: Float64
+    rotation: Float64
+    shift: Float64
+    filled: Filled
+
+
+def _find_actor(
+    motion: MarkerMotion, places: dict[str, str], neutral: Neutral, model: FaceModel, traits: Traits
+) -> _Actor:
+    """Return the markers of a map as the actor's; those that are not where the map says are repaired."""
     names = tuple(places)
     positions = motion.positions[:, [motion.names.index(name) for name in names]]
     if traits.confused:
@@ -223,11 +274,10 @@ def find_face(
         a, b = names.index(one), names.index(other)
         positions[:, [a, b]] = positions[:, [b, a]]
     kept = [n for n, name in enumerate(names) if name not in where.astray]
-    names = tuple(names[n] for n in kept)
-    before, places = tuple(places), {name: places[name] for name in names}
     positions = positions[:, kept]
+    places = {names[n]: places[names[n]] for n in kept}
     changed = {name for pair in where.swapped for name in pair} | set(where.astray)
-    if changed & {before[n] for n in fixed}:
+    if changed & {names[n] for n in fixed}:
         fixed = traits.find_still(places)
         rotation, shift = follow_head(positions[:, fixed], motion.times)
     else:
@@ -235,52 +285,67 @@ def find_face(
         rotation, shift = basis @ rotation @ basis.T, (shift * mirror) @ turn.T
     rotation, shift = relate_poses(rotation, shift, rest)
     local = remove_poses(rotation, shift, positions)
-    local, filled = fill_gaps(names, local, motion.times)
+    local, filled = fill_gaps(tuple(places), local, motion.times)
     warn_of_gaps(filled)
-    neutral_local = np.median(local[rest], axis=0)
+    return _Actor(places, where, rest, local, rotation, shift, filled)
+
+
+def _measure_points(
+    actor: _Actor, times: Float64, model: FaceModel, traits: Traits
+) -> tuple[Float64, Float64]:
+    """Return the neutral feature points, float64 (84, 3), and how they move from there, (T, 84, 3)."""
+    local, names = actor.local, tuple(actor.places)
+    neutral = np.median(local[actor.rest], axis=0)
     for n, name in enumerate(names):
         if name in traits.rests:
-            neutral_local[n] = np.median(local[traits.rests[name], n], axis=0)
-        neutral_local[n, 1] -= traits.raised.get(name, 0.0)
-    known = {places[name]: neutral_local[n] for n, name in enumerate(names) if places[name] != "head"}
-    points = complete_points(known, model.points)
-    _open_by_blinks(points, places, names, local - neutral_local, motion.times)
-    try:
-        fapu = Fapu.measure(points)
-    except ModelError as error:
-        raise ModelError(f"the neutral face: {error.finding}").with_remedies(GIVE_MAP) from error
-    moved = np.zeros((len(motion), len(points), 3))
+            neutral[n] = np.median(local[traits.rests[name], n], axis=0)
+        neutral[n, 1] -= traits.raised.get(name, 0.0)
+    placed = {place: neutral[n] for n, place in enumerate(actor.places.values()) if place != "head"}
+    points = complete_points(placed, model.points)
+    _open_by_blinks(points, actor.places, names, local - neutral, times)
+    moved = np.zeros((len(local), len(points), 3))
     rows = row_of()
-    for n, name in enumerate(names):
-        if places[name] in rows:
-            moved[:, rows[places[name]]] = local[:, n] - neutral_local[n]
-    told = [place for place in places.values() if place in rows and place not in (*RIGID, *PUPILS)]
+    for n, place in enumerate(actor.places.values()):
+        if place in rows:
+            moved[:, rows[place]] = local[:, n] - neutral[n]
+    return points, moved
+
+
+def _solve_features(
+    actor: _Actor, moved: Float64, points: Float64, fapu: Fapu, model: FaceModel, traits: Traits
+) -> tuple[Float64, tuple[int, ...]]:
+    """Return the FAPs of all frames, float64 (T, 68), and which of them the face's own markers tell."""
+    rows = row_of()
+    told = [place for place in actor.places.values() if place in rows and place not in (*RIGID, *PUPILS)]
     unknowns = choose_unknowns(told, traits.depth, traits.untold)
-    values = np.zeros((len(motion), FAP_COUNT))
-    sent: tuple[int, ...] = ()
-    if unknowns.faps:
-        values = solve(moved, points, fapu, unknowns, measure_responses(model))
-        sent = (*unknowns.faps, *unknowns.mates)
-    turns = where.axes.T @ rotation if traits.camera else rotation
+    if not unknowns.faps:
+        return np.zeros((len(moved), FAP_COUNT)), ()
+    values = solve(moved, points, fapu, unknowns, measure_responses(model))
+    return values, (*unknowns.faps, *unknowns.mates)
+
+
+def _turn_head(values: Float64, actor: _Actor, fapu: Fapu, traits: Traits) -> tuple[int, ...]:
+    """Put the turns of the head into FAPs, float64 (T, 68); return which these are."""
+    turns = actor.where.axes.T @ actor.rotation if traits.camera else actor.rotation
     values[:, [HEAD_PITCH - 1, HEAD_YAW - 1, HEAD_ROLL - 1]] = _head_angles(turns) / fapu.AU
-    sent = (*sent, HEAD_PITCH, HEAD_YAW, HEAD_ROLL)
-    eyes = find_gaze(moved, points, set(places.values()), where.scale)
-    if eyes is not None and gaze == "none":
-        sent = (*sent, *YAW_EYE, *PITCH_EYE)
-        values[:, [fap - 1 for fap in YAW_EYE]] = eyes[:, :1] / fapu.AU
-        values[:, [fap - 1 for fap in PITCH_EYE]] = eyes[:, 1:] / fapu.AU
-        limit_gaze(values)
+    return HEAD_PITCH, HEAD_YAW, HEAD_ROLL
+
+
+def _turn_eyes(
+    values: Float64, actor: _Actor, moved: Float64, points: Float64, fapu: Fapu, gaze: str
+) -> tuple[int, ...]:
+    """Put the turns of the eyes into FAPs, float64 (T, 68), which hold the head's; return which these are."""
+    eyes = find_gaze(moved, points, set(actor.places.values()), actor.where.scale)
     if gaze == "camera":
-        sent = (*sent, *YAW_EYE, *PITCH_EYE)
-        values[:, [fap - 1 for fap in YAW_EYE]] = -values[:, [HEAD_YAW - 1]]
-        values[:, [fap - 1 for fap in PITCH_EYE]] = -values[:, [HEAD_PITCH - 1]]
-        limit_gaze(values, warn=False)  # a head that turns away leaves the camera
-    spine = points[rows["7.1"]]
-    path = np.einsum("tcd,d->tc", rotation, spine) + shift - spine
-    return MarkerFace(
-        places, found_by, where, (rest.start, rest.stop), points, fapu, filled, values, tuple(sorted(sent)),
-        path,
-    )  # fmt: skip
+        yaw, pitch = -values[:, [HEAD_YAW - 1]], -values[:, [HEAD_PITCH - 1]]
+    elif eyes is not None:
+        yaw, pitch = eyes[:, :1] / fapu.AU, eyes[:, 1:] / fapu.AU
+    else:
+        return ()
+    values[:, [fap - 1 for fap in YAW_EYE]] = yaw
+    values[:, [fap - 1 for fap in PITCH_EYE]] = pitch
+    limit_gaze(values, warn=gaze == "none")  # by the camera's gaze, a head that turns away leaves the camera
+    return (*YAW_EYE, *PITCH_EYE)
 
 
 def _open_by_blinks(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +10,53 @@ import click
 
 from fba.cli import joint_options, marker_options, options
 from fba.cli.command import Decorated
-from fba.cli.inputs import check_capture_options
+from fba.cli.inputs import Reading, check_capture_options
 
-CAPTURE = ("spine", "ground", "plant", "origin", "rest", "up", "scale", "swap", "face", "neutral", "gaze",
-           "head_path", "aspect")  # fmt: skip
-"""Those that the reader of a capture takes."""
+
+@dataclass(frozen=True)
+class CaptureOptions:
+    """How a capture becomes BAPs and FAPs.
+
+    maps, map_out: places of joints or markers. The other fields are options of the readers of captures.
+    """
+
+    maps: tuple[Path | joint_options.Pair, ...]
+    map_out: Path | None
+    spine: str
+    ground: str
+    plant: bool
+    origin: str
+    rest: str | int
+    up: str
+    scale: float | None
+    swap: str
+    face: str | None
+    neutral: marker_options.Neutral
+    gaze: str
+    head_path: bool | None
+    aspect: float | None
+
+    @property
+    def map_files(self) -> list[Path]:
+        """The files among the maps."""
+        return [each for each in self.maps if isinstance(each, Path)]
+
+    def for_readers(self, inputs: tuple[Path, ...], reading: Reading) -> dict[str, Any]:
+        """Return the options of the readers of captures.
+
+        Raises click.UsageError for one that was given and that no reader of the inputs takes.
+        """
+        names = [one.name for one in fields(self) if one.name not in ("maps", "map_out")]
+        given = {name: f"--{name.replace('_', '-')}" for name in names if options.is_given(name)}
+        check_capture_options(given, inputs, reading)
+        taken = {name: getattr(self, name) for name in names}
+        if self.head_path is None:
+            taken["head_path"] = len(inputs) == 1  # of two files, the other has a body
+        return taken
 
 
 def capture_options(command: Decorated) -> Decorated:
-    """Add the options; the command takes them as keywords: `CAPTURE`, and those of maps."""
+    """Add the options; the command takes them as keywords: the fields of `CaptureOptions`."""
     for option in reversed(
         (
             options.choice_option(
@@ -76,18 +115,3 @@ def capture_options(command: Decorated) -> Decorated:
     ):  # fmt: skip
         command = option(command)
     return command
-
-
-def take_capture_options(
-    settings: dict[str, Any], inputs: tuple[Path, ...], format: str | None
-) -> dict[str, Any]:
-    """Return what the options say for readers of captures, and remove them from those of a command.
-
-    Raises click.UsageError for one that was given and that no reader of the inputs takes.
-    """
-    given = {name: f"--{name.replace('_', '-')}" for name in CAPTURE if options.is_given(name)}
-    check_capture_options(given, inputs, format)
-    taken = {name: settings.pop(name) for name in CAPTURE}
-    if taken["head_path"] is None:
-        taken["head_path"] = len(inputs) == 1  # of two files, the other has a body
-    return taken

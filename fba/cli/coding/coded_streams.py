@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -182,17 +181,19 @@ def _read_model_with_fit(path: Path | None) -> FaceModel | None:
 
 
 def encode_as_epf(
-    epf: Path, animation: Animation, settings: Mapping[str, Any], limits: Limits
+    epf: Path, animation: Animation, table: str, limits: Limits, *, marked: bool
 ) -> CodedStream:
-    """Return the stream of an animation, coded plane by plane as an EPF file says."""
+    """Return the stream of an animation, coded plane by plane as an EPF file says.
+
+    table: of BAP steps. marked: whether the stream names it.
+    """
     from fba.codec import encode_planes, write_mark
     from fba.formats.epf.epf import read_epf
 
     with input_file(epf) as file:
         planes = read_epf(file, limits=limits)
-    table = settings["bap_steps"]
     data = encode_planes(animation, planes, bap_steps=table)
     quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
-    if settings["mark"] and quant:
+    if marked and quant:
         data += write_mark(table)
     return CodedStream(data, len(planes), sum(plane.intra for plane in planes), {}, quant)

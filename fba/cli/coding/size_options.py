@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -40,11 +39,6 @@ class Size:
     fap_quant: int | None = None
     bap_quant: int | None = None
     still: bool | None = None
-
-    @classmethod
-    def take(cls, settings: dict[str, Any]) -> Size:
-        """Return what the options say, and remove them from the values of a command's options."""
-        return cls(**{field.name: settings.pop(field.name) for field in fields(cls)})
 
     def quantisers(self) -> dict[str, int]:
         """Return the quantisers, by default the finest."""

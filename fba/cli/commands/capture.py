@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,62 @@ if TYPE_CHECKING:
 KINDS = ("livelink", "ifacialmocap", "vtube", "vmc")
 PRESETS = tuple(name for name in ALL_PRESETS if name != "exact")  # who knows what will never move?
 LONGEST_NEUTRAL = 60.0
+
+
+@dataclass(frozen=True)
+class _Network:
+    """Where data come from: see `fba.live.Receiver`. sender: of several, the one to use."""
+
+    host: str
+    port: int | None
+    ask: str | None
+    sender: str | None
+
+
+@dataclass(frozen=True)
+class _Coding:
+    """How the stream is coded: by a preset and a quantiser, or at a bit rate with a buffer in seconds."""
+
+    preset: str | None
+    fap_quant: int
+    bitrate: float | None
+    buffer: float | None
+
+    @property
+    def is_compact(self) -> bool:
+        """Whether only what players do not derive is sent."""
+        return self.preset == "compact"
+
+    def recorder(self, targets: list[Target]) -> StreamRecorder:
+        """Return what encodes frames and writes them to the targets."""
+        from fba.codec import EncoderOptions
+        from fba.live import StreamRecorder
+
+        return StreamRecorder(
+            targets,
+            EncoderOptions(fap_quant=self.fap_quant, clamp=True, bap_steps="visage"),
+            bit_rate=self.bitrate,
+            buffer=rate_options.DEFAULT_BUFFER if self.buffer is None else self.buffer,
+            compact=self.is_compact,
+        )
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What the command line asks for. seconds: after which it stops. neutral: seconds of a neutral face."""
+
+    kind: str
+    output: Path | None
+    no_clobber: bool
+    play: bool
+    seconds: Fraction | None
+    fps: Fraction | None
+    neutral: float | None
+    swap: bool
+    model: Path | None
+    as_json: bool
+    network: _Network
+    coding: _Coding
 
 
 @click.command(
@@ -105,84 +162,68 @@ LONGEST_NEUTRAL = 60.0
     help="With --play, the face that is shown. Default: the built-in head.",
 )
 @options.json_option
-def command(
-    kind: str,
-    output: Path | None,
-    no_clobber: bool,
-    play: bool,
-    port: int | None,
-    host: str,
-    ask: str | None,
-    sender: str | None,
-    seconds: Fraction | None,
-    fps: Fraction | None,
-    neutral: float | None,
-    swap: bool,
-    preset: str | None,
-    fap_quant: int,
-    bitrate: float | None,
-    buffer: float | None,
-    model: Path | None,
-    as_json: bool,
-) -> None:
+@options.gather(network=_Network, coding=_Coding)
+@options.gather(request=_Request)
+def command(request: _Request) -> None:
     """Receive a captured face or person over the network, show it, and record it as an FBA stream.
 
     livelink is Live Link Face, ifacialmocap also Facemotion3d, vtube VTube Studio on a telephone, vmc any
     program that performs by the VMC protocol, bodies too. The file is complete at any moment, whatever
     happens to this program. Ctrl-C ends it and prints what was received, and what was left out.
     """
-    if output is None and not play:
-        raise click.UsageError("give -o OUT.fba to record, --play to see it, or both")
-    if model is not None and not play:
-        raise click.UsageError("--model goes with --play")
-    rate_options.check_buffer()
-    if bitrate is not None and options.is_given("fap_quant"):
-        raise click.UsageError("--quant and --bitrate contradict each other: the bit rate decides how finely")
-    if bitrate is not None and preset is not None:
-        raise click.UsageError(
-            "--preset and --bitrate contradict each other: the bit rate decides what is sent"
-        )
-    compact = preset == "compact"
+    _check(request)
+    output, network, coding = request.output, request.network, request.coding
     written = [] if output is None else [Output("-o", output)]
-    outputs = Outputs(written, [] if model is None else [model], no_clobber=no_clobber)
-    if play:
+    outputs = Outputs(written, [request.model], no_clobber=request.no_clobber)
+    if request.play:
         from fba import player
 
         player.check_display()  # before anything that takes long
-    from fba.codec import EncoderOptions
-    from fba.live import Capture, Receiver, StreamRecorder, find_kind
+    from fba.live import Capture, Receiver, find_kind
     from fba.live.recording import warm_up
 
-    found = find_kind(kind)
-    if ask is not None and not found.asked_port:
-        raise click.UsageError(f"--ask: {found.description} sends by itself; enter our address in the app")
-    warm_up(bodies=found.bodies, rated=bitrate is not None, compact=compact)
+    kind = find_kind(request.kind)
+    if network.ask is not None and not kind.asked_port:
+        raise click.UsageError(f"--ask: {kind.description} sends by itself; enter our address in the app")
+    warm_up(bodies=kind.bodies, rated=coding.bitrate is not None, compact=coding.is_compact)
     raise_delayed()  # from here on, Ctrl-C ends the capture and not the command
-    targets, stream = _targets(output, play=play)
-    recorder = StreamRecorder(
-        targets, EncoderOptions(fap_quant=fap_quant, clamp=True, bap_steps="visage"),
-        bit_rate=bitrate, buffer=rate_options.DEFAULT_BUFFER if buffer is None else buffer,
-        compact=compact,
-    )  # fmt: skip
+    targets, stream = _targets(output, play=request.play)
+    recorder = coding.recorder(targets)
     capture = Capture(
-        found, recorder.push, sender=sender, rate=fps, swap=swap, neutral=neutral,
-        say=lambda text: click.echo(f"fba: {text}", err=True),
+        kind, recorder.push, sender=network.sender, rate=request.fps, swap=request.swap,
+        neutral=request.neutral, say=lambda text: click.echo(f"fba: {text}", err=True),
     )  # fmt: skip
-    with Receiver(capture, host=host, port=port, ask=ask) as receiver:
-        click.echo(f"fba: listening for {found.description} on UDP port {receiver.port}", err=True)
-        limit = None if seconds is None else float(seconds)
+    with Receiver(capture, host=network.host, port=network.port, ask=network.ask) as receiver:
+        click.echo(f"fba: listening for {kind.description} on UDP port {receiver.port}", err=True)
+        limit = None if request.seconds is None else float(request.seconds)
         try:
             if stream is None:
                 with _stopping(receiver.stop):
                     receiver.run(limit)
             else:
-                _play(stream, receiver, capture, recorder, limit, model)
+                _play(stream, receiver, capture, recorder, limit, request.model)
         finally:
             summary = capture.finish()
             recorder.finish()
     if not summary.frames:
         raise FbaError(_nothing(summary, capture, receiver))
-    _report(outputs, output, recorder, summary, fps, as_json=as_json)
+    _report(outputs, output, recorder, summary, as_json=request.as_json)
+
+
+def _check(request: _Request) -> None:
+    """Raise click.UsageError for options that contradict each other."""
+    coding = request.coding
+    if request.output is None and not request.play:
+        raise click.UsageError("give -o OUT.fba to record, --play to see it, or both")
+    if request.model is not None and not request.play:
+        raise click.UsageError("--model goes with --play")
+    rate_options.check_buffer()
+    if coding.bitrate is not None and options.is_given("fap_quant"):
+        raise click.UsageError("--quant and --bitrate contradict each other: the bit rate decides how finely")
+    if coding.bitrate is not None and coding.preset is not None:
+        raise click.UsageError(
+            "--preset and --bitrate contradict each other: the bit rate decides what is sent"
+        )
 
 
 def _targets(output: Path | None, *, play: bool) -> tuple[list[Target], Any]:
@@ -269,8 +310,7 @@ def _nothing(summary: Summary, capture: Capture, receiver: Receiver) -> str:
 
 
 def _report(
-    outputs: Outputs, output: Path | None, recorder: StreamRecorder, summary: Summary, fps: Fraction | None,
-    *, as_json: bool,
+    outputs: Outputs, output: Path | None, recorder: StreamRecorder, summary: Summary, *, as_json: bool
 ) -> None:  # fmt: skip
     """Print what was received and written."""
     clamped = recorder.encoder.statistics.clamped_parameters

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,58 @@ if TYPE_CHECKING:
     from fba_conformance.suite.index import Vector
     from fba_conformance.suite.programs import Program
     from fba_conformance.suite.result import Result
+
+
+@dataclass(frozen=True)
+class _Programs:
+    """Command lines of the programs to test, None for this codec, and the seconds that they may take."""
+
+    decoder: str | None
+    encoder: str | None
+    timeout: float
+
+    @property
+    def name(self) -> str:
+        """What is tested."""
+        return self.decoder or self.encoder or "fba"
+
+    def checks(self) -> list[Callable[[Vector], Result]]:
+        """Return what is done with each vector."""
+        from fba_conformance.suite import programs
+        from fba_conformance.suite.runner import check
+
+        made: list[Callable[[Vector], Result]] = []
+        if self.decoder is not None:
+            decoder = _program("--decoder", self.decoder, programs.DECODER_PLACES, self.timeout)
+            made.append(lambda vector: programs.check_decoder(decoder, vector))
+        if self.encoder is not None:
+            encoder = _program("--encoder", self.encoder, programs.ENCODER_PLACES, self.timeout)
+            made.append(lambda vector: programs.check_encoder(encoder, vector))
+        return made or [check]
+
+
+@dataclass(frozen=True)
+class _Report:
+    """How results are shown. junit: a file, too. verbose: a line for every vector."""
+
+    junit: Path | None
+    verbose: bool
+    as_json: bool
+
+    def write(self, results: list[Result], outputs: Outputs, name: str) -> None:
+        """Print the results. name: of what was tested."""
+        from fba_conformance.suite.result import junit, summary, table
+
+        if self.junit is not None:
+            outputs.write(self.junit, junit(results, name))
+        if self.as_json:
+            outputs.print_json([result.to_dict() for result in results])
+            return
+        for result in results if self.verbose else [one for one in results if not one.exact]:
+            outputs.say(result.line())
+        for line in table(results):
+            outputs.say(line)
+        outputs.say(summary(results))
 
 
 @click.command(
@@ -65,17 +118,14 @@ if TYPE_CHECKING:
 @click.option("--verbose", "-v", is_flag=True, help="Print a line for every vector, not only for failures.")
 @options.no_clobber_option
 @options.json_option
+@options.gather(programs=_Programs, report=_Report)
 def command(
     folder: Path | None,
-    decoder: str | None,
-    encoder: str | None,
-    timeout: float,
+    programs: _Programs,
     only: Sequence[str],
-    junit: Path | None,
     archive: Path | None,
-    verbose: bool,
+    report: _Report,
     no_clobber: bool,
-    as_json: bool,
 ) -> None:
     """Check this codec, or the programs of --decoder and --encoder, against test vectors.
 
@@ -85,12 +135,11 @@ def command(
     if archive is not None:
         _write_archive(archive, folder, no_clobber=no_clobber)
         return
-    written = [] if junit is None else [Output("--junit", junit, text=True)]
+    written = [] if report.junit is None else [Output("--junit", report.junit, text=True)]
     outputs = Outputs(written, no_clobber=no_clobber)
-    from fba_conformance.suite import result as results_module
     from fba_conformance.suite.index import read_vectors
 
-    checks = _checks(decoder, encoder, timeout)
+    checks = programs.checks()
     vectors = _chosen(read_vectors(folder), only)
     results: list[Result] = []
     with Progress("checking", len(vectors) * len(checks)) as step:
@@ -98,34 +147,9 @@ def command(
             for vector in vectors:
                 results.append(check(vector))
                 step.advance()
-    if junit is not None:
-        outputs.write(junit, results_module.junit(results, decoder or encoder or "fba"))
-    failed = [result for result in results if not result.passed]
-    if as_json:
-        outputs.print_json([result.to_dict() for result in results])
-    else:
-        for result in results if verbose else [one for one in results if not one.exact]:
-            outputs.say(result.line())
-        for line in results_module.table(results):
-            outputs.say(line)
-        outputs.say(results_module.summary(results))
-    if failed:
+    report.write(results, outputs, programs.name)
+    if not all(result.passed for result in results):
         raise click.exceptions.Exit(1)
-
-
-def _checks(decoder: str | None, encoder: str | None, timeout: float) -> list[Callable[[Vector], Result]]:
-    """Return what is done with each vector."""
-    from fba_conformance.suite import programs
-    from fba_conformance.suite.runner import check
-
-    made: list[Callable[[Vector], Result]] = []
-    if decoder is not None:
-        tested = _program("--decoder", decoder, programs.DECODER_PLACES, timeout)
-        made.append(lambda vector: programs.check_decoder(tested, vector))
-    if encoder is not None:
-        tested_encoder = _program("--encoder", encoder, programs.ENCODER_PLACES, timeout)
-        made.append(lambda vector: programs.check_encoder(tested_encoder, vector))
-    return made or [check]
 
 
 def _program(option: str, text: str, places: Sequence[str], timeout: float) -> Program:

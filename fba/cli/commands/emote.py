@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from fba.cli import options
 from fba.cli.command import Command, examples, usage_errors
 from fba.cli.emotions.pictures import draw, option_errors, picture_kind
-from fba.cli.inputs import EXISTING, ExistingPath, read_input, read_model
+from fba.cli.inputs import EXISTING, ExistingPath, Reading, read_input, read_model
 from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
 from fba.cli.printing import Progress, seconds_text
 from fba.errors import SAVE_AS_UTF8, FormatError
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 DEFAULT_EASE = 0.5
 MOST_KEYS = 1_000_000
 KEY_HEADER = ("seconds", "emotion", "intensity")
+_Typed = tuple[str, float | None, float | None]
+"""Names with intensities, and when they begin and end."""
 
 
 class SecondsType(click.ParamType[float]):
@@ -69,6 +72,39 @@ class MoodType(click.ParamType[tuple[str, float | None, float | None]]):
             times.convert(first, param, ctx) if first else None,
             times.convert(last, param, ctx) if last else None,
         )
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """Moods as they are typed, with times in seconds or None. start, end: of those without times."""
+
+    moods: tuple[_Typed, ...]
+    start: float | None
+    end: float | None
+    ease: float | None
+    keys: Path | None
+
+    def parse(self, moods: tuple[_Typed, ...]) -> list[Mood]:
+        """Return some of the moods, with their times."""
+        from fba.emotion import Mood, parse_weights
+
+        ease = DEFAULT_EASE if self.ease is None else self.ease
+        result = []
+        for text, start, end in moods:
+            span = (self.start, self.end) if start is None and end is None else (start, end)
+            result += [Mood(name, intensity, *span, ease) for name, intensity in parse_weights(text).items()]
+        return result
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Where the performance goes. writing: the format. model, size: the face and the size of pictures."""
+
+    output: Path
+    writing: str | None
+    no_clobber: bool
+    model: Path | None
+    size: tuple[int, int] | None
 
 
 @click.command(
@@ -135,21 +171,9 @@ class MoodType(click.ParamType[tuple[str, float | None, float | None]]):
     help="Pictures: default 1280x720; of each side by side, 320x320.",
 )
 @options.limit_option
+@options.gather(asked=_Asked, target=_Target)
 def command(
-    source: Path,
-    output: Path,
-    moods: tuple[tuple[str, float | None, float | None], ...],
-    start: float | None,
-    end: float | None,
-    ease: float | None,
-    keys: Path | None,
-    side_by_side: bool,
-    reading: str | None,
-    writing: str | None,
-    no_clobber: bool,
-    model: Path | None,
-    size: tuple[int, int] | None,
-    limit: Limits,
+    source: Path, asked: _Asked, target: _Target, side_by_side: bool, reading: str | None, limit: Limits
 ) -> None:
     """Put a performance into a mood: angry, surprised, sad, sleepy, happy, or any named expression.
 
@@ -159,37 +183,38 @@ def command(
     """
     from fba.emotion import emote
 
+    keys, moods, output, model = asked.keys, asked.moods, target.output, target.model
     if not moods and keys is None:
         raise click.UsageError("give a mood: --emotion angry=70, or --keys FILE.csv")
-    kind = picture_kind(output, writing)
-    for option, wanted in (("--size", size is not None), ("--side-by-side", side_by_side)):
+    kind = picture_kind(output, target.writing)
+    for option, wanted in (("--size", target.size is not None), ("--side-by-side", side_by_side)):
         if wanted and not kind:
             raise click.UsageError(f"{option} goes with a picture or a film")
     if side_by_side and (keys is not None or not moods):
         raise click.UsageError("--side-by-side draws one performance for each --emotion; leave --keys out")
-    format = None if kind else find_writer(output, writing)
+    format = None if kind else find_writer(output, target.writing)
     text = format is not None and format.name in TEXT_FORMATS
-    outputs = Outputs([Output("--output", output, text)], [source, keys, model], no_clobber=no_clobber)
+    outputs = Outputs([Output("--output", output, text)], [source, keys, model], no_clobber=target.no_clobber)
     with option_errors():
-        given: list[Mood | MoodCurve] = [*_parse_moods(moods, start, end, ease)]
+        given: list[Mood | MoodCurve] = [*asked.parse(moods)]
         if keys is not None:
             given += _read_keys(keys)
-    animation = read_input(source, format=reading, limits=limit)
+    animation = read_input(source, Reading(format=reading, limit=limit))
     face = read_model(model)
     if side_by_side:
         with option_errors():
             several = {
-                text: emote(animation, _parse_moods((mood,), start, end, ease), model=face)
+                text: emote(animation, asked.parse((mood,)), model=face)
                 for mood in moods
                 for text in [mood[0].replace("=", " ")]
             }
-        _draw_side_by_side(several, output, outputs, kind, face, size)
+        _draw_side_by_side(several, target, outputs, kind, face)
         outputs.say(f"{display_name(output)}: {', '.join(several)}; {seconds_text(animation.duration)}")
         return
     with option_errors():
         made = emote(animation, given, model=face)
     if format is None:
-        draw(made, output, outputs, kind, model, size)
+        draw(made, output, outputs, kind, model, target.size)
     else:
         from fba.formats import write
 
@@ -201,35 +226,17 @@ def command(
 
 def _draw_side_by_side(
     performances: dict[str, Animation],
-    output: Path,
+    target: _Target,
     outputs: Outputs,
     kind: str,
     model: FaceModel | None,
-    size: tuple[int, int] | None,
 ) -> None:
     from fba_player.export.side_by_side import draw_side_by_side
     from fba_player.scene.scene import Scene
 
     scenes = {name: Scene(animation, model) for name, animation in performances.items()}
-    with outputs.file(output, f".{kind}") as file, Progress("rendering", None) as step, usage_errors():
-        draw_side_by_side(scenes, file, tile=size, progress=step.show)
-
-
-def _parse_moods(
-    moods: tuple[tuple[str, float | None, float | None], ...],
-    start: float | None,
-    end: float | None,
-    ease: float | None,
-) -> list[Mood]:
-    from fba.emotion import Mood, parse_weights
-
-    result = []
-    for text, own_start, own_end in moods:
-        timed = own_start is not None or own_end is not None
-        span = (own_start, own_end) if timed else (start, end)
-        for name, intensity in parse_weights(text).items():
-            result.append(Mood(name, intensity, *span, DEFAULT_EASE if ease is None else ease))
-    return result
+    with outputs.file(target.output, f".{kind}") as file, Progress("rendering", None) as step, usage_errors():
+        draw_side_by_side(scenes, file, tile=target.size, progress=step.show)
 
 
 def _read_keys(path: Path) -> list[MoodCurve]:

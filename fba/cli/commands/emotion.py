@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,16 +14,25 @@ import click
 from fba.cli import options
 from fba.cli.command import Command, examples
 from fba.cli.emotions import tables
-from fba.cli.inputs import EXISTING, ExistingPath, read_input, read_model
+from fba.cli.inputs import EXISTING, ExistingPath, Reading, read_input, read_model
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import print_json
 from fba.errors import FormatError
-from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.emotion import Readings
 
 BASELINES = ("none", "start", "median")
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Where readings go: a table; None prints them. frames: print a row for each frame, too."""
+
+    output: Path | None
+    no_clobber: bool
+    frames: bool
+    as_json: bool
 
 
 @click.command(
@@ -63,30 +73,29 @@ BASELINES = ("none", "start", "median")
 @options.salvage_option
 @options.json_option
 @options.limit_option
+@options.gather(target=_Target, reading=Reading)
 def command(
     file: Path,
-    frames: bool,
-    output: Path | None,
-    no_clobber: bool,
+    target: _Target,
     baseline: str,
     model: Path | None,
     fps: Fraction | None,
-    format: str | None,
-    salvage: bool,
-    as_json: bool,
-    limit: Limits,
+    reading: Reading,
 ) -> None:
     """Read the expressions of a face: families, named expressions, intensities, activation, evaluation.
 
     FILE: any file with a face, streams as well as captures. "neutral": nothing is shown, or too little to
     count. "unknown": something is shown that is like no expression. FAPs that a file never sends say nothing.
     """
-    if output is not None and (frames or as_json):
+    output = target.output
+    if output is not None and (target.frames or target.as_json):
         raise click.UsageError("-o writes a table; --frames and --json print one: give one of them")
     outputs = None
     if output is not None:
-        outputs = Outputs([Output("--output", output, text=True)], [file, model], no_clobber=no_clobber)
-    animation = read_input(file, header_fps=fps, format=format, salvage=salvage, limits=limit)
+        outputs = Outputs(
+            [Output("--output", output, text=True)], [file, model], no_clobber=target.no_clobber
+        )
+    animation = read_input(file, reading, header_fps=fps)
     if animation.face is None:
         raise FormatError("has no face: it sends no FAPs, from which expressions are read", path=file)
     from fba.emotion import read_expressions
@@ -95,7 +104,7 @@ def command(
     if outputs is not None and output is not None:
         outputs.write(output, _csv(readings).encode())
         outputs.say(f"{display_name(output)}: {len(readings)} frames; {tables.summary_text(readings)}")
-    elif as_json:
+    elif target.as_json:
         print_json(
             {
                 **readings.summary(),
@@ -106,7 +115,7 @@ def command(
         )
     else:
         click.echo(f"{file}: {len(readings)} frames; {tables.summary_text(readings)}")
-        for line in tables.reading_lines(readings, every=frames):
+        for line in tables.reading_lines(readings, every=target.frames):
             click.echo(line)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -13,20 +14,20 @@ from fba.animation import Animation
 from fba.cli import capture_report, joint_options, marker_options, options, step_tables
 from fba.cli.clamped_values import bring_near, clamped_lines
 from fba.cli.coding import capture_options, size_options
-from fba.cli.coding.coded_streams import encode_as_epf, encode_stream
+from fba.cli.coding.coded_streams import CodedStream, encode_as_epf, encode_stream
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, check_clip, has_markers, has_skeleton
+from fba.cli.inputs import EXISTING, Reading, check_clip, has_markers, has_skeleton
 from fba.cli.outputs import Output, Outputs, OutputType, display_name, opening_for
 from fba.cli.printing import Progress
 from fba.cli.recordings import voice
 from fba.cli.recordings.inputs import (
-    Moment,
+    Inputs,
+    Sync,
     read_inputs,
     sync_options,
     together_lines,
     together_values,
 )
-from fba.limits import Limits
 
 
 class _EncodeCommand(Command):
@@ -39,6 +40,48 @@ class _EncodeCommand(Command):
             for word, after in pairs
         ]
         return super().parse_args(ctx, words)
+
+
+@dataclass(frozen=True)
+class _Planes:
+    """How planes are coded: see `fba.codec.EncoderOptions`. clamp: None for motion capture only."""
+
+    intra_period: Fraction | None
+    start_codes: bool
+    time_codes: bool
+    unsent: str
+    gender: int
+    clamp: bool | None
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What the command line asks for.
+
+    fps: to resample to; None for the inputs' own. name: of input without a header. mark: None: by default.
+    """
+
+    inputs: tuple[Path, ...]
+    output: Path
+    no_clobber: bool
+    fps: Fraction | None
+    name: str | None
+    epf: Path | None
+    mark: bool | None
+    limits: str
+    report: str | None
+    as_json: bool
+    reading: Reading
+    size: size_options.Size
+    planes: _Planes
+    capture: capture_options.CaptureOptions
+    sync: Sync
+    sound: voice.VoiceOptions
+
+    @property
+    def marked(self) -> bool:
+        """Whether the stream names its table of BAP steps."""
+        return self.epf is None if self.mark is None else self.mark
 
 
 @click.command(
@@ -126,31 +169,16 @@ class _EncodeCommand(Command):
 @options.salvage_option
 @options.limit_option
 @options.json_option
-def command(
-    inputs: tuple[Path, ...],
-    output: Path,
-    no_clobber: bool,
-    fps: Fraction | None,
-    format: str | None,
-    clip: str | None,
-    name: str | None,
-    epf: Path | None,
-    maps: tuple[Path | joint_options.Pair, ...],
-    map_out: Path | None,
-    sync: str | None,
-    offset: Moment | None,
-    trim: bool,
-    audio: Path | None,
-    audio_offset: float | None,
-    limits: str,
-    report: str | None,
-    salvage: bool,
-    as_json: bool,
-    limit: Limits,
-    mark: bool | None,
-    bap_steps: str,
-    **settings: Any,
-) -> None:
+@options.gather(
+    reading=Reading,
+    size=size_options.Size,
+    planes=_Planes,
+    capture=capture_options.CaptureOptions,
+    sync=Sync,
+    sound=voice.VoiceOptions,
+)
+@options.gather(request=_Request)
+def command(request: _Request) -> None:
     """Encode FAP and BAP files, motion capture or captured faces as an FBA stream.
 
     A face file and a body file together become one stream: captures by their time codes where both have
@@ -158,110 +186,201 @@ def command(
     an error; --clamp limits it to the codable range. With --epf, only what that file says is written, and no
     mark unless you ask for one.
     """
-    from fba.codec import EncoderOptions
+    plan = _plan(request)
+    made = _execute(plan)
+    _report(plan, made)
 
+
+@dataclass(frozen=True)
+class _Plan:
+    """What to read and to write, which no option contradicts.
+
+    sound: the WAV file to write. page: the file of `--report`. captures, marked: inputs with the motion of a
+    skeleton, and of markers on a face. capture: options of their readers,
+    with the places of `--map`.
+    """
+
+    request: _Request
+    outputs: Outputs
+    sound: Path | None
+    page: Path | None
+    captures: list[Path]
+    marked: list[Path]
+    capture: dict[str, Any]
+
+    @property
+    def detailed(self) -> bool:
+        """Whether a report was asked for."""
+        return self.request.report is not None
+
+
+@dataclass(frozen=True, eq=False)
+class _Encoded:
+    """What was read, coded and written.
+
+    animation: that was coded, limited as `--limits` says. table: of BAP steps. limits: report of `--limits`.
+    """
+
+    taken: Inputs
+    animation: Animation
+    table: str
+    coded: CodedStream
+    spoken: voice.Voice | None
+    limits: dict[str, Any]
+    reports: list[capture_report.CaptureReport]
+
+
+def _plan(request: _Request) -> _Plan:
+    """Return what is to be done; click.UsageError for options that contradict each other or the inputs."""
+    inputs, reading, capture, size = request.inputs, request.reading, request.capture, request.size
     size_options.check_sizes()
-    size = size_options.Size.take(settings)
-    check_clip(clip, inputs, format)
-    page = _report_file(report)
-    written = [Output("--output", output), *([Output("--report", page)] if page is not None else [])]
-    saved = [] if map_out is None else [Output("--map-out", map_out, True)]
-    sounds = voice.check_audio(audio, audio_offset, output)
-    read = [*inputs, epf, audio, size.model, size.fit, *(each for each in maps if isinstance(each, Path))]
-    outputs = Outputs([*written, *saved, *sounds], read, no_clobber=no_clobber)
-    captures = [path for path in inputs if has_skeleton(path, format)]
-    marked = [path for path in inputs if has_markers(path, format)]
-    capture = capture_options.take_capture_options(settings, inputs, format)
-    if map_out is not None and not (captures or marked):
+    check_clip(reading, inputs)
+    page = _report_file(request.report)
+    written = [Output("--output", request.output)]
+    written += [] if page is None else [Output("--report", page)]
+    written += [] if capture.map_out is None else [Output("--map-out", capture.map_out, True)]
+    sounds = request.sound.check(request.output)
+    read = [*inputs, request.epf, request.sound.audio, size.model, size.fit, *capture.map_files]
+    outputs = Outputs([*written, *sounds], read, no_clobber=request.no_clobber)
+    captures = [path for path in inputs if has_skeleton(path, reading.format)]
+    marked = [path for path in inputs if has_markers(path, reading.format)]
+    taken = capture.for_readers(inputs, reading)
+    if capture.map_out is not None and not (captures or marked):
         raise click.UsageError("--map-out goes with motion capture: joints of a body, or markers on a face")
-    if (maps or map_out is not None) and captures and marked:
+    if (capture.maps or capture.map_out is not None) and captures and marked:
         raise click.UsageError("--map and --map-out go with one capture; encode face and body by themselves")
-    joints = places = None
+    taken |= {"joints": None, "markers": None}
     if marked:
-        places = marker_options.read_places(maps, marked, format, limit)
+        taken["markers"] = marker_options.read_places(capture.maps, marked, reading)
     else:
-        joints = joint_options.read_joints(maps, captures, format, clip, limit)
-    capture |= {"joints": joints, "markers": places}
+        taken["joints"] = joint_options.read_joints(capture.maps, captures, reading)
+    sound = sounds[0].path if sounds else None
+    return _Plan(request, outputs, sound, page, captures, marked, taken)
+
+
+def _execute(plan: _Plan) -> _Encoded:
+    """Read the inputs, encode them, and write all files."""
+    request, outputs = plan.request, plan.outputs
     taken = read_inputs(
-        inputs, capture=capture, sync=sync, offset=offset, trim=trim, fps=fps, format=format, limits=limit,
-        timed=audio is not None, name=name, bap_steps=bap_steps, salvage=salvage, clip=clip,
-    )  # fmt: skip
-    animation = taken.animation
-    spoken = voice.place_voice(audio, audio_offset, taken, sounds[0].path) if audio is not None else None
-    if report is not None and (animation.body is None or not captures):
+        request.inputs,
+        request.reading,
+        capture=plan.capture,
+        sync=request.sync,
+        fps=request.fps,
+        name=request.name,
+        timed=plan.sound is not None,
+    )
+    spoken = None if plan.sound is None else voice.place_voice(request.sound, taken, plan.sound)
+    if plan.detailed and (taken.animation.body is None or not plan.captures):
         raise click.UsageError(
             "--report compares motion capture with its result, and there is no body to compare"
         )
-    animation, limit_values = capture_report.apply_limits(animation, limits)
-    if settings["clamp"] is None:
-        settings["clamp"] = taken.is_captured
-    mark = mark if mark is not None else epf is None
+    animation, limits = capture_report.apply_limits(taken.animation, request.limits)
     table = step_tables.table_to_write(
-        bap_steps, made=taken.has_captured_body, marked=mark, read=taken.tables[0] if taken.tables else None
+        request.reading.bap_steps,
+        made=taken.has_captured_body,
+        marked=request.marked,
+        read=taken.tables[0] if taken.tables else None,
     )
-    settings |= size.quantisers() | {"bap_steps": table, "mark": mark}
-    if captures and not options.is_given("origin"):
-        animation = bring_near(animation, table, settings["bap_quant"])
-    with Progress("encoding", None):
-        if epf is not None:
-            coded = encode_as_epf(epf, animation, settings, limit)
-        else:
-            coded = encode_stream(animation, EncoderOptions(**settings), size, taken)
-    step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
-    opening = opening_for(output, animation, table, coded.bap_quant, marked=mark)
-    outputs.write(output, opening + coded.data)
+    quantisers = request.size.quantisers()
+    if plan.captures and not options.is_given("origin"):
+        animation = bring_near(animation, table, quantisers["bap_quant"])
+    coded = _encode(request, animation, taken, table)
+    step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(plan.captures))
+    opening = opening_for(request.output, animation, table, coded.bap_quant, marked=request.marked)
+    outputs.write(request.output, opening + coded.data)
     if spoken is not None:
         voice.write_voice(outputs, spoken)
-    if map_out is not None:
-        with outputs.file(map_out) as file:
-            if marked:
-                mapped = marker_options.write_used_places(file, places, marked[0], format, limit)
-            else:
-                mapped = joint_options.write_joints(file, joints, captures[0], format, clip, limit)
-        what = f"markers of {marked[0]}" if marked else f"joints of {captures[0]}"
-        outputs.say(f"{display_name(map_out)}: {mapped} {what}")
-    detailed = report is not None
-    reports = []
-    if captures and animation.body is not None:
-        with Progress("comparing", None):
-            source, lead = taken.body_of(animation)
-            shown = _decode(coded.data, bap_steps=table)
-            if len(shown) < len(animation):  # players fill in the frames that were left out
-                shown = shown.resample(shown.rate)
-            decoded, _ = taken.body_of(shown)
-            reports = capture_report.compare_captures(
-                captures, source, decoded, coded.clamped, ground=str(capture["ground"]), detailed=detailed,
-                format=format, clip=clip, options=capture, lead=lead,
-            )  # fmt: skip
-            if page is not None:
-                draw = capture_report.write_page if page.suffix == ".html" else capture_report.draw_report
-                outputs.write(page, draw(reports[0]))
-    for one in reports:
-        if line := capture_report.poor_line(one, detailed=detailed):
+    _write_map(plan)
+    reports = _compare(plan, taken, animation, coded, table)
+    return _Encoded(taken, animation, table, coded, spoken, limits, reports)
+
+
+def _encode(request: _Request, animation: Animation, taken: Inputs, table: str) -> CodedStream:
+    """Return the stream. table: of BAP steps."""
+    from fba.codec import EncoderOptions
+
+    with Progress("encoding", None):
+        if request.epf is not None:
+            return encode_as_epf(request.epf, animation, table, request.reading.limit, marked=request.marked)
+        given = asdict(request.planes) | request.size.quantisers()
+        if given["clamp"] is None:
+            given["clamp"] = taken.is_captured
+        settings = EncoderOptions(**given, bap_steps=table, mark=request.marked)
+        return encode_stream(animation, settings, request.size, taken)
+
+
+def _write_map(plan: _Plan) -> None:
+    """Write the joints or markers that were used, where `--map-out` asks for them."""
+    target, reading = plan.request.capture.map_out, plan.request.reading
+    if target is None:
+        return
+    with plan.outputs.file(target) as file:
+        if plan.marked:
+            places = plan.capture["markers"]
+            mapped = marker_options.write_used_places(file, places, plan.marked[0], reading)
+        else:
+            mapped = joint_options.write_joints(file, plan.capture["joints"], plan.captures[0], reading)
+    what = f"markers of {plan.marked[0]}" if plan.marked else f"joints of {plan.captures[0]}"
+    plan.outputs.say(f"{display_name(target)}: {mapped} {what}")
+
+
+def _compare(
+    plan: _Plan, taken: Inputs, animation: Animation, coded: CodedStream, table: str
+) -> list[capture_report.CaptureReport]:
+    """Return how captured bodies differ from what a decoder shows; write the page of `--report`."""
+    from fba.codec import decode
+
+    if not plan.captures or animation.body is None:
+        return []
+    with Progress("comparing", None):
+        before, lead = taken.body_of(animation)
+        shown = decode(coded.data, bap_steps=table)
+        if len(shown) < len(animation):  # players fill in the frames that were left out
+            shown = shown.resample(shown.rate)
+        after, _ = taken.body_of(shown)
+        body = capture_report.CodedBody(before, after, coded.clamped, lead)
+        reports = capture_report.compare_captures(
+            plan.captures, body, plan.capture, plan.request.reading, detailed=plan.detailed
+        )
+        if plan.page is not None:
+            is_page = plan.page.suffix == ".html"
+            draw = capture_report.write_page if is_page else capture_report.draw_report
+            plan.outputs.write(plan.page, draw(reports[0]))
+    return reports
+
+
+def _report(plan: _Plan, made: _Encoded) -> None:
+    """Print what was encoded, for people or for programs."""
+    request, coded, animation = plan.request, made.coded, made.animation
+    inputs, together, spoken = request.inputs, made.taken.together, made.spoken
+    for report in made.reports:
+        if line := capture_report.poor_line(report, detailed=plan.detailed):
             click.echo(line, err=True)
-    if as_json:
-        used = {"bap_steps": table if animation.body is not None else None}
-        said: dict[str, Any] = {"verdict": reports[0].comparison.verdict} if reports else {}
-        if detailed:
-            said["captures"] = [capture_report.report_values(one) for one in reports]
-        figures = coded.figures(animation)
-        if taken.together is not None:
-            figures |= together_values(inputs, taken.together)
+    if request.as_json:
+        said: dict[str, Any] = {"output": str(request.output), **coded.figures(animation)}
+        if together is not None:
+            said |= together_values(inputs, together)
         if spoken is not None:
-            figures |= voice.voice_values(spoken)
-        outputs.print_json({"output": str(output), **figures, **used, **said, **limit_values})
+            said |= voice.voice_values(spoken)
+        said["bap_steps"] = made.table if animation.body is not None else None
+        if made.reports:
+            said["verdict"] = made.reports[0].comparison.verdict
+        if plan.detailed:
+            said["captures"] = [capture_report.report_values(report) for report in made.reports]
+        plan.outputs.print_json(said | made.limits)
         return
     for line in (
-        coded.summary(output, animation),
+        coded.summary(request.output, animation),
         *coded.details(animation),
-        *(together_lines(inputs, taken.together) if taken.together is not None else ()),
+        *(together_lines(inputs, together) if together is not None else ()),
         *((voice.voice_line(spoken),) if spoken is not None else ()),
         *clamped_lines(coded.clamped),
-        *(line for one in reports if detailed for line in capture_report.report_lines(one)),
-        *capture_report.limit_lines(limit_values),
+        *(line for report in made.reports if plan.detailed for line in capture_report.report_lines(report)),
+        *capture_report.limit_lines(made.limits),
     ):
-        outputs.say(line)
-    step_tables.remind(output, animation, table, coded.bap_quant, marked=mark)
+        plan.outputs.say(line)
+    step_tables.remind(request.output, animation, made.table, coded.bap_quant, marked=request.marked)
 
 
 def _report_file(report: str | None) -> Path | None:
@@ -272,9 +391,3 @@ def _report_file(report: str | None) -> Path | None:
     if path.suffix not in capture_report.SUFFIXES:
         raise click.UsageError(f"--report={report}: a report is a page, .html, or a picture, .png")
     return path
-
-
-def _decode(data: bytes, bap_steps: str) -> Animation:
-    from fba.codec import decode
-
-    return decode(data, bap_steps=bap_steps)

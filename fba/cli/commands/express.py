@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,6 +40,49 @@ class PointType(click.ParamType[tuple[float, float]]):
         except ValueError:
             self.fail(f"{value!r} is no activation and evaluation; write e.g. 4.0,1.1", param, ctx)
         return activation, evaluation
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """Which expression: names with intensities, or a point of the plane; and the rules that mix them."""
+
+    weights: tuple[str, ...]
+    point: tuple[float, float] | None
+    interpolation: float | None
+    reduction: float | None
+    nearness: float | None
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """How an expression comes and goes, in seconds, and how it is sent."""
+
+    seconds: float | None
+    ease: float | None
+    fps: Fraction | None
+    send: str
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Where an expression goes. to: the format. model, size: of a picture or a film."""
+
+    output: Path | None
+    to: str | None
+    no_clobber: bool
+    model: Path | None
+    size: tuple[int, int] | None
+
+    def check(self, motion: _Motion) -> str:
+        """Return the kind of a picture or a film, else ""; click.UsageError for options that do not fit."""
+        kind = "" if self.output is None else picture_kind(self.output, self.to)
+        drawn = {"--model": self.model, "--size": self.size}
+        moving = {"--seconds": motion.seconds, "--ease": motion.ease, "--fps": motion.fps, "--to": self.to}
+        for option, value in {**({} if kind else drawn), **(moving if self.output is None else {})}.items():
+            if value is not None:
+                what = "a picture or a film" if option in drawn else "-o"
+                raise click.UsageError(f"{option} goes with {what}")
+        return kind
 
 
 @click.command(
@@ -98,69 +142,47 @@ class PointType(click.ParamType[tuple[float, float]]):
 @click.option("--size", type=options.SizeType(), metavar="WIDTHxHEIGHT", help="Pictures: default 1280x720.")
 @click.option("--list", "listed", is_flag=True, help="List the named expressions.")
 @options.json_option
-def command(
-    weights: tuple[str, ...],
-    point: tuple[float, float] | None,
-    output: Path | None,
-    to: str | None,
-    no_clobber: bool,
-    seconds: float | None,
-    ease: float | None,
-    fps: Fraction | None,
-    send: str,
-    interpolation: float | None,
-    reduction: float | None,
-    nearness: float | None,
-    model: Path | None,
-    size: tuple[int, int] | None,
-    listed: bool,
-    as_json: bool,
-) -> None:
+@options.gather(asked=_Asked, motion=_Motion, target=_Target)
+def command(asked: _Asked, motion: _Motion, target: _Target, listed: bool, as_json: bool) -> None:
     """Show expressions: named ones, mixtures of them, or a point of the plane of activation and evaluation.
 
     NAME=INTENSITY: an intensity of 0 to 100; a name alone has 100. Without -o, what moves is printed.
     """
-    if sum((bool(weights), point is not None, listed)) != 1:
+    output = target.output
+    if sum((bool(asked.weights), asked.point is not None, listed)) != 1:
         raise click.UsageError("give one of expressions (fear=60), --at A,E and --list")
     if listed:
         if output is not None:
             raise click.UsageError("--list prints a table; -o goes with an expression")
         tables.print_expressions(as_json)
         return
-    drawn = {"--model": model, "--size": size}
-    moving = {"--seconds": seconds, "--ease": ease, "--fps": fps, "--to": to}
-    kind = "" if output is None else picture_kind(output, to)
-    for option, value in {**(drawn if not kind else {}), **(moving if output is None else {})}.items():
-        if value is not None:
-            what = "a picture or a film" if option in drawn else "-o"
-            raise click.UsageError(f"{option} goes with {what}")
-    blend = _make_blend(weights, point, interpolation, reduction, nearness)
+    kind = target.check(motion)
+    blend = _make_blend(asked)
     if output is None:
         tables.print_blend(blend, as_json)
         return
-    still = kind in PICTURES
-    if still and (seconds or ease):
-        raise click.UsageError("a picture shows the full expression; --seconds and --ease are for films")
-    length = 0.0 if still else DEFAULT_SECONDS if seconds is None else seconds
-    easing = min(DEFAULT_EASE, length / 2) if ease is None else ease
+    if kind in PICTURES:
+        if motion.seconds or motion.ease:
+            raise click.UsageError("a picture shows the full expression; --seconds and --ease are for films")
+        motion = replace(motion, seconds=0.0)
     with option_errors():
-        animation = _perform(blend, length, easing, fps, send)
+        animation = _perform(blend, motion, motion.send)
+    report: dict[str, Any] = {"file": display_name(output), **tables.blend_record(blend)}
+    text = f"{display_name(output)}: {blend}"
     if kind:
-        outputs = Outputs([Output("--output", output)], [model], no_clobber=no_clobber)
-        draw(animation, output, outputs, kind, model, size)
-        report = {"file": display_name(output), **tables.blend_record(blend)}
-        text = f"{display_name(output)}: {blend}"
+        outputs = Outputs([Output("--output", output)], [target.model], no_clobber=target.no_clobber)
+        draw(animation, output, outputs, kind, target.model, target.size)
     else:
-        writing = find_writer(output, to)
-        outputs = Outputs([Output("--output", output, writing.name in TEXT_FORMATS)], no_clobber=no_clobber)
+        writing = find_writer(output, target.to)
+        written = Output("--output", output, writing.name in TEXT_FORMATS)
+        outputs = Outputs([written], no_clobber=target.no_clobber)
         from fba.formats import write
 
         with outputs.file(output) as file:
             write(file, animation, format=writing.name)
-        bits = _count_bits(blend, length, easing, fps)
-        report = {"file": display_name(output), **tables.blend_record(blend)}
+        bits = _count_bits(blend, motion)
         report |= {"frames": len(animation), "sent": _sent(animation), "bits": bits}
-        text = f"{display_name(output)}: {blend}, {len(animation)} frames, {seconds_text(animation.duration)}"
+        text += f", {len(animation)} frames, {seconds_text(animation.duration)}"
         text += f"; {_bits_text(animation, bits)}"
     if as_json:
         outputs.print_json(report)
@@ -168,37 +190,34 @@ def command(
         outputs.say(text)
 
 
-def _make_blend(
-    weights: tuple[str, ...],
-    point: tuple[float, float] | None,
-    interpolation: float | None,
-    reduction: float | None,
-    nearness: float | None,
-) -> Blend:
+def _make_blend(asked: _Asked) -> Blend:
     from fba import emotion
 
-    given = {"interpolation": interpolation, "reduction": reduction, "nearness": nearness}
+    names = ("interpolation", "reduction", "nearness")
+    given = {name: value for name in names if (value := getattr(asked, name)) is not None}
     with option_errors():
-        rules = emotion.Rules(**{name: value for name, value in given.items() if value is not None})
-        if point is not None:
-            return emotion.expression_at(*point, rules)
-        return emotion.combine(emotion.parse_weights(" ".join(weights)), rules)
+        rules = emotion.Rules(**given)
+        if asked.point is not None:
+            return emotion.expression_at(*asked.point, rules)
+        return emotion.combine(emotion.parse_weights(" ".join(asked.weights)), rules)
 
 
-def _perform(blend: Blend, seconds: float, ease: float, fps: Fraction | None, send: str) -> Animation:
+def _perform(blend: Blend, motion: _Motion, send: str) -> Animation:
     from fba.emotion import perform
 
-    return perform(blend, seconds=seconds, ease=ease, rate=fps or DEFAULT_RATE, send=send)
+    seconds = DEFAULT_SECONDS if motion.seconds is None else motion.seconds
+    ease = min(DEFAULT_EASE, seconds / 2) if motion.ease is None else motion.ease
+    return perform(blend, seconds=seconds, ease=ease, rate=motion.fps or DEFAULT_RATE, send=send)
 
 
-def _count_bits(blend: Blend, seconds: float, ease: float, fps: Fraction | None) -> dict[str, int | None]:
+def _count_bits(blend: Blend, motion: _Motion) -> dict[str, int | None]:
     """Return the bits of the stream for each way of sending; None where FAP 2 cannot say it."""
     from fba.codec import EncoderOptions, encode
 
     bare = EncoderOptions(mark=False)
     ways = {"expression": blend.fields is not None, "faps": True}
     return {
-        way: 8 * len(encode(_perform(blend, seconds, ease, fps, way), bare)) if possible else None
+        way: 8 * len(encode(_perform(blend, motion, way), bare)) if possible else None
         for way, possible in ways.items()
     }
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from fba.cli import options, step_tables
 from fba.cli.command import Command, examples, usage_errors
-from fba.cli.inputs import EXISTING, read_input
+from fba.cli.inputs import EXISTING, Reading, read_input
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
@@ -21,12 +22,45 @@ from fba.cli.outputs import (
     opening_for,
 )
 from fba.cli.printing import print_json, seconds_text
-from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.animation import Animation
 
 DEFAULT_RATE = Fraction(30)
+
+
+@dataclass(frozen=True)
+class _Walk:
+    """The walk to make: arguments of `fba.body.gait.walk`."""
+
+    stride: float | None
+    character: str
+    cycles: float | None
+    seconds: float | None
+    in_place: bool
+
+    def check(self, *, made: bool) -> None:
+        """Raise click.UsageError for options that contradict each other, or for any where no walk is made."""
+        if self.cycles is not None and self.seconds is not None:
+            raise click.UsageError("give either --cycles or --seconds, not both")
+        lengths = {"--cycles": self.cycles, "--seconds": self.seconds}
+        given = {"--stride": self.stride, **lengths, "--in-place": self.in_place or None}
+        for option, value in given.items() if not made else ():
+            if value is not None:
+                raise click.UsageError(f"{option} goes with -o: it is of a walk that is made")
+        for option, length in lengths.items():
+            if length is not None and not length > 0:
+                raise click.UsageError(f"{option} must be a positive number, not {length:g}")
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Where a walk goes. to: its format. mark: whether a stream names its table of BAP steps."""
+
+    output: Path | None
+    to: str | None
+    no_clobber: bool
+    mark: bool | None
 
 
 @click.command(
@@ -71,69 +105,56 @@ DEFAULT_RATE = Fraction(30)
 )
 @options.json_option
 @options.limit_option
+@options.gather(walk=_Walk, target=_Target, reading=Reading)
 def command(
-    stride: float | None,
-    character: str,
-    cycles: float | None,
-    seconds: float | None,
+    walk: _Walk,
+    target: _Target,
+    reading: Reading,
     fps: Fraction | None,
-    format: str | None,
-    in_place: bool,
-    output: Path | None,
-    to: str | None,
-    no_clobber: bool,
-    bap_steps: str,
-    mark: bool | None,
     listed: bool,
     find: Path | None,
     as_json: bool,
-    limit: Limits,
 ) -> None:
     """Generate a walk: body animation from four characteristic poses and a character.
 
     A foot on the ground does not move. The standard's BAP steps (--bap-steps iso) move the body by 64 mm at a
     time; a stream gets finer ones, and says so.
     """
-    if sum((output is not None, listed, find is not None)) != 1:
+    if sum((target.output is not None, listed, find is not None)) != 1:
         raise click.UsageError("give one of -o OUT, --list and --find FILE")
-    if to is not None and output is None:
+    if target.to is not None and target.output is None:
         raise click.UsageError("--to goes with -o")
-    if cycles is not None and seconds is not None:
-        raise click.UsageError("give either --cycles or --seconds, not both")
-    walking = {"--stride": stride, "--cycles": cycles, "--seconds": seconds, "--in-place": in_place or None}
-    for option, value in walking.items() if output is None else ():
-        if value is not None:
-            raise click.UsageError(f"{option} goes with -o: it is of a walk that is made")
-    for option, value in (("--cycles", cycles), ("--seconds", seconds)):
-        if value is not None and not value > 0:
-            raise click.UsageError(f"{option} must be a positive number, not {value:g}")
+    walk.check(made=target.output is not None)
     if listed:
         _print_characters(as_json)
     elif find is not None:
-        _print_steps(find, bap_steps, fps, format, as_json, limit)
-    elif output is not None:
+        _print_steps(find, fps, reading, as_json)
+    elif target.output is not None:
         if as_json:
             raise click.UsageError("--json goes with --list and --find")
-        from fba.body import gait
+        _write_walk(walk, fps or DEFAULT_RATE, target.output, target, reading.bap_steps)
 
-        made: dict[str, Any] = {"stride": stride, "cycles": cycles, "seconds": seconds, "in_place": in_place}
-        writing = find_writer(output, to)  # refuses what cannot be written before anything is made
-        out = Output("--output", output, writing.name in TEXT_FORMATS)
-        outputs = Outputs([out], no_clobber=no_clobber)
-        with usage_errors("walk: "):
-            animation = gait.walk(character=character, rate=fps or DEFAULT_RATE, **made)
-        marked = mark is not False
-        table = step_tables.table_to_write(bap_steps, made=True, marked=marked)
-        from fba.formats import write
 
-        if writing.name == "fba":
-            _write_stream(animation, output, outputs, table, marked=marked)
-        else:
-            with outputs.file(output) as file:
-                write(file, animation, format=writing.name)
-        outputs.say(_summary(animation, output, character, in_place=in_place))
-        if writing.name == "fba":
-            step_tables.remind(output, animation, table, marked=marked)
+def _write_walk(walk: _Walk, rate: Fraction, output: Path, target: _Target, bap_steps: str) -> None:
+    """Make a walk, write it to the output and print a summary."""
+    from fba.body import gait
+    from fba.formats import write
+
+    writing = find_writer(output, target.to)  # refuses what cannot be written before anything is made
+    out = Output("--output", output, writing.name in TEXT_FORMATS)
+    outputs = Outputs([out], no_clobber=target.no_clobber)
+    with usage_errors("walk: "):
+        animation = gait.walk(rate=rate, **asdict(walk))
+    marked = target.mark is not False
+    table = step_tables.table_to_write(bap_steps, made=True, marked=marked)
+    if writing.name == "fba":
+        _write_stream(animation, output, outputs, table, marked=marked)
+    else:
+        with outputs.file(output) as file:
+            write(file, animation, format=writing.name)
+    outputs.say(_summary(animation, output, walk.character, in_place=walk.in_place))
+    if writing.name == "fba":
+        step_tables.remind(output, animation, table, marked=marked)
 
 
 def _write_stream(animation: Animation, output: Path, outputs: Outputs, table: str, *, marked: bool) -> None:
@@ -172,13 +193,11 @@ def _print_characters(as_json: bool) -> None:
         click.echo(f"{c.name:{width}}  {pace}  {c.about}")
 
 
-def _print_steps(
-    file: Path, bap_steps: str, fps: Fraction | None, format: str | None, as_json: bool, limits: Limits
-) -> None:
+def _print_steps(file: Path, fps: Fraction | None, reading: Reading, as_json: bool) -> None:
     from fba.body import gait
     from fba.errors import FormatError
 
-    animation = read_input(file, bap_steps=bap_steps, header_fps=fps, format=format, limits=limits)
+    animation = read_input(file, reading, header_fps=fps)
     if animation.body is None:
         raise FormatError("has no body to walk with", path=file)
     detected = gait.detect(animation)

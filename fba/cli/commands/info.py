@@ -15,6 +15,7 @@ from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import (
     EXISTING,
+    Reading,
     check_clip,
     describe_person,
     input_file,
@@ -25,7 +26,6 @@ from fba.cli.inputs import (
 from fba.cli.printing import clock_text, print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
 from fba.errors import FbaWarning, ModelError
-from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO
 
 if TYPE_CHECKING:
@@ -58,18 +58,15 @@ SHOWN = 8
 @options.salvage_option
 @options.limit_option
 @click.option("--values", is_flag=True, help="With --trace: the decoded symbols of every segment as well.")
+@options.gather(reading=Reading)
 def command(
     files: tuple[Path, ...],
-    bap_steps: str,
+    reading: Reading,
     as_json: bool,
     trace: bool,
     values: bool,
     fps: Fraction | None,
-    format: str | None,
-    clip: str | None,
     face: str | None,
-    salvage: bool,
-    limit: Limits,
 ) -> None:
     """Show what a file holds: frames, rate, parameters, bits. Any format is recognised by content.
 
@@ -77,56 +74,62 @@ def command(
 
     --trace reads the stream a second time, bit by bit, with an independent decoder. It is slow.
     """
-    check_clip(clip, files, format)
+    check_clip(reading, files)
     each = EachFile(files)
     if trace:
         for path in files:
             with each.file(path):
-                _trace(path, bap_steps=bap_steps, as_json=as_json, values=values)
+                _trace(path, bap_steps=reading.bap_steps, as_json=as_json, values=values)
         each.finish()
         return
     reports = []
     for path in files:
         with each.file(path), input_file(path) as file:
-            steps = ""
-            if (person := describe_person(file, format, limit)) is not None:
-                if clip is not None:
-                    raise ModelError(f"there is no animation {clip!r}; the file has none")
-                size = file.stat().st_size
-                reports.append({"file": str(path), "format": "gltf", "size": size, "person": asdict(person)})
-                if not as_json:
-                    _print_person(path, size, person)
-                continue
-            kind, captured = read_face(file, fps, format, limit, {"face": face}) or ("", None)
-            if captured is not None and (markers := _summarise_markers(captured)) is not None:
-                size = file.stat().st_size
-                reports.append({"file": str(path), "format": kind, "size": size, "markers": markers})
-                if not as_json:
-                    click.echo(f"{path}: {kind.upper()}, {size} bytes")
-                    _print_markers(markers)
-                continue
-            capture = None if captured is None else captured.describe()
-            with warnings.catch_warnings():
-                if capture is not None:  # which lists what would be warned of
-                    warnings.simplefilter("ignore", FbaWarning)
-                info = probe_input(
-                    file, fps=fps, format=format, salvage=salvage, clip=clip, face=face, limits=limit
-                )
-            clips = list_clips(file, info.format, limit)
-            if info.format == "fba" and info.body is not None:
-                data = file.read_bytes()
-                steps = step_tables.explain_choice(data, bap_steps, limit)
-                if bap_steps != BAP_STEPS_AUTO:
-                    step_tables.warn_of_doubtful_stream(path, data, bap_steps)
-            report = {"file": str(path), **info.to_dict(), "bap_steps_choice": steps or None}
-            report |= {"clips": [asdict(clip) for clip in clips]} if clips else {}
-            reports.append(report | ({"capture": capture} if capture is not None else {}))
-            if not as_json:
-                _print(path, info, clips, steps)
-                _print_capture(capture)
+            reports.append(_report(path, file, reading, fps, face, printed=not as_json))
     if as_json:
         print_json(reports if len(files) > 1 else reports[0])
     each.finish()
+
+
+def _report(
+    path: Path, file: Path, reading: Reading, fps: Fraction | None, face: str | None, *, printed: bool
+) -> dict[str, Any]:
+    """Return what a file holds, for programs; print it for people as well if `printed`.
+
+    path: as it was typed; file: that to read. fps, face: see `probe_input`.
+    """
+    if (person := describe_person(file, reading.format, reading.limit)) is not None:
+        if reading.clip is not None:
+            raise ModelError(f"there is no animation {reading.clip!r}; the file has none")
+        size = file.stat().st_size
+        if printed:
+            _print_person(path, size, person)
+        return {"file": str(path), "format": "gltf", "size": size, "person": asdict(person)}
+    kind, captured = read_face(file, fps, reading, {"face": face}) or ("", None)
+    if captured is not None and (markers := _summarise_markers(captured)) is not None:
+        size = file.stat().st_size
+        if printed:
+            click.echo(f"{path}: {kind.upper()}, {size} bytes")
+            _print_markers(markers)
+        return {"file": str(path), "format": kind, "size": size, "markers": markers}
+    capture = None if captured is None else captured.describe()
+    with warnings.catch_warnings():
+        if capture is not None:  # which lists what would be warned of
+            warnings.simplefilter("ignore", FbaWarning)
+        info = probe_input(file, reading, fps=fps, face=face)
+    clips = list_clips(file, info.format, reading.limit)
+    steps = ""
+    if info.format == "fba" and info.body is not None:
+        data = file.read_bytes()
+        steps = step_tables.explain_choice(data, reading.bap_steps, reading.limit)
+        if reading.bap_steps != BAP_STEPS_AUTO:
+            step_tables.warn_of_doubtful_stream(path, data, reading.bap_steps)
+    if printed:
+        _print(path, info, clips, steps)
+        _print_capture(capture)
+    report = {"file": str(path), **info.to_dict(), "bap_steps_choice": steps or None}
+    report |= {"clips": [asdict(clip) for clip in clips]} if clips else {}
+    return report | ({"capture": capture} if capture is not None else {})
 
 
 def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,13 +12,12 @@ import click
 
 from fba.cli import options
 from fba.cli.command import Command, examples, usage_errors
-from fba.cli.inputs import ExistingPath
+from fba.cli.inputs import ExistingPath, Reading
 from fba.cli.joint_options import MapType, Pair
-from fba.cli.marker_options import NeutralType
+from fba.cli.marker_options import Neutral, NeutralType
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress
 from fba.errors import FbaWarning, ModelError, OptionError
-from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.capture.markers.motion import MarkerMotion
@@ -27,7 +26,63 @@ if TYPE_CHECKING:
     from fba_player.scene.markers_scene import MarkersScene
 
 PICTURES, FILMS, OTHERS = (".png", ".jpg", ".jpeg"), (".mp4", ".gif"), (".glb", ".toml")
-Neutral = str | int | tuple[float, float]
+
+
+@dataclass(frozen=True)
+class _Tuning:
+    """What changes a mapping; None keeps what it says. squint: percent."""
+
+    assignment: str | None
+    overlap: str | None
+    gaze: str | None
+    squint: float | None
+
+    def applied(self, mapping: MarkerMapping) -> MarkerMapping:
+        """Return the changed mapping."""
+        return replace(
+            mapping,
+            assignment=self.assignment or mapping.assignment,
+            overlap=self.overlap or mapping.overlap,
+            gaze=self.gaze or mapping.gaze,
+            squint=mapping.squint if self.squint is None else self.squint / 100,
+        )
+
+
+@dataclass(frozen=True)
+class _Drawing:
+    """How a picture or a film is drawn; times in seconds, size in pixels."""
+
+    cloud: str | None
+    camera: str
+    time: float | None
+    start: float | None
+    end: float | None
+    fps: Fraction | None
+    size: tuple[int, int] | None
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What the command line asks for."""
+
+    capture: Path
+    head: Path | None
+    output: Path | None
+    maps: tuple[Path | Pair, ...]
+    map_out: Path | None
+    no_clobber: bool
+    points: Path | None
+    up: str
+    neutral: Neutral
+    marker: str | None
+    tuning: _Tuning
+    drawing: _Drawing
+    reading: Reading
+
+    @property
+    def saved(self) -> list[Path]:
+        """The mappings among the maps."""
+        return [each for each in self.maps if isinstance(each, Path)]
 
 
 @click.command(
@@ -121,31 +176,9 @@ Neutral = str | int | tuple[float, float]
 @click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
 @options.from_option
 @options.limit_option
-def command(
-    capture: Path,
-    head: Path | None,
-    output: Path | None,
-    maps: tuple[Path | Pair, ...],
-    map_out: Path | None,
-    no_clobber: bool,
-    points: Path | None,
-    up: str,
-    assignment: str | None,
-    overlap: str | None,
-    neutral: Neutral,
-    gaze: str | None,
-    squint: float | None,
-    marker: str | None,
-    cloud: str | None,
-    camera: str,
-    time: float | None,
-    start: float | None,
-    end: float | None,
-    fps: Fraction | None,
-    size: tuple[int, int] | None,
-    format: str | None,
-    limit: Limits,
-) -> None:
+@options.gather(tuning=_Tuning, drawing=_Drawing, reading=Reading)
+@options.gather(request=_Request)
+def command(request: _Request) -> None:
     """Let captured markers move any head, in a window or into a file.
 
     CAPTURE has markers on a face (C3D, TRC, CSV, ...). HEAD is a face model, or any mesh (OBJ, PLY, glTF);
@@ -156,29 +189,20 @@ def command(
     In the window, click on a marker, then on the head where it belongs; the panel has its reach, and all
     keys. With -o, no window opens.
     """
-    films: dict[str, object] = {"--start": start, "--end": end, "--fps": fps}
-    _check_options(output, {"--cloud": cloud, "--time": time, **films, "--size": size}, films, time)
-    saved = [each for each in maps if isinstance(each, Path)]
-    if len(saved) > 1:
-        raise click.UsageError("--map: give one mapping at most; pairs change what it says")
-    outputs = _outputs(output, map_out, [capture, head, points, *saved], no_clobber=no_clobber)
+    output, capture = request.output, request.capture
+    _check_options(output, request.drawing)
+    outputs = _outputs(request)
     if output is None:
         from fba_player.window.map_markers import check_window
 
         check_window()
-    motion = _read_capture(capture, format, limit)
+    motion = _read_capture(capture, request.reading)
     with Progress("reading", None):
         from fba.capture.virtual_markers import read_head
 
-        shown = read_head(head, points=points, up=up, limits=limit)
-        mapping = _find_mapping(motion, shown, saved, maps, limit, needed=output is not None)
-    mapping = replace(
-        mapping,
-        assignment=assignment or mapping.assignment,
-        overlap=overlap or mapping.overlap,
-        gaze=gaze or mapping.gaze,
-        squint=mapping.squint if squint is None else squint / 100,
-    )
+        head = read_head(request.head, points=request.points, up=request.up, limits=request.reading.limit)
+        mapping = request.tuning.applied(_find_mapping(motion, head, request))
+    marker = request.marker
     if marker is not None and marker not in (*motion.names, *mapping.markers):
         from fba.name_maps import list_names
 
@@ -186,38 +210,49 @@ def command(
             f"--marker {marker}: the capture has no such marker; it has {list_names(motion.names)}"
         )
     if output is None:
-        path = map_out or (saved[0] if saved else Path(f"{capture.stem}.virtual.toml"))
-        _show(motion, shown, mapping, path, neutral, marker, capture.name, size)
+        default = request.saved[0] if request.saved else Path(f"{capture.stem}.virtual.toml")
+        editing = _edit(motion, head, mapping, request, request.map_out or default)
+        _show(editing, capture.name, request.drawing.size)
     elif output.suffix.lower() == ".toml":
-        _write_mapping(mapping, shown, output, outputs)
+        _write_mapping(mapping, head, output, outputs)
     else:
-        from fba.capture.virtual_markers import perform
-
-        with Progress("preparing", None):
-            performance = perform(motion, shown, mapping, neutral)  # says what is wrong or odd
-        if output.suffix.lower() == ".glb":
-            from fba.formats.gltf.moved_head import write_moved_head
-
-            with outputs.file(output) as file:
-                write_moved_head(file, performance, motion.name or capture.stem)
-            outputs.say(
-                f"{display_name(output)}: {len(motion)} frames, {len(performance.names)} virtual markers"
-            )
-        else:
-            from fba_player.scene.markers_scene import MarkersScene
-
-            scene = MarkersScene(_edit(motion, shown, mapping, None, neutral, marker), capture.name)
-            scene.place_cloud(cloud or "beside")
-            scene.shows_current = marker is not None
-            _draw(scene, output, outputs, camera=camera, time=time, start=start, end=end, fps=fps, size=size)
-        if map_out is not None:
-            _write_mapping(mapping, shown, map_out, outputs)
+        _write_moved(motion, head, mapping, request, output, outputs)
+        if request.map_out is not None:
+            _write_mapping(mapping, head, request.map_out, outputs)
 
 
-def _check_options(
-    output: Path | None, drawn: dict[str, object], films: dict[str, object], time: float | None
+def _write_moved(
+    motion: MarkerMotion,
+    head: MarkedHead,
+    mapping: MarkerMapping,
+    request: _Request,
+    output: Path,
+    outputs: Outputs,
 ) -> None:
+    """Write the head that markers move: its animation as glTF, a picture or a film."""
+    from fba.capture.virtual_markers import perform
+
+    with Progress("preparing", None):
+        performance = perform(motion, head, mapping, request.neutral)  # says what is wrong or odd
+    if output.suffix.lower() == ".glb":
+        from fba.formats.gltf.moved_head import write_moved_head
+
+        with outputs.file(output) as file:
+            write_moved_head(file, performance, motion.name or request.capture.stem)
+        outputs.say(f"{display_name(output)}: {len(motion)} frames, {len(performance.names)} virtual markers")
+        return
+    from fba_player.scene.markers_scene import MarkersScene
+
+    scene = MarkersScene(_edit(motion, head, mapping, request, None), request.capture.name)
+    scene.place_cloud(request.drawing.cloud or "beside")
+    scene.shows_current = request.marker is not None
+    _draw(scene, output, outputs, request.drawing)
+
+
+def _check_options(output: Path | None, drawing: _Drawing) -> None:
     """Raise click.UsageError for options that the output does not take."""
+    films = {"--start": drawing.start, "--end": drawing.end, "--fps": drawing.fps}
+    drawn = {"--cloud": drawing.cloud, "--time": drawing.time, **films, "--size": drawing.size}
     suffix = "" if output is None else output.suffix.lower()
     if output == STANDARD:
         raise click.UsageError("--output -: give the name of a file")
@@ -235,13 +270,15 @@ def _check_options(
             raise click.UsageError(f"{name} is for a picture or a film, not for {output}")
         if name in films and suffix in PICTURES:
             raise click.UsageError(f"{name} is for a film; a picture has a --time")
-    if time is not None and suffix in FILMS:
+    if drawing.time is not None and suffix in FILMS:
         raise click.UsageError("--time is for a picture; a film has a --start and an --end")
 
 
-def _outputs(
-    output: Path | None, map_out: Path | None, inputs: list[Path | None], *, no_clobber: bool
-) -> Outputs:
+def _outputs(request: _Request) -> Outputs:
+    """Return the files to write; click.UsageError for names of other kinds, and for several mappings."""
+    output, map_out, saved = request.output, request.map_out, request.saved
+    if len(saved) > 1:
+        raise click.UsageError("--map: give one mapping at most; pairs change what it says")
     if map_out == STANDARD:
         raise click.UsageError("--map-out -: give the name of a file")
     if map_out is not None and map_out.suffix.lower() != ".toml":
@@ -251,16 +288,19 @@ def _outputs(
     written = [Output("--output", output)] if output is not None else []
     if output is not None and map_out is not None:
         written.append(Output("--map-out", map_out, text=True))
-    return Outputs(written, inputs, no_clobber=no_clobber)
+    inputs = [request.capture, request.head, request.points, *saved]
+    return Outputs(written, inputs, no_clobber=request.no_clobber)
 
 
-def _read_capture(path: Path, format: str | None, limits: Limits) -> MarkerMotion:
+def _read_capture(path: Path, reading: Reading) -> MarkerMotion:
     """Return the markers of a capture; click.UsageError for a file of another kind."""
     from fba.capture.markers.motion import MarkerMotion
     from fba.formats import format_of, formats
 
-    reader = format_of(path, format)
-    motion = reader.read_face(path, limits=limits) if reader.has_markers and reader.read_face else None
+    reader = format_of(path, reading.format)
+    motion = None
+    if reader.has_markers and reader.read_face is not None:
+        motion = reader.read_face(path, limits=reading.limit)
     if not isinstance(motion, MarkerMotion):
         readers = ", ".join(one.name for one in formats() if one.has_markers)
         raise click.UsageError(
@@ -271,23 +311,16 @@ def _read_capture(path: Path, format: str | None, limits: Limits) -> MarkerMotio
     return motion
 
 
-def _find_mapping(
-    motion: MarkerMotion,
-    head: MarkedHead,
-    saved: list[Path],
-    maps: tuple[Path | Pair, ...],
-    limits: Limits,
-    *,
-    needed: bool,
-) -> MarkerMapping:
+def _find_mapping(motion: MarkerMotion, head: MarkedHead, request: _Request) -> MarkerMapping:
     """Return the mapping of `--map`, else the proposed one, changed by pairs.
 
-    needed: whether it is an error if none can be proposed; a window may begin without.
+    It is an error if none can be proposed, but for a window, which may begin without.
     """
     from fba.capture.markers.marker_maps import change_map
     from fba.capture.virtual_markers import MarkerMapping, propose_mapping, read_mapping
 
-    pairs = dict(each for each in maps if not isinstance(each, Path))
+    saved = request.saved
+    pairs = dict(each for each in request.maps if not isinstance(each, Path))
     places = {name: place for name, place in pairs.items() if place and not place.isdecimal()}
     missing = [name for name in pairs if name not in motion.names]
     if missing:
@@ -301,7 +334,7 @@ def _find_mapping(
         raise click.UsageError(f"--map {name}={place}: with a saved mapping, give a vertex: {name}=1234")
     mapping = MarkerMapping()
     if saved:
-        mapping = read_mapping(saved[0], limits=limits)
+        mapping = read_mapping(saved[0], limits=request.reading.limit)
         mapping.check(head)
         mapping.check_names(motion.names)
     try:
@@ -311,7 +344,7 @@ def _find_mapping(
     except OptionError as error:
         raise click.UsageError(f"--map: {error}") from error
     except ModelError as error:
-        if needed:
+        if request.output is not None:
             raise
         warnings.warn(str(error), FbaWarning, stacklevel=2)
     for name, vertex in pairs.items():
@@ -354,49 +387,33 @@ def _edit(
     motion: MarkerMotion,
     head: MarkedHead,
     mapping: MarkerMapping,
+    request: _Request,
     path: Path | None,
-    neutral: Neutral,
-    marker: str | None,
 ) -> MarkerEditing:
+    """Return the mapping to be edited. path: where it is saved; None for pictures."""
     from fba_player.scene.marker_editing import MarkerEditing
 
-    editing = MarkerEditing(motion, head, mapping, path, neutral=neutral)
-    if marker is not None:
-        editing.choose(marker)
+    editing = MarkerEditing(motion, head, mapping, path, neutral=request.neutral)
+    if request.marker is not None:
+        editing.choose(request.marker)
     elif path is None:
         editing.shows_weights = False
     return editing
 
 
-def _show(
-    motion: MarkerMotion,
-    head: MarkedHead,
-    mapping: MarkerMapping,
-    path: Path,
-    neutral: Neutral,
-    marker: str | None,
-    title: str,
-    size: tuple[int, int] | None,
-) -> None:
+def _show(editing: MarkerEditing, title: str, size: tuple[int, int] | None) -> None:
     from fba_player.window.map_markers import map_markers
 
-    editing = _edit(motion, head, mapping, path, neutral, marker)
     map_markers(editing, title, size=size or (1280, 800))
     if editing.written:
-        click.echo(f"{path}: {_count(editing.mapping)}")
+        click.echo(f"{editing.path}: {_count(editing.mapping)}")
 
 
 def _draw(
     scene: MarkersScene,
     output: Path,
     outputs: Outputs,
-    *,
-    camera: str,
-    time: float | None,
-    start: float | None,
-    end: float | None,
-    fps: Fraction | None,
-    size: tuple[int, int] | None,
+    drawing: _Drawing,
 ) -> None:
     from fba_player.export.render import picture_size, render
 
@@ -404,13 +421,13 @@ def _draw(
         render(
             scene,
             file,
-            camera=camera,
-            time=time,
-            start=start,
-            end=end,
-            fps=fps,
-            size=size,
+            camera=drawing.camera,
+            time=drawing.time,
+            start=drawing.start,
+            end=drawing.end,
+            fps=drawing.fps,
+            size=drawing.size,
             progress=step.show,
         )
-    wide, high = picture_size(size, output)
+    wide, high = picture_size(drawing.size, output)
     outputs.say(f"{display_name(output)}: {wide}x{high}")

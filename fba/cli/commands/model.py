@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import shlex
 import warnings
-from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +34,47 @@ PART = click.option(
     help="Kind of a group, object, mesh or material: skin, eye, teeth, tongue, ..., or none to leave it out; "
     "repeatable.",
 )
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Where a model goes, and a picture of its face."""
+
+    output: Path
+    sheet: Path | None
+    no_clobber: bool
+
+
+@dataclass(frozen=True)
+class _Mesh:
+    """How a mesh is read, see `fba.face.importers.import_model`; kinds: NAME=KIND of its parts."""
+
+    points: Path | None
+    kind: str | None
+    up: str
+    kinds: tuple[str, ...]
+
+    def options(self) -> dict[str, Any]:
+        """Return arguments of `import_model`; click.UsageError for a kind that does not exist."""
+        from fba.face.model import PART_KINDS
+
+        kinds = {}
+        for text in self.kinds:
+            name, equals, kind = text.rpartition("=")
+            if not equals or not name or kind not in (*PART_KINDS, "none"):
+                raise click.UsageError(
+                    f"--part {text}: write NAME=KIND, with a kind of {', '.join(PART_KINDS)} or none"
+                )
+            kinds[name] = kind
+        return {"points": self.points, "kind": self.kind, "up": self.up, "kinds": kinds or None}
+
+    def import_command(self, head: Path, points: Path) -> str:
+        """Return the command that imports a head with its points."""
+        words = ["fba", "model", "import", str(head), "--points", str(points)]
+        words += ["--kind", self.kind] if self.kind else []
+        words += ["--up", self.up] if self.up != "y" else []
+        words += [word for text in self.kinds for word in ("--part", text)]
+        return shlex.join([*words, "-o", f"{head.stem}.fba.glb"])
 
 
 @click.group(
@@ -177,16 +217,12 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     type=OutputType(),
     help="Picture that shows the face at rest and in its main motions, visemes and expressions.",
 )
+@options.gather(mesh=_Mesh, target=_Target)
 def import_(
     source: Path,
-    output: Path,
-    no_clobber: bool,
-    sheet: Path | None,
-    points: Path | None,
-    kind: str | None,
+    mesh: _Mesh,
+    target: _Target,
     unit: float | None,
-    up: str,
-    kinds: tuple[str, ...],
     name: str | None,
     wrinkles: bool,
 ) -> None:
@@ -202,11 +238,11 @@ def import_(
     from fba.face import checks
     from fba.face.importers import import_model
 
-    outputs = _outputs(output, [source, points], no_clobber=no_clobber, sheet=sheet)
-    part_kinds = _parse_kinds(kinds) or None
+    output, sheet = target.output, target.sheet
+    outputs = _outputs(output, [source, mesh.points], no_clobber=target.no_clobber, sheet=sheet)
+    given = mesh.options() | {"unit": unit, "name": name}
     with Progress("importing", None):
-        model = import_model(source, kind=kind, points=points, unit=unit, up=up, kinds=part_kinds, name=name)
-    model = replace(model, wrinkles=wrinkles)
+        model = replace(import_model(source, **given), wrinkles=wrinkles)
     with Progress("checking", None):
         findings = [*checks.check_neutral(model), *checks.check_faps(model)]
     _write(model, output, outputs)
@@ -250,16 +286,8 @@ def import_(
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis.")
 @PART
 @click.option("--size", type=options.SizeType(), default="1280x800", show_default=True, metavar="WxH")
-def points_(
-    head: Path,
-    output: Path,
-    no_clobber: bool,
-    points: Path | None,
-    kind: str | None,
-    up: str,
-    kinds: tuple[str, ...],
-    size: tuple[int, int],
-) -> None:
+@options.gather(mesh=_Mesh)
+def points_(head: Path, mesh: _Mesh, output: Path, no_clobber: bool, size: tuple[int, int]) -> None:
     """Open a window in which you place the feature points of a head, for `fba model import --points`.
 
     HEAD is a mesh that lacks shapes, or whose points are not found: OBJ, PLY, Candide or glTF. The list
@@ -274,7 +302,7 @@ def points_(
     from fba.face.importers.head_surface import read_head_surface
 
     with Progress("reading", None):
-        surface = read_head_surface(head, kind=kind, points=points, up=up, kinds=_parse_kinds(kinds))
+        surface = read_head_surface(head, **mesh.options())
     placement = place_points(surface, output, size=size)
     if not placement.written:
         outputs.say(f"{output}: not written, as the window was closed without saving")
@@ -283,16 +311,7 @@ def points_(
     if placement.missing_units:
         outputs.say(f"  no face can be made without {', '.join(placement.missing_units)}")
     else:
-        outputs.say(f"  next: {_import_command(head, output, kind, up, kinds)}")
-
-
-def _import_command(head: Path, points: Path, kind: str | None, up: str, kinds: tuple[str, ...]) -> str:
-    """Return the command that imports a head with its points."""
-    words = ["fba", "model", "import", str(head), "--points", str(points)]
-    words += ["--kind", kind] if kind else []
-    words += ["--up", up] if up != "y" else []
-    words += [word for text in kinds for word in ("--part", text)]
-    return shlex.join([*words, "-o", f"{head.stem}.fba.glb"])
+        outputs.say(f"  next: {mesh.import_command(head, output)}")
 
 
 def _points_outputs(output: Path, head: Path, *, no_clobber: bool) -> Outputs:
@@ -405,20 +424,6 @@ def _parse_unit(text: str | None) -> str | float | None:
         raise click.UsageError(
             f"--unit {text}: write one of {', '.join(UNITS)}, or metres for one unit, as in 0.01"
         ) from None
-
-
-def _parse_kinds(texts: tuple[str, ...]) -> Mapping[str, str]:
-    from fba.face.model import PART_KINDS
-
-    kinds = {}
-    for text in texts:
-        name, equals, kind = text.rpartition("=")
-        if not equals or not name or kind not in (*PART_KINDS, "none"):
-            raise click.UsageError(
-                f"--part {text}: write NAME=KIND, with a kind of {', '.join(PART_KINDS)} or none"
-            )
-        kinds[name] = kind
-    return kinds
 
 
 def _outputs(

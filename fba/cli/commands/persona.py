@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from fba.cli.printing import print_json
 from fba.limits import Limits
 
 if TYPE_CHECKING:
+    from fba.animation import Animation
     from fba.persona import Persona, TrackedFace
 
 MEANS = ("motion", "curves", "masks")
@@ -54,6 +56,49 @@ _aspect_option = click.option(
     help="Width and height of the picture, 16:9 or 1920x1080; default: what makes the points a face.",
 )
 _fps_option = options.fps_option("Frame rate of recordings that do not say theirs.")
+
+
+@dataclass(frozen=True)
+class _Tracking:
+    """How recordings of tracked points are read. neutral: seconds in which the face rests."""
+
+    neutral: tuple[float, float] | None
+    aspect: float | None
+    fps: Fraction | None
+    face: str | None
+    limit: Limits
+
+    def read(self, path: Path) -> TrackedFace:
+        """Return the face in a recording."""
+        from fba.persona.recordings import read_recording
+
+        with input_file(path) as file:
+            return read_recording(file, fps=self.fps, face=self.face, aspect=self.aspect, limits=self.limit)
+
+
+@dataclass(frozen=True)
+class _Performer:
+    """Whose Personas are used, and how. no_head: leave out how the user's head turns."""
+
+    persona_file: Path | None
+    user_file: Path | None
+    means: str
+    no_head: bool
+
+    def play(self, file: Path, tracking: _Tracking) -> tuple[Persona | None, Animation]:
+        """Return the actor's Persona, if any, and a user's recording played by it."""
+        from fba.persona.performance import play
+
+        persona = None if self.persona_file is None else _load(self.persona_file, tracking.limit)
+        user = None if self.user_file is None else _load(self.user_file, tracking.limit)
+        return persona, play(
+            tracking.read(file),
+            persona,
+            means=self.means,
+            neutral=tracking.neutral,
+            user=user,
+            head=not self.no_head,
+        )
 
 
 @click.group(
@@ -98,19 +143,16 @@ def command() -> None:
 @options.no_clobber_option
 @options.json_option
 @options.limit_option
+@options.gather(tracking=_Tracking)
 def learn_command(
     actors: tuple[Path, ...],
     output: Path,
     name: str,
-    neutral: tuple[float, float] | None,
+    tracking: _Tracking,
     warm_up: int,
     report: Path | None,
-    aspect: float | None,
-    fps: Fraction | None,
-    face: str | None,
     no_clobber: bool,
     as_json: bool,
-    limit: Limits,
 ) -> None:
     """Learn how an actor moves the face, from points that a tracker found in films.
 
@@ -126,7 +168,8 @@ def learn_command(
     from fba.persona.learning import learn
     from fba.persona.storage import save_persona
 
-    faces = [_read(path, fps, face, aspect, limit) for path in actors]
+    neutral = tracking.neutral
+    faces = [tracking.read(path) for path in actors]
     persona = learn(faces, name or actors[0].stem, neutral=[neutral] * len(faces), warm_up=warm_up)
     with outputs.file(output) as file:
         save_persona(persona, file)
@@ -188,53 +231,34 @@ def info_command(file: Path, as_json: bool, limit: Limits) -> None:
 @options.face_option
 @options.no_clobber_option
 @options.limit_option
+@options.gather(performer=_Performer, tracking=_Tracking)
 def play_command(
     file: Path,
-    persona_file: Path | None,
-    user_file: Path | None,
+    performer: _Performer,
+    tracking: _Tracking,
     output: Path,
     to: str | None,
-    means: str,
-    neutral: tuple[float, float] | None,
-    no_head: bool,
-    aspect: float | None,
-    fps: Fraction | None,
-    face: str | None,
     no_clobber: bool,
-    limit: Limits,
 ) -> None:
     """Play a user's performance in an actor's way: tracked points to FAPs, which move any face.
 
     Without --persona, the FAPs are those of the user's own way.
     """
-    if persona_file is None and user_file is not None:
+    if performer.persona_file is None and performer.user_file is not None:
         raise click.UsageError("--user goes with --persona")
     writing = find_writer(output, to)
-    inputs = (file, persona_file, user_file)
+    inputs = (file, performer.persona_file, performer.user_file)
     outputs = Outputs(
         [Output("--output", output, writing.name in TEXT_FORMATS)], inputs, no_clobber=no_clobber
     )
     from fba.formats import write
-    from fba.persona.performance import play
 
-    persona = None if persona_file is None else _load(persona_file, limit)
-    user = None if user_file is None else _load(user_file, limit)
-    recording = _read(file, fps, face, aspect, limit)
-    animation = play(recording, persona, means=means, neutral=neutral, user=user, head=not no_head)
+    persona, animation = performer.play(file, tracking)
     extra: dict[str, Any] = {"clamp": True} if writing.name == "fba" else {}
     with outputs.file(output) as target:
         write(target, animation, format=writing.name, **extra)
     whose = "the user's own way" if persona is None else f"the way of {persona.name}"
     outputs.say(f"{display_name(output)}: {len(animation)} frames in {whose}")
-
-
-def _read(
-    path: Path, fps: Fraction | None, face: str | None, aspect: float | None, limits: Limits
-) -> TrackedFace:
-    from fba.persona.recordings import read_recording
-
-    with input_file(path) as file:
-        return read_recording(file, fps=fps, face=face, aspect=aspect, limits=limits)
 
 
 def _load(path: Path, limits: Limits) -> Persona:

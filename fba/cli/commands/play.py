@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from fba.cli import options, scene_options
 from fba.cli.command import Command, examples
+from fba.cli.inputs import ReadFile
 from fba.cli.scene_options import MOST, SceneOptions, SoundOptions, check_files
 from fba.parameters import BAP_STEPS_DEFAULT
 
 if TYPE_CHECKING:
+    from fba.animation import Animation
+    from fba_player.playback.live import LiveAnimation
     from fba_player.view.protocols import Showable
+
+
+@dataclass(frozen=True)
+class _Window:
+    """Options of the window, which dropped files keep. size: pixels. speed: 1 as recorded."""
+
+    size: tuple[int, int]
+    loop: bool
+    speed: float
+    interpolate: bool
 
 
 @click.command(
@@ -55,16 +68,14 @@ if TYPE_CHECKING:
     fps="Frame rate of a file without a header.",
     arrange="Several files: side by side (default), or over each other (default with --compare).",
 )
+@options.gather(window=_Window)
 def command(
     files: tuple[Path, ...],
     compare: bool,
     sound: SoundOptions,
-    speed: float,
-    loop: bool,
     start: float | None,
     paused: bool,
-    interpolate: bool,
-    size: tuple[int, int],
+    window: _Window,
     how: SceneOptions,
 ) -> None:
     """Play files in a window: space plays and pauses, arrows step, F1 shows all keys.
@@ -87,46 +98,48 @@ def command(
 
     player.check_display()  # before anything that takes long
     if not files:
-        dropped = _puppet(how, size)
+        dropped = _puppet(how, window.size)
     else:
-        dropped = _play(
-            files, how, sound, compare=compare, start=start, paused=paused, size=size, loop=loop, speed=speed,
-            interpolate=interpolate,
-        )  # fmt: skip
+        dropped = _play(files, how, sound, window, compare=compare, start=start, paused=paused)
     while dropped:
         beside = SoundOptions(None, sound.no_audio, 0.0)
-        dropped = _play(
-            dropped[:MOST], replace(how, arrange=None), beside, size=size, loop=loop, speed=speed,
-            interpolate=interpolate,
-        )  # fmt: skip
+        dropped = _play(dropped[:MOST], replace(how, arrange=None), beside, window)
 
 
 def _play(
     files: tuple[Path, ...],
     how: SceneOptions,
     sound: SoundOptions,
+    window: _Window,
     *,
     compare: bool = False,
     start: float | None = None,
-    **window: Any,
+    paused: bool = False,
 ) -> tuple[Path, ...]:
     """Play files in a window; return those that were dropped onto it."""
     from fba import player
     from fba.cli import scene_loading
 
     audio = scene_loading.find_sound(files, sound, "played without sound")
-    streams = []
+    streams: list[LiveAnimation] = []
+    whole: list[ReadFile] = []
     try:
-        opened, doubts, tables = [], list[str](), list[str]()
+        animations: list[Animation | LiveAnimation] = []
         for file in files:
-            opened.append(scene_loading.open_file(file, how, doubts, tables))
-            if opened[-1][1]:
-                streams.append(opened[-1][0])
+            opened = scene_loading.open_file(file, how)
+            if isinstance(opened, ReadFile):
+                animations.append(opened.animation)
+                whole.append(opened)
+            else:
+                animations.append(opened)
+                streams.append(opened)
         names = [
             animation.name if name == "-" else name
-            for name, (animation, _) in zip(scene_loading.display_names(files), opened, strict=True)
+            for name, animation in zip(scene_loading.display_names(files), animations, strict=True)
         ]
-        scene = scene_loading.build_scene(opened, names, how, over=compare)
+        scene = scene_loading.build_scene(animations, names, how, over=compare)
+        tables = [one.table for one in whole if one.table is not None]
+        doubts = [one.doubt for one in whole if one.doubt is not None]
         _check_start(scene, start, growing=bool(streams))
         single = (
             len(files) == 1 and not streams and str(files[0]) != "-" and not scene_loading.is_pipe(files[0])
@@ -142,13 +155,17 @@ def _play(
             bap_steps=tables[0] if tables else BAP_STEPS_DEFAULT,
             warnings=tuple(doubts),
             panels=("differences",) if compare else (),
-            **window,
+            paused=paused,
+            size=window.size,
+            loop=window.loop,
+            speed=window.speed,
+            interpolate=window.interpolate,
         )
     finally:
         for stream in streams:
-            for text in filter(None, (stream.details, stream.doubt)):  # type: ignore[union-attr]
+            for text in filter(None, (stream.details, stream.doubt)):
                 click.echo(f"fba: warning: {stream.name}: {text}", err=True)
-            stream.close()  # type: ignore[union-attr]
+            stream.close()
 
 
 def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:
@@ -158,7 +175,7 @@ def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:
     from fba_player.session.performer import neutral
 
     title = " ".join(file.name for file in (how.model, how.body) if file is not None)
-    scene = scene_loading.build_scene([(neutral(body=how.body is not None), False)], [title], how)
+    scene = scene_loading.build_scene([neutral(body=how.body is not None)], [title], how)
     return player.play(
         scene, title=title, size=size, camera=how.camera, loop=True, paused=True, panels=("puppet",)
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from fba.cli import options, scene_options
 from fba.cli.command import Command, examples, usage_errors
 from fba.cli.inputs import read_input, read_model
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.pose_options import Pose, still_animation
 from fba.cli.printing import Progress
 from fba.cli.scene_options import SceneOptions, SoundOptions, check_files
 
@@ -37,6 +38,46 @@ class SheetType(click.ParamType[str | int]):
             kinds = ", ".join(f"{kind!r}" for kind in SHEETS)
             self.fail(f"{value!r} is neither a number of frames nor one of {kinds}", param, ctx)
         return int(value)
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """Which frames are drawn: of a picture, one by its number or time; of a film, a span in seconds."""
+
+    frame: int | None
+    time: float | None
+    start: float | None
+    end: float | None
+
+    @property
+    def is_one(self) -> bool:
+        """Whether one frame is named."""
+        return self.frame is not None or self.time is not None
+
+
+@dataclass(frozen=True)
+class _Writing:
+    """How files are written. to: their format. replace: numbered pictures, too."""
+
+    to: str | None
+    no_clobber: bool
+    replace: bool
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What the command line asks for. sheet: which kind of contact sheet, or its number of frames."""
+
+    files: tuple[Path, ...]
+    output: str
+    sheet: str | int | None
+    size: tuple[int, int] | None
+    transparent: bool
+    pose: Pose
+    moment: _Moment
+    writing: _Writing
+    sound: SoundOptions
+    how: SceneOptions
 
 
 @click.command(
@@ -111,117 +152,121 @@ class SheetType(click.ParamType[str | int]):
     fps="Frame rate of the film; default: the input's own, or a whole fraction of it, at most 60 (GIF: 25).",
     arrange="Several files: side by side (default), or the others as drawings over the first.",
 )
-def command(
-    files: tuple[Path, ...],
-    output: str,
-    to: str | None,
-    no_clobber: bool,
-    faps: tuple[str, ...],
-    visemes: tuple[str, ...],
-    expressions: tuple[str, ...],
-    sheet: str | int | None,
-    size: tuple[int, int] | None,
-    frame: int | None,
-    time: float | None,
-    start: float | None,
-    end: float | None,
-    sound: SoundOptions,
-    transparent: bool,
-    replace: bool,
-    how: SceneOptions,
-) -> None:
+@options.gather(pose=Pose, moment=_Moment, writing=_Writing)
+@options.gather(request=_Request)
+def command(request: _Request) -> None:
     """Render files, or a face in a given pose, to a picture, numbered pictures, or a film (MP4 or GIF).
 
     Needs OpenGL through EGL, but no display.
     """
-    given = [name for name, value in (("--fap", faps), ("--viseme", visemes), ("--expression", expressions),
-                                      ("--contact-sheet", isinstance(sheet, str))) if value]  # fmt: skip
+    target = _plan(request)
+    if isinstance(request.sheet, str):
+        _draw_kinds(request, request.sheet, target)
+    else:
+        _draw_scene(request, target)
+
+
+def _plan(request: _Request) -> _Target:
+    """Return where pictures go; click.UsageError for options that contradict each other."""
+    files, sheet, how, sound = request.files, request.sheet, request.how, request.sound
+    given = request.pose.given + (["--contact-sheet"] if isinstance(sheet, str) else [])
     if files and given:
         what = f"{given[0]} {sheet}" if given == ["--contact-sheet"] else given[0]
         raise click.UsageError(f"{what} makes a picture without a file; leave out {files[0]}")
-    if not files and isinstance(sheet, int):
-        raise click.UsageError(f"--contact-sheet {sheet} shows frames of a file: give one")
-    if not files and how.body is not None and how.model is None and not given:
-        raise click.UsageError("--body goes with a file, which says how the body moves")
-    if not files and not given and how.model is None:
-        raise click.UsageError(
-            "give a file, or a face by --fap, --viseme, --expression or --contact-sheet; a --model alone "
-            "is shown at rest"
-        )
-    moments = {"--frame": frame, "--time": time, "--start": start, "--end": end, "--fps": how.fps}
-    for name, value in (*moments.items(), ("--audio", sound.audio)):
-        if not files and value is not None:
-            shown = given[0] if given else "--model alone"
-            raise click.UsageError(f"{name} goes with a file; {shown} makes a single picture")
+    if not files:
+        _check_still(request, given)
     check_files(files, how, sound, "picture")
-    target = _Target.parse(output, to)
-    film, mp4 = target.film, target.suffix == ".mp4"
-    if no_clobber and replace:
+    target = _Target.parse(request.output, request.writing.to)
+    if request.writing.no_clobber and request.writing.replace:
         raise click.UsageError("--no-clobber and --replace contradict each other")
-    if not mp4 and (sound.audio is not None or sound.audio_offset):
+    if target.suffix != ".mp4" and (sound.audio is not None or sound.audio_offset):
         name = "--audio" if sound.audio is not None else "--audio-offset"
         raise click.UsageError(f"{name} goes into an .mp4 alone")
     if isinstance(sheet, str):
         if given != ["--contact-sheet"] or how.camera is not None or how.view != "figure" or how.shows:
             raise click.UsageError("--contact-sheet has poses and cameras of its own; leave the others out")
-        if film:
+        if target.film:
             raise click.UsageError(f"--contact-sheet {sheet} makes one picture, .png or .jpg")
-        outputs = target.outputs([how.model], no_clobber=no_clobber, replace=replace)
-        with target.file(outputs) as name:
-            made = _kinds_sheet(sheet, Path(name), how.model, size)
-        outputs.say(f"{display_name(target.path)}: {made}")
-        return
-    if sheet is not None and (film or transparent or frame is not None or time is not None):
+        return target
+    if sheet is not None and (target.film or request.transparent or request.moment.is_one):
         raise click.UsageError(
             f"--contact-sheet {sheet} makes one picture, .png or .jpg, of frames between --start and --end"
         )
-    if not files and film:
+    if not files and target.film:
         raise click.UsageError("a face in one pose is a picture: write it to a .png")
+    return target
+
+
+def _check_still(request: _Request, given: list[str]) -> None:
+    """Raise click.UsageError for options that need a file. given: those that say which face is shown."""
+    how, moment = request.how, request.moment
+    if isinstance(request.sheet, int):
+        raise click.UsageError(f"--contact-sheet {request.sheet} shows frames of a file: give one")
+    if how.body is not None and how.model is None and not given:
+        raise click.UsageError("--body goes with a file, which says how the body moves")
+    if not given and how.model is None:
+        raise click.UsageError(
+            "give a file, or a face by --fap, --viseme, --expression or --contact-sheet; a --model alone "
+            "is shown at rest"
+        )
+    moments = {f"--{name}": value for name, value in asdict(moment).items()}
+    for name, value in {**moments, "--fps": how.fps, "--audio": request.sound.audio}.items():
+        if value is not None:
+            shown = given[0] if given else "--model alone"
+            raise click.UsageError(f"{name} goes with a file; {shown} makes a single picture")
+
+
+def _draw_kinds(request: _Request, sheet: str, target: _Target) -> None:
+    """Write a sheet of FAPs, visemes or expressions."""
+    model = request.how.model
+    outputs = target.outputs([model], request.writing)
+    with target.file(outputs) as name:
+        made = _kinds_sheet(sheet, Path(name), model, request.size)
+    outputs.say(f"{display_name(target.path)}: {made}")
+
+
+def _draw_scene(request: _Request, target: _Target) -> None:
+    """Write a picture, a film, or a sheet of frames, of the files or of a face in a pose."""
     from fba.cli import scene_loading
-    from fba.cli.pose_options import still_animation
+
+    files, how, sound = request.files, request.how, request.sound
+    mp4 = target.suffix == ".mp4"
+    audio = scene_loading.find_sound(files, sound, "the film has no sound") if mp4 else None
+    outputs = target.outputs([*files, how.model, how.body, audio], request.writing)
+    with Progress("preparing", None):
+        animations = [read_input(file, how, header_fps=how.fps) for file in files]
+        names = scene_loading.display_names(files) or [""]
+        scene = scene_loading.build_scene(animations or [still_animation(request.pose)], names, how)
+    with target.file(outputs) as name:
+        if isinstance(request.sheet, int):
+            made = _frames_sheet(scene, request.sheet, Path(name), request)
+        else:
+            made = _picture(scene, name, request, audio, film=target.film)
+    heard = f", with the sound of {audio}" if audio is not None else ""
+    outputs.say(f"{display_name(target.path)}: {made}{heard}")
+
+
+def _picture(scene: Showable, output: str, request: _Request, audio: Path | None, *, film: bool) -> str:
+    """Write a picture or a film; return its size and, of a film with another rate than its file, that."""
     from fba_player.export.render import render
 
-    audio = scene_loading.find_sound(files, sound, "the film has no sound") if mp4 else None
-    outputs = target.outputs([*files, how.model, how.body, audio], no_clobber=no_clobber, replace=replace)
-    with Progress("preparing", None):
-        animations = [
-            read_input(
-                file,
-                bap_steps=how.bap_steps,
-                header_fps=how.fps,
-                salvage=how.salvage,
-                format=how.format,
-                clip=how.clip,
-                limits=how.limit,
-            )
-            for file in files
-        ] or [still_animation(faps, visemes, expressions)]
-        names = scene_loading.display_names(files) or [""]
-        scene = scene_loading.build_scene([(animation, False) for animation in animations], names, how)
-    heard = f", with the sound of {audio}" if audio is not None else ""
-    with target.file(outputs) as name:
-        if sheet is not None:
-            made = _frames_sheet(scene, sheet, Path(name), tile=size, camera=how.camera, start=start, end=end)
-        else:
-            made = _size(size, name) + (_rate_text(scene, name) if film and how.fps is None else "")
-            with Progress("rendering", None) as step, usage_errors():
-                render(
-                    scene,
-                    name,
-                    size=size,
-                    fps=how.fps if film else None,
-                    camera=how.camera,
-                    frame=frame,
-                    time=time,
-                    start=start,
-                    end=end,
-                    audio=audio,
-                    audio_offset=sound.audio_offset,
-                    transparent=transparent,
-                    replace=replace,
-                    progress=step.show,
-                )
-    outputs.say(f"{display_name(target.path)}: {made}{heard}")
+    how = request.how
+    made = _size(request.size, output) + (_rate_text(scene, output) if film and how.fps is None else "")
+    with Progress("rendering", None) as step, usage_errors():
+        render(
+            scene,
+            output,
+            size=request.size,
+            fps=how.fps if film else None,
+            camera=how.camera,
+            **asdict(request.moment),
+            audio=audio,
+            audio_offset=request.sound.audio_offset,
+            transparent=request.transparent,
+            replace=request.writing.replace,
+            progress=step.show,
+        )
+    return made
 
 
 @dataclass(frozen=True)
@@ -259,11 +304,11 @@ class _Target:
 
         return self.pictures is not None or is_film(f"film{self.suffix}")
 
-    def outputs(self, inputs: Iterable[Path | None], *, no_clobber: bool, replace: bool) -> Outputs:
+    def outputs(self, inputs: Iterable[Path | None], writing: _Writing) -> Outputs:
         """Return the files to write; of numbered pictures, those that are replaced."""
         if self.pictures is None:
-            return Outputs([Output("--output", self.path)], inputs, no_clobber=no_clobber)
-        numbers = self.pictures.existing() if replace else []
+            return Outputs([Output("--output", self.path)], inputs, no_clobber=writing.no_clobber)
+        numbers = self.pictures.existing() if writing.replace else []
         return Outputs([Output("--output", self.pictures.path(number)) for number in numbers], inputs)
 
     @contextmanager
@@ -305,13 +350,21 @@ def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, i
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
 
-def _frames_sheet(scene: Showable, count: int, output: Path, **how: Any) -> str:
+def _frames_sheet(scene: Showable, count: int, output: Path, request: _Request) -> str:
     """Write a sheet of frames; return its size as text."""
     from fba_player.export.film_sheet import film_sheet
     from fba_player.export.image_files import check_picture, write_picture
 
     check_picture(output, transparent=False)
     with Progress("rendering", None) as step, usage_errors():
-        pixels = film_sheet(scene, count, progress=step.show, **how)
+        pixels = film_sheet(
+            scene,
+            count,
+            tile=request.size,
+            camera=request.how.camera,
+            start=request.moment.start,
+            end=request.moment.end,
+            progress=step.show,
+        )
     write_picture(output, pixels)
     return f"{pixels.shape[1]}x{pixels.shape[0]}"

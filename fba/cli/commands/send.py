@@ -9,8 +9,7 @@ import click
 
 from fba.cli import options
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, read_input
-from fba.limits import Limits
+from fba.cli.inputs import EXISTING, Reading, read_input
 
 
 @click.command(
@@ -31,6 +30,7 @@ from fba.limits import Limits
 @options.from_option
 @options.clip_option
 @options.limit_option
+@options.gather(reading=Reading)
 def command(
     file: Path,
     address: str,
@@ -38,9 +38,7 @@ def command(
     loop: bool,
     seconds: Fraction | None,
     fps: Fraction | None,
-    format: str | None,
-    clip: str | None,
-    limit: Limits,
+    reading: Reading,
 ) -> None:
     """Send a face, at its own pace, as Live Link Face sends it from a telephone.
 
@@ -50,7 +48,7 @@ def command(
     from fba.live.receiver import split_address
     from fba.live.sending import send
 
-    animation = read_input(file, header_fps=fps, format=format, clip=clip, limits=limit)
+    animation = read_input(file, reading, header_fps=fps)
     target = split_address(address, 11111)
     limit_seconds = None if seconds is None else float(seconds)
     count = send(animation, target, subject=name, loop=loop, seconds=limit_seconds)

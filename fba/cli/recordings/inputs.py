@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -13,13 +13,12 @@ import click
 
 from fba.animation import Animation
 from fba.cli.command import STANDARD_INPUT, Decorated
-from fba.cli.inputs import read_face_quietly, read_input
+from fba.cli.inputs import ReadFile, Reading, read_face_quietly, read_file
 from fba.cli.printing import Progress, rate_text
 from fba.errors import FormatError, OptionError
 from fba.formats import merge
 from fba.formats.synchronisation import SYNCS, Recording, Together, join
 from fba.formats.time_codes import parse_time_code, parse_time_of_day
-from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.formats.registry import FaceCapture, Format
@@ -60,6 +59,15 @@ class OffsetType(click.ParamType[Moment]):
         return Moment(text, seconds)
 
 
+@dataclass(frozen=True)
+class Sync:
+    """How two recordings go together: `--sync`, `--offset` and `--trim`."""
+
+    sync: str | None
+    offset: Moment | None
+    trim: bool
+
+
 def sync_options(command: Decorated) -> Decorated:
     """Add the options that say how two recordings go together."""
     sync = click.option(
@@ -86,7 +94,7 @@ class Inputs:
     """What was read.
 
     animation: of all inputs. start: time of day at its index 0, in seconds; None where unknown. together: how
-    two inputs with a capture among them were put together; None for others. tables: see `read_input`.
+    two inputs with a capture among them were put together; None for others. tables: of BAP steps, of streams.
     formats: of the files that "face" and "body" come from. is_resampled: whether frames were interpolated.
     """
 
@@ -133,74 +141,70 @@ class Inputs:
 
 def read_inputs(
     files: tuple[Path, ...],
+    reading: Reading,
     *,
     capture: Mapping[str, object],
-    sync: str | None,
-    offset: Moment | None,
-    trim: bool,
+    sync: Sync,
     fps: Fraction | None,
-    format: str | None,
-    limits: Limits,
+    name: str | None,
     timed: bool = False,
-    **options: Any,
 ) -> Inputs:
-    """Return face and body of one or two files as one animation. options: further ones of `read_input`.
+    """Return face and body of one or two files as one animation. capture, fps, name: see `read_file`.
 
     timed: find out when a single file was recorded.
 
     Raises click.UsageError for two faces, two bodies, and rates that differ where nothing was captured.
     """
-    _check_sync(files, sync, offset, trim)
-    tables: list[str] = []
-    readers: list[Format] = []
-    rates: list[Fraction] = []
+    _check_sync(files, sync)
+    read: list[ReadFile] = []
     recordings: list[Recording] = []
     faces: list[FaceCapture | None] = []
     with Progress("reading", len(files)) as step:
         for path in files:
-            animation = read_input(
-                path, fps=fps, format=format, capture=capture, limits=limits, tables=tables,
-                readers=readers, rates=rates, **options,
-            )  # fmt: skip
+            read.append(read_file(path, reading, fps=fps, name=name, capture=capture))
+            animation = read[-1].animation
             step.advance()
             if not len(animation):
                 raise FormatError("the file holds no frames; there is nothing to encode", path=path)
             _check_parts(path, animation, [one.animation for one in recordings])
             again = timed or len(files) > 1
-            faces.append(read_face_quietly(path, fps, format, limits, capture) if again else None)
-            name = STANDARD_INPUT if str(path) == "-" else str(path)
-            recordings.append(Recording(name, animation, None if faces[-1] is None else faces[-1].start))
-    by_part = formats_by_part([one.animation for one in recordings], readers)
+            faces.append(read_face_quietly(path, fps, reading, capture) if again else None)
+            shown = STANDARD_INPUT if str(path) == "-" else str(path)
+            recordings.append(Recording(shown, animation, None if faces[-1] is None else faces[-1].start))
+    tables = tuple(one.table for one in read if one.table is not None)
+    rates = [one.rate for one in read]
+    by_part = formats_by_part(read)
     if len(recordings) == 1:
         only = recordings[0]
         resampled = only.animation.rate != rates[0]
-        return Inputs(only.animation, only.start, None, tuple(tables), by_part, resampled)
+        return Inputs(only.animation, only.start, None, tables, by_part, resampled)
     first, second = recordings
-    if sync is None and offset is None and not any(reader.is_capture for reader in readers):
+    offset = sync.offset
+    if sync.sync is None and offset is None and not any(one.format.is_capture for one in read):
         resampled = [one.animation.rate for one in recordings] != rates
-        return Inputs(_merge(first, second), None, None, tuple(tables), by_part, resampled)
+        return Inputs(_merge(first, second), None, None, tables, by_part, resampled)
     try:
         together = join(
             first,
             second,
-            sync="offset" if offset is not None and offset.seconds is not None else sync,
+            sync="offset" if offset is not None and offset.seconds is not None else sync.sync,
             offset=0.0 if offset is None or offset.seconds is None else offset.seconds,
             begins=None if offset is None or offset.seconds is not None else _time_of_day(offset, faces[0]),
-            trim=trim,
-            limits=limits,
+            trim=sync.trim,
+            limits=reading.limit,
         )
     except OptionError as error:
         raise click.UsageError(str(error)) from error
     resampled = any(rate != together.animation.rate for rate in rates)
-    return Inputs(together.animation, together.start, together, tuple(tables), by_part, resampled)
+    return Inputs(together.animation, together.start, together, tables, by_part, resampled)
 
 
-def formats_by_part(animations: Sequence[Animation], readers: Sequence[Format]) -> dict[str, Format]:
-    """Return the format that "face" and "body" come from, as far as they exist, given each file's."""
+def formats_by_part(files: Iterable[ReadFile]) -> dict[str, Format]:
+    """Return the format that "face" and "body" come from, as far as they exist."""
     return {
-        part: reader
-        for animation, reader in zip(animations, readers, strict=True)
-        for part, track in (("face", animation.face), ("body", animation.body))
+        part: file.format
+        for file in files
+        for part, track in (("face", file.animation.face), ("body", file.animation.body))
         if track is not None
     }
 
@@ -245,9 +249,10 @@ def _time_of_day(offset: Moment, first: FaceCapture | None) -> float:
     return seconds
 
 
-def _check_sync(files: tuple[Path, ...], sync: str | None, offset: Moment | None, trim: bool) -> None:
+def _check_sync(files: tuple[Path, ...], given: Sync) -> None:
     """Raise click.UsageError for options that contradict each other or the number of files."""
-    typed = [f"--{name}" for name, value in (("sync", sync), ("offset", offset), ("trim", trim)) if value]
+    sync, offset = given.sync, given.offset
+    typed = [f"--{name}" for name in ("sync", "offset", "trim") if getattr(given, name)]
     if typed and len(files) != 2:
         raise click.UsageError(f"{typed[0]} is for two inputs, a face and a body; there is {len(files)}")
     if offset is not None and sync is not None and (offset.seconds is None) != (sync == "timecode"):

@@ -36,6 +36,30 @@ class Voice:
     how: str
 
 
+@dataclass(frozen=True)
+class VoiceOptions:
+    """The sound beside the stream. audio_offset: seconds from the first frame to the sound's start."""
+
+    audio: Path | None
+    audio_offset: float | None
+
+    def check(self, output: Path) -> list[Output]:
+        """Return the WAV file that will be written, or nothing; click.UsageError where it cannot be."""
+        if self.audio is None:
+            if self.audio_offset is not None:
+                raise click.UsageError("--audio-offset needs a sound: give one with --audio")
+            return []
+        if output == STANDARD:
+            raise click.UsageError("--audio writes a sound beside the stream; give the stream a name with -o")
+        target = output.with_suffix(".wav")
+        if target.exists() and target.samefile(self.audio):
+            raise click.UsageError(
+                f"{self.audio} is beside {output} already: leave --audio out to play it from the first frame "
+                "on, or give the stream another name"
+            )
+        return [Output("--audio", target)]
+
+
 def audio_options(command: Decorated) -> Decorated:
     """Add the options that put a sound beside the stream."""
     audio = click.option(
@@ -56,29 +80,17 @@ def audio_options(command: Decorated) -> Decorated:
     return decorated  # type: ignore[no-any-return]
 
 
-def check_audio(audio: Path | None, offset: float | None, output: Path) -> list[Output]:
-    """Return the WAV file that will be written, or nothing; click.UsageError where it cannot be."""
-    if audio is None:
-        if offset is not None:
-            raise click.UsageError("--audio-offset needs a sound: give one with --audio")
-        return []
-    if output == STANDARD:
-        raise click.UsageError("--audio writes a sound beside the stream; give the stream a name with -o")
-    target = output.with_suffix(".wav")
-    if target.exists() and target.samefile(audio):
-        raise click.UsageError(
-            f"{audio} is beside {output} already: leave --audio out to play it from the first frame on, or "
-            "give the stream another name"
-        )
-    return [Output("--audio", target)]
+def place_voice(given: VoiceOptions, taken: Inputs, target: Path) -> Voice:
+    """Return where the given sound begins.
 
-
-def place_voice(audio: Path, offset: float | None, taken: Inputs, target: Path) -> Voice:
-    """Return where a sound begins. Raises FormatError for a file that is no sound, or of another moment."""
+    Raises FormatError for a file that is no sound, or of another moment.
+    """
     from fba.formats.time_codes import seconds_between
     from fba_player.sound.audio_file import SoundFile
     from fba_player.sound.sound_clip import read_time_of_day
 
+    assert given.audio is not None  # the target is its copy
+    audio, offset = given.audio, given.audio_offset
     animation = taken.animation
     recorded, first = read_time_of_day(audio), _first_moment(taken.start, animation)
     begins, how = 0.0, "both from the start on"

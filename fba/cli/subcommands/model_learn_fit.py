@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +12,31 @@ import click
 from fba.cli import options
 from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, ExistingPath, read_input
+from fba.cli.inputs import EXISTING, ExistingPath, Reading, read_input
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress
 from fba.errors import FbaError
-from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.face.learning import LearntFit
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Where the model goes, and its table by itself."""
+
+    output: Path
+    fit: Path | None
+    no_clobber: bool
+
+
+@dataclass(frozen=True)
+class _Goal:
+    """How many FAPs to send: a count, or as many as keep within a tolerance in metres."""
+
+    count: int | None
+    tolerance: float | None
 
 
 @click.command(
@@ -59,17 +75,13 @@ if TYPE_CHECKING:
 @options.salvage_option
 @options.limit_option
 @options.json_option
+@options.gather(target=_Target, goal=_Goal, reading=Reading)
 def command(
     streams: tuple[Path, ...],
-    output: Path,
-    no_clobber: bool,
+    target: _Target,
     model: Path | None,
-    count: int | None,
-    tolerance: float | None,
-    fit: Path | None,
-    format: str | None,
-    salvage: bool,
-    limit: Limits,
+    goal: _Goal,
+    reading: Reading,
     as_json: bool,
 ) -> None:
     """Learn an interpolation table (FIT) from streams of a performer, and store it with a face model.
@@ -78,12 +90,13 @@ def command(
     errors are those on each stream while the table is learned from the others (of one stream, on fifths of
     it). Streams may be of any format with FAPs, captured faces too.
     """
-    if count is not None and tolerance is not None:
+    if goal.count is not None and goal.tolerance is not None:
         raise click.UsageError(
             "--faps and --tolerance contradict each other: each says how many FAPs to send"
         )
+    output, fit = target.output, target.fit
     written = [Output("--output", output), *([Output("--fit", fit)] if fit is not None else [])]
-    outputs = Outputs(written, [*streams, *([model] if model is not None else [])], no_clobber=no_clobber)
+    outputs = Outputs(written, [*streams, model], no_clobber=target.no_clobber)
     if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
         name = output.with_suffix(".glb").name
         raise click.UsageError(f"--output {output}: face models are written as glTF; name it {name}")
@@ -96,11 +109,12 @@ def command(
     animations = []
     with Progress("reading", len(streams)) as step:
         for path in streams:
-            animations.append(read_input(path, format=format, salvage=salvage, limits=limit))
+            animations.append(read_input(path, reading))
             step.advance()
     tracks = [_face(animation, path) for animation, path in zip(animations, streams, strict=True)]
     with Progress("learning", None):
-        learnt = learn_fit(tracks, head, count=count or FAPS, tolerance=tolerance and 1000 * tolerance)
+        millimetres = goal.tolerance and 1000 * goal.tolerance
+        learnt = learn_fit(tracks, head, count=goal.count or FAPS, tolerance=millimetres)
     with outputs.file(output) as file:
         replace(head, fit=learnt.table).save(file)
     if fit is not None:

@@ -23,6 +23,13 @@ _NONE = Header(lists="0000")
 
 def range_cases() -> Iterator[Case]:
     """Yield streams of range lists."""
+    yield from _default_range_cases()
+    yield from _list_cases()
+    yield from _alphabet_cases()
+
+
+def _default_range_cases() -> Iterator[Case]:
+    """Yield streams without lists."""
     yield Case(
         "fap_default_ranges",
         "no lists: the standard's limits of FAPs, both signs; FAP 47 1080 and 420, FAP 63 720",
@@ -47,6 +54,10 @@ def range_cases() -> Iterator[Case]:
             script(None, bodies(6, STANDARD_BAPS, seed=10), intra=(0, 3), bap=Header(quant=7, lists="0000"))
         ),
     )
+
+
+def _list_cases() -> Iterator[Case]:
+    """Yield streams of all lists and codes."""
     yield Case(
         "fap_lists",
         "the four lists of FAPs in all 16 combinations; those not sent stay in force",
@@ -58,6 +69,10 @@ def range_cases() -> Iterator[Case]:
         lambda: _lists("bap"),
     )
     yield Case("codes", "every code of a range, 0 to 31, as maximum and as minimum", _codes)
+
+
+def _alphabet_cases() -> Iterator[Case]:
+    """Yield streams of narrow and wide ranges."""
     yield Case(
         "alphabet_of_one",
         "ranges 0 to 0: symbols that take no bits",

@@ -38,6 +38,14 @@ _LIBERAL = (
 
 def start_code_cases() -> Iterator[Case]:
     """Yield streams of start codes and stuffing."""
+    yield from _code_place_cases()
+    yield from _stuffing_cases()
+    yield from _old_code_cases()
+    yield from _hidden_plane_cases()
+
+
+def _code_place_cases() -> Iterator[Case]:
+    """Yield streams with start codes before planes."""
     yield Case(
         "code_before_intra", "a plane start code before every I plane", lambda: _coded(lambda n: n % 4 == 0)
     )
@@ -64,6 +72,10 @@ def start_code_cases() -> Iterator[Case]:
         "the same with a byte of stuffing between",
         lambda: write_stream(edited(script(faces(6, FEW_FAPS)), {0: {"start_code": PLANE}})),
     )
+
+
+def _stuffing_cases() -> Iterator[Case]:
+    """Yield streams with stuffing before start codes, and what looks like it."""
     yield Case(
         "stuffing_lengths",
         "stuffing of 1 to 8 bits before plane start codes",
@@ -88,6 +100,10 @@ def start_code_cases() -> Iterator[Case]:
         _like_stuffing,
         encodes=False,
     )
+
+
+def _old_code_cases() -> Iterator[Case]:
+    """Yield streams with the old start codes."""
     yield Case(
         "old_codes",
         "the old start codes of object (01 01) and plane (01 03)",
@@ -113,6 +129,10 @@ def start_code_cases() -> Iterator[Case]:
         encodes=False,
         optional="only one vendor's early tools wrote these codes",
     )
+
+
+def _hidden_plane_cases() -> Iterator[Case]:
+    """Yield planes that a decoder may take for stuffing, and those with a start code before them."""
     for unsure in (False, True):
         yield Case(
             "zeros_at_boundary" + "_bare" * unsure,

@@ -15,6 +15,13 @@ _LONG_SKIP = 15 * 3000 + 7
 
 def time_cases() -> Iterator[Case]:
     """Yield streams of frame rates, skips and time codes."""
+    yield from _rate_cases()
+    yield from _skip_cases()
+    yield from _time_code_cases()
+
+
+def _rate_cases() -> Iterator[Case]:
+    """Yield streams of frame rates."""
     for name, rate, text in (
         ("rate_30_5", (30, 8, 0), "30 1/2 frames/s"),
         (
@@ -58,12 +65,20 @@ def time_cases() -> Iterator[Case]:
         "rate_missing", "no frame rate anywhere", lambda: write_stream(script(faces(5, (3,)), rate=None)),
         times=False,
     )  # fmt: skip
+
+
+def _skip_cases() -> Iterator[Case]:
+    """Yield streams with skipped frames."""
     yield Case("skips", f"skipped frames in P planes: {', '.join(map(str, _SKIPS))}", lambda: _skips(()))
     yield Case("skips_intra", "the same in I planes, with FAPs and BAPs", lambda: _skips(range(len(_SKIPS))))
     yield Case(
         "skip_long", f"{_LONG_SKIP} skipped frames: 3001 words",
         lambda: write_stream(edited(script(faces(5, (3,))), {2: {"skip": _LONG_SKIP}})),
     )  # fmt: skip
+
+
+def _time_code_cases() -> Iterator[Case]:
+    """Yield streams with time codes."""
     yield Case(
         "time_code", "a first time code of 5:59:59",
         lambda: write_stream(edited(script(faces(6, (3, 4))), {0: {"time_code": (5, 59, 1, 59)}})),
