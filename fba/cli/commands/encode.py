@@ -253,7 +253,7 @@ def command(
         return
     for line in (
         coded.summary(output, animation),
-        *coded.details(animation),
+        *coded.lines,
         *(together_lines(inputs, taken.together) if taken.together is not None else ()),
         *((voice.voice_line(spoken),) if spoken is not None else ()),
         *clamped_lines(coded.clamped),
