@@ -1,4 +1,4 @@
-"""`fba.encode` and `encode_stream`: each choice makes the stream of its function; what contradicts is told."""
+"""`fba.encode` and `encode_stream`: each choice makes the stream of its function; mistakes are told."""
 
 from __future__ import annotations
 
