@@ -12,14 +12,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
+from importlib import import_module
 from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Array, Bool, Float64, Int64, Intp
+from fba.errors import OptionError
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import baps
+from fba.parameters import EXPRESSION_FIELDS, VISEME_FIELDS, bap_numbers, baps, fap_numbers
 from fba.tracks import BodyTrack, FaceTrack, freeze, integers
 
 __all__ = ["Animation", "BodyTrack", "FaceTrack", "Frame"]
@@ -75,8 +77,8 @@ class Animation:
     at index[t] / rate seconds. face, body: tracks of T frames, at least one of them. Immutable;
     compared by content, without the name.
 
-    `animation[3]` is a `Frame`, `animation[10:20]` an `Animation`. Raises ValueError if the parts contradict
-    each other.
+    `animation[3]` is a `Frame`, `animation[10:20]` an `Animation`, and so is `animation.between(1.5, 3)`,
+    which takes seconds. Raises ValueError if the parts contradict each other.
     """
 
     rate: Fraction
@@ -205,6 +207,52 @@ class Animation:
         return (
             Fraction(int(self.index[-1]) - int(self.index[0]) + 1) / self.rate if len(self) else Fraction(0)
         )
+
+    def between(self, start: Fraction | float, end: Fraction | float = math.inf) -> Animation:
+        """Return the frames that are shown from `start` on and before `end`, in seconds as in `times`.
+
+        Their times stay as they are. ValueError if the end is before the start.
+        """
+        if not start <= end:
+            raise ValueError(f"between: the end, {end} s, must not be before the start, {start} s")
+        first, last = np.searchsorted(self.times, [float(start), float(end)]).tolist()
+        return self[first:last]
+
+    def to_dataframe(self) -> Any:
+        """Return a `pandas.DataFrame` of what is sent: a row for each frame, indexed by its time in seconds.
+
+        Columns are the parameters that any frame sends, by name: integers in the standard's units, missing
+        (`pandas.NA`) in frames that do not send them. The fields of visemes and expressions stand in place of
+        FAPs 1 and 2. OptionError where pandas is not installed.
+        """
+        try:
+            pandas = import_module("pandas")
+        except ImportError as error:
+            raise OptionError(
+                "to_dataframe needs the package pandas, which is not installed; without it, "
+                "np.asarray(animation.face) is an array of values"
+            ) from error
+        columns = {
+            name: pandas.arrays.IntegerArray(values.astype(np.int32), ~sent)
+            for name, values, sent in self._columns()
+        }
+        return pandas.DataFrame(columns, index=pandas.Index(self.times, name="seconds"))
+
+    def _columns(self) -> Iterator[tuple[str, Array, Bool]]:
+        """Yield the name, the values (T,), and the mask (T,) of each parameter that any frame sends."""
+        if self.face is not None:
+            high_level = ((VISEME_FIELDS, self.face.viseme), (EXPRESSION_FIELDS, self.face.expression))
+            for column, (names, values) in enumerate(high_level):
+                sent = self.face.mask[:, column]
+                if sent.any():
+                    yield from ((name, values[:, each], sent) for each, name in enumerate(names))
+        for track, numbers in ((self.face, fap_numbers()), (self.body, bap_numbers())):
+            if track is None:
+                continue
+            for name, number in numbers.items():
+                sent = track.mask[:, number - 1]
+                if name not in ("viseme", "expression") and sent.any():
+                    yield name, track.values[:, number - 1], sent
 
     def resample(self, rate: Fraction | int | str, *, limits: Limits = DEFAULT_LIMITS) -> Animation:
         """Return the same animation at another frame rate, in evenly spaced frames without gaps.

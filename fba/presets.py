@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-REFERENCE = "reference"
-"""All that the animation sends."""
-PLANNED = ("exact", "compact")
+from typing import Final, Literal
+
+PlannedPreset = Literal["exact", "compact"]
 """Not what never moves; of FAPs, only those that a player does not derive from others. See `fba.planning`."""
-PRESETS = (REFERENCE, *PLANNED)
+Preset = Literal["reference", PlannedPreset]
+"""`REFERENCE`, or a planned preset."""
+
+REFERENCE: Final = "reference"
+"""All that the animation sends."""
+PLANNED: tuple[PlannedPreset, ...] = ("exact", "compact")
+PRESETS: tuple[Preset, ...] = (REFERENCE, *PLANNED)

@@ -8,9 +8,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import BinaryIO
 
-from fba.errors import BitstreamError, FormatError, LimitError, ModelError, RangeError, UnsupportedError
+from fba.errors import (
+    BitstreamError,
+    FormatError,
+    LimitError,
+    ModelError,
+    OptionError,
+    RangeError,
+    UnsupportedError,
+)
 
 Path = str | os.PathLike[str]
+
+_BYTES = bytes | bytearray | memoryview
 
 HEAD_BYTES = 65536
 """Bytes of a file that are read to find its format."""
@@ -22,8 +32,13 @@ def open_source(path: Path) -> tuple[BinaryIO, int]:
     """Return the file, opened for binary reading, and its size in bytes when it was opened.
 
     Readers stop at that size, even if the file grows meanwhile. Raises FormatError for a missing
-    file, a folder, a pipe or device, an empty or unreadable file.
+    file, a folder, a pipe or device, an empty or unreadable file, OptionError for what is no name of a file.
     """
+    if not isinstance(path, str | os.PathLike):
+        hint = (
+            "fba.decode(data) decodes the bytes of a stream" if isinstance(path, _BYTES) else "give its name"
+        )
+        raise OptionError(f"the name of a file is needed, not {type(path).__name__}; {hint}")
     name = os.fspath(path)
     try:
         # opening a pipe that nobody writes to would block

@@ -10,13 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Array, Bool, Int16, Int32
+from fba.errors import OptionError, did_you_mean
 from fba.parameters import (
     BAP_COUNT,
     EXPRESSION_FIELDS,
     EXPRESSION_SELECT_MAX,
     FAP_COUNT,
+    FIRST_LOW_LEVEL_FAP,
     VISEME_FIELDS,
     VISEME_SELECT_MAX,
+    bap_numbers,
+    fap_numbers,
 )
 
 _CHUNK = 4096
@@ -48,6 +52,9 @@ class FaceTrack:
     Arrays are copied if they must be changed, and read-only afterwards. Raises ValueError on a wrong
     shape, a non-integer dtype, or a select or flag outside its range. Tracks are equal if they send the
     same; interpolated is not compared, because FAP files do not contain it.
+
+    `track[10:20]` are frames, `track["open_jaw"]` and `track[3]` the values of a FAP by name or number, int32
+    (T,). NumPy takes a track as its values.
     """
 
     values: Int32
@@ -119,7 +126,23 @@ class FaceTrack:
     def __len__(self) -> int:
         return len(self._compact[1]) if self._compact is not None else len(self.values)
 
-    def __getitem__(self, frames: slice) -> FaceTrack:
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> Array:
+        """Return the values for NumPy: int32 (T, 68), read-only unless copied."""
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    __iter__ = None  # frames are taken by slices, and numbers are those of parameters
+
+    @overload
+    def __getitem__(self, frames: slice) -> FaceTrack: ...
+    @overload
+    def __getitem__(self, frames: str | int) -> Int32: ...
+    def __getitem__(self, frames: slice | str | int) -> FaceTrack | Int32:
+        if not isinstance(frames, slice):
+            number = _number(frames, fap_numbers(), "FAP")
+            if number < FIRST_LOW_LEVEL_FAP:
+                name = ("viseme", "expression")[number - 1]
+                raise OptionError(f"FAP {number} {name} has fields in place of a value: use .{name}")
+            return self.values[:, number - 1]
         if self._compact is not None:
             return compact_track(FaceTrack, self._compact[0], self._compact[1][frames])
         names = ("values", "mask", "viseme", "expression")
@@ -137,6 +160,10 @@ class FaceTrack:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __repr__(self) -> str:
+        """Return one line, without the arrays."""
+        return _summary(self, "FAP")
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BodyTrack:
@@ -145,7 +172,7 @@ class BodyTrack:
     values: int32 (T, 296), BAP i+1 in column i: 1e-5 rad, millimetres for BAPs 181..183.
     mask: bool (T, 296), True where the parameter was sent.
 
-    The same rules apply as for `FaceTrack`.
+    The same rules apply as for `FaceTrack`; `track["l_knee_flexion"]` are the values of a BAP.
     """
 
     values: Int32
@@ -182,7 +209,19 @@ class BodyTrack:
     def __len__(self) -> int:
         return len(self._compact[1]) if self._compact is not None else len(self.values)
 
-    def __getitem__(self, frames: slice) -> BodyTrack:
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> Array:
+        """Return the values for NumPy: int32 (T, 296), read-only unless copied."""
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    __iter__ = None  # frames are taken by slices, and numbers are those of parameters
+
+    @overload
+    def __getitem__(self, frames: slice) -> BodyTrack: ...
+    @overload
+    def __getitem__(self, frames: str | int) -> Int32: ...
+    def __getitem__(self, frames: slice | str | int) -> BodyTrack | Int32:
+        if not isinstance(frames, slice):
+            return self.values[:, _number(frames, bap_numbers(), "BAP") - 1]
         if self._compact is not None:
             return compact_track(BodyTrack, self._compact[0], self._compact[1][frames])
         return trusted(BodyTrack, values=self.values[frames], mask=self.mask[frames])
@@ -193,6 +232,10 @@ class BodyTrack:
         return _equal(self, other, ("mask", "values"))
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """Return one line, without the arrays."""
+        return _summary(self, "BAP")
 
 
 Track = TypeVar("Track", FaceTrack, BodyTrack)
@@ -267,6 +310,38 @@ def _equal(one: Track, other: Track, names: tuple[str, ...]) -> bool:
         for mine, theirs in zip(batches(one), batches(other), strict=True)
         for name in names
     )
+
+
+def _number(key: object, numbers: dict[str, int], kind: str) -> int:
+    """Return the number of a parameter, which may be given by its name. OptionError if there is none."""
+    if isinstance(key, str):
+        if key in numbers:
+            return numbers[key]
+        raise OptionError(
+            f"there is no {kind} {key!r}{did_you_mean(key, numbers)}; their names are in "
+            f"fba.parameters.{kind.lower()}_numbers()"
+        )
+    if isinstance(key, bool) or not isinstance(key, int | np.integer):
+        raise OptionError(
+            f"a track is indexed by a slice of frames, or by the name or the number of a {kind}, not by "
+            f"{type(key).__name__}; index its .values like an array"
+        )
+    if not 1 <= key <= len(numbers):
+        raise OptionError(
+            f"{kind}s are numbered from 1 to {len(numbers)}, not {key}; frames are taken by slices"
+        )
+    return int(key)
+
+
+def _summary(track: FaceTrack | BodyTrack, kind: str) -> str:
+    """Return a line on a track of this kind of parameters."""
+    sent = (
+        sum(np.bitwise_or.reduce([part.mask.any(axis=0) for part in batches(track)], axis=0))
+        if len(track)
+        else 0
+    )
+    frames = f"{len(track)} frame{'s' if len(track) != 1 else ''}"
+    return f"<{type(track).__name__} {frames}, {sent} {kind}{'s' if sent != 1 else ''} sent>"
 
 
 def _check_values(values: object, mask: object, columns: int, what: str) -> tuple[Int32, Bool]:

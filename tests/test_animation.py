@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import re
+import sys
 from fractions import Fraction
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fba import Animation, BodyTrack, FaceTrack, Frame
+from fba import Animation, BodyTrack, FaceTrack, Frame, OptionError
 
 FACE, BODY = 68, 296
 
@@ -299,3 +304,139 @@ def test_empty_tracks() -> None:
     joined = BodyTrack.join([(None, 2), (body(1), 1)])
     assert joined is not None
     assert len(joined) == 3
+
+
+# --- what a user of NumPy tries first -----------------------------------------------------------------
+
+
+def test_numpy_takes_a_track_as_its_values() -> None:
+    for track in (face(3), body(3)):
+        array = np.asarray(track)
+        assert array.dtype == np.int32
+        assert np.array_equal(array, track.values)
+        assert not array.flags.writeable
+        copied = np.array(track)
+        copied[:] = 9
+        assert np.array_equal(np.asarray(track), array)
+        assert np.asarray(track, dtype=np.float64).dtype == np.float64
+        with pytest.raises(ValueError, match="copy"):
+            np.asarray(track, dtype=np.float64, copy=False)
+
+
+@pytest.mark.parametrize(
+    ("track", "key", "column"),
+    [
+        (face(4), "open_jaw", 2),
+        (face(4), 3, 2),
+        (face(4), np.int64(3), 2),
+        (face(4)[1:3], "open_jaw", 2),
+        (body(4), "sacroiliac_tilt", 0),
+        (body(4), 1, 0),
+        (body(4), "l_knee_flexion", 15),
+        (body(4), 296, 295),
+    ],
+)
+def test_a_parameter_by_name_or_number(track: FaceTrack | BodyTrack, key: str | int, column: int) -> None:
+    values = track[key]
+    assert values.dtype == np.int32
+    assert np.array_equal(values, track.values[:, column])
+
+
+@pytest.mark.parametrize(
+    ("track", "key", "text"),
+    [
+        (face(2), "opn_jaw", "there is no FAP 'opn_jaw' (did you mean 'open_jaw'?); their names are in"),
+        (body(2), "open_jaw", "there is no BAP 'open_jaw'"),
+        (face(2), 0, "FAPs are numbered from 1 to 68, not 0; frames are taken by slices"),
+        (face(2), -1, "from 1 to 68, not -1"),
+        (body(2), 297, "BAPs are numbered from 1 to 296, not 297"),
+        (face(2), "viseme", "FAP 1 viseme has fields in place of a value: use .viseme"),
+        (face(2), 2, "use .expression"),
+        (face(2), True, "by the name or the number of a FAP, not by bool; index its .values like an array"),
+        (body(2), (0, 3), "not by tuple"),
+    ],
+)
+def test_what_is_no_parameter_says_what_is(track: FaceTrack | BodyTrack, key: Any, text: str) -> None:
+    with pytest.raises(OptionError, match=re.escape(text)):
+        track[key]
+
+
+def test_a_track_is_no_sequence_of_its_parameters() -> None:
+    for track in (face(2), body(2)):
+        with pytest.raises(TypeError, match="not iterable"):
+            list(track)  # type: ignore[call-overload]
+
+
+@pytest.mark.parametrize(
+    ("shown", "text"),
+    [
+        (face(250), "<FaceTrack 250 frames, 3 FAPs sent>"),
+        (body(1), "<BodyTrack 1 frame, 1 BAP sent>"),
+        (FaceTrack.empty(0), "<FaceTrack 0 frames, 0 FAPs sent>"),
+        (animation(4), "<Animation test: 4 frames at 25 frames/s, 0.16 s, face, body>"),
+        (
+            animation(4)[2],
+            "Frame(index=2, rate=Fraction(25, 1), face=<FaceTrack 1 frame, 3 FAPs sent>, "
+            "body=<BodyTrack 1 frame, 1 BAP sent>)",
+        ),
+    ],
+)
+def test_shown_in_a_line(shown: object, text: str) -> None:
+    assert repr(shown) == text
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "frames"),
+    [
+        (0, 0.16, [0, 1, 2, 3]),
+        (0.04, 0.12, [1, 2]),
+        (Fraction(1, 25), Fraction(3, 25), [1, 2]),
+        (0.041, math.inf, [2, 3]),
+        (-5, 0.001, [0]),
+        (0.08, 0.08, []),
+        (9, 10, []),
+    ],
+)
+def test_frames_between_two_times(start: Fraction | float, end: Fraction | float, frames: list[int]) -> None:
+    whole = animation(4)
+    part = whole.between(start, end)
+    assert part.index.tolist() == frames
+    assert part == whole[slice(frames[0], frames[-1] + 1) if frames else slice(0, 0)]
+
+
+def test_frames_between_times_that_are_none() -> None:
+    assert len(animation(4).between(0.04)) == 3
+    for start, end in ((2, 1), (math.nan, 1)):
+        with pytest.raises(ValueError, match="must not be before the start"):
+            animation(4).between(start, end)
+
+
+def test_a_table_for_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a stand-in for pandas, which is no dependency: what it is given."""
+    pandas = SimpleNamespace(
+        DataFrame=lambda columns, index: (columns, index),
+        Index=lambda values, name: (name, values.tolist()),
+        arrays=SimpleNamespace(IntegerArray=lambda values, absent: (values.tolist(), absent.tolist())),
+    )
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    values, mask = np.zeros((2, FACE), dtype=np.int32), np.zeros((2, FACE), dtype=bool)
+    values[0, 2], mask[0, 2], mask[1, 0] = 7, True, True
+    viseme = np.array([[0, 0, 0, 0], [10, 0, 63, 0]], dtype=np.int16)
+    columns, index = Animation(
+        Fraction(25), np.array([0, 3]), FaceTrack(values, mask, viseme), body(2)
+    ).to_dataframe()
+    assert index == ("seconds", [0.0, 0.12])
+    assert columns == {
+        "viseme_select1": ([0, 10], [True, False]),
+        "viseme_select2": ([0, 0], [True, False]),
+        "viseme_blend": ([0, 63], [True, False]),
+        "viseme_def": ([0, 0], [True, False]),
+        "open_jaw": ([7, 0], [False, True]),
+        "sacroiliac_tilt": ([0, -7], [False, False]),
+    }
+
+
+def test_a_table_without_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(OptionError, match="needs the package pandas, which is not installed"):
+        animation(2).to_dataframe()

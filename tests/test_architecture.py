@@ -62,6 +62,7 @@ fba.body.gait
 fba.body.importers
 fba.planning
 fba.planning.rate
+fba.planning._encoding
 fba.capture.markers
 fba.capture.virtual_markers
 fba.capture.motion
@@ -129,6 +130,7 @@ FACADES = {
         "fba.formats.registry",
         "fba.formats.*",
     ): "the table of formats: readers and writers by name",
+    ("fba.planning", "fba.planning._encoding"): "the function over all ways to encode, bit rates among them",
     ("fba.cli.main", "fba.cli.commands.*"): "the subcommands by name",
     ("fba.face.model", "fba.face.gltf.storage"): "`FaceModel.load` and `save`",
     ("fba.face.model", "fba.face.builtin"): "`FaceModel.default`",

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Literal
 
 import numpy as np
 
 from fba.codec._plane import slots
 from fba.codec.settings import QUANT_MAX
 from fba.parameters import BAP_STEP_TABLES
-from fba.presets import PRESETS, REFERENCE
+from fba.presets import PRESETS, REFERENCE, Preset
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ class EncoderOptions:
     bap_steps: str = "iso"
     mark: bool = True
     checksums: bool = True
-    preset: str = REFERENCE
-    unsent: str = "keep"
+    preset: Preset = REFERENCE
+    unsent: Literal["keep", "interpolate"] = "keep"
     gender: int = 0
     clamp: bool = False
 

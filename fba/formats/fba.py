@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.atomic import atomic
-from fba.errors import OptionError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEPS_AUTO
-from fba.presets import PRESETS, REFERENCE
 from fba.source import Path, naming_file, read_whole
 
 if TYPE_CHECKING:
@@ -69,21 +67,14 @@ def write_fba(
 ) -> None:
     """Encode an animation into an FBA file.
 
-    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Raises OptionError if options
-    and fields are given, or for an unknown preset, RangeError for values that no stream can carry,
-    FormatError if the file cannot be written.
+    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. settings: these, and what else
+    `fba.encode` takes: `preset`, `tolerance` and `bit_rate`. Raises as `fba.encode` does, FormatError if the
+    file cannot be written.
     """
-    from fba.codec import EncoderOptions
     from fba.planning import encode
 
-    if settings:
-        if options is not None:
-            raise OptionError(f"give either options or {', '.join(settings)}, not both")
-        if settings.get("preset", REFERENCE) not in PRESETS:
-            raise OptionError(f"preset must be one of {', '.join(PRESETS)}, not {settings['preset']!r}")
-        options = EncoderOptions(**settings)
     with naming_file(path):
-        data = encode(animation, options)
+        data = encode(animation, options, **settings)
     with atomic(path) as file:
         file.write(data)
 
@@ -92,7 +83,7 @@ def _encoder_settings() -> tuple[str, ...]:
     """Return the names of the keywords of `write_fba`."""
     from fba.codec import EncoderOptions
 
-    return tuple(field.name for field in fields(EncoderOptions) if field.init)
+    return (*(field.name for field in fields(EncoderOptions)), "tolerance", "bit_rate")
 
 
 write_fba.extra_options = _encoder_settings  # type: ignore[attr-defined]

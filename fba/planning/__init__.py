@@ -3,16 +3,20 @@
 May use: the codec; faces and bodies, for what they show and by how much it moves.
 """
 
+from fba.planning._encoding import BitRate, Encoded, Goal, encode, encode_stream
 from fba.planning.body_tolerance import BodyErrors, body_errors
 from fba.planning.live_encoder import LiveEncoder
 from fba.planning.near_lossless import FaceErrors, NearLossless, encode_within_tolerance
-from fba.planning.plan import Plan, encode, encode_planned, plan_compact, plan_exact
+from fba.planning.plan import Plan, encode_planned, plan_compact, plan_exact
 from fba.planning.stillness import hold_still
 from fba.planning.tolerance import Tolerance
 
 __all__ = [
+    "BitRate",
     "BodyErrors",
+    "Encoded",
     "FaceErrors",
+    "Goal",
     "LiveEncoder",
     "NearLossless",
     "Plan",
@@ -20,6 +24,7 @@ __all__ = [
     "body_errors",
     "encode",
     "encode_planned",
+    "encode_stream",
     "encode_within_tolerance",
     "hold_still",
     "plan_compact",

@@ -21,9 +21,7 @@ from fba.codec import (
     decode,
     encode_with_statistics,
     quantise,
-    warn_of_clamped,
 )
-from fba.codec import encode as encode_all
 from fba.errors import FbaWarning
 from fba.face.resolve import FaceSettings, known_faps, resolve
 from fba.limits import Limits
@@ -37,7 +35,7 @@ from fba.planning.derived_faps import (
     table_columns,
 )
 from fba.planning.segments import Cuts, cheapest_segments, find_cuts
-from fba.presets import PLANNED, REFERENCE
+from fba.presets import PLANNED, REFERENCE, PlannedPreset
 from fba.tracks import BodyTrack, FaceTrack
 
 _NO_LIMITS = Limits(frames=1 << 62, bytes=1 << 62)
@@ -63,25 +61,11 @@ class Plan:
         return b"".join(chunks), encoder.statistics
 
 
-def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes:
-    """Encode an animation as one FBA object, with ranges fitted to all of it.
-
-    `options.preset` says what is sent. Raises RangeError for what the syntax cannot carry (see
-    `EncoderOptions.clamp`), ValueError for an animation without frames. Gives an FbaWarning that names what
-    was clamped.
-    """
-    if options is None or options.preset == REFERENCE:
-        return encode_all(animation, options)
-    data, statistics = encode_planned(animation, options, preset=options.preset)
-    warn_of_clamped(statistics)
-    return data
-
-
 def encode_planned(
     animation: Animation,
     options: EncoderOptions | None = None,
     *,
-    preset: str = "exact",
+    preset: PlannedPreset = "exact",
     keep_masks: Collection[str] = (),
     model: FaceSettings | None = None,
 ) -> tuple[bytes, EncoderStatistics]:

@@ -319,7 +319,7 @@ def test_an_interrupted_write_leaves_the_old_file(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fba.planning.encode_planned", interrupted)
+    monkeypatch.setattr("fba.planning.encode_stream", interrupted)
     assert run("encode", face_file, "-o", stream)[0] == 130
     assert stream.read_bytes() == b"old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["face.fap", "x.fba"]

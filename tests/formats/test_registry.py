@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import io
 import os
+import re
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,6 +92,22 @@ def test_other_files(tmp_path: Path, content: bytes) -> None:
     path.write_bytes(content)
     with pytest.raises(FormatError, match=r"no format known here: FBA \(\.fba\), FAP"):
         fba.read(path)
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (b"\0\0\1\xba" * 5000, "the name of a file is needed, not bytes; fba.decode(data) decodes the bytes"),
+        (bytearray(b"2.2 a 25 1"), "not bytearray; fba.decode(data) decodes the bytes of a stream"),
+        (io.BytesIO(b"2.2 a 25 1"), "not BytesIO; give its name"),
+        (performance(), "not Animation; give its name"),
+    ],
+)
+def test_what_is_no_name_of_a_file(given: Any, text: str) -> None:
+    for read in (fba.read, functools.partial(fba.read, format="fap")):
+        with pytest.raises(OptionError, match=re.escape(text)) as caught:
+            read(given)
+        assert len(str(caught.value)) < 120
 
 
 def test_paths_that_are_no_readable_file(tmp_path: Path) -> None:

@@ -212,7 +212,7 @@ def _options(rng: np.random.Generator) -> EncoderOptions:
         fap_quant=int(rng.choice([0, 1, 1, 1, int(rng.integers(32))])),
         bap_quant=int(rng.choice([0, 1, 1, 1, int(rng.integers(32))])),
         bap_steps=str(rng.choice(["iso", "visage"])),
-        unsent=str(rng.choice(["keep", "interpolate"])),
+        unsent="interpolate" if rng.choice(["keep", "interpolate"]) == "interpolate" else "keep",
         gender=int(rng.integers(2)),
         clamp=bool(rng.random() < 0.7),
         mark=bool(rng.random() < 0.5),

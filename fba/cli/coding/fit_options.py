@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.animation import Animation
 from fba.cli.inputs import ExistingPath
 
 if TYPE_CHECKING:
-    from fba.codec import EncoderOptions
     from fba.planning.fit_streams import FitStream
 
 fit_option = click.option(
@@ -21,14 +18,6 @@ fit_option = click.option(
     help="Leave to this head the FAPs that it computes to within 3 mm by its interpolation table, which "
     "`fba model learn-fit` makes. The stream must be played with --model HEAD.glb.",
 )
-
-
-def encode_for_head(animation: Animation, options: EncoderOptions, head: Path) -> FitStream:
-    """Return the stream for the head in a file."""
-    from fba.face.importers import import_model
-    from fba.planning.fit_streams import encode_with_fit
-
-    return encode_with_fit(animation, import_model(head), options)
 
 
 def fit_values(made: FitStream) -> dict[str, Any]:

@@ -13,8 +13,7 @@ from fba.cli.command import Decorated
 from fba.cli.options import is_given
 
 if TYPE_CHECKING:
-    from fba.animation import Animation
-    from fba.codec import Encoder, EncoderOptions
+    from fba.codec import Encoder
     from fba.planning import LiveEncoder
     from fba.planning.rate import RateEncoder, RateStatistics, ShownErrors
 
@@ -90,18 +89,6 @@ class HeldRate(NamedTuple):
     statistics: RateStatistics
     quant: int
     errors: ShownErrors | None = None
-
-
-def encode_held(
-    animation: Animation, options: EncoderOptions, bitrate: float, buffer: float | None
-) -> tuple[bytes, HeldRate]:
-    """Return the stream at a rate. buffer: None for the default."""
-    from fba.planning.rate import encode_at_rate, measure_errors
-
-    seconds = DEFAULT_BUFFER if buffer is None else buffer
-    found = encode_at_rate(animation, bitrate, seconds, options)
-    errors = measure_errors(animation, found.shown)
-    return found.data, HeldRate(bitrate, seconds, found.statistics, found.options.fap_quant, errors)
 
 
 def held_by(encoder: Encoder | RateEncoder | LiveEncoder) -> HeldRate | None:

@@ -14,7 +14,7 @@ from fba.cli.coding.rate_options import check_buffer, rate_options
 from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Decorated
 from fba.cli.inputs import ExistingPath
-from fba.presets import PRESETS
+from fba.presets import PRESETS, Preset
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Size:
     still (`fba.planning.hold_still`); None: in bodies of motion capture.
     """
 
-    preset: str | None = None
+    preset: Preset | None = None
     fit: Path | None = None
     body_tolerance: float | None = None
     model: Path | None = None

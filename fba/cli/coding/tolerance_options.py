@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.cli.inputs import read_model
-
 if TYPE_CHECKING:
     from fba.animation import Animation
-    from fba.codec import EncoderOptions
-    from fba.planning import FaceErrors, NearLossless
+    from fba.planning import FaceErrors, NearLossless, Tolerance
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "\u00b5m": 1e-6, "\u03bcm": 1e-6}
 """Metres of the units that a length may have; the last two have the micro sign and the Greek letter."""
@@ -43,21 +39,12 @@ class LengthType(click.ParamType[float]):
         return number * UNITS[match[2]]
 
 
-def encode_near(
-    animation: Animation,
-    options: EncoderOptions,
-    face: float | None,
-    body: float | None,
-    model: Path | None,
-    *,
-    every_frame: bool,
-) -> tuple[bytes, NearLossless]:
-    """Return the stream within tolerances in metres, by default those of `fba.planning.Tolerance`.
+def tolerance_in_metres(animation: Animation, face: float | None, body: float | None) -> Tolerance:
+    """Return a tolerance in metres; what is None is as `fba.planning.Tolerance` has it by default.
 
-    body: of points beside joints; half of it holds for feet that stand. model: file of the head; None for the
-    built-in one.
+    body: of points beside joints; half of it holds for feet that stand.
     """
-    from fba.planning import Tolerance, encode_within_tolerance
+    from fba.planning import Tolerance
 
     if body is not None and animation.body is None:
         raise click.UsageError(
@@ -70,8 +57,7 @@ def encode_near(
     given = {} if face is None else {"face": face}
     if body is not None:
         given |= {"joint": body, "foot": body / 2}
-    allowed = Tolerance(**given)
-    return encode_within_tolerance(animation, allowed, options, read_model(model), every_frame=every_frame)
+    return Tolerance(**given)
 
 
 def tolerance_lines(result: NearLossless, animation: Animation) -> list[str]:

@@ -372,7 +372,7 @@ def _report(plan: _Plan, made: _Encoded) -> None:
         return
     for line in (
         coded.summary(request.output, animation),
-        *coded.details(animation),
+        *coded.lines,
         *(together_lines(inputs, together) if together is not None else ()),
         *((voice.voice_line(spoken),) if spoken is not None else ()),
         *clamped_lines(coded.clamped),
