@@ -29,6 +29,7 @@ LIMBS = tuple(
     for side in "lr"
     for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 )
+"""Joints of each limb: a source that has one of them should have all."""
 BACKWARDS = -0.5
 """Mean cosine to ahead of knees, or of toes where knees hardly bend, above which they point backwards. In
 real files knees have 0.8 to 1, toes 0.15 to 1."""

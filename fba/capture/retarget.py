@@ -14,6 +14,7 @@ from fba.body import BapSolver
 from fba.body.skeleton import ROOT
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _spine as spine
+from fba.capture._named_bones import FINGERS
 from fba.capture.limbs import bone_ik, hinges
 from fba.capture.limbs.foot_planting import plant_feet, turn_foot
 from fba.capture.limbs.targets import Targets
@@ -22,7 +23,6 @@ from fba.errors import FbaWarning, Remedy
 from fba.parameters import baps
 
 HINGES = (("shoulder", "elbow"), ("hip", "knee"))
-FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 LOOSE = 1e-3
 """Weight of staying close to the source's angles, relative to a bone's direction."""
 STIFF = {"thumb": 0.3, "index": 0.1, "middle": 0.1, "ring": 0.1, "pinky": 0.1}

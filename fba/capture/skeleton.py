@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from fba.body.solve.solver import solve_track
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _spine as spines
 from fba.capture import retarget
+from fba.capture.bones import LIMBS
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare
 from fba.errors import FbaWarning, ModelError
@@ -32,21 +34,12 @@ FRAME_BYTES = 2400
 """Memory, in bytes, that retargeting takes for each frame."""
 JOINT_BYTES = 130
 """Memory, in bytes, that retargeting takes for each joint of the source in a frame."""
-LIMBS = tuple(
-    tuple(f"{side}_{joint}" for joint in chain)
-    for side in "lr"
-    for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
-)
-"""Joints of each limb: a source that has one of them should have all."""
 MIN_REST_COSINE = np.cos(np.radians(1.0))
 """Smallest cosine of the angle between a bone of a limb at rest and in the default posture."""
 MAX_SIZE_DIFFERENCE = 1e-4
 """Share of the body's height by which a joint of the scaled figure may be off its place in the body."""
-LIMB_BONES = tuple(
-    (f"{side}_{upper}", f"{side}_{lower}")
-    for side in "lr"
-    for upper, lower in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
-)
+LIMB_BONES = tuple(bone for limb in LIMBS for bone in pairwise(limb))
+"""Joints at both ends of each bone of a limb."""
 
 
 def from_skeleton(

@@ -18,7 +18,9 @@ from fba.errors import FormatError
 from fba.source import Path
 
 DAY = 86_400.0
+"""Seconds in a day."""
 NOON = DAY / 2
+"""Seconds from midnight to noon."""
 TIME_CODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.])(\d{1,3}(?:\.\d{1,9})?))?")
 TIME_OF_DAY = re.compile(r"\b(\d{1,2})[:.](\d{2})[:.](\d{2}\.\d{1,9})\s*([AaPp])?[Mm]?")
 """A clock's time with parts of a second; without these it is too coarse to put two recordings together."""

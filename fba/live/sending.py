@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator
 from fba.animation import Animation
 from fba.capture import to_blendshapes
 from fba.errors import FbaError
-from fba.formats.face_tables.livelink_udp import DAY, join_values, write_packet
+from fba.formats.face_tables.livelink_udp import join_values, write_packet
+from fba.formats.time_codes import DAY
 
 DEVICE = "00000000-0000-0000-0000-000000000000"
 """In place of the id of a telephone."""

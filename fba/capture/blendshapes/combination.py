@@ -7,13 +7,24 @@ from collections.abc import Mapping
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.blendshapes.shape_table import amounts_of, key_of
+from fba.capture.blendshapes.shape_table import amounts_of, key_of, with_mates
+from fba.face.gaze import limit_gaze
 from fba.face.shape_names import arkit_of
 from fba.parameters import FAP_COUNT, fap_numbers
+from fba.tracks import FaceTrack
 
 LID_GAP = 1024.0
 """Sum of the closings of both lids of an eye at which they meet."""
-JAW, CLOSED = "jawOpen", "mouthClose"
+JAW = "jawOpen"
+"""Shape that opens the jaw."""
+CLOSED = "mouthClose"
+"""Shape that brings the lips of an open jaw together."""
+JAW_OPEN = np.radians(20.0)
+"""Angle of a jaw, in radians, at which the mouth is as open as by a shape "jawOpen" of weight 1."""
+RADIAN = 1e5
+"""Units of the FAPs that are angles in one radian."""
+MAX_FAP = 1 << 30
+"""Largest magnitude of a FAP value."""
 
 
 def combine(weights: Mapping[str, Float64], count: int, *, but: Bool | None = None) -> tuple[Float64, Bool]:
@@ -45,3 +56,14 @@ def part_lids(values: Float64) -> None:
         lower = fap_numbers()[f"close_b_{side}_eyelid"] - 1
         np.minimum(values[:, upper], LID_GAP, out=values[:, upper])
         np.minimum(values[:, lower], LID_GAP - values[:, upper], out=values[:, lower])
+
+
+def to_face_track(values: Float64, moved: Bool) -> FaceTrack:
+    """Return FAPs (T, 68) as a track: lids kept apart, the gaze limited, values rounded.
+
+    values: changed in place. moved: (68,), the FAPs that are sent, with their mates.
+    """
+    part_lids(values)
+    limit_gaze(values)
+    rounded = np.rint(np.clip(values, -MAX_FAP, MAX_FAP)).astype(np.int32)
+    return FaceTrack(rounded, np.broadcast_to(with_mates(moved), rounded.shape))

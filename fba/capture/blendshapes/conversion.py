@@ -9,20 +9,14 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.capture.blendshapes.combination import combine, part_lids
+from fba.capture.blendshapes.combination import RADIAN, combine, to_face_track
 from fba.capture.blendshapes.motion import ShapeMotion
-from fba.capture.blendshapes.shape_table import with_mates
 from fba.capture.sampling import frame_numbers, interpolate
 from fba.errors import ModelError
-from fba.face.gaze import limit_gaze
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import FAP_COUNT, fap_numbers
 from fba.tracks import FaceTrack
 
-RADIAN = 1e5
-"""Units of the FAPs that are angles."""
-MAX_FAP = 1 << 30
-"""Largest magnitude of a FAP value."""
 FRAME_BYTES = 1500
 """Memory, in bytes, that a frame takes: its FAPs in several number types."""
 HEAD = ("head_pitch", "head_yaw", "head_roll")
@@ -79,11 +73,7 @@ def convert_rows(
         listed = ", ".join(map(repr, names[:6]))
         raise ModelError(f"no name of a shape is known here: {listed}; expected ARKit's, such as 'jawOpen'")
     values += amounts
-    part_lids(values)
-    limit_gaze(values)
-    rounded = np.rint(np.clip(values, -MAX_FAP, MAX_FAP)).astype(np.int32)
-    sent = with_mates(moved | turned)
-    return FaceTrack(rounded, np.broadcast_to(sent, rounded.shape))
+    return to_face_track(values, moved | turned)
 
 
 def _recorded(angles: Float64 | None) -> Float64 | None:

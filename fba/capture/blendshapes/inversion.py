@@ -9,8 +9,8 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture.blendshapes.combination import CLOSED, JAW
-from fba.capture.blendshapes.conversion import EYES, HEAD, RADIAN
+from fba.capture.blendshapes.combination import CLOSED, JAW, RADIAN
+from fba.capture.blendshapes.conversion import EYES, HEAD
 from fba.capture.blendshapes.motion import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
 from fba.compiled import compiled

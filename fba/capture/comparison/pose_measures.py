@@ -35,7 +35,6 @@ LIMBS = (
     ("thigh", "hip", "knee"),
     ("shank", "knee", "ankle"),
 )
-DIGITS = ("thumb", "index", "middle", "ring", "pinky")
 TURNING = (
     ("pelvis", "HumanoidRoot", "sacroiliac"),
     ("head", "skullbase", "skullbase"),
@@ -44,6 +43,7 @@ TURNING = (
     )),
 )  # fmt: skip
 """Parts, the source's joint that turns each, and that of the result."""
+DIGITS = ("thumb", "index", "middle", "ring", "pinky")
 CHEST = ("vt1", "vt4", "vt6", "vt8", "vt9", "vt10", "vt12", "vl1", "vl2", "vl3", "vl5")
 """Where a source may have the joint of its chest, from the top."""
 HANGS = 0.5

@@ -10,7 +10,8 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture.blendshapes.conversion import EYES, HEAD, RADIAN, convert_rows
+from fba.capture.blendshapes.combination import RADIAN
+from fba.capture.blendshapes.conversion import EYES, HEAD, convert_rows
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of, largest_amounts
 from fba.capture.sampling import TIME_TOLERANCE, interpolate
 from fba.limits import DEFAULT_LIMITS

@@ -21,6 +21,7 @@ from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import FormatError, Remedy, UnsupportedError
 from fba.formats.face_tables._shape_rows import check_weights, find_lacks, find_swap, to_animation
 from fba.formats.face_tables._tables import named
+from fba.formats.time_codes import DAY, NOON
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_whole
 
@@ -28,8 +29,6 @@ VERSION = 6
 VALUES = 61
 MOST_TEXT = 255
 TIME = struct.Struct(">ifii")
-DAY = 86_400.0
-NOON = DAY / 2
 LARGEST_RATE = 1000
 PACKET_BYTES = 700
 """Memory of a datagram while it is read."""

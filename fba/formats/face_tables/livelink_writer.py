@@ -10,6 +10,7 @@ from fba.atomic import atomic
 from fba.capture.blendshapes import to_blendshapes
 from fba.errors import FormatError, ModelError
 from fba.formats.face_tables.livelink_udp import join_values
+from fba.formats.time_codes import DAY
 from fba.source import Path
 
 ANGLES = (
@@ -23,7 +24,6 @@ MIN_RATE = 10
 DEFAULT_RATE = 30
 """Rate, in frames per second, to which slower animations are resampled."""
 BATCH_FRAMES = 1024
-DAY = 86_400
 
 
 def write(path: Path, animation: Animation) -> None:

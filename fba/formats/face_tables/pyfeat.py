@@ -105,8 +105,8 @@ def read_face(
     findings = rows.findings + find_missing(rows.intensities, rows.times, rows.rate)
     findings.append(
         "its action units are how likely each is to be there, not how strong it is: up to "
-        f"{MIN_PROBABILITY:g} nothing is shown, at 1 what is usual ({USUAL_STRENGTH:g} of the strongest); if "
-        "it has points, these tell more: read it as the format 'points'"
+        f"{MIN_PROBABILITY:g} nothing is shown, at 1 what is usual ({USUAL_STRENGTH:g} of the strongest); "
+        "if it has points, these tell more: read it as the format 'points'"
     )
     if POSE[0] in column:
         findings.append(how)

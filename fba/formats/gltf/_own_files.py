@@ -16,6 +16,7 @@ from fba.body import BapSolver, Skeleton
 from fba.body.solve.conventions import convention_names
 from fba.body.solve.solver import solve_track
 from fba.errors import FormatError
+from fba.formats.gltf._fap_joints import MAX_COORDINATE
 from fba.formats.gltf._fap_tracks import read_face
 from fba.formats.gltf._pose import Sampler, key_times, nearest_rotation
 from fba.formats.gltf.writer import MARK, MOST_FRAMES
@@ -27,8 +28,6 @@ from fba.gltf.values import Value, optional_member
 VERSION = 1
 MAX_INDEX = 1 << 62
 """Bound of frame numbers."""
-MAX_COORDINATE = 1e6
-"""Largest coordinate that a note may have."""
 
 
 def find_note(gltf: Gltf, clip: Clip) -> Value | None:

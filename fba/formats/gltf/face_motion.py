@@ -14,10 +14,9 @@ import numpy as np
 
 from fba.animation import FaceTrack
 from fba.arrays import Bool, Float64
-from fba.capture.blendshapes.combination import combine, part_lids
-from fba.capture.blendshapes.shape_table import amounts_of, with_mates
+from fba.capture.blendshapes.combination import JAW_OPEN, RADIAN, combine, to_face_track
+from fba.capture.blendshapes.shape_table import amounts_of
 from fba.errors import FbaWarning
-from fba.face.gaze import limit_gaze
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
 from fba.formats.gltf.clips import choose_clip
 from fba.formats.gltf.humanoid import find_humanoid
@@ -26,12 +25,6 @@ from fba.gltf import Gltf
 from fba.gltf.values import Value, optional_member
 from fba.parameters import FAP_COUNT, fap_numbers
 
-MAX_FAP = 1 << 30
-"""Largest magnitude of a FAP value."""
-RADIAN = 1e5
-"""Units of the FAPs that turn eyeballs."""
-JAW_OPEN = np.radians(20.0)
-"""Angle of a jaw bone at which the mouth is as open as by a shape "jawOpen" of weight 1."""
 NO_EYE = re.compile("brow|lid|lash|end|target|look|aim")
 EYES = {
     "l": re.compile("left_?eye|eye(ball)?_?left|(^|_)l_?(face)?_?eye(ball)?$|eye(ball)?[_.]?l$"),
@@ -77,10 +70,7 @@ def read_face_motion(gltf: Gltf, clip: Clip, times: Float64, *, head: bool = Fal
     _add(combine(_weights(gltf, clip, times), len(times), but=turned), values, sent)
     if not sent.any():
         return None
-    part_lids(values)
-    limit_gaze(values)
-    rounded = np.rint(np.clip(values, -MAX_FAP, MAX_FAP)).astype(np.int32)
-    return FaceTrack(rounded, np.broadcast_to(with_mates(sent), rounded.shape))
+    return to_face_track(values, sent)
 
 
 def _add(motion: tuple[Float64, Bool], values: Float64, sent: Bool) -> None:

@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 from fba.animation import Animation, FaceTrack
 from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture.blendshapes.combination import JAW_OPEN
 from fba.capture.blendshapes.conversion import convert_rows
 from fba.capture.sampling import find_rate, interpolate
 from fba.capture.skeleton import check_memory
@@ -38,8 +39,6 @@ BODY = 22
 FINGERS = 30
 SMPL, SMPL_H, SMPL_X = 72, 156, 165
 """Numbers of a pose: 24 joints, 52 with fingers, 55 with jaw and eyes as well."""
-JAW_OPEN = np.radians(20.0)
-"""Angle of the jaw at which the mouth is as open as by a shape "jawOpen" of weight 1."""
 MIN_RATE = 0.1
 """Lowest rate, in frames per second; a lower one is damage."""
 MAX_RATE = 10_000
