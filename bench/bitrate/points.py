@@ -16,6 +16,7 @@ from fba.codec import EncoderOptions, decode, encode_with_statistics, probe_stre
 from fba.face.resolve import known_faps, resolve
 from fba.planning import LiveEncoder, Tolerance, encode_planned, encode_within_tolerance, plan_compact
 from fba.planning.rate import RateEncoder
+from fba.presets import PlannedPreset
 
 QUANTISERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 31)
 UNPLANNED = "FBA, nothing known"
@@ -97,7 +98,7 @@ def options_for(subject: Subject, quant: int) -> EncoderOptions:
     )
 
 
-def encode_with_preset(subject: Subject, preset: str, quant: int) -> bytes:
+def encode_with_preset(subject: Subject, preset: PlannedPreset, quant: int) -> bytes:
     """Return the stream of a preset, planned with the whole recording known."""
     return encode_planned(subject.animation, options_for(subject, quant), preset=preset)[0]
 

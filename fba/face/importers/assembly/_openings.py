@@ -139,10 +139,7 @@ def mouth_points(
 
 
 def _inner_lip_points(ring: Float64, falls: Float64, middle: float) -> dict[str, Float64]:
-    """Return points on a ring (N, 3) around a mouth.
-
-    falls: (N,) of its vertices. middle: the x of the midline.
-    """
+    """Return points on a ring (N, 3) around a mouth. falls: (N,) of its vertices. middle: x of its middle."""
     left, right = int(ring[:, 0].argmax()), int(ring[:, 0].argmin())
     order = np.arange(len(ring))
     first, last = sorted((left, right))

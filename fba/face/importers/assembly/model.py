@@ -182,7 +182,7 @@ def pupil_distance(points: Float64) -> float:
 
 
 def turn_outward(pieces: Sequence[Piece], centre: Float64, reach: float = np.inf) -> tuple[list[Piece], int]:
-    """Return pieces whose skin faces away from the centre of the head, and the number of turned triangles.
+    """Return pieces with the skin facing away from the centre of the head, and the count of turned triangles.
 
     reach: distance from the centre within which skin is that of the head; hands and feet of avatars, which
     may have its material, face anywhere as seen from there. Within the skin, triangles that run against their
