@@ -88,7 +88,7 @@ class HandEditing(ABC, Generic[State]):
         return False
 
     def undo(self) -> bool:
-        """Take back the last change and go to the item that was current; return False if there is none."""
+        """Take back the last change, with the item that was current then; return False without a change."""
         if not self._undo_stack:
             return False
         self.current, self.state = self._undo_stack.pop()

@@ -171,10 +171,7 @@ def make_dots(points: Float64, names: tuple[str, ...], colour: Colour, radius: f
 
 
 def fit_box(low: Float64, high: Float64) -> Subject:
-    """Return the subject of a camera that shows all of a box from any side.
-
-    low, high: corners (3,), metres.
-    """
+    """Return the subject that shows all of a box from any side. low, high: its corners (3,), metres."""
     x, y, z = ((low + high) / 2).tolist()
     wide, tall, deep = ((high - low) / 2).tolist()
     return Subject((x, y, z), tall * 1.05, max(wide, deep), deep)
