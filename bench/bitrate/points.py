@@ -141,10 +141,10 @@ def encode_live_at_rate(subject: Subject, rate: float) -> bytes:
 
 def operating_points(kind: str) -> tuple[Point, ...]:
     """Return all settings for a face or a body, those without loss first."""
-    name, preset = ("FBA compact", "compact") if kind == FACE else ("FBA exact", "exact")
+    preset: PlannedPreset = "compact" if kind == FACE else "exact"
     found = [
         Point(
-            name,
+            f"FBA {preset}",
             f"quantiser {quant}",
             partial(encode_with_preset, preset=preset, quant=quant),
             quant in WITH_RIVALS[kind],
