@@ -34,7 +34,7 @@ def text(rows: list[str], offset: str = "0", time: str = "0.1") -> str:
 
 
 def test_more_frames_than_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reader, "MOST_FRAMES", 3)
+    monkeypatch.setattr(reader, "MAX_FRAMES", 3)
     assert reader.parse(text(["0 0 0"] * 3)).rotations.shape[0] == 3
     with pytest.raises(FormatError, match="more than 3 frames; cut the motion into pieces") as caught:
         reader.parse(text(["0 0 0"] * 9))
