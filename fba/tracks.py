@@ -313,7 +313,7 @@ def _equal(one: Track, other: Track, names: tuple[str, ...]) -> bool:
 
 
 def _number(key: object, numbers: dict[str, int], kind: str) -> int:
-    """Return the number of a parameter, which may be given by its name. OptionError if there is none."""
+    """Return the number of a parameter, which may be given by its name. OptionError for another key."""
     if isinstance(key, str):
         if key in numbers:
             return numbers[key]

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 EMPTY_SHAPE_MOTION = 1e-7
 """Metres up to which a shape moves its vertices that counts as empty."""
 MIN_FAPS = 5
-"""Number of shapes named after FAPs from which only these are used."""
+"""Number of shapes named after FAPs at which only these are used."""
 ARCS = frozenset((3, *range(19, 31), *range(43, 51)))
 """FAPs whose points move on arcs: jaw, lids, eyeballs, tongue, head. A shape is straight, and is used for
 these only where the mesh alone gives no table."""
