@@ -19,7 +19,7 @@ from fba.capture.limbs import bone_ik, hinges
 from fba.capture.limbs.foot_planting import plant_feet, turn_foot
 from fba.capture.limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion
-from fba.errors import FbaWarning, Remedy
+from fba.errors import FbaWarning, ModelError, Remedy
 from fba.parameters import baps
 
 HINGES = (("shoulder", "elbow"), ("hip", "knee"))
@@ -116,6 +116,12 @@ def _turn_pelvis(
     expected, found = frames @ row, positions[:, hips[0]] - positions[:, hips[1]]
     if np.abs(found - expected).max() <= MAX_HIP_OFFSET * np.linalg.norm(row):
         return
+    apart = np.minimum(np.linalg.norm(expected, axis=1), np.linalg.norm(found, axis=1))
+    if not apart.min() > 0:
+        raise ModelError(
+            f"both hips are in one place in frame {int(np.argmin(apart))}, so the pelvis cannot be turned; "
+            "map other joints to the hips, or cut that frame"
+        )
     turn = rotations.between_all(expected, found)
     for joint in (ROOT, "sacroiliac"):
         if joint in turned:

@@ -323,7 +323,7 @@ class StreamReader:
         self._scanned = max(self._scanned, buffer.length - 3)
         self._bit = 8 * self._scanned
         if final:
-            end = self._find_end()
+            end = self._find_end(max(self.damage[-1].start - buffer.offset, 0))
             self._log.end(buffer.offset + (buffer.length if end is None else end))
             self._log.resume(*(self._log.estimate() or (None, None)) if end is not None else (None, None))
             if end is not None and self.objects.count and not self._was_at_end:
@@ -334,10 +334,10 @@ class StreamReader:
                 return []
         return None
 
-    def _find_end(self) -> int | None:
-        """Return the byte of the buffer behind the end code of the stream, or None where it has none."""
+    def _find_end(self, begin: int) -> int | None:
+        """Return the byte of the buffer behind the last end code; None without one after `begin`."""
         data = self._buffer.data[: self._buffer.length].tobytes()
-        end = data.rfind(_END) + len(_END)
+        end = data.rfind(_END, begin) + len(_END)
         ended = end >= len(_END) and (end == len(data) or data.startswith(START, end))
         return end if ended else None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from functools import cache
 from zlib import crc32
@@ -256,3 +257,27 @@ def test_a_plane_behind_the_end_of_a_damaged_stream_is_reported_once() -> None:
     decoder.push(bad)
     decoder.finish()
     assert 0 < len(decoder.damage) < 5
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        "ffffffff93a53217000001bbd19001b24924924924925824921f0fffffffffffff0ffffffff83ffffffffffff8"
+        "7fffffffc3ffffffffffffc3fffffffe0ffffffffffffe2ffffffff4a5bf000001b1000001b266626120626170"
+        "5f73746570ff733d69736f3b63726333323d333b010203040506070809000001bbd97a",
+        "000001b1000001b2666261206261705f73746570733d69736f3bf0fc3ffffffffff83c107fffffff07c3ffffff"
+        "ffff87c30fffffffffab9cbc0cee4f1fce41bfa6cf13da6cad050f000001bbf19001f68002e00492c921f087c2"
+        "1ff17e00f801fe0fc22f087fc5f803e007f83fd84b9fd78cecae8d086c9251249249241f",
+    ],
+)
+def test_an_end_code_before_the_damage_does_not_end_it(data: str) -> None:
+    """Found by fuzzing: what was lost was listed twice, and out of order."""
+    decoder = Decoder(on_error="salvage")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)
+        decoder.push(bytes.fromhex(data))
+        decoder.finish()
+    borders = [(damage.start, damage.stop) for damage in decoder.damage]
+    assert len(borders) > 1
+    assert all(start <= stop for start, stop in borders)
+    assert all(before[1] <= after[0] for before, after in itertools.pairwise(borders))
