@@ -370,3 +370,20 @@ def test_a_leaky_bucket() -> None:
     assert bucket.level == 0
     bucket.add(1)
     assert bucket.peak == 40
+
+
+@pytest.mark.parametrize("share", [0.9, 0.95, 0.99, 0.999])
+def test_the_last_frame_is_left_out_where_the_buffer_has_no_room(share: float) -> None:
+    """A first I plane fills most of the buffer, and the stream ends before it has drained."""
+    values = np.zeros((3, 68), dtype=np.int32)
+    values[:, 2:] = np.random.default_rng(1).integers(-1800, 1801, (3, 66))
+    face = FaceTrack(values, np.broadcast_to(np.arange(68) >= 2, values.shape))
+    animation = Animation(25, np.arange(3), face)
+    first = RateEncoder(1e6, 1.0, EncoderOptions(clamp=True), choose_quantisers=False)
+    first.push_animation(animation[:1])
+    size = first.bucket.peak / share + 100
+    encoder = RateEncoder(size / 10, 10.0, EncoderOptions(clamp=True), choose_quantisers=False)
+    data = encoder.push_animation(animation) + encoder.finish()
+    assert encoder.statistics.over == 0
+    assert encoder.bucket.peak <= size
+    assert len(fba.decode(data)) == encoder.statistics.planes < 3

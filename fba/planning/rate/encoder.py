@@ -105,6 +105,7 @@ class RateEncoder:
         self._refused: Animation | None = None  # a frame whose I plane no buffer would hold
         self._planes = 0  # with the last frame, which is not encoded yet
         self._due = 0  # first index at which a frame may have a plane
+        self._needed = 0  # bits that must be free for the next plane, without a change
         self._origin: int | None = None
 
     @property
@@ -135,10 +136,12 @@ class RateEncoder:
         if self._last is None:
             raise ValueError("there is no frame to encode")
         data = b""
-        if self._late is not None:
-            self._due = 0
-            late, self._late = self._late, None
-            data = self._push_due(late)
+        late, self._late = self._late, None
+        if late is not None:
+            assert self._origin is not None
+            time = float((int(late.index[0]) - self._origin) / late.rate)
+            if self.bucket.level_at(time) + self._needed <= self.bucket.size:
+                data = self._push_due(late)
         data += self._encoder.finish()
         self._count()
         return data
@@ -193,8 +196,8 @@ class RateEncoder:
     def _push_intra(self, frame: Animation) -> bytes | None:
         """Encode a frame as an I plane; None where the buffer has no room for that yet."""
         index = int(frame.index[0])
-        if frame.body is not None and self.options.mark:
-            self._spare = SPARE + 8 * len(write_mark(self.options.bap_steps))
+        marked = frame.body is not None and self.options.mark
+        spare = SPARE + 8 * len(write_mark(self.options.bap_steps)) if marked else self._spare
         trial = copy.deepcopy(self._encoder)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FbaWarning)  # given below
@@ -204,14 +207,15 @@ class RateEncoder:
             trial.push_animation(frame)
             trial.settle(index + 1)
         bits = trial.bits - before
-        if bits + self._spare > self.bucket.size:
+        if bits + spare > self.bucket.size:
             if self._last is None:
-                raise self._too_small(bits + self._spare)
+                raise self._too_small(bits + spare)
             self._refused = frame
             self.statistics.not_sent = True
             return self._push_predicted(_sending_as(frame, self._last))
-        if bits + self._spare > self.bucket.room:
+        if bits + spare > self.bucket.room:
             return None
+        self._spare = spare
         data = self._encoder.settle(index)
         self._begin_segment(self._encoder, frame)
         self._encoder.push_animation(frame)
@@ -260,7 +264,7 @@ class RateEncoder:
     def _plan_gap(self, frame: Animation, still: int) -> None:
         """Set from which frame on a plane may come. still: bits of a plane without a change."""
         bucket, period = self.bucket, float(1 / frame.rate)
-        need = still + LEARNING + self._spare + SKIP_BITS
+        self._needed = still + LEARNING + self._spare + SKIP_BITS
         longest = max(1, math.floor(MAX_GAP / period + 1e-9))
         gap = 1
         while gap < longest and (
@@ -268,7 +272,7 @@ class RateEncoder:
             and bucket.level_at(bucket.time + gap * period) > FULL * bucket.size
         ):
             gap += 1
-        over = bucket.level + SKIP_BITS + need - bucket.size  # must have drained
+        over = bucket.level + SKIP_BITS + self._needed - bucket.size  # must have drained
         if over > 0:
             gap = max(gap, math.ceil(over / (bucket.rate * period)))
         if gap > 1:
