@@ -20,6 +20,8 @@ from tools.fuzz.targets import Target
 
 MOST_SECONDS, MOST_SECONDS_PER_BYTE = 3.0, 0.002
 """Processor time that one input may take, and more for each of its bytes: generous, as machines differ."""
+SEED_SECONDS = 60.0
+"""Processor time that a seed may take, whose length says nothing: a search on head and body takes seconds."""
 MOST_MEMORY, MOST_MEMORY_PER_BYTE = 200_000_000, 20
 """Memory that one input may take beyond what the process had before it, in bytes."""
 MINIMISED_SECONDS = 15.0
@@ -196,7 +198,7 @@ class Check:
 
     def __init__(self, target: Target, folder: Path, most_seconds: float = MOST_SECONDS) -> None:
         self.seconds = 0.0
-        self._most_seconds = most_seconds
+        self._most_seconds = SEED_SECONDS if target.random else most_seconds
         self._check, self._folder = target.load(), folder
         self._limited = False
 
