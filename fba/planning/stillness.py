@@ -80,16 +80,15 @@ class _Block:
         self.first = np.full(BAP_COUNT, np.nan) if first is None else first
         self.result = np.zeros_like(wanted)
         self.moved = np.asarray(wanted.any(axis=0))
-        solver = BapSolver()
-        root = [column for column in solver.convention.translation if column >= 0]
         self.slopes: dict[int, Float64] = {}
         self.trunk: set[int] = set()  # of them, those that move both feet, and what is above
         self.rests, self.errors = _no_soles(len(wanted))
-        if steps[root].max() <= COARSE:
-            self._place_soles(solver)
 
     def levels(self) -> Float64:
         """Return the levels of all BAPs: (T, 296)."""
+        solver = BapSolver()
+        if self.steps[[column for column in solver.convention.translation if column >= 0]].max() <= COARSE:
+            self._place_soles(solver)
         rests, errors = _no_soles(len(self.wanted))
         for column in np.flatnonzero(self.moved).tolist():
             if column not in self.slopes:

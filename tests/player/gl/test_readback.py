@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import pytest
 
-import graphics
-from fba_player.gl.context import offscreen_context
 from fba_player.gl.readback import Readback
 from fba_player.session.captures import read_pixels
-
-
-@pytest.fixture
-def context() -> Iterator[Any]:
-    if (reason := graphics.missing_opengl()) is not None:
-        graphics.skip(reason)
-    made = offscreen_context()
-    with made:
-        yield made
-    made.release()
 
 
 def test_what_is_fetched_is_what_was_there_when_reading_began(context: Any) -> None:

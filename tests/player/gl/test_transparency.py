@@ -3,32 +3,19 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 
-import graphics
 from fba.mesh.meshes import Alpha
 from fba_player.gl._mesh_renderer import FaceRenderer
-from fba_player.gl.context import offscreen_context
 from fba_player.mesh.textures import load_picture
 from fba_player.view.view import FaceMesh, FaceShape
 
 Image = pytest.importorskip("PIL.Image")
 SIZE = 16
 RED, WHITE, BLUE = (0.8, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0, 0.0), (0.0, 0.0, 0.8, 0.0)
-
-
-@pytest.fixture(scope="module")
-def context() -> Iterator[Any]:
-    if (reason := graphics.missing_opengl()) is not None:
-        graphics.skip(reason)
-    made = offscreen_context()
-    with made:
-        yield made
-    made.release()
 
 
 def wall(depth: float, colour: tuple[float, ...], alphas: list[int], **look: Any) -> FaceMesh:
