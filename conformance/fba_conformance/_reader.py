@@ -166,7 +166,7 @@ class Reader:
         return None
 
     def only_stuffing_left(self) -> bool:
-        """Whether only alignment stuffing is left before the end of the data."""
+        """Return whether only alignment stuffing is left before the end of the data."""
         left = self.size - self.bit
         return left == 0 or (left <= 8 and self._ahead(left) == _stuffing(left))
 

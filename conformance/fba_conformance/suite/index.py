@@ -8,6 +8,7 @@ wrote: `stream`, `bap_steps`, `decoded_fap`, `decoded_bap`, `epf`, `source_fap`,
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -79,6 +80,12 @@ class Vector:
         if found.digest() != self.entry["values"]:
             raise FormatError("these are not the values whose digest is in index.json", path=path)
         return found
+
+
+def index_text(entries: Sequence[dict[str, Any]]) -> str:
+    """Return the content of index.json."""
+    lines = ",\n".join(json.dumps(entry) for entry in entries)
+    return f"[\n{lines}\n]\n"
 
 
 def read_vectors(folder: Path | None = None) -> list[Vector]:

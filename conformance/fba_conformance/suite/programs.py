@@ -37,7 +37,7 @@ class Program:
     seconds: float = SECONDS
 
     def has_place(self, name: str) -> bool:
-        """Whether the command line has "{name}"."""
+        """Return whether the command line has "{name}"."""
         return any(f"{{{name}}}" in word for word in self.words)
 
     def run(self, values: Mapping[str, str], output: Path) -> Run:
