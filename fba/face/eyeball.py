@@ -44,7 +44,7 @@ class Eyeball:
 
 
 def eyeballs(model: FaceModel) -> dict[str, Eyeball]:
-    """The eyeballs by side, "left" and "right": the biggest part of kind "eye" on each, if any."""
+    """Return the eyeballs by side, "left" and "right": the biggest part of kind "eye" on each, if any."""
     result: dict[str, Eyeball] = {}
     middle = _middle_x(model.points)
     for part in model.of_kind("eye"):
@@ -60,7 +60,7 @@ def eyeballs(model: FaceModel) -> dict[str, Eyeball]:
 
 
 def fit_eyeball(part: Part, pupil: Float64) -> tuple[Float64, float, float, float] | None:
-    """(centre, radius, error, share) of an eyeball, as in `Eyeball`; None for too few vertices.
+    """Return (centre, radius, error, share) of an eyeball, as in `Eyeball`; None for too few vertices.
 
     A flat eye, as drawn figures have, stands for a ball of usual size behind its pupil. pupil: (3,), NaN
     where unknown.
@@ -75,7 +75,8 @@ def fit_eyeball(part: Part, pupil: Float64) -> tuple[Float64, float, float, floa
 
 
 def flat_width(part: Part) -> float | None:
-    """The width of a flat eye, which is an iris without a ball, in the unit of the part; None for others."""
+    """Return the width of a flat eye, which is an iris without a ball, in the unit of the part; None for
+    others."""
     vertices = np.unique(part.vertices.astype(np.float64), axis=0)
     if len(vertices) < FEWEST_VERTICES:
         return None
@@ -90,7 +91,7 @@ def _middle_x(points: Float64) -> float:
 
 
 def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
-    """(centre, radius, error, share) of the sphere through most of a part's vertices, as in `Eyeball`.
+    """Return (centre, radius, error, share) of the sphere through most of a part's vertices, as in `Eyeball`.
 
     Least squares, repeated without outliers, such as a cornea or an iris. None for too few vertices.
     """
@@ -121,14 +122,15 @@ def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
 
 
 def gaze(model: FaceModel, eye: Eyeball) -> Float64 | None:
-    """Unit vector from the eyeball's centre to its pupil point, None where the model has none."""
+    """Return the unit vector from the eyeball's centre to its pupil point, None where the model has none."""
     arm = model.points[row_of()[PUPIL_POINT[eye.side]]] - eye.centre
     length = float(np.linalg.norm(arm))
     return arm / length if np.isfinite(length) and length > 0 else None
 
 
 def pupil_diameter(model: FaceModel, eye: Eyeball) -> float | None:
-    """Diameter of the pupil, metres, from the vertices that dilate_pupil moves most; None where unknown."""
+    """Return the diameter of the pupil, metres, from the vertices that dilate_pupil moves most; None where
+    unknown."""
     table = model.table_of.get(PUPIL_FAP[eye.side])
     direction = gaze(model, eye)
     if table is None or direction is None:
@@ -150,7 +152,7 @@ def pupil_diameter(model: FaceModel, eye: Eyeball) -> float | None:
 
 
 def distances_from_axis(points: Floating, centre: Float64, direction: Float64) -> Float64:
-    """(N,) distances of points (N, 3) from the line through a centre along a unit vector."""
+    """Return (N,) distances of points (N, 3) from the line through a centre along a unit vector."""
     arms = points.astype(np.float64) - centre
     distances: Float64 = np.linalg.norm(arms - np.outer(arms @ direction, direction), axis=1)
     return distances

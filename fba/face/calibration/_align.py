@@ -45,7 +45,7 @@ class Alignment:
 
 
 def align(given: Float64, reference: Float64, *, unit: str | float | None = None) -> Alignment:
-    """A person's feature points (84, 3), scaled, rotated and shifted to match a reference (84, 3).
+    """Return a person's feature points (84, 3), scaled, rotated and shifted to match a reference (84, 3).
 
     NaN marks unknown points. unit: a name in `UNITS`, or metres for one unit of the file; None finds it.
     Raises ModelError where fewer than four points are known in both, or where they coincide or lie on one
@@ -78,7 +78,7 @@ def align(given: Float64, reference: Float64, *, unit: str | float | None = None
 
 
 def known_rows(*points: Float64) -> Bool:
-    """(N,) mask of the rows that are finite in all of the arrays (N, 3)."""
+    """Return (N,) mask of the rows that are finite in all of the arrays (N, 3)."""
     return np.asarray(np.isfinite(np.hstack(points)).all(axis=1))
 
 
@@ -122,14 +122,16 @@ def _fit_rotation(here: Float64, there: Float64, *, reflected: bool = False) -> 
 
 
 def _robust_weights(errors: Float64, points: Float64) -> Float64:
-    """(N,) Geman-McClure weights of points (N, 3) by their errors (N,), near 1 below the median error."""
+    """Return (N,) Geman-McClure weights of points (N, 3) by their errors (N,), near 1 below the median
+    error."""
     usual = max(1.5 * float(np.median(errors)), 1e-9 * float(np.abs(points).max()))
     weights: Float64 = 1.0 / (1.0 + (errors / (2 * usual)) ** 2) ** 2
     return weights
 
 
 def _find_flat_pose(here: Float64, there: Float64) -> Float64:
-    """(3, 3) rotation of points in a plane onto the model seen from the front, the better side forward."""
+    """Return (3, 3) rotation of points in a plane onto the model seen from the front, the better side
+    forward."""
     axes, _ = principal_axes(here)
     axes[2] = np.cross(axes[0], axes[1])
     flat = (here - here.mean(axis=0)) @ axes.T
@@ -143,7 +145,8 @@ def _find_flat_pose(here: Float64, there: Float64) -> Float64:
 
 
 def _snap_to_axes(matrix: Float64) -> Float64:
-    """The nearest rotation by multiples of 90 degrees if within `OWN_AXES`, else the matrix unchanged."""
+    """Return the nearest rotation by multiples of 90 degrees if within `OWN_AXES`, else the matrix
+    unchanged."""
     right_angled = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
@@ -160,7 +163,7 @@ def _angle(matrix: Float64) -> float:
 
 
 def _robust_size(posed: Float64, there: Float64) -> tuple[float, Float64]:
-    """(size of there relative to posed, (N,) weight of each point), robust against outliers."""
+    """Return (size of there relative to posed, (N,) weight of each point), robust against outliers."""
     weight = np.ones(len(posed))
     size = 1.0
     for _ in range(20):
@@ -172,7 +175,7 @@ def _robust_size(posed: Float64, there: Float64) -> tuple[float, Float64]:
 
 
 def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
-    """(metres for one unit, its name or ""). size: factor by which the points fit the model best."""
+    """Return (metres for one unit, its name or ""). size: factor by which the points fit the model best."""
     if isinstance(unit, str):
         if unit not in UNITS:
             raise ModelError(f"there is no unit of length {unit!r}; there are {', '.join(UNITS)}")
@@ -189,7 +192,8 @@ def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
 
 
 def centre_on_pupils(points: Float64, reference: Float64) -> Float64:
-    """Points (84, 3) shifted so that the midpoint of the pupils is the reference's; unchanged if unknown."""
+    """Return the points (84, 3) shifted so that the midpoint of the pupils is the reference's; unchanged if
+    unknown."""
     rows = [row_of()["3.5"], row_of()["3.6"]]
     shift = reference[rows].mean(axis=0) - points[rows].mean(axis=0)
     return points + shift if np.isfinite(shift).all() else points

@@ -42,7 +42,7 @@ _OTHER = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 
 
 def drop_mistakes(points: Float64, expected: Float64) -> Float64:
-    """Points (84, 3) with obvious mistakes set to NaN; an FbaWarning names each.
+    """Return the points (84, 3) with obvious mistakes set to NaN; an FbaWarning names each.
 
     expected: (84, 3), the model's points at the person's size, metres. Of two points that coincide but are
     apart on the model, the one less symmetric to its mate is dropped, or else the one further from its
@@ -135,7 +135,7 @@ def _symmetry_plane(points: Float64) -> tuple[Float64, float]:
 
 
 def centre_pupils(points: Float64) -> tuple[Float64, tuple[str, ...]]:
-    """(points (84, 3) with pupils at mid-height between the lids, names of those that were moved).
+    """Return (points (84, 3) with pupils at mid-height between the lids, names of those that were moved).
 
     Lids are tangent to the iris in a neutral face, so the pupil is in the middle. An FbaWarning names a
     pupil further off than drooping lids explain.
@@ -159,7 +159,8 @@ def centre_pupils(points: Float64) -> tuple[Float64, tuple[str, ...]]:
 
 
 def shut_mouth(points: Float64, reference: Float64) -> Float64:
-    """Points (84, 3) with lips and teeth that meet as those of the reference do; the upper ones stay.
+    """Return the points (84, 3) with lips and teeth that meet as those of the reference do; the upper ones
+    stay.
 
     reference: (84, 3), the model's points at the person's size. If the person's mouth is open, the whole
     lower lip is raised, and an FbaWarning says how far.
@@ -203,7 +204,7 @@ def shut_mouth(points: Float64, reference: Float64) -> Float64:
 
 
 def _between(points: Float64, left: str, right: str) -> float:
-    """Distance of two points in x, metres; 0.06 where it is unknown or not positive."""
+    """Return the distance of two points in x, metres; 0.06 where it is unknown or not positive."""
     distance = float(points[row_of()[left], 0] - points[row_of()[right], 0])
     return distance if np.isfinite(distance) and distance > 0 else 0.06
 

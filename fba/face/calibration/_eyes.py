@@ -44,7 +44,7 @@ class FittedEye:
     iris_was: float
 
     def __call__(self, vertices: Floating) -> Float64:
-        """Vertices (N, 3) of the old eyeball moved and scaled, the iris widened on the sphere."""
+        """Return the vertices (N, 3) of the old eyeball moved and scaled, the iris widened on the sphere."""
         arms = np.asarray(vertices, dtype=np.float64) - self.was.centre
         distance = np.linalg.norm(arms, axis=1)
         unit = arms / np.maximum(distance, 1e-12)[:, None]
@@ -74,7 +74,7 @@ def fit_eye(
     iris: tuple[float, float],
     given: tuple[Float64, Float64],
 ) -> FittedEye:
-    """The eyeball that fits under the fitted lids as the old one does under the old lids.
+    """Return the eyeball that fits under the fitted lids as the old one does under the old lids.
 
     skin, fitted: (V, 3) vertices before and after. pupil: its point before and after. size: of the fitted
     face around the eye relative to the old one. pupil_given: keep the pupil exactly in place, with the
@@ -126,7 +126,8 @@ def fit_eye(
 
 
 def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> float:
-    """Metres by which an eyeball must be set back for points (K, 3) to be at least (K,) from its centre."""
+    """Return the metres by which an eyeball must be set back for points (K, 3) to be at least (K,) from its
+    centre."""
     across = np.hypot(*(given - centre)[:, :2].T)
     room = np.sqrt(np.maximum(least**2 - across**2, 0.0))
     back = float(np.where(room > 0, centre[2] + room - given[:, 2], 0.0).max(initial=0.0))
@@ -143,7 +144,7 @@ def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> floa
 def lay_lids_on(
     eye: FittedEye, skin: Float64, fitted: Float64, sources: Float64, targets: Float64
 ) -> Float64:
-    """(V, 3) the fitted skin, laid on an eyeball as the old skin was on the old one.
+    """Return (V, 3) the fitted skin, laid on an eyeball as the old skin was on the old one.
 
     Near the sphere it keeps its distance from it, in proportion; further out it stays as fitted. The given
     points (sources before, targets after) reach their targets, and no other vertex that was outside the
@@ -172,14 +173,14 @@ def _lay_on(eye: FittedEye, skin: Float64, fitted: Float64) -> Float64:
 
 
 def eyeball_weight(eye: FittedEye, points: Float64) -> Float64:
-    """(N,) influence of the eyeball on points (N, 3): 1 on it, 0 beyond `REACH`."""
+    """Return (N,) influence of the eyeball on points (N, 3): 1 on it, 0 beyond `REACH`."""
     distance = np.linalg.norm(points - eye.was.centre, axis=1)
     weight: Float64 = 1 - smoothstep((distance / eye.was.radius - LID) / (REACH - LID))
     return weight
 
 
 def _push_outside(eye: FittedEye, skin: Float64, moved: Float64, near: Bool, sources: Float64) -> Float64:
-    """`moved` (V, 3), with vertices inside the eyeball pushed out onto it, in place; sources stay."""
+    """Return `moved` (V, 3), with vertices inside the eyeball pushed out onto it, in place; sources stay."""
     from scipy.spatial import cKDTree
 
     before = np.linalg.norm(skin - eye.was.centre, axis=1) / eye.was.radius

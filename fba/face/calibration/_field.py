@@ -47,18 +47,18 @@ class Field:
         return moved
 
     def rotations(self, points: Floating) -> Float64:
-        """(N, 3, 3) rotation of the deformation at each point, without its stretch."""
+        """Return (N, 3, 3) rotation of the deformation at each point, without its stretch."""
         return nearest_orthonormal(self.jacobians(points))
 
     def jacobians(self, points: Floating) -> Float64:
-        """(N, 3, 3) Jacobian of the deformation at each point, by central differences."""
+        """Return (N, 3, 3) Jacobian of the deformation at each point, by central differences."""
         flat = np.asarray(points, dtype=np.float64)
         columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * DIFFERENCE]
         return np.stack(columns, axis=2) / (2 * DIFFERENCE)
 
 
 def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str, size: float) -> Field:
-    """The deformation of a mesh (V, 3) that takes sources (N, 3) to targets (N, 3).
+    """Return the deformation of a mesh (V, 3) that takes sources (N, 3) to targets (N, 3).
 
     size: of the person relative to the face. An affine map covers directions in which the points spread, a
     radial basis function (`KERNELS`) the rest; anchors on the mesh keep that near zero far from all points,
@@ -82,7 +82,8 @@ def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str,
 
 
 def anchors_far_from(mesh: Float64, sources: Float64) -> Float64:
-    """(K, 3): up to `ANCHORS` vertices, spread over that part of a mesh that is far from all sources."""
+    """Return (K, 3): up to `ANCHORS` vertices, spread over that part of a mesh that is far from all
+    sources."""
     from scipy.spatial import cKDTree
 
     away = cKDTree(sources).query(mesh)[0]
@@ -99,7 +100,8 @@ def anchors_far_from(mesh: Float64, sources: Float64) -> Float64:
 
 
 def bump_field(centres: Float64, shifts: Float64, width: float) -> Any:
-    """A function from points (N, 3) to shifts: exact at the centres, fading within about `width` metres."""
+    """Return a function from points (N, 3) to shifts: exact at the centres, fading within about `width`
+    metres."""
     centres, shifts = _merge_coincident(centres, shifts)
     gram = np.exp(-_squares(centres, centres) / (2 * width**2))
     strength = np.linalg.lstsq(gram, shifts, rcond=None)[0]
@@ -108,7 +110,7 @@ def bump_field(centres: Float64, shifts: Float64, width: float) -> Any:
 
 
 def linear_field(centres: Float64, shifts: Float64) -> Any:
-    """A function from points (N, 3) to shifts (N, 3): exact at the centres, linear between them."""
+    """Return a function from points (N, 3) to shifts (N, 3): exact at the centres, linear between them."""
     from scipy.interpolate import RBFInterpolator
 
     centres, shifts = _merge_coincident(centres, shifts)
@@ -116,13 +118,14 @@ def linear_field(centres: Float64, shifts: Float64) -> Any:
 
 
 def _squares(a: Float64, b: Float64) -> Float64:
-    """(N, M) squared distances between points (N, 3) and (M, 3)."""
+    """Return (N, M) squared distances between points (N, 3) and (M, 3)."""
     squares: Float64 = ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)
     return squares
 
 
 def _merge_coincident(sources: Float64, targets: Float64) -> tuple[Float64, Float64]:
-    """Sources and targets (K, 3), coinciding sources (as of touching lips) merged, their targets averaged."""
+    """Return the sources and targets (K, 3), coinciding sources (as of touching lips) merged, their targets
+    averaged."""
     from scipy.spatial import cKDTree
 
     group = np.arange(len(sources))
@@ -136,13 +139,14 @@ def _merge_coincident(sources: Float64, targets: Float64) -> tuple[Float64, Floa
 
 
 def folded_vertices(field: Field, mesh: Floating, size: float) -> Intp:
-    """Vertices at which the deformation turns space inside out, or nearly so. size: its usual scale."""
+    """Return the vertices at which the deformation turns space inside out, or nearly so. size: its usual
+    scale."""
     volume = np.linalg.det(field.jacobians(mesh)) / size**3
     return np.flatnonzero(~(volume > LEAST_VOLUME))
 
 
 def turned_over_triangles(before: Floating, after: Float64, triangles: Integer) -> tuple[Intp, float]:
-    """(triangles that a deformation turns over, their share of the total area before).
+    """Return (triangles that a deformation turns over, their share of the total area before).
 
     A triangle has turned over if its normal agreed with the mean of its neighbours' normals before but
     opposes it after: a rotation of the whole surface does not count.
@@ -159,7 +163,8 @@ def turned_over_triangles(before: Floating, after: Float64, triangles: Integer) 
 
 
 def nearest_points(points: Float64, sources: Float64, rows: Intp) -> tuple[str, ...]:
-    """Names of the four feature points (rows, at sources (N, 3)) that are nearest to most of the points."""
+    """Return the names of the four feature points (rows, at sources (N, 3)) that are nearest to most of the
+    points."""
     from scipy.spatial import cKDTree
 
     if not len(points) or not len(sources):

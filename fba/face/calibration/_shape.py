@@ -56,7 +56,7 @@ class Shape:
 
 
 def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: tuple[float, float]) -> Shape:
-    """All parts and feature points of a model after a deformation.
+    """Return all parts and feature points of a model after a deformation.
 
     targets: (84, 3), required positions of the feature points in metres, NaN where the field gives them.
     given: (84,), mask of the points that are reliable in the person's data. iris: its diameter before and
@@ -128,7 +128,7 @@ def _snap_to_points(model: FaceModel, vertices: dict[str, Float64], targets: Flo
 
 
 def _surface_points(model: FaceModel, targets: Float64) -> tuple[Float64, Float64]:
-    """((K, 3), (K, 3)): the known points on the surface before, and their targets."""
+    """Return ((K, 3), (K, 3)): the known points on the surface before, and their targets."""
     outer = np.array([name not in INNER for name in names()])
     known = known_rows(targets, model.points) & outer
     return model.points[known], targets[known]
@@ -144,7 +144,7 @@ def fit_size(before: Floating, after: Float64) -> Similarity:
 def _fit_teeth_and_tongue(
     model: FaceModel, field: Field, targets: Float64, given: Bool
 ) -> tuple[dict[str, Similarity], Map]:
-    """(map of the teeth by jaw, map of the tongue)."""
+    """Return (map of the teeth by jaw, map of the tongue)."""
     row = row_of()
     teeth = [part.vertices for part in model.of_kind("teeth")]
     inside = teeth or [part.vertices for part in model.of_kind("tongue")] or [model.vertices]
@@ -166,7 +166,7 @@ def _fit_teeth_and_tongue(
 
 
 def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarity:
-    """The map of the teeth, shifted back so that they are as far behind the inner lips as before."""
+    """Return the map of the teeth, shifted back so that they are as far behind the inner lips as before."""
     known = [row for row in (row_of()[name] for name in LIPS) if np.isfinite(model.points[row]).all()]
     vertices = np.concatenate([part.vertices for part in model.of_kind("teeth")]).astype(np.float64)
     lips, moved = field(model.points[known]), teeth.apply(vertices)
@@ -180,13 +180,14 @@ def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarit
 
 
 def _foremost_z(points: Float64, point: Float64) -> float:
-    """The greatest z of points (N, 3) right behind or before a point; -inf without such points."""
+    """Return the greatest z of points (N, 3) right behind or before a point; -inf without such points."""
     near = np.hypot(points[:, 0] - point[0], points[:, 1] - point[1]) < BESIDE
     return float(points[near, 2].max()) if near.any() else -np.inf
 
 
 def _fit_tongue(base: Similarity, here: Float64, there: Float64) -> Map:
-    """The map of the tongue, which moves as the lower teeth (`base`), and takes given points to others."""
+    """Return the map of the tongue, which moves as the lower teeth (`base`), and takes given points to
+    others."""
     if not len(here):
         return base.apply
     rest = bump_field(here, there - base.apply(here), TONGUE_WIDTH)
@@ -194,7 +195,7 @@ def _fit_tongue(base: Similarity, here: Float64, there: Float64) -> Map:
 
 
 def _jaw(model: FaceModel, part: Part) -> str:
-    """The jaw of a part of the teeth, "upper" or "lower": above or below the line where they meet."""
+    """Return the jaw of a part of the teeth, "upper" or "lower": above or below the line where they meet."""
     edges = model.points[[row_of()["9.10"], row_of()["9.11"]], 1]
     heights = [float(one.vertices[:, 1].mean()) for one in model.of_kind("teeth")]
     boundary = float(edges.mean()) if np.isfinite(edges).all() else float(np.mean(heights))
@@ -204,7 +205,7 @@ def _jaw(model: FaceModel, part: Part) -> str:
 def _lid_shift_at(
     vertices: Floating, skin: Float64, shift: Float64, eyes: Mapping[str, FittedEye]
 ) -> Float64:
-    """(V, 3) shift of the nearby skin by `lay_lids_on`, for parts that stand on the skin."""
+    """Return (V, 3) shift of the nearby skin by `lay_lids_on`, for parts that stand on the skin."""
     from scipy.spatial import cKDTree
 
     near = np.zeros(len(skin), dtype=bool)
@@ -227,7 +228,7 @@ def _points(
     teeth: Mapping[str, Similarity],
     tongue: Map,
 ) -> Float64:
-    """(84, 3) feature points after the deformation: bound ones at their vertices, others as given."""
+    """Return (84, 3) feature points after the deformation: bound ones at their vertices, others as given."""
     points = field(np.nan_to_num(model.points))
     for jaw, group in TEETH.items():
         for name in group:
@@ -247,7 +248,8 @@ def _points(
 
 
 def rebuild_part(part: Part, vertices: Float64) -> Part:
-    """The part with other vertices, its normals rotated with the surface so that seams stay invisible."""
+    """Return the part with other vertices, its normals rotated with the surface so that seams stay
+    invisible."""
     before, after = (
         vertex_normals(corners, part.triangles).astype(np.float64) for corners in (part.vertices, vertices)
     )

@@ -37,7 +37,7 @@ FACING = -0.3
 
 
 def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
-    """Yields a finding per part whose triangles turn over or tear at either end of a FAP's range."""
+    """Yield a finding per part whose triangles turn over or tear at either end of a FAP's range."""
     entry = faps()[fap - 1]
     if fap in RIGID or entry.i_limits is None:
         return
@@ -74,7 +74,8 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
 
 
 def _checked_triangles(poser: Poser, part: Part, fap: int) -> Integer:
-    """(M, 3) triangles of a part; for lid FAPs without those at the eyes' corners, where skin folds."""
+    """Return (M, 3) triangles of a part; for lid FAPs without those at the eyes' corners, where skin
+    folds."""
     if fap not in LIDS:
         return part.triangles
     corners = np.array([poser.point(name) for name in EYE_CORNERS])
@@ -86,7 +87,7 @@ def _checked_triangles(poser: Poser, part: Part, fap: int) -> Integer:
 
 
 def _touching(mask: Bool, triangles: Integer) -> Bool:
-    """(F,) mask of the triangles (F, 3) with a vertex in a mask (V,)."""
+    """Return (F,) mask of the triangles (F, 3) with a vertex in a mask (V,)."""
     touching: Bool = mask[triangles[:, 0]] | mask[triangles[:, 1]] | mask[triangles[:, 2]]
     return touching
 
@@ -94,7 +95,7 @@ def _touching(mask: Bool, triangles: Integer) -> Bool:
 def count_damage(
     before: Float64, after: Float64, triangles: Integer, *, turning: bool
 ) -> tuple[int, int, float]:
-    """(triangles turned over, edges torn, share of the moving area turned over)."""
+    """Return (triangles turned over, edges torn, share of the moving area turned over)."""
     moves = np.abs(after - before) > 1e-9
     moved_triangles = triangles[_touching(moves[:, 0] | moves[:, 1] | moves[:, 2], triangles)]
     sides = [
@@ -121,7 +122,7 @@ def count_damage(
 
 
 def _facing(normals: Float64, triangles: Integer, count: int) -> Float64:
-    """(F,) cosine between each triangle's normal and that of the triangles around it."""
+    """Return (F,) cosine between each triangle's normal and that of the triangles around it."""
     sums = np.zeros((count, 3))
     for corner in range(3):
         np.add.at(sums, triangles[:, corner], normals)
@@ -132,6 +133,6 @@ def _facing(normals: Float64, triangles: Integer, count: int) -> Float64:
 
 
 def _moved_rigidly(before: Float64, after: Float64) -> bool:
-    """Whether the vertices moved as a rigid body, which harms no triangle."""
+    """Return whether the vertices moved as a rigid body, which harms no triangle."""
     a, b = before - before.mean(axis=0), after - after.mean(axis=0)
     return bool(np.abs(a @ nearest_rotation(a.T @ b) - b).max() < 1e-4 * max(float(np.ptp(a)), 1e-9))

@@ -40,7 +40,7 @@ HEAD_AXIS = {HEAD_PITCH: (1.0, 0.0, 0.0), HEAD_YAW: (0.0, 1.0, 0.0), HEAD_ROLL: 
 
 
 def check_point(poser: Poser, fap: int) -> Iterator[Finding]:
-    """Yields findings about how a FAP moves its feature point."""
+    """Yield findings about how a FAP moves its feature point."""
     if fap in HEAD_AXIS:
         yield from _check_head(poser, fap)
     elif fap in (*YAW_EYE, *PITCH_EYE):
@@ -197,7 +197,7 @@ def _eye_vertices(poser: Poser, side: str) -> Intp:
 
 
 def _rotation(before: Float64, after: Float64) -> Float64:
-    """(3,) rotation vector, radians, that takes points (N, 3) about the origin closest to others."""
+    """Return (3,) rotation vector, radians, that takes points (N, 3) about the origin closest to others."""
     from scipy.spatial.transform import Rotation
 
     if len(before) < 3:

@@ -28,7 +28,7 @@ OUTSIDE = 0.97
 
 
 def check_lids(poser: Poser, side: str) -> Iterator[Finding]:
-    """Yields findings about the lids of one side, "left" or "right"."""
+    """Yield findings about the lids of one side, "left" or "right"."""
     upper, lower = SIDES[side]
     subject = f"FAP {upper} and {lower}, {side} lids"
     gap, split = max((lid_gap(poser, side, split), split) for split in SPLITS)
@@ -52,7 +52,8 @@ def check_lids(poser: Poser, side: str) -> Iterator[Finding]:
 
 
 def lid_gap(poser: Poser, side: str, split: float) -> float:
-    """The widest distance between the margins of closed lids, as a share of IRISD0; nan without margins.
+    """Return the widest distance between the margins of closed lids, as a share of IRISD0; nan without
+    margins.
 
     What margins of few edges cannot avoid is not counted: where one has a corner between two vertices of the
     other, the other's edge cuts it off.
@@ -74,7 +75,8 @@ def lid_gap(poser: Poser, side: str, split: float) -> float:
 
 
 def _cut_corners(line: Float64, other: Float64) -> Float64:
-    """(N,) distances of the vertices of a line (N, 3) from itself, as the other's vertices (M, 3) sample it.
+    """Return (N,) distances of the vertices of a line (N, 3) from itself, as the other's vertices (M, 3)
+    sample it.
 
     The samples are the line's points at the x of the other's vertices.
     """
@@ -85,7 +87,8 @@ def _cut_corners(line: Float64, other: Float64) -> Float64:
 
 
 def lid_cut(poser: Poser, side: str, split: float) -> float:
-    """Greatest depth of closed lids inside the eyeball beyond that of open ones, as a share of its radius."""
+    """Return the greatest depth of closed lids inside the eyeball beyond that of open ones, as a share of its
+    radius."""
     upper, lower = SIDES[side]
     eye = poser.eyes[side]
     surface = poser.marks.surface
@@ -116,7 +119,7 @@ class _EyeballProfile:
     reach: Float64
 
     def depth(self, points: Float64) -> Float64:
-        """(N,) metres below the eyeball's surface, negative outside."""
+        """Return (N,) metres below the eyeball's surface, negative outside."""
         angle, distance = _polar(self.eye, points)
         result: Float64 = np.interp(angle, self.angles, self.reach) - distance
         return result
@@ -136,14 +139,14 @@ def _measure_profile(poser: Poser, side: str) -> _EyeballProfile:
 
 
 def _polar(eye: Eye, points: Float64) -> tuple[Float64, Float64]:
-    """(N,) angle of points (N, 3) from the gaze, radians, and distance from the eyeball's centre."""
+    """Return (N,) angle of points (N, 3) from the gaze, radians, and distance from the eyeball's centre."""
     arms = points - eye.centre
     distance = np.linalg.norm(arms, axis=1)
     return np.arccos(np.clip(arms @ eye.gaze / np.maximum(distance, 1e-12), -1, 1)), distance
 
 
 def _distances_to_line(points: Float64, line: Float64) -> Float64:
-    """(N,) distances of points from a polyline (M, 3)."""
+    """Return (N,) distances of points from a polyline (M, 3)."""
     start, along = line[:-1], np.diff(line, axis=0)
     length = np.maximum((along**2).sum(axis=1), 1e-30)
     share = np.clip(((points[:, None] - start) * along).sum(axis=2) / length, 0.0, 1.0)

@@ -25,7 +25,7 @@ MAX_UNWANTED_MOTION = 0.03
 
 
 def check_mouth(poser: Poser) -> Iterator[Finding]:
-    """Yields findings about lips, teeth and tongue."""
+    """Yield findings about lips, teeth and tongue."""
     present = set(poser.model.table_of)
     if all(fap in present for pair in PAIRS for fap in pair):
         yield from _check_touching_lips(poser)
@@ -34,7 +34,8 @@ def check_mouth(poser: Poser) -> Iterator[Finding]:
 
 
 def lip_gap(poser: Poser, value: float) -> float:
-    """Widening of the gap between lips that all move down by the same value, as a share of MNS0."""
+    """Return the widening of the gap between lips that all move down by the same value, as a share of
+    MNS0."""
     pairs = [*PAIRS, *(pair for pair in OUTER_PAIRS if set(pair) <= set(poser.model.table_of))]
     values = {fap: sign * value for pair in pairs for fap, sign in zip(pair, (1, -1), strict=True)}
     now, before = (_lip_distances(poser, vertices) for vertices in (poser.pose(values), poser.neutral))
@@ -56,7 +57,7 @@ def _check_touching_lips(poser: Poser) -> Iterator[Finding]:
 
 
 def _lip_distances(poser: Poser, moved: Float64) -> Float64:
-    """(C,) gap between the lips along the middle three quarters of the mouth, metres."""
+    """Return (C,) gap between the lips along the middle three quarters of the mouth, metres."""
     upper, lower = (poser.contour(f"{name} inner lip", moved) for name in ("upper", "lower"))
     if len(upper) < 3 or len(lower) < 3:
         return np.zeros(0)

@@ -47,7 +47,8 @@ SYMMETRY = 0.04
 
 
 def check_neutral(model: FaceModel) -> list[Finding]:
-    """Deviations of the model's rest position from the standard's neutral face; [] without deviations.
+    """Return the deviations of the model's rest position from the standard's neutral face; [] without
+    deviations.
 
     "error" where FAPs would play wrongly, "warning" where it merely looks odd or cannot be checked.
     """
@@ -124,7 +125,7 @@ def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
 
 
 def _check_lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator[Finding]:
-    """The iris, as big as IRISD0 and centred on the pupil, touches both lid margins."""
+    """Yield the iris, as big as IRISD0 and centred on the pupil, touches both lid margins."""
     iris = model.fapu.IRISD * PER_DISTANCE
     pupil = _point(model, PUPIL_POINT[side])
     for name, edge in ((upper, 0.5 * iris), (lower, -0.5 * iris)):
@@ -189,14 +190,15 @@ def _check_touching(model: FaceModel, upper: str, lower: str, rule: str, limits:
 
 
 def _surface(part: Part) -> Float64:
-    """Corners, edge midpoints and centres of a part's triangles: dense enough even for coarse teeth."""
+    """Return the corners, edge midpoints and centres of a part's triangles: dense enough even for coarse
+    teeth."""
     corners = part.vertices[part.triangles].astype(np.float64)
     edges = (corners + np.roll(corners, 1, axis=1)) / 2
     return np.concatenate([part.vertices, edges.reshape(-1, 3), corners.mean(axis=1)])
 
 
 def _jaws(parts: tuple[Part, ...]) -> tuple[Part, Part] | None:
-    """The highest and the lowest part of the teeth, where there are two."""
+    """Return the highest and the lowest part of the teeth, where there are two."""
     ordered = sorted(
         (p for p in parts if len(p.vertices)), key=lambda part: float(part.vertices[:, 1].mean())
     )
@@ -266,7 +268,7 @@ def _point(model: FaceModel, name: str) -> Float64:
 def _judge(
     deviation: float, limits: Limits, subject: str, rule: str, found: str, expected: str
 ) -> Iterator[Finding]:
-    """Yields a finding where a deviation exceeds the limits; none where it is unknown (NaN)."""
+    """Yield a finding where a deviation exceeds the limits; none where it is unknown (NaN)."""
     if deviation > limits[0]:
         yield Finding(subject, rule, found, expected, "error" if deviation > limits[1] else "warning")
 

@@ -30,7 +30,7 @@ SHARE = 0.03
 
 
 def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Finding]:
-    """Deviations of a face's motions from the standard; an empty list without deviations.
+    """Return the deviations of a face's motions from the standard; an empty list without deviations.
 
     faps: numbers of the FAPs to check (3..68), all by default; those in `model.lost` are left out. For
     each: its feature point moves by value x FAPU in the standard's direction (within 5 % at small values;
@@ -106,7 +106,7 @@ def region_table() -> dict[int, tuple[tuple[str, ...], float]]:
 
 
 def _check_region(poser: Poser, fap: int) -> Iterator[Finding]:
-    """A finding where vertices move that are too far from the points of the FAP's region."""
+    """Yield a finding where vertices move that are too far from the points of the FAP's region."""
     if fap not in region_table():
         return
     names, reach = region_table()[fap]

@@ -257,7 +257,7 @@ class Scratch(NamedTuple):
 
 
 def allocate_scratch(vertices: int, parts: int) -> Scratch:
-    """Working arrays for a face of this number of vertices and parts."""
+    """Return the working arrays for a face of this number of vertices and parts."""
     return Scratch(
         moved=np.empty((vertices, 3), dtype=np.float32),
         touched=np.zeros(parts, dtype=np.int64),

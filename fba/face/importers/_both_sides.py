@@ -31,7 +31,8 @@ BLEND = 0.1
 
 
 def split_sides(pieces: Sequence[Piece]) -> list[Piece]:
-    """The pieces, with shapes of both sides as shapes of each, too, where the file has none of those."""
+    """Return the pieces, with shapes of both sides as shapes of each, too, where the file has none of
+    those."""
     result = list(pieces)
     known = canonical_names(sorted({name for piece in pieces for name in piece.morphs}))
     for name in sorted({name for piece in pieces for name in piece.morphs}):
@@ -56,7 +57,7 @@ def split_sides(pieces: Sequence[Piece]) -> list[Piece]:
 
 
 def _ends(pieces: Sequence[Piece], name: str) -> tuple[float, float] | None:
-    """The least and the largest x of what a shape moves; None where it moves nothing."""
+    """Return the least and the largest x of what a shape moves; None where it moves nothing."""
     moving = [(piece.part.vertices, _sizes(piece.morphs[name])) for piece in pieces if name in piece.morphs]
     most = max((float(size.max(initial=0.0)) for _, size in moving), default=0.0)
     if not most > 0:

@@ -25,7 +25,7 @@ DITHER = "paletteuse=dither=sierra2_4a:diff_mode=rectangle"
 
 
 def gif_rate(rate: Fraction) -> Fraction:
-    """The frame rate of a GIF: that of the film, divided by an integer so that it is at most 25."""
+    """Return the frame rate of a GIF: that of the film, divided by an integer so that it is at most 25."""
     return rate / math.ceil(rate / SMOOTH)
 
 
@@ -59,7 +59,7 @@ class Gif:
         self._numbers.append(number)
 
     def finish(self, count: int) -> Path:
-        """Finish the film, count / rate seconds long; returns its path."""
+        """Finish the film, count / rate seconds long; return its path."""
         self._into[0].push(None)
         palette = self._palette.pull()
         times = [round(number / self._rate * TICKS) for number in (*self._numbers, count)]
@@ -110,7 +110,8 @@ class Gif:
         return frame
 
     def _graph(self, description: str, inputs: int) -> tuple[Any, list[Any], Any]:
-        """(graph, inputs, output) of a filter for pictures of the film's size; input 2 is a palette."""
+        """Return (graph, inputs, output) of a filter for pictures of the film's size; input 2 is a
+        palette."""
         name, _, options = description.partition("=")
         graph = self._av.filter.Graph()
         width, height = self._size

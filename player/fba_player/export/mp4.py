@@ -88,7 +88,7 @@ class Mp4:
                 self._audio.encode_until(number / self._rate)
 
     def finish(self, count: int) -> Path:
-        """Finish the film, count / rate seconds long; returns its path."""
+        """Finish the film, count / rate seconds long; return its path."""
         with self._convert_errors():
             self._container.mux(self._stream.encode(None))
             if self._audio is not None:

@@ -71,7 +71,7 @@ class Preview:
         return f"<preview of {describe(self._animation)}>"
 
     def _repr_html_(self) -> str:
-        """The film as self-contained HTML; made once."""
+        """Return the film as self-contained HTML; made once."""
         if self._html is None:
             self._html = self._make_html()
         return self._html
@@ -147,7 +147,8 @@ def show_animations(shell: Any) -> None:
 
 
 def describe(animation: Animation) -> str:
-    """One line about an animation: its name, frames, duration, rate, and whether it has a face and a body."""
+    """Return one line about an animation: its name, frames, duration, rate, and whether it has a face and a
+    body."""
     parts = [
         name for name, track in (("face", animation.face), ("body", animation.body)) if track is not None
     ]

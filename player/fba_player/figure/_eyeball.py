@@ -45,7 +45,8 @@ class Eyeball:
     step: float
 
     def pose(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
-        """The eye for moved vertices (V, 3) of its part and of the face; matrix: (4, 4), into the world."""
+        """Return the eye for moved vertices (V, 3) of its part and of the face; matrix: (4, 4), into the
+        world."""
         moved = part.take(self.rows, axis=0).astype(np.float64)
         turn, centre = _fit_motion(self.neutral, moved, self.centre)
         if not np.isfinite(turn).all():  # the samples lie in a plane
@@ -65,7 +66,8 @@ class Eyeball:
         )
 
     def _lid_positions(self, face: Float32, centre: Float64) -> Float64:
-        """(4, 3): lid middles and corners relative to the centre, in radii; an open eye's if missing."""
+        """Return (4, 3): lid middles and corners relative to the centre, in radii; an open eye's if
+        missing."""
         if min(self.lids) >= 0:
             known: Float64 = (face.take(self.lids, axis=0) - centre) / self.radius
             return known
@@ -77,7 +79,7 @@ class Eyeball:
 
 
 def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
-    """The sphere that fits a part, or None if it is not round."""
+    """Return the sphere that fits a part, or None if it is not round."""
     vertices = part.vertices.astype(np.float64)
     if len(vertices) < MIN_BALL_VERTICES or flat_width(part) is not None:
         return None
@@ -101,7 +103,7 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
 
 
 def _fit_sphere(points: Float64) -> tuple[Float64, float]:
-    """Centre (3,) and radius of the sphere that fits points (N, 3) best."""
+    """Return the centre (3,) and radius of the sphere that fits points (N, 3) best."""
     middle = points.mean(axis=0)
     p = points - middle
     a = np.column_stack([2 * p, np.ones(len(p))])
@@ -112,7 +114,7 @@ def _fit_sphere(points: Float64) -> tuple[Float64, float]:
 
 @compiled
 def _fit_motion(before: Float64, after: Float64, centre: Float64) -> tuple[Float64, Float64]:
-    """The rotation (3, 3) that takes points (N, 3) best to others, and the image (3,) of `centre`.
+    """Return the rotation (3, 3) that takes points (N, 3) best to others, and the image (3,) of `centre`.
 
     The orthogonal factor of their covariance by Newton's iteration (Higham 1986); NaN if that fails.
 

@@ -75,7 +75,7 @@ def blend_swaying(light: Float32, still: Float32, rows: Intp, share: Float32) ->
 def _products(
     light: Float32, through: Float32, basis: Float32, count: int
 ) -> tuple[Float32, Float32, Float32]:
-    """Key light, rim light, and rim light through the skin, each (count,)."""
+    """Return the key light, rim light, and rim light through the skin, each (count,)."""
     key = np.zeros(count, dtype=np.float32)
     rim, back = np.zeros_like(key), np.zeros_like(key)
     for k in range(0, basis.shape[1], 4):  # four at a time: the sums are read and written less often

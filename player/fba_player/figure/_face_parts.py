@@ -40,7 +40,8 @@ metre, and a colour off by its whole range."""
 
 
 def compute_sway(model: FaceModel) -> Float32:
-    """float32 (V,): how far each vertex turns with the head, from 1 above jaw and ears to 0 down the neck."""
+    """Return float32 (V,): how far each vertex turns with the head, from 1 above jaw and ears to 0 down the
+    neck."""
     chin = known_middle(model, ("2.1", "2.10"))
     lobe = known_middle(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
     if chin is None or lobe is None:
@@ -54,14 +55,14 @@ def compute_sway(model: FaceModel) -> Float32:
 
 
 def known_middle(model: FaceModel, names: Sequence[str]) -> Float64 | None:
-    """(3,): the middle of the first two of the named feature points that the face has, or None."""
+    """Return (3,): the middle of the first two of the named feature points that the face has, or None."""
     points = np.array([model.points[point_row(name)] for name in names])
     known = points[np.isfinite(points).all(axis=1)][:2]
     return np.asarray(known.mean(axis=0)) if len(known) else None
 
 
 def make_shape(part: Part, sways: Float32) -> FaceShape:
-    """The constant data of a part. sways: (V,), how far its vertices turn with the head."""
+    """Return the constant data of a part. sways: (V,), how far its vertices turn with the head."""
     colours = part.colours
     if colours is None:
         row = (*part.material.colour, 1.0 - part.material.roughness)
@@ -89,8 +90,8 @@ def make_shape(part: Part, sways: Float32) -> FaceShape:
 def detail_levels(
     part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None
 ) -> DetailLevels:
-    """Levels of detail of a part for these poses, (V, 3) each. more: (V, N), attributes to preserve besides
-    normals, colours and texture, scaled to metres."""
+    """Return the levels of detail of a part for these poses, (V, 3) each. more: (V, N), attributes to
+    preserve besides normals, colours and texture, scaled to metres."""
     columns = list(poses)
     if part.normals is not None:
         columns.append(part.normals * NORMAL_WEIGHT)
@@ -105,20 +106,21 @@ def detail_levels(
 
 
 def part_rows(model: FaceModel | BodyModel, name: str) -> slice:
-    """The slice of a part's vertices in the arrays of its model. Raises KeyError for an unknown name."""
+    """Return the slice of a part's vertices in the arrays of its model. Raises KeyError for an unknown
+    name."""
     start = model.starts[name]
     return slice(start, start + len(model.part(name).vertices))
 
 
 def with_triangles(shape: FaceShape, triangles: Int32) -> FaceShape:
-    """The shape with these triangles (F, 3) only."""
+    """Return the shape with these triangles (F, 3) only."""
     triangles = np.ascontiguousarray(triangles, dtype=np.int32)
     coarser = None if shape.coarser is None else replace(shape.coarser, triangles=triangles)
     return replace(shape, triangles=triangles, coarser=coarser)
 
 
 def find_hairs(part: Part) -> Float32 | None:
-    """float32 (V, 8) as in `FaceShape.across`, or None if a part does not consist of single hairs.
+    """Return float32 (V, 8) as in `FaceShape.across`, or None if a part does not consist of single hairs.
 
     A hair is a strip of two rows of vertices that ends in a point; the vertex opposite to another is the
     nearest one joined to it by an edge.
@@ -153,7 +155,7 @@ def find_hairs(part: Part) -> Float32 | None:
 
 
 def _pieces(edges: Intp, count: int) -> Intp:
-    """(V,): the lowest vertex in each vertex's connected piece. edges: (E, 2), in both directions."""
+    """Return (V,): the lowest vertex in each vertex's connected piece. edges: (E, 2), in both directions."""
     lowest = np.arange(count)
     while True:  # each round halves the remaining distance
         lower = lowest.copy()
@@ -166,7 +168,7 @@ def _pieces(edges: Intp, count: int) -> Intp:
 
 
 def _relief(part: Part) -> tuple[float, float]:
-    """Strength of the skin's relief and its repetitions, so that each is `RELIEF` metres wide."""
+    """Return the strength of the skin's relief and its repetitions, so that each is `RELIEF` metres wide."""
     if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
         return (0.0, 1.0)
     metres = texture_breadth(part.vertices, part.texcoords, part.triangles)
@@ -174,7 +176,7 @@ def _relief(part: Part) -> tuple[float, float]:
 
 
 def _is_smooth(part: Part) -> bool:
-    """Whether most edges bend so little that light may be interpolated between vertices."""
+    """Return whether most edges bend so little that light may be interpolated between vertices."""
     if part.normals is None or not len(part.triangles):
         return True
     normals, corners = part.normals[part.triangles], part.vertices[part.triangles]
@@ -184,7 +186,7 @@ def _is_smooth(part: Part) -> bool:
 
 
 def _picture(part: Part) -> FacePicture | None:
-    """The part's texture, or None, with an FbaWarning if it cannot be read."""
+    """Return the part's texture, or None, with an FbaWarning if it cannot be read."""
     if part.material.texture is None:
         return None
     try:

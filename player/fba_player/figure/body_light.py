@@ -63,7 +63,7 @@ class BodyLight:
     radii: Float64
 
     def shade(self, positions: Float32, normals: Float32, joints: Float64) -> Float32:
-        """float32 (V, 4), as in `FaceMesh.light`; meaningless at parts that are not drawn.
+        """Return float32 (V, 4), as in `FaceMesh.light`; meaningless at parts that are not drawn.
 
         positions, normals: (V, 3) of the body in the world. joints: (J, 4, 4), its joint matrices. Without
         numba, nothing is in the light's way.
@@ -112,7 +112,7 @@ class BodyLight:
 
 
 def build_body_light(body: BodyModel, coarser: Mapping[str, DetailLevels | None]) -> BodyLight:
-    """The light on a body; coarser as in `BodyLight`."""
+    """Return the light on a body; coarser as in `BodyLight`."""
     names = body.skeleton.names
     known = [row for row in CAPSULES if row[0] in names and row[1] in names]
     ends = np.array([[names.index(a), names.index(b)] for a, b, _ in known], dtype=np.intp)
@@ -158,9 +158,9 @@ def _nearest_samples(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, 
 
 
 def _capsules(ends: Float64, radii: Float64) -> Float32:
-    """float32 (K, 11) for ends (K, 2, 3) and radii (K,): one end (3), the axis to the other end (3), its
-    inverse squared length, its component towards the key light, the inverse squared length of the rest, the
-    radius and its square."""
+    """Return float32 (K, 11) for ends (K, 2, 3) and radii (K,): one end (3), the axis to the other end (3),
+    its inverse squared length, its component towards the key light, the inverse squared length of the rest,
+    the radius and its square."""
     capsules = np.empty((len(ends), 11), dtype=np.float32)
     axis = ends[:, 1] - ends[:, 0]
     squared = np.maximum(np.einsum("ij,ij->i", axis, axis), 1e-9)

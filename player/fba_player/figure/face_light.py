@@ -62,7 +62,7 @@ class FaceLight:
         self._tongues = [part_rows(model, part.name) for part in model.of_kind("tongue")]
 
     def shade(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
-        """float32 (V, 4), 0..1: the share of light that reaches each vertex, as in `FaceMesh.light`.
+        """Return float32 (V, 4), 0..1: the share of light that reaches each vertex, as in `FaceMesh.light`.
 
         positions: (V, 3), without the head's turn (3, 3). matrix: (3, 3), the face's rotation in the world.
         Returns the same array until something changes.
@@ -78,7 +78,7 @@ class FaceLight:
         return self._last[1]
 
     def _shaded(self, share: float, lights: Float32, out: list[Float32]) -> Float32:
-        """float32 (V, 4) for a mouth open by `share`. out: (N,) for each tongue, how far it is out."""
+        """Return float32 (V, 4) for a mouth open by `share`. out: (N,) for each tongue, how far it is out."""
         light = np.empty((len(self._sway), 4), dtype=np.float32)
         for part, baked in zip(self._model.parts, self._part_lights, strict=True):
             # Teeth get more light than falls in, as a photographer would have it.
@@ -107,7 +107,8 @@ class FaceLight:
         return math.sqrt(float(way @ way))
 
     def _out_of_mouth(self, depths: Float32, positions: Float32) -> Float32:
-        """float32 (N,), 0..1: how far vertices of a tongue at these depths (z) are out between the lips."""
+        """Return float32 (N,), 0..1: how far vertices of a tongue at these depths (z) are out between the
+        lips."""
         if self._lips is None:
             return np.zeros(len(depths), dtype=np.float32)
         reach = 0.12 * self._model.fapu.ENS * 1024
@@ -145,13 +146,14 @@ class FaceLight:
         return self._deformer.local(faps, out=positions, normals=normals), normals
 
     def _near_mouth(self, positions: Float32) -> Bool:
-        """bool (V,): vertices about as near to the mouth as the eyes are to the nose."""
+        """Return bool (V,): vertices about as near to the mouth as the eyes are to the nose."""
         away = np.linalg.norm(positions - positions[self._lips].mean(axis=0), axis=1)
         return np.asarray(away < 1.1 * self._model.fapu.ENS * 1024)
 
 
 def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
-    """What `bake` returns, stored in the disk cache: computing it takes half a second of every start."""
+    """Return what `bake` returns, stored in the disk cache: computing it takes half a second of every
+    start."""
 
     def make() -> list[Float16]:
         return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
@@ -194,7 +196,7 @@ class _PartLight:
 
 
 def _part_light(baked: Baked, rows: slice, sway: Float32) -> _PartLight:
-    """The tables of a part's rows of a model. sway: (V,), of all vertices of the model."""
+    """Return the tables of a part's rows of a model. sway: (V,), of all vertices of the model."""
     vertices = np.arange(rows.start, rows.stop)
     swaying = np.flatnonzero(sway[vertices] < 1)
     still = _table(baked, vertices[swaying])
@@ -202,7 +204,7 @@ def _part_light(baked: Baked, rows: slice, sway: Float32) -> _PartLight:
 
 
 def _table(baked: Baked, vertices: Intp) -> Table:
-    """The visibility of some vertices of a model."""
+    """Return the visibility of some vertices of a model."""
     near = np.flatnonzero(baked.near[vertices])
     shut, wide = (
         [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]
@@ -212,7 +214,7 @@ def _table(baked: Baked, vertices: Intp) -> Table:
 
 
 def _basis(*turns: Float64) -> Float32:
-    """float32 (2 N, 16): weights of the harmonics for key and rim light under N rotations (3, 3)."""
+    """Return float32 (2 N, 16): weights of the harmonics for key and rim light under N rotations (3, 3)."""
     towards = np.empty((2 * len(turns), 3))
     for k, into in enumerate(turns):
         np.dot(LIGHTS, into.T, out=towards[2 * k : 2 * k + 2])

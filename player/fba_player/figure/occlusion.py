@@ -50,7 +50,7 @@ def bake(
     triangles: Int32,
     within: Bool | None = None,
 ) -> Visibility:
-    """The visibility of every vertex (V, 3) of a mesh; takes about half a second for 20,000 vertices.
+    """Return the visibility of every vertex (V, 3) of a mesh; takes about half a second for 20,000 vertices.
 
     within: bool (V,), the vertices whose visibility is computed, all by default; others may count as free.
     Without numba, which would take minutes, all vertices count as free.
@@ -82,12 +82,12 @@ def bake(
 
 
 def weights(directions: Float64) -> Float64:
-    """float64 (N, 16): weights for rows of `Visibility`, for large lights in directions (N, 3)."""
+    """Return float64 (N, 16): weights for rows of `Visibility`, for large lights in directions (N, 3)."""
     return harmonics(directions) * _bands()
 
 
 def harmonics(directions: Float64) -> Float64:
-    """float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
+    """Return float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
     values = np.empty((len(directions), HARMONICS))
     _harmonics(np.ascontiguousarray(directions, dtype=np.float64), values)
     return values
@@ -123,7 +123,7 @@ def _bands() -> Float64:
 
 @cache
 def _directions() -> Float64:
-    """float64 (N, 3): unit vectors spread evenly over the sphere."""
+    """Return float64 (N, 3): unit vectors spread evenly over the sphere."""
     k = np.arange(DIRECTIONS) + 0.5
     z = 1 - 2 * k / DIRECTIONS
     around = np.pi * (1 + 5**0.5) * k
@@ -132,7 +132,7 @@ def _directions() -> Float64:
 
 
 def _frame(direction: Float64) -> Float64:
-    """float64 (3, 3), as rows: right, up and towards the viewer, who looks from this direction."""
+    """Return float64 (3, 3), as rows: right, up and towards the viewer, who looks from this direction."""
     aside = np.cross(direction, (0.0, 1.0, 0.0) if abs(direction[1]) < 0.9 else (1.0, 0.0, 0.0))
     aside /= np.linalg.norm(aside)
     return np.stack([aside, np.cross(direction, aside), direction])

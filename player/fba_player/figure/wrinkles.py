@@ -46,8 +46,8 @@ STIFFNESS = 1e-4
 
 @cache
 def _table() -> tuple[Intp, Intp, Float64]:
-    """The rows of wrinkles.csv: their wrinkles (R,), columns of their FAPs, left and right (2, R), and the
-    values that bring the wrinkles out fully (R,)."""
+    """Return the rows of wrinkles.csv: their wrinkles (R,), columns of their FAPs, left and right (2, R), and
+    the values that bring the wrinkles out fully (R,)."""
     with (files(__package__) / "wrinkles.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     kinds = np.array([WRINKLES.index(row["wrinkle"]) for row in rows])
@@ -56,7 +56,7 @@ def _table() -> tuple[Intp, Intp, Float64]:
 
 
 def wrinkle_strengths(faps: Float32) -> Float32:
-    """float32 (2, 4), 0..1: how strong each of `WRINKLES` is on the left and on the right side.
+    """Return float32 (2, 4), 0..1: how strong each of `WRINKLES` is on the left and on the right side.
 
     faps: (68,). A FAP counts in its own direction only; what several of them do adds up.
     """
@@ -69,9 +69,9 @@ def wrinkle_strengths(faps: Float32) -> Float32:
 
 
 def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
-    """float32 (V, 2): where the vertices of a part lie in the map, x positive on the face's left; outside of
-    it where they have no wrinkles. None for a part that is no skin, and for a face that shall have none or
-    lacks the points needed."""
+    """Return float32 (V, 2): where the vertices of a part lie in the map, x positive on the face's left;
+    outside of it where they have no wrinkles. None for a part that is no skin, and for a face that shall have
+    none or lacks the points needed."""
     if not model.wrinkles or part.kind != "skin":
         return None
     own, shown = _known_points(model)
@@ -86,14 +86,14 @@ def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
 
 
 def _in_front(model: FaceModel, positions: Float64) -> Float64:
-    """Positions (N, 3) relative to the middle of the pupils, in eye separations."""
+    """Return the positions (N, 3) relative to the middle of the pupils, in eye separations."""
     middle = model.points[[point_row("3.5"), point_row("3.6")]].mean(axis=0)
     away: Float64 = (positions - middle) / (model.fapu.ES * 1024)
     return away
 
 
 def _known_points(model: FaceModel) -> tuple[Float64, Float64] | tuple[None, None]:
-    """The points (N, 2) of a face that the map knows, and their places in the map (N, 2)."""
+    """Return the points (N, 2) of a face that the map knows, and their places in the map (N, 2)."""
     own, shown = [], []
     for name, (x, y) in MAP_POINTS.items():
         for side, point in ((1, name), (-1, MIRRORED.get(name, ""))):
@@ -123,14 +123,14 @@ class _ThinPlate:
         self._weights = np.linalg.lstsq(matrix, np.vstack([values, np.zeros((3, 2))]), rcond=None)[0]
 
     def __call__(self, places: Float64) -> Float64:
-        """The spline (N, 2) at places (N, 2)."""
+        """Return the spline (N, 2) at places (N, 2)."""
         basis = np.column_stack([_bending(places, self._points), np.ones(len(places)), places])
         values: Float64 = basis @ self._weights
         return values
 
 
 def _bending(places: Float64, points: Float64) -> Float64:
-    """(N, M): r^2 log r of the distances between places (N, 2) and points (M, 2)."""
+    """Return (N, M): r^2 log r of the distances between places (N, 2) and points (M, 2)."""
     squared = ((places[:, None] - points[None]) ** 2).sum(axis=2)
     bending: Float64 = 0.5 * squared * np.log(np.maximum(squared, 1e-30))
     return bending

@@ -47,7 +47,8 @@ PROGRAMS = ("line", "dot", "shell", "grid", "label")
 
 
 def project(points: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Float64, Float64]:
-    """Pixels (N, 2) from the upper left and depths (N,), 0..1, of points (N, 3); NaN behind the camera.
+    """Return the pixels (N, 2) from the upper left and depths (N,), 0..1, of points (N, 3); NaN behind the
+    camera.
 
     matrix: (4, 4), world to clip space.
     """
@@ -58,7 +59,7 @@ def project(points: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Fl
 
 
 def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> float:
-    """Pixels per metre at the middle of the dots."""
+    """Return the pixels per metre at the middle of the dots."""
     if not len(dots.positions):
         return 0.0
     away = float(np.linalg.norm(dots.positions.mean(axis=0) - camera.eye))
@@ -66,7 +67,7 @@ def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> floa
 
 
 def _lift(points: Float64, eye: Float64, lift: float) -> Float64:
-    """Points (N, 3) moved by `lift` metres towards the eye."""
+    """Return the points (N, 3) moved by `lift` metres towards the eye."""
     towards = eye - points
     length = np.linalg.norm(towards, axis=1, keepdims=True)
     lifted: Float64 = points + towards * (lift / np.maximum(length, 1e-6))
@@ -133,7 +134,7 @@ class ExtrasRenderer:
         self._programs.clear()
 
     def _fill_buffer(self, name: str, data: Array) -> Any:
-        """The buffer of this name, filled with data; it grows as needed."""
+        """Return the buffer of this name, filled with data; it grows as needed."""
         buffer = self._buffers.get(name)
         if buffer is None or buffer.size < data.nbytes:
             if buffer is not None:
@@ -245,7 +246,8 @@ class ExtrasRenderer:
             self._draw_labels(texture, np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
 
     def _depths_of(self, size: tuple[int, int]) -> Float32:
-        """float32 (H, W): depths of the picture, 0..1, bottom row first; read once for each picture."""
+        """Return float32 (H, W): depths of the picture, 0..1, bottom row first; read once for each
+        picture."""
         if self._depths is not None:
             return self._depths
         gl, source, parts = self._gl, self._gl.fbo, []
@@ -261,7 +263,7 @@ class ExtrasRenderer:
         return self._depths
 
     def _label(self, key: Hashable, make: Callable[[], tuple[UInt8, Any]]) -> tuple[Any, Any]:
-        """A texture of labels, cached, and what `make` returned with its picture."""
+        """Return a texture of labels, cached, and what `make` returned with its picture."""
 
         def upload() -> tuple[Any, Any]:
             picture, more = make()

@@ -101,7 +101,8 @@ class ShadowCaster:
 
 
 def _spread(shape: FaceShape) -> Points | None:
-    """Points spread over a shape's surface in its rest pose; None for a shape that casts no shadow."""
+    """Return the points spread over a shape's surface in its rest pose; None for a shape that casts no
+    shadow."""
     if shape.coarser is None or shape.kind in WITHIN:
         return None
     coarse = shape.coarser.triangles_within(COARSE)
@@ -127,7 +128,7 @@ def _spread(shape: FaceShape) -> Points | None:
 
 @cache
 def _rays() -> Float64:
-    """float64 (N, 3): unit vectors towards the key light, then towards the sky."""
+    """Return float64 (N, 3): unit vectors towards the key light, then towards the sky."""
     key = np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION)
     aside = np.cross(key, (0.0, 1.0, 0.0))
     aside /= np.linalg.norm(aside)
@@ -282,7 +283,7 @@ def _blur(grid: Float32, reach: int, room: Float32) -> None:
 
 @compiled
 def _darken(key: Float32, sky: Float32, darkness: UInt8) -> tuple[int, int, int, int]:
-    """Write the darkness of each cell from the hidden rays of both lights; returns as `_cast_shadow`.
+    """Write the darkness of each cell from the hidden rays of both lights; return as `_cast_shadow`.
 
     Bounds: three squares of as many cells.
     """

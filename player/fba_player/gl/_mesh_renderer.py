@@ -92,7 +92,7 @@ class FaceRenderer:
         return self._programs[options]
 
     def _array(self, parts: dict[str, Any], options: tuple[str, ...]) -> Any:
-        """The vertex array of a part for a program."""
+        """Return the vertex array of a part for a program."""
         if options not in parts["arrays"]:
             attributes: list[tuple[Any, ...]] = [
                 (parts["positions"], "3f", "in_position"),
@@ -186,7 +186,7 @@ class FaceRenderer:
         return parts
 
     def _wrinkle_map(self, mesh: FaceMesh, parts: dict[str, Any], wide: float) -> Any:
-        """The map of wrinkles for pixels of this width (m), or None where there is nothing to see."""
+        """Return the map of wrinkles for pixels of this width (m), or None where there is nothing to see."""
         if mesh.wrinkles is None or parts["wrinkles"] is None or mesh.wrinkles.max() < MIN_WRINKLE:
             return None
         halvings = count_halvings(parts["wrinkle_texel"], wide, max(WRINKLE_SHAPE))
@@ -207,7 +207,7 @@ class FaceRenderer:
         return self._wrinkles[halvings]
 
     def _relief_texture(self, wide: float) -> Any:
-        """The skin's relief for pixels of this width (m), or None if it would be too fine to see."""
+        """Return the skin's relief for pixels of this width (m), or None if it would be too fine to see."""
         if self._pixels is None:
             self._pixels = skin_relief()
         size = self._pixels.shape[0]
@@ -267,7 +267,7 @@ def _set_wrinkles(program: Any, mesh: FaceMesh) -> None:
 
 
 def _in_map(shape: FaceShape, positions: Float32) -> tuple[Float32, Float32, Int32]:
-    """A shape's positions, places in the map of wrinkles, and triangles inside of the map."""
+    """Return a shape's positions, places in the map of wrinkles, and triangles inside of the map."""
     assert shape.wrinkle_places is not None
     inside = (np.abs(shape.wrinkle_places[shape.triangles]) < max(WIDTH, TOP)).all(axis=(1, 2))
     return positions, shape.wrinkle_places, shape.triangles[inside]

@@ -39,7 +39,7 @@ class Edges:
 
 
 def find_edges(triangles: Int32) -> Edges:
-    """The edges of triangles (F, 3)."""
+    """Return the edges of triangles (F, 3)."""
     corners = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     owner = np.repeat(np.arange(len(triangles), dtype=np.int32), 3)
     ordered = np.sort(corners, axis=1)
@@ -111,7 +111,8 @@ class Outliner:
         )
 
     def tiles(self) -> Float32:
-        """(N, 2) corners of triangles over all tiles with outlines in them, -1..1 across the picture."""
+        """Return (N, 2) corners of triangles over all tiles with outlines in them, -1..1 across the
+        picture."""
         corners = np.empty((6 * _runs(self._marked, self._size, np.empty((0, 2), dtype=np.float32)), 2), "f4")
         _runs(self._marked, self._size, corners)
         return corners

@@ -63,7 +63,7 @@ class Target:
         self._drawn = self._own(gl.framebuffer([colour], depth))
 
     def _own(self, part: Any) -> Any:
-        """The OpenGL object, which `close` will release."""
+        """Return the OpenGL object, which `close` will release."""
         self._parts.append(part)
         return part
 
@@ -72,7 +72,8 @@ class Target:
         self._drawn.use()
 
     def finish(self, into: Any = None, within: Steps | None = None) -> Any:
-        """The framebuffer that holds the finished picture: one of its own, or, with samples = 0, `into`.
+        """Return the framebuffer that holds the finished picture: one of its own, or, with samples = 0,
+        `into`.
 
         within: the regions to be smoothed; everywhere by default.
 

@@ -37,8 +37,8 @@ class Details:
         self._levels: WeakKeyDictionary[FaceShape, dict[int, _Level | None]] = WeakKeyDictionary()
 
     def choose(self, meshes: list[FaceMesh], eye: npt.ArrayLike, pixel: float) -> list[FaceMesh]:
-        """The meshes at the levels of detail for a camera at `eye` (3,), with pixels of size `pixel` at a
-        distance of 1."""
+        """Return the meshes at the levels of detail for a camera at `eye` (3,), with pixels of size `pixel`
+        at a distance of 1."""
         position = np.asarray(eye, dtype=np.float64)
         return [self._choose(mesh, position, pixel) for mesh in meshes]
 
@@ -87,7 +87,8 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
 
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
-    """Distance from an eye (3,) to the nearest of some sampled vertices, in the mesh's own unit."""
+    """Return the distance from an eye (3,) to the nearest of some sampled vertices, in the mesh's own
+    unit."""
     sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED, 1)]
     return float(_nearest(sample, mesh.matrix, eye))
 
@@ -110,7 +111,7 @@ def _nearest(positions: Float32, matrix: Float64, eye: Float64) -> float:
 
 
 def share_memory(one: Float32, other: Float32) -> bool:
-    """Whether two arrays are equal views of the same memory; both must be alive."""
+    """Return whether two arrays are equal views of the same memory; both must be alive."""
     if one is other:
         return True
     return (

@@ -221,7 +221,7 @@ class Renderer:
         array.render()
 
     def _upload_mesh(self, mesh: Mesh) -> list[Any]:
-        """Buffers of positions and normals, the vertex array, and what belongs to it."""
+        """Return the buffers of positions and normals, the vertex array, and what belongs to it."""
         gl, shape = self._gl, mesh.shape
         positions = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
         normals = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)

@@ -45,7 +45,7 @@ def around(triangles: Int32, count: int, start: Int64, owners: Int32) -> None:
 
 @inlined
 def _count_triangles(triangles: Int32, start: Int64, owners: Int32, a: int, b: int) -> int:
-    """Number of triangles with an edge from a to b."""
+    """Return the number of triangles with an edge from a to b."""
     count = 0
     for o in range(start[a], start[a + 1]):
         other = triangles[owners[o]]
@@ -154,7 +154,7 @@ def _apart(points: Float64, a: int, b: int, i: int) -> tuple[float, float, float
 def _fits(
     points: Float64, poses: int, triangles: Int32, first: int, stop: int, owners: Int32, u: int, v: int
 ) -> bool:
-    """Whether no triangle around u turns over or becomes a splinter when u goes to v, in any pose."""
+    """Return whether no triangle around u turns over or becomes a splinter when u goes to v, in any pose."""
     for o in range(first, stop):
         corners = triangles[owners[o]]
         if corners[0] == v or corners[1] == v or corners[2] == v:

@@ -37,8 +37,8 @@ class DetailLevels:
     triangles: Int32
 
     def triangles_within(self, tolerance: float) -> Int32 | None:
-        """int32 (F, 3): triangles of the coarsest level whose error is at most `tolerance` (m); None for the
-        mesh as it is."""
+        """Return int32 (F, 3): triangles of the coarsest level whose error is at most `tolerance` (m); None
+        for the mesh as it is."""
         level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
         if level < 0 or len(self.triangles) < MIN_TRIANGLES or not is_compiled():
             return None
@@ -71,7 +71,8 @@ class DetailLevels:
 def simplify(
     points: Float64, poses: int, triangles: Int32, tolerances: Sequence[float] = TOLERANCES
 ) -> tuple[Int32, Int32]:
-    """For each vertex, int32 (V,) twice: the vertex that it collapses onto, and the level at which it does.
+    """Return for each vertex, int32 (V,) twice: the vertex that it collapses onto, and the level at which it
+    does.
 
     The level is an index into tolerances (m, rising), or their number for a vertex that stays. points, poses,
     triangles: as in `DetailLevels`. Borders keep their course; vertices that share a position stay.
@@ -117,13 +118,13 @@ def simplify(
 
 
 def _without_flat(triangles: Int32) -> Int32:
-    """The triangles (F, 3) with three different corners."""
+    """Return the triangles (F, 3) with three different corners."""
     a, b, c = triangles.T
     return np.ascontiguousarray(triangles[(a != b) & (b != c) & (c != a)])
 
 
 def _share_positions(positions: Float64) -> Bool:
-    """bool (V,): whether another vertex has the same position, as along a seam, which would gape."""
+    """Return bool (V,): whether another vertex has the same position, as along a seam, which would gape."""
     rounded = np.ascontiguousarray(np.round(positions * 1e6).astype(np.int64))
     _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
     shared: Bool = counts[inverse.ravel()] > 1

@@ -59,7 +59,8 @@ class FacePicture:
         return _decode(self.data)
 
     def reduced(self, factor: int) -> UInt8:
-        """uint8 (h, w, 4): reduced by `factor` each way, as square roots of linear light, and alpha."""
+        """Return uint8 (h, w, 4): reduced by `factor` each way, as square roots of linear light, and
+        alpha."""
         if factor < 2 or len(self.data) < MIN_CACHED_BYTES:
             return _reduced(self.pixels, factor)
         width, height = (-(-across // factor) for across in self.size)
@@ -71,7 +72,7 @@ class FacePicture:
 
 
 def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture:
-    """The picture in the bytes of a PNG, JPEG or WebP file.
+    """Return the picture in the bytes of a PNG, JPEG or WebP file.
 
     Raises OSError, ValueError or SyntaxError if it cannot be read, LimitError if it has more pixels, or takes
     more memory for its bytes, than the limits allow.
@@ -79,7 +80,7 @@ def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture
     _check_size(data, limits)
 
     def measure() -> list[Int32]:
-        """Width, height, and 1 if it is opaque."""
+        """Return the width, height, and 1 if it is opaque."""
         pixels = _decode(data)
         height, width = pixels.shape[:2]
         return [np.array([width, height, (pixels[..., 3] == 255).all()], dtype=np.int32)]
@@ -132,7 +133,7 @@ def _prepare(image: Any) -> None:
 
 
 def _decode(data: bytes) -> UInt8:
-    """uint8 (H, W, 4): the pixels of a file, at most `MAX_PICTURE_SIZE` wide and high."""
+    """Return uint8 (H, W, 4): the pixels of a file, at most `MAX_PICTURE_SIZE` wide and high."""
     with _opened(data) as image:
         _prepare(image)
         if max(image.size) > MAX_PICTURE_SIZE:
@@ -155,17 +156,18 @@ def _reduced(pixels: UInt8, factor: int) -> UInt8:
 
 @cache
 def _roots() -> tuple[int, ...]:
-    """Table from sRGB codes to square roots of linear light, 0..255."""
+    """Return the table from sRGB codes to square roots of linear light, 0..255."""
     return tuple(int(v) for v in np.round(255 * np.sqrt(linear_light(np.arange(256) / 255))))
 
 
 def linear_light(srgb: Float64) -> Float64:
-    """Linear light of values in sRGB, both 0..1."""
+    """Return linear light of values in sRGB, both 0..1."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def texture_breadth(positions: Float32, texcoords: Float32, triangles: Int32) -> float:
-    """Metres that the whole width of a texture covers on a mesh (a median); 0 where it covers nothing."""
+    """Return the metres that the whole width of a texture covers on a mesh (a median); 0 where it covers
+    nothing."""
     if not len(triangles):
         return 0.0
     corners, flat = positions[triangles], texcoords[triangles]
@@ -177,7 +179,7 @@ def texture_breadth(positions: Float32, texcoords: Float32, triangles: Int32) ->
 
 
 def skin_relief() -> UInt8:
-    """uint8 (256, 256, 3): the fine relief of skin, three channels of repeating noise around 128.
+    """Return uint8 (256, 256, 3): the fine relief of skin, three channels of repeating noise around 128.
 
     From pores to the coarser grain seen from further away; always the same, stored in the disk cache.
     """

@@ -66,7 +66,8 @@ STROKES: dict[str, tuple[Stroke, ...]] = {
 
 
 def wrinkle_map() -> UInt8:
-    """uint8 (H, W, 4): the wrinkles, each in its own channel, around `PLAIN`; stored in the disk cache."""
+    """Return uint8 (H, W, 4): the wrinkles, each in its own channel, around `PLAIN`; stored in the disk
+    cache."""
     key = make_key("wrinkles", MAKING, TEXELS, EDGE, EDGE_BELOW, EDGE_BREADTH, FADE, repr(STROKES))
     (pixels,) = load_or_make(key, ((*SHAPE, len(WRINKLES)),), lambda: [_draw()], np.uint8)
     return pixels
@@ -87,7 +88,7 @@ def _draw() -> UInt8:
 
 
 def _stroke(across: Float64, up: Float64, points: Sequence[tuple[float, float]], width: float) -> Float64:
-    """(H, W), 0..1: a soft line through points, which thins out towards its ends."""
+    """Return (H, W), 0..1: a soft line through points, which thins out towards its ends."""
     line = _smooth(np.array(points))
     along = np.linspace(0, 1, len(line))
     strength = np.zeros(across.shape)
@@ -106,7 +107,7 @@ def _stroke(across: Float64, up: Float64, points: Sequence[tuple[float, float]],
 
 
 def _smooth(points: Float64) -> Float64:
-    """(N, 2): points on a Catmull-Rom curve through `points`, about two a texel."""
+    """Return (N, 2): points on a Catmull-Rom curve through `points`, about two a texel."""
     ends = np.vstack([2 * points[0] - points[1], points, 2 * points[-1] - points[-2]])
     pieces = []
     for a, b, c, d in zip(ends, ends[1:], ends[2:], ends[3:], strict=False):

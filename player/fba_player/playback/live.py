@@ -43,7 +43,7 @@ class Readable(Protocol):
     """A source of bytes: standard input's buffer, a FIFO, a socket's file."""
 
     def read1(self, size: int = -1, /) -> bytes:
-        """At most `size` bytes that have arrived; waits for at least one. b"" at the end."""
+        """Return at most `size` bytes that have arrived; waits for at least one. b"" at the end."""
 
 
 class LiveAnimation:
@@ -130,11 +130,12 @@ class LiveAnimation:
         return len(self._now.index)
 
     def snapshot(self) -> Animation:
-        """A copy of what has arrived so far. Raises ValueError before the first frame."""
+        """Return a copy of what has arrived so far. Raises ValueError before the first frame."""
         return self._now.animation(self.name)
 
     def info(self) -> StreamInfo:
-        """Planes that have arrived, their bits and the bit rate; without the list of parameters."""
+        """Return the planes that have arrived, their bits and the bit rate; without the list of
+        parameters."""
         now, size = self._now, self.received
         first, last = (int(now.index[0]), int(now.index[-1])) if len(now.index) else (0, -1)
         return StreamInfo(
@@ -177,7 +178,7 @@ class LiveAnimation:
         return True
 
     def wait_end(self, timeout: float | None = None) -> bool:
-        """Wait until the stream has ended. timeout: seconds; returns False after it."""
+        """Wait until the stream has ended. timeout: seconds; return False after it."""
         with self._changed:
             return self._changed.wait_for(lambda: not self.growing, timeout)
 
@@ -235,7 +236,8 @@ class LiveAnimation:
             self._changed.notify_all()
 
     def _is_marked(self, new: int) -> bool:
-        """Whether a mark is among what is held back. new: bytes at its end that were not searched yet."""
+        """Return whether a mark is among what is held back. new: bytes at its end that were not searched
+        yet."""
         assert self._held is not None
         begin = max(len(self._held) - new - MARK_BYTES, 0)
         return b"bap_steps=" in self._held[begin:] and marked_table(self._held) is not None

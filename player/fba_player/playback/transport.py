@@ -88,7 +88,7 @@ class Transport:
         return self.share_of(self.time)
 
     def share_of(self, time: float) -> float:
-        """A time as a share: 0 at the start, 1 at the last frame or after."""
+        """Return a time as a share: 0 at the start, 1 at the last frame or after."""
         duration = self._last_time() - self.start
         return min(max((time - self.start) / duration, 0.0), 1.0) if duration > 0 else 0.0
 
@@ -262,7 +262,7 @@ class Transport:
         self._motion = self._motion_from(clock(), here)
 
     def text(self) -> str:
-        """Time, frame and speed as text: "0:01.240 / 0:04.000   frame 31 / 99   1x"."""
+        """Return the time, frame and speed as text: "0:01.240 / 0:04.000 frame 31 / 99 1x"."""
         time = self.time
         parts = [
             f"{clock_text(time - self.start)} / {clock_text(self.duration)}",
@@ -278,7 +278,7 @@ class Transport:
         return f"frame {self.frame} / {self._timeline.frames - 1}"
 
     def timecode(self, time: float | None = None) -> str:
-        """The time code "h:mm:ss:ff" of a time, by default the current one.
+        """Return the time code "h:mm:ss:ff" of a time, by default the current one.
 
         It is that of the stream, if the stream carries time codes: the times of its frames follow them.
         Hours, minutes and seconds are those of the time itself at any rate; ff counts the frame periods that
@@ -290,7 +290,8 @@ class Transport:
         return float(self._timeline.time_of(self._timeline.frames - 1))
 
     def _stop(self) -> float:
-        """Time at which the last frame has been shown; in a live stream, the time of its last frame."""
+        """Return the time at which the last frame has been shown; in a live stream, the time of its last
+        frame."""
         return self._last_time() if self._timeline.growing else self.end
 
     def _low(self) -> float:

@@ -54,7 +54,7 @@ HEADROOM = 0.14
 
 
 def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HEADROOM) -> Extent:
-    """The extent of joints at positions (T, J, 3), metres, the root first, over T moments.
+    """Return the extent of joints at positions (T, J, 3), metres, the root first, over T moments.
 
     headroom: metres above the highest joint.
     """
@@ -96,6 +96,6 @@ def _head_above(positions: Float64, names: tuple[str, ...], headroom: float) -> 
 
 
 def _aside(low: Float64, high: Float64) -> Float64:
-    """The shift of the floor for a body that does not stand at the origin."""
+    """Return the shift of the floor for a body that does not stand at the origin."""
     middle = (low + high) / 2
     return np.array([middle[0], 0.0, middle[2]])

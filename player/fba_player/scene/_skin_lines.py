@@ -30,13 +30,13 @@ class SkinLine:
     shares: Float64
 
     def positions(self, vertices: Float32) -> Float64:
-        """float64 (N, 3): the line's points on moved vertices (V, 3)."""
+        """Return float64 (N, 3): the line's points on moved vertices (V, 3)."""
         positions: Float64 = np.einsum("nk,nkc->nc", self.shares, vertices[self.corners].astype(np.float64))
         return positions
 
 
 def skin_lines(model: FaceModel) -> list[SkinLine]:
-    """The lines of `skin_lines.csv` whose feature points lie on the skin."""
+    """Return the lines of `skin_lines.csv` whose feature points lie on the skin."""
     with (files(__package__) / "skin_lines.csv").open(encoding="utf-8") as file:
         rows = [(row["kind"], row["points"].split()) for row in csv.DictReader(file)]
     skin = _build_skin_graph(model)
@@ -66,7 +66,8 @@ class _SkinGraph:
     used: frozenset[int]
 
     def line(self, through: list[int]) -> tuple[Indices, Float64] | None:
-        """Corners (N, 3) and weights (N, 3) of a smooth line through vertices; None if unconnected."""
+        """Return the corners (N, 3) and weights (N, 3) of a smooth line through vertices; None if
+        unconnected."""
         from scipy.interpolate import CubicSpline
 
         knots = self.vertices[through]
@@ -94,7 +95,8 @@ class _SkinGraph:
         return np.array(corners, dtype=np.intp), np.array(shares)
 
     def _triangles_along(self, start: int, end: int) -> Indices | None:
-        """Triangles (F, 3) along the shortest path between two vertices; None if no path joins them."""
+        """Return the triangles (F, 3) along the shortest path between two vertices; None if no path joins
+        them."""
         from scipy.sparse.csgraph import dijkstra
 
         first, last = int(self.node[start]), int(self.node[end])
@@ -134,7 +136,8 @@ def _build_skin_graph(model: FaceModel) -> _SkinGraph:
 
 
 def _nearest(point: Float64, triangles: Float64) -> tuple[int, Float64]:
-    """Index of the triangle (F, 3, 3) nearest to a point, and the weights (3,) of its corners there."""
+    """Return the index of the triangle (F, 3, 3) nearest to a point, and the weights (3,) of its corners
+    there."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     ab, ac, ap = b - a, c - a, point - a
     d1, d2 = (ab * ap).sum(1), (ac * ap).sum(1)

@@ -121,7 +121,7 @@ class CompareScene(Timed[CompareTimeline]):
         return any(scene.has_body for scene in self.scenes)
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """A camera that has all figures in view; from now on they stand side by side as it sees them.
+        """Return a camera that has all figures in view; from now on they stand side by side as it sees them.
 
         preset: see `Scene.camera`.
         """
@@ -146,15 +146,15 @@ class CompareScene(Timed[CompareTimeline]):
         return camera.fit(self._all(subjects), aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """Offset of a following camera at a time, metres: the first scene's."""
+        """Return the offset of a following camera at a time, metres: the first scene's."""
         return self.scenes[0].travel(self.timeline.own_time(0, time))
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Way of the first scene's head from the start to a time, metres."""
+        """Return the way of the first scene's head from the start to a time, metres."""
         return self.scenes[0].head_travel(self.timeline.own_time(0, time))
 
     def view_at(self, time: float) -> View:
-        """Everything to be drawn at a time in seconds; ValueError if it is not finite."""
+        """Return everything to be drawn at a time in seconds; ValueError if it is not finite."""
         times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]
         if self._arrangement == "over":
             return self._over(times)
@@ -169,11 +169,11 @@ class CompareScene(Timed[CompareTimeline]):
         return join_views(views)
 
     def still(self, faps: Float32) -> View:
-        """The first scene alone for FAPs (68,)."""
+        """Return the first scene alone for FAPs (68,)."""
         return self.scenes[0].still(faps)
 
     def differences(self, second: int = 1) -> Differences:
-        """Performance `second` minus the first; cached until more of a performance arrives.
+        """Return the performance `second` minus the first; cached until more of a performance arrives.
 
         Raises ValueError if there is no such performance.
         """
@@ -199,12 +199,12 @@ class CompareScene(Timed[CompareTimeline]):
         return join_views(views)
 
     def _right(self) -> Float64:
-        """(3,): the picture's right, on the ground."""
+        """Return (3,): the picture's right, on the ground."""
         yaw = math.radians(self._yaw)
         return np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
 
     def _shift(self, number: int) -> Float64:
-        """(3,): the shift of a figure in the arrangement."""
+        """Return (3,): the shift of a figure in the arrangement."""
         if self._arrangement == "over":
             return self._height(number)
         widths = [self._half_width(scene) for scene in self.scenes]
@@ -215,7 +215,7 @@ class CompareScene(Timed[CompareTimeline]):
         return np.asarray(self._right() * along * APART + to_first + height)
 
     def _half_width(self, scene: Scene) -> float:
-        """Half the width that a figure takes: of a body its own, of heads that of the widest."""
+        """Return half the width that a figure takes: of a body its own, of heads that of the widest."""
         if self._apart is not None:
             return self._apart
         if scene.has_body:
@@ -224,7 +224,7 @@ class CompareScene(Timed[CompareTimeline]):
         return max(heads, SHOULDERS) if self.has_body else heads
 
     def _height(self, number: int) -> Float64:
-        """(3,): the shift that brings a head alone to the height of heads on bodies."""
+        """Return (3,): the shift that brings a head alone to the height of heads on bodies."""
         scene = self.scenes[number]
         with_body = next((one for one in self.scenes if one.has_body), None)
         if scene.has_body or with_body is None:
@@ -237,7 +237,7 @@ class CompareScene(Timed[CompareTimeline]):
         return np.asarray(np.array([x, y + head.half_height * ABOVE, z]) + self._shift(number))
 
     def _all(self, subjects: list[Subject]) -> Subject:
-        """One subject around all subjects in their places."""
+        """Return one subject around all subjects in their places."""
         right = self._right()
         centres = [np.array(one.centre) + self._shift(n) for n, one in enumerate(subjects)]
         along = [float(centre @ right) for centre in centres]

@@ -191,7 +191,8 @@ class MarkerEditing(HandEditing[MarkerMapping]):
         return made
 
     def _steady_markers(self) -> SteadyMarkers:
-        """The markers without the head's motion, which depends on what is mapped and what is fixed alone."""
+        """Return the markers without the head's motion, which depends on what is mapped and what is fixed
+        alone."""
         key = (tuple(self.mapping.markers), self.mapping.fixed)
         if self._steady is None or self._steady[0] != key:
             self._steady = (key, steady(self.motion, self.mapping, self.neutral))

@@ -61,7 +61,7 @@ class PlacementScene(Timed[Timeline]):
         self.switches.show(name, on)
 
     def view_at(self, time: float) -> View:
-        """The head and its points; at any time the same."""
+        """Return the head and its points; at any time the same."""
         if not math.isfinite(time):
             raise ValueError(f"a time must be finite, not {time}")
         hidden = self.placement.hidden
@@ -69,7 +69,7 @@ class PlacementScene(Timed[Timeline]):
         return View(faces=faces, extras=Extras(dots=self._dots()))
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """The camera of a preset, fitted to the head."""
+        """Return the camera of a preset, fitted to the head."""
         return Camera.preset("front" if preset in (None, "body") else str(preset), self._subject, aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
@@ -81,14 +81,14 @@ class PlacementScene(Timed[Timeline]):
         return 0.0, 0.0, 0.0
 
     def vertex_under(self, camera: Camera, x: float, y: float, size: tuple[int, int]) -> int | None:
-        """The vertex, by its number in the file, of what a pixel of a picture shows, or None."""
+        """Return the vertex, by its number in the file, of what a pixel of a picture shows, or None."""
         placement = self.placement
         shown = np.flatnonzero(~np.isin(placement.surface.part_of, list(placement.hidden)))
         hit = first_hit(*ray_through(camera, x, y, size), self._corners[shown])
         return None if hit is None else placement.nearest_corner(int(shown[hit[0]]), hit[1])
 
     def to_world(self, points: Float64) -> Float64:
-        """Points (N, 3) in the file's axes, in the world."""
+        """Return the points (N, 3) in the file's axes, in the world."""
         matrix = self._matrix
         world: Float64 = points @ matrix[:3, :3].T + matrix[:3, 3]
         return world
@@ -198,7 +198,7 @@ def plain_shape(part: Part) -> FaceShape:
 
 
 def _picture(part: Part) -> FacePicture | None:
-    """The part's texture, or None, with an FbaWarning if it cannot be read."""
+    """Return the part's texture, or None, with an FbaWarning if it cannot be read."""
     if part.material.texture is None:
         return None
     try:
@@ -213,7 +213,7 @@ def _picture(part: Part) -> FacePicture | None:
 
 
 def _stillness() -> Animation:
-    """One neutral frame: the window wants times."""
+    """Return one neutral frame: the window wants times."""
     return Animation(
         Fraction(25), np.zeros(1, np.int64), FaceTrack(np.zeros((1, 68), np.int32), np.zeros((1, 68), bool))
     )

@@ -74,7 +74,8 @@ class Viewpoint:
         return self._first_view if isinstance(self._first_view, Camera) else self.fit(self._first_view)
 
     def fit(self, preset: str | None) -> Camera:
-        """The camera of a preset, fitted above what is covered; None: the view that suits the content."""
+        """Return the camera of a preset, fitted above what is covered; None: the view that suits the
+        content."""
         free = 1.0 - min(max(self.covered, 0.0), 0.5)
         camera = self.scene.camera(preset, self.aspect / free)
         camera = camera.zoom(1 / free).pan(0.0, (free - 1) / 2)
@@ -116,11 +117,11 @@ class Viewpoint:
         self._preset = self._first_view if not isinstance(self._first_view, Camera) else ""
 
     def camera_without_panels(self, time: float) -> Camera:
-        """The camera at a time in seconds, for a picture without panels at the sides."""
+        """Return the camera at a time in seconds, for a picture without panels at the sides."""
         return self._follow_travel(self.camera, time, 1.0) if self.follow else self.camera
 
     def camera_at(self, time: float) -> Camera:
-        """The camera at a time in seconds, with the figure between the panels at the sides."""
+        """Return the camera at a time in seconds, with the figure between the panels at the sides."""
         shift, further = self._shift_now()
         if (shift, further) == NOT_SHIFTED:
             return self.camera_without_panels(time)
@@ -135,7 +136,8 @@ class Viewpoint:
         self.follow = not self.follow
 
     def _progress(self, until: float) -> float:
-        """Progress, 0 to 1, of a glide that ends at a reading of the clock; it starts and ends slowly."""
+        """Return the progress, 0 to 1, of a glide that ends at a reading of the clock; it starts and ends
+        slowly."""
         return float(smoothstep(1.0 - (until - self._clock()) / GLIDE))
 
     def _shift_now(self) -> tuple[float, float]:
@@ -147,7 +149,7 @@ class Viewpoint:
         return (a, b) if share < 1.0 else self._shift
 
     def _shift_between(self, left: float, right: float) -> tuple[float, float]:
-        """Shift of the middle as a share of the width, and factor on the camera's distance."""
+        """Return the shift of the middle as a share of the width, and factor on the camera's distance."""
         free = max(1.0 - left - right, MIN_FREE_WIDTH)
         if self._preset == "" or free >= 1.0:
             return (left - right) / 2, 1.0

@@ -100,7 +100,7 @@ class Controls:
         viewpoint.camera = viewpoint.camera.zoom(ZOOM_STEP ** max(min(steps, 10.0), -10.0))
 
     def bar(self) -> tuple[float, float]:
-        """Left and right end of the plain timeline, in pixels."""
+        """Return left and right end of the plain timeline, in pixels."""
         margin = BAR_MARGIN * self.session.scale
         return margin, max(self.session.size[0] - margin, margin + 1)
 

@@ -146,7 +146,7 @@ class Session:
         self._notices.append(Notice(text, kind, self.clock() + seconds, about))
 
     def notices(self) -> list[Notice]:
-        """The current notices, oldest first."""
+        """Return the current notices, oldest first."""
         now = self.clock()
         self._notices = [one for one in self._notices if one.until > now]
         return list(self._notices)
@@ -223,7 +223,7 @@ class Session:
             self.audio.offset = self.sound_offset
 
     def view(self, time: float) -> View:
-        """What is drawn at a time in seconds, after the hooks of `before_frame`."""
+        """Return what is drawn at a time in seconds, after the hooks of `before_frame`."""
         scene = self.scene
         if not self.before_frame or not isinstance(scene, Scene):
             return scene.view_at(time)
@@ -239,15 +239,15 @@ class Session:
             self.scene.view = "figure" if self.scene.view == "points" else "points"
 
     def switch_key(self, switch: Switch) -> str:
-        """The key of a switch; "" if it has none, or the window uses that key for something else."""
+        """Return the key of a switch; "" if it has none, or the window uses that key for something else."""
         return "" if switch.key.lower() in by_name() else switch.key
 
     def switch_keys(self) -> list[tuple[str, str]]:
-        """(key, label) of all switches that have a key."""
+        """Return (key, label) of all switches that have a key."""
         return [(self.switch_key(one), one.label) for one in SWITCHES.values() if self.switch_key(one)]
 
     def press_switch(self, key: str) -> bool:
-        """Turn the switch with this key to its next value; returns False without one."""
+        """Turn the switch with this key to its next value; return False without one."""
         for name, switch in SWITCHES.items():
             if self.switch_key(switch).lower() == key:
                 self.touched()
@@ -257,5 +257,5 @@ class Session:
         return False
 
     def camera(self, time: float) -> Camera:
-        """The camera at a time in seconds."""
+        """Return the camera at a time in seconds."""
         return self.viewpoint.camera_at(time)

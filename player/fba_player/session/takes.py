@@ -26,7 +26,7 @@ ALWAYS = slice(180, 186)
 
 
 def take_rate(rate: Fraction) -> Fraction:
-    """The frame rate of a take over an animation with this rate."""
+    """Return the frame rate of a take over an animation with this rate."""
     return rate if RATES[0] <= rate <= RATES[1] else RATE
 
 
@@ -72,7 +72,7 @@ class TakeRecorder:
         self.seconds = seconds
 
     def take(self, name: str = "take") -> Animation:
-        """The recording as an animation. Raises ValueError if nothing was recorded.
+        """Return the recording as an animation. Raises ValueError if nothing was recorded.
 
         All FAPs are sent in every frame, because a face fills in those that are not sent. BAPs are 0 unless
         sent, so only those that ever moved are.
@@ -118,7 +118,8 @@ class Takes:
         return self._takes.pop() if self._takes else None
 
     def path(self, name: str) -> Path:
-        """The path for a name: in the folder, with the suffix .fba. Raises FormatError for an empty name."""
+        """Return the path for a name: in the folder, with the suffix .fba. Raises FormatError for an empty
+        name."""
         name = name.strip()
         if not name or name.endswith(("/", os.sep)) or name in (".", ".."):
             raise FormatError("is not a file name; give one, such as take.fba", path=name or "take")
@@ -126,14 +127,14 @@ class Takes:
         return path if path.suffix.lower() == ".fba" else path.with_name(path.name + ".fba")
 
     def free_name(self, name: str = "take") -> str:
-        """`name`, or `name-2` and so on: the first that no file has yet."""
+        """Return `name`, or `name-2` and so on: the first that no file has yet."""
         number, free = 2, name
         while self.path(free).exists():
             free, number = f"{name}-{number}", number + 1
         return free
 
     def save(self, name: str, *, bap_steps: str = "iso") -> tuple[Path, str]:
-        """Write the last take; returns its path, and the table of BAP steps that readers need.
+        """Write the last take; return its path, and the table of BAP steps that readers need.
 
         If the steps of the standard ("iso") cannot code a turn of a joint, "visage" are used. Raises
         FormatError if a file of that name exists, nothing was recorded or the file cannot be written,

@@ -45,7 +45,7 @@ class SoundMixer:
         self._tail: Float32 = np.zeros((0, 2), dtype=np.float32)  # what is left of the fading end
 
     def fill(self, clock: float, count: int) -> Int16:
-        """Samples int16 (count, 2); the first is heard at this reading of the clock."""
+        """Return the samples int16 (count, 2); the first is heard at this reading of the clock."""
         motion, rate = self._motion(), self._rate
         mixed = np.zeros((count, 2), dtype=np.float32)
         done = 0
@@ -87,7 +87,7 @@ class SoundMixer:
         return samples
 
     def _read_at_speed(self, first: float, speed: float, count: int) -> Float32:
-        """Samples float32 (count, 2) of the file from `first` on, resampled by `speed`."""
+        """Return the samples float32 (count, 2) of the file from `first` on, resampled by `speed`."""
         if speed == 1.0:
             return self._take(round(first), count).astype(np.float32)
         low = math.floor(first)

@@ -54,7 +54,7 @@ class SoundBlocks:
         self._thread.start()
 
     def take(self, start: int, count: int) -> Int16:
-        """Samples int16 (count, 2); zeros outside of the file, and where it is not decoded yet."""
+        """Return the samples int16 (count, 2); zeros outside of the file, and where it is not decoded yet."""
         taken = np.zeros((count, CHANNELS), dtype=np.int16)
         for number in range(max(start, 0) // self._size, (start + count - 1) // self._size + 1):
             block = self._blocks.get(number)
@@ -66,7 +66,7 @@ class SoundBlocks:
         return taken
 
     def load(self) -> bool:
-        """Decode the most urgent block that is not in memory; returns False where all wanted ones are."""
+        """Decode the most urgent block that is not in memory; return False where all wanted ones are."""
         for sample in self._wanted():
             number = sample // self._size
             if number < 0:

@@ -124,7 +124,7 @@ class Audio:
         self.close()
 
     def _device_samples(self) -> Generator[bytes, int, None]:
-        """Samples for the device as bytes; runs in its thread."""
+        """Yield the samples for the device as bytes; runs in its thread."""
         samples = yield b""
         while True:
             first = self.clock.take(samples)
@@ -158,7 +158,7 @@ class SoundClock:
         self._last = -latency
 
     def __call__(self) -> float:
-        """Seconds; 0 when the first sample is heard, before that negative."""
+        """Return the seconds; 0 when the first sample is heard, before that negative."""
         ahead = self._ahead
         if ahead is not None:
             self._last = max(self._last, self._monotonic() + ahead)

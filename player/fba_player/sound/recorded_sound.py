@@ -71,7 +71,8 @@ class FilmSound:
         self._ended = True
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """The next samples, at most as many as are mixed, as `av.AudioFrame`s ("fltp") without times."""
+        """Yield the next samples, at most as many as are mixed, as `av.AudioFrame`s ("fltp") without
+        times."""
         while samples > 0:
             with self._lock:
                 part = self._mixed.popleft() if self._mixed else None
@@ -92,7 +93,7 @@ class FilmSound:
         self._file.close()
 
     def _take(self, start: int, count: int) -> Int16:
-        """Samples int16 (count, 2) of the file; zeros outside."""
+        """Return the samples int16 (count, 2) of the file; zeros outside."""
         taken = np.zeros((count, CHANNELS), dtype=np.int16)
         first = min(max(-start, 0), count)
         samples = self._file.read(start + first, count - first)

@@ -52,7 +52,7 @@ class Bar:
         return bool(self._held)
 
     def height(self, display: tuple[float, float]) -> float:
-        """Height of the bar in points, in a display of this size."""
+        """Return the height of the bar in points, in a display of this size."""
         return HEIGHT if display[1] >= 260 and display[0] >= 330 else LOW_HEIGHT
 
     def draw(self, session: Session, display: tuple[float, float]) -> None:
@@ -222,7 +222,7 @@ class Bar:
 
 
 def _ticks(ruler: Ruler) -> tuple[list[float], list[tuple[float, float, str]]]:
-    """x of the small ticks; and (x, left edge of the label, label) of the large ones."""
+    """Return x of the small ticks; and (x, left edge of the label, label) of the large ones."""
     step = ruler.step(APART)
     large = []
     for time in ruler.ticks(step):
@@ -233,7 +233,7 @@ def _ticks(ruler: Ruler) -> tuple[list[float], list[tuple[float, float, str]]]:
 
 
 def _span(session: Session) -> tuple[float, float]:
-    """Times of the first and the last frame."""
+    """Return the times of the first and the last frame."""
     timeline = session.scene.timeline
     start = float(timeline.start)
     return start, max(float(timeline.time_of(timeline.frames - 1)), start)

@@ -55,7 +55,8 @@ class Docks:
             self._arranged = ((), {})
 
     def arrange(self, requests: list[DockRequest], wide: float, top: float, high: float) -> dict[str, Dock]:
-        """Positions of panels by name, in a display `wide` points wide with `high` free points from `top` on.
+        """Return the positions of panels by name, in a display `wide` points wide with `high` free points
+        from `top` on.
 
         Panels whose title has no room are left out.
         """
@@ -112,7 +113,7 @@ class Docks:
 
 
 def free_middle(docks: Iterable[Dock], wide: float) -> tuple[float, float]:
-    """Shares of the width that the columns cover at the left and at the right."""
+    """Return the shares of the width that the columns cover at the left and at the right."""
     left = right = 0.0
     for dock in docks:
         if dock.left <= EDGE:
@@ -123,7 +124,7 @@ def free_middle(docks: Iterable[Dock], wide: float) -> tuple[float, float]:
 
 
 def _side(request: DockRequest, columns: dict[str, list[DockRequest]], high: float) -> str:
-    """The side for a new panel: its own if all fit there, else the other if they do, else the emptier.
+    """Return the side for a new panel: its own if all fit there, else the other if they do, else the emptier.
 
     All fit with the heights that they ask for if possible, else with their least heights.
     """
@@ -149,7 +150,8 @@ def _gaps(column: list[DockRequest], folded: set[str]) -> float:
 
 
 def _share_height(least: list[float], most: list[float], room: float) -> list[float]:
-    """Heights from `least` to `most`; the room beyond the least is shared in proportion to the difference."""
+    """Return the heights from `least` to `most`; the room beyond the least is shared in proportion to the
+    difference."""
     least = [min(low, high) for low, high in zip(least, most, strict=True)]
     missing = sum(most) - sum(least)
     spare = min(max(room - sum(least), 0.0), missing)

@@ -24,7 +24,7 @@ MIN_NAME_WIDTH = 560.0
 
 
 def draw_recording(session: Session) -> float:
-    """Draw "REC" and the time in the upper left corner during a recording; returns its width in points."""
+    """Draw "REC" and the time in the upper left corner during a recording; return its width in points."""
     if session.recording is None:
         return 0.0
     to = imgui.get_background_draw_list()
@@ -57,7 +57,7 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
 
 
 def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
-    """Draw a button for each panel, or one for all, in the upper right corner; returns their left edge."""
+    """Draw a button for each panel, or one for all, in the upper right corner; return their left edge."""
     if display[0] < 130 or display[1] < 200:
         return display[0]
     labels = [panel.label for panel in panels]

@@ -80,7 +80,7 @@ class PanelWindows:
             session.open.discard(panel.name)
 
     def _window(self, panel: Panel, session: Session, flags: int, *, folded: bool) -> bool:
-        """Draw the window of a panel; returns False if the user closed it."""
+        """Draw the window of a panel; return False if the user closed it."""
         imgui.push_style_var(imgui.StyleVar_.window_min_size, (32, 1))
         expanded, stays_open = imgui.begin(f"{panel.title}###{panel.name}", True, flags)
         imgui.pop_style_var()
@@ -114,7 +114,7 @@ class PanelWindows:
 
     @staticmethod
     def _holds_title() -> bool:
-        """Whether the mouse is pressed on the title of the window that is being drawn."""
+        """Return whether the mouse is pressed on the title of the window that is being drawn."""
         x, y = imgui.get_window_pos()
         start_x, start_y = imgui.get_mouse_pos() - imgui.get_mouse_drag_delta(0)
         on_title = y <= start_y <= y + imgui.get_frame_height()

@@ -75,7 +75,7 @@ class Overlay:
 
 
 def bar_picture(controls: Controls) -> Image:
-    """A picture of the bar at the bottom: the timeline, and below it the status text."""
+    """Return a picture of the bar at the bottom: the timeline, and below it the status text."""
     from PIL import Image, ImageDraw
 
     session = controls.session
@@ -104,7 +104,7 @@ def bar_picture(controls: Controls) -> Image:
 
 
 def help_picture(scale: float) -> Image:
-    """A picture of the help: two columns of keys."""
+    """Return a picture of the help: two columns of keys."""
     from PIL import Image, ImageDraw
 
     rows = [row for row in keys() if not row.action.startswith("panel") or row.action == "panel help"]

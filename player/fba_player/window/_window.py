@@ -251,7 +251,7 @@ class Window:
         return int(width), int(height)
 
     def _scale(self) -> float:
-        """Pixels per point: 1 on normal displays, 2 on high-resolution ones."""
+        """Return the pixels per point: 1 on normal displays, 2 on high-resolution ones."""
         return min(max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5), 8.0)
 
     def _draw_checked(self, size: tuple[int, int]) -> None:

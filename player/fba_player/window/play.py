@@ -53,7 +53,7 @@ def play(
     panels: tuple[str, ...] = (),
     newest: Newest | None = None,
 ) -> tuple[Path, ...]:
-    """Play an animation in a window; returns when it is closed, with the files dropped onto it.
+    """Play an animation in a window; return when it is closed, with the files dropped onto it.
 
     Those files can be read, and the user wants to see them next.
 
@@ -100,7 +100,7 @@ def play(
 
 
 def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
-    """Add a sound to the session; returns None, with a notice, if there is no sound device."""
+    """Add a sound to the session; return None, with a notice, if there is no sound device."""
     from fba_player.sound.player import open_audio
 
     session.audio = open_audio(path, session.transport, offset=offset)

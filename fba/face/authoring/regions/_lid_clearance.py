@@ -51,20 +51,22 @@ class Profile:
     nearby: Float64
 
     def radius(self, points: Float64, *, around: bool) -> Float64:
-        """(N,) metres: radius of the eyeball in the directions of points (N, 3), or its largest nearby."""
+        """Return (N,) metres: radius of the eyeball in the directions of points (N, 3), or its largest
+        nearby."""
         angle, _ = _polar(points, self.centre, self.gaze)
         result: Float64 = np.interp(angle, ANGLES, self.nearby if around else self.straight)
         return result
 
     def is_outside(self, points: Float64, share: float = 1.0) -> Bool:
-        """(N,) mask of points (N, 3) outside the eyeball. share: of its radius that counts as its surface."""
+        """Return (N,) mask of points (N, 3) outside the eyeball. share: of its radius that counts as its
+        surface."""
         reach = np.linalg.norm(points - self.centre, axis=1)
         return np.asarray(reach >= share * self.radius(points, around=False))
 
     def lift(
         self, points: Float64, shifts: Float64, *, edges: bool = True, always: Bool | None = None
     ) -> Float64:
-        """(N, 3) forward shifts to add so that points that were outside the eyeball stay outside.
+        """Return (N, 3) forward shifts to add so that points that were outside the eyeball stay outside.
 
         edges: leave room for the edges between vertices, whose middles dip. always: (N,) mask of points that
         count as outside.
@@ -80,7 +82,7 @@ class Profile:
         return result
 
     def shortfall(self, points: Float64, *, edges: bool = True) -> Float64:
-        """(N,) metres by which points (N, 3) are too far back for a moved lid; 0 behind the centre.
+        """Return (N,) metres by which points (N, 3) are too far back for a moved lid; 0 behind the centre.
 
         edges: leave room for the edges between vertices.
         """
@@ -92,7 +94,7 @@ class Profile:
 
 
 def measure_profile(eye: Eye, parts: Sequence[Part], edge: float) -> Profile:
-    """The profile of an eye's parts. edge: typical length of the lids' edges, metres."""
+    """Return the profile of an eye's parts. edge: typical length of the lids' edges, metres."""
     straight = np.full(len(ANGLES), 0.0)
     nearby = np.full(len(ANGLES), eye.radius)
     for part in parts:
@@ -109,14 +111,14 @@ def measure_profile(eye: Eye, parts: Sequence[Part], edge: float) -> Profile:
 
 
 def _polar(points: Float64, centre: Float64, axis: Float64) -> tuple[Float64, Float64]:
-    """(angles (N,) from an axis, distances (N,) from a centre) of points (N, 3)."""
+    """Return (angles (N,) from an axis, distances (N,) from a centre) of points (N, 3)."""
     arms = points - centre
     distance = np.linalg.norm(arms, axis=1)
     return np.arccos(np.clip(arms @ axis / np.maximum(distance, 1e-12), -1, 1)), distance
 
 
 def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
-    """A typical length of the longer edges at the margins of an eye, metres."""
+    """Return a typical length of the longer edges at the margins of an eye, metres."""
     surface = marks.surface
     at_margin = surface.mask(np.concatenate([own, other]))
     edges = surface.vertices[surface.edges[at_margin[surface.edges].any(axis=1)]]
@@ -126,7 +128,7 @@ def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
 def push_vertices_outside(
     profile: Profile, points: Float64, shifts: Float64, values: Float64, margins: Bool | None = None
 ) -> Float64:
-    """Shifts (K, N, 3) corrected so that no vertex cuts the eyeball, increasingly along the way.
+    """Return the shifts (K, N, 3) corrected so that no vertex cuts the eyeball, increasingly along the way.
 
     margins: (N,) mask of the vertices of both lids' margins where these must meet also if the eyeball is so
     large that some lie in it. They are kept outside on the way, and end on the other margin where it is.
@@ -147,7 +149,7 @@ def push_vertices_outside(
 def push_edges_outside(
     profile: Profile, surface: Surface, vertices: Intp, shifts: Float64, margins: Bool, values: Float64
 ) -> Float64:
-    """Shifts (K, N, 3) with vertices moved forwards where their edges would cut the eyeball."""
+    """Return the shifts (K, N, 3) with vertices moved forwards where their edges would cut the eyeball."""
     # a lid's inner side may run into the eyeball where nobody sees it
     in_front = surface.mask(vertices) & profile.is_outside(surface.vertices)
     edges = surface.edges[in_front[surface.edges].all(axis=1)]

@@ -34,7 +34,8 @@ SAMPLES = 12
 def painted_width(
     marks: Landmarks, opening: Opening, eye: Eye, lid: str, parts: Sequence[Part], crease: float
 ) -> float:
-    """Distance from a lid's margin along the skin, metres, up to which it is painted dark; 0 without paint.
+    """Return the distance from a lid's margin along the skin, metres, up to which it is painted dark; 0
+    without paint.
 
     crease: distance of the lid's crease from the margin, metres. The colour is that of the skin's texture and
     of its vertices; a picture that cannot be read is taken for plain.
@@ -63,7 +64,7 @@ def _median(values: Float64) -> float:
 def _samples(
     marks: Landmarks, opening: Opening, eye: Eye, lid: str, parts: Sequence[Part], reach: float
 ) -> tuple[Float64, Float64, Float64]:
-    """Distance from the margin (M,), x (M,) and brightness (M,) of points on a lid's outside."""
+    """Return the distance from the margin (M,), x (M,) and brightness (M,) of points on a lid's outside."""
     surface = marks.surface
     far = surface.distances(marks.contour(f"{eye.side} {lid} lid"), reach)
     margin = opening.upper if lid == "upper" else opening.lower
@@ -93,7 +94,7 @@ def _samples(
 
 
 def _barycentric() -> Float64:
-    """(S, 3) weights of a triangle's corners at points spread over it."""
+    """Return (S, 3) weights of a triangle's corners at points spread over it."""
     first, second = np.meshgrid(np.arange(SAMPLES), np.arange(SAMPLES))
     inside = first + second < SAMPLES
     a, b = (first[inside] + 1 / 3) / SAMPLES, (second[inside] + 1 / 3) / SAMPLES
@@ -101,7 +102,7 @@ def _barycentric() -> Float64:
 
 
 def _brightness(part: Part, triangles: Integer, weights: Float64) -> Float64:
-    """(F * S,) brightness of points on a part's triangles, 1 where it is plain white."""
+    """Return (F * S,) brightness of points on a part's triangles, 1 where it is plain white."""
     bright = np.ones(len(triangles) * len(weights))
     if part.colours is not None:
         light = np.einsum("sc,fc->fs", weights, part.colours[triangles, :3] @ LUMINANCE).reshape(-1)

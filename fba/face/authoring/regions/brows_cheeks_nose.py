@@ -68,7 +68,7 @@ class Handle:
 
 @cache
 def regions() -> dict[str, Region]:
-    """The regions by name."""
+    """Return the regions by name."""
     return {
         row["region"]: Region(
             row["region"],
@@ -87,7 +87,7 @@ def regions() -> dict[str, Region]:
 
 @cache
 def handles() -> tuple[Handle, ...]:
-    """The handles of all FAPs, right mates included."""
+    """Return the handles of all FAPs, right mates included."""
     result = []
     mirror = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
     for row in _rows("handles.csv"):
@@ -102,7 +102,7 @@ def handles() -> tuple[Handle, ...]:
 
 
 def brow_cheek_nose_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
-    """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
+    """Return (motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
     lost = {handle.fap: reason for handle in handles() if (reason := marks.missing_point(handle.fap))}
     motions: dict[int, Motion] = {}
     for area in regions().values():
@@ -115,7 +115,8 @@ def brow_cheek_nose_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[in
 
 
 def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64, Bool]:
-    """((N, H) share of each handle's motion at each vertex, (N,) mask of vertices whose share is given)."""
+    """Return ((N, H) share of each handle's motion at each vertex, (N,) mask of vertices whose share is
+    given)."""
     surface, es = marks.surface, marks.fapu.ES * 1024
     points = [name for name in area.points if marks.has(name)]
     pulled = marks.vertices_of(points)

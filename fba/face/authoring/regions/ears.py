@@ -39,7 +39,7 @@ HEM = 0.006
 
 
 def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
-    """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
+    """Return (motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
     motions: dict[int, Motion] = {}
     lost: dict[int, str] = {}
     for fap, side in (RAISE | PULL).items():
@@ -55,7 +55,7 @@ def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
 
 
 def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
-    """(N,) share of the ear's motion at each vertex."""
+    """Return (N,) share of the ear's motion at each vertex."""
     names = EARS[side]
     surface = marks.surface
     top, back, lobe, below, above = (marks.point_or_average(name) for name in names.values())
@@ -78,6 +78,6 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
 
 
 def _rim(marks: Landmarks, names: dict[str, str]) -> Intp:
-    """Vertices around the ear, from its upper end at the face over the back to the lobe."""
+    """Return the vertices around the ear, from its upper end at the face over the back to the lobe."""
     known = marks.vertices_of(names[key] for key in ("top", "back", "lobe"))
     return np.unique(np.concatenate([known, *(marks.surface.path(a, b) for a, b in pairwise(known))]))

@@ -66,7 +66,7 @@ class Jaw:
 
 
 def find_jaw(marks: Landmarks) -> Jaw | str:
-    """The jaw of a face, or the reason why it has none."""
+    """Return the jaw of a face, or the reason why it has none."""
     if reason := marks.missing_point(OPEN_JAW):
         return reason
     ears = np.array([marks.point_or_average(name) for name in EARS])
@@ -79,7 +79,7 @@ def find_jaw(marks: Landmarks) -> Jaw | str:
 
 
 def opening_angles(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
-    """(values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
+    """Return (values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
     low, high = fap_limits(OPEN_JAW)
     fine = np.linspace(0, MAX_OPENING, 400)
     sunk = -opening_shifts(jaw.chin[None], jaw, fine)[:, 0, 1]
@@ -96,7 +96,7 @@ def opening_angles(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
 
 
 def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
-    """(K, N, 3) shifts of points (N, 3), metres, when the jaw opens by angles (K,), radians.
+    """Return (K, N, 3) shifts of points (N, 3), metres, when the jaw opens by angles (K,), radians.
 
     The jaw turns about the hinge, +z down, while the hinge itself slides forwards and a little down, as the
     joint of a human jaw does.
@@ -109,7 +109,7 @@ def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
 
 
 def bite_height(marks: Landmarks) -> float:
-    """Height (y, metres) at which upper and lower teeth meet."""
+    """Return the height (y, metres) at which upper and lower teeth meet."""
     known: list[float] = []
     for pair in (("9.10", "9.11"), ("2.2", "2.3")):
         known = known or [height for name in pair if np.isfinite(height := marks.point(name)[1])]
@@ -117,7 +117,7 @@ def bite_height(marks: Landmarks) -> float:
 
 
 def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
-    """(N,) metres below the plane through the hinge and the teeth's edge."""
+    """Return (N,) metres below the plane through the hinge and the teeth's edge."""
     front = marks.point_or_average("9.10")
     reach = max(front[2] - hinge[1], 1e-6)
     ahead = np.clip((points[:, 2] - hinge[1]) / reach, 0.2, None)
@@ -127,7 +127,7 @@ def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
 
 
 def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
-    """(V,) share of the jaw's turn at each vertex of a part inside the mouth.
+    """Return (V,) share of the jaw's turn at each vertex of a part inside the mouth.
 
     A connected piece on one side of the teeth's edge moves as one, as teeth do not bend.
     """
@@ -174,7 +174,7 @@ def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
 
 
 def _share(marks: Landmarks, hinge: Float64) -> Float64:
-    """(N,) share of the opening at each vertex of the surface."""
+    """Return (N,) share of the opening at each vertex of the surface."""
     surface, es = marks.surface, marks.fapu.ES * 1024
     line = marks.contour("jaw line")
     values: dict[int, float] = {}
@@ -206,7 +206,8 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
 
 
 def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
-    """(M,) shares along the jaw line: 1 between the corners of the chin, less towards those of the jaw."""
+    """Return (M,) shares along the jaw line: 1 between the corners of the chin, less towards those of the
+    jaw."""
     chin = np.flatnonzero(np.isin(line, marks.vertices_of(CHIN)))
     steps = np.linalg.norm(np.diff(marks.surface.vertices[line], axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(steps)])
@@ -217,7 +218,7 @@ def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
 
 
 def _with_lip(marks: Landmarks, share: Float64) -> Float64:
-    """(N,) shares of a sliding jaw's motion: half on the lower lip, none on the upper one."""
+    """Return (N,) shares of a sliding jaw's motion: half on the lower lip, none on the upper one."""
     upper = marks.on_contours("upper outer lip", "upper inner lip")
     lower = marks.on_contours("lower outer lip", "lower inner lip") & ~upper
     if not lower.any():
@@ -236,7 +237,7 @@ def _with_lip(marks: Landmarks, share: Float64) -> Float64:
 
 
 def _from_corners(marks: Landmarks, vertices: Intp) -> Float64:
-    """(M,) 0 about the corners of the mouth, where the lips touch, 1 in its middle."""
+    """Return (M,) 0 about the corners of the mouth, where the lips touch, 1 in its middle."""
     x = marks.surface.vertices[vertices, 0]
     left, right = marks.point_or_average("2.4")[0], marks.point_or_average("2.5")[0]
     across = (x - right) / (left - right)

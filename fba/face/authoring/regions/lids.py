@@ -88,7 +88,7 @@ def lid_motion(
     parts: Sequence[Part],
     sculpted: Float64 | None = None,
 ) -> Motion | str:
-    """The motion of the surface for a lid's FAP, or the reason why it cannot be made.
+    """Return the motion of the surface for a lid's FAP, or the reason why it cannot be made.
 
     sculpted: (N, 3) displacements of the surface by which somebody closed this eye, metres: then each vertex
     makes the share of the margin's way that it makes there, and folds that are in it are no reason to stop.
@@ -145,7 +145,8 @@ def lid_motion(
 
 
 def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift: Float64) -> Float64 | None:
-    """(N,) share of the margin's motion at each vertex in a shape; None where that moves this lid little.
+    """Return (N,) share of the margin's motion at each vertex in a shape; None where that moves this lid
+    little.
 
     shift: (N, 3) displacements of the surface by the shape, metres.
     """
@@ -175,7 +176,7 @@ def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift
 
 
 def _folded_vertices(limiter: Limiter, shift: Float64) -> Intp:
-    """Vertices of the triangles that a shape folds. shift: (N, 3)."""
+    """Return the vertices of the triangles that a shape folds. shift: (N, 3)."""
     patch = limiter.patch(np.flatnonzero(np.abs(shift).max(axis=1) > 0))
     if not len(patch.triangles):
         return np.zeros(0, dtype=np.intp)
@@ -183,7 +184,7 @@ def _folded_vertices(limiter: Limiter, shift: Float64) -> Intp:
 
 
 def lid_values(fap: int) -> Float64:
-    """(K,) rising borders over the FAP's range, extended to where the lid meets the other one."""
+    """Return (K,) rising borders over the FAP's range, extended to where the lid meets the other one."""
     low, high = fap_limits(fap)
     high = max(high, float(CLOSED))
     between = np.arange(np.ceil(low / STEP) * STEP, high + 1, STEP)
@@ -203,7 +204,7 @@ def _share(
     other: Intp,
     parts: Sequence[Part],
 ) -> Float64:
-    """(N,) share of the margin's motion at each vertex of a column.
+    """Return (N,) share of the margin's motion at each vertex of a column.
 
     1 on the lid's edge, a quarter at the crease, 0 well before the brow; towards the corners, where the
     crease is closer, within a shorter distance. parts: of the face; what is painted on their skin widens the
@@ -242,7 +243,8 @@ def _share(
 
 
 def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: float) -> Float64:
-    """(N,) share by which the front edge of a lid must move further than the margin to meet the other's.
+    """Return (N,) share by which the front edge of a lid must move further than the margin to meet the
+    other's.
 
     The margin lies on the eyeball; the front edge before it is further away from the other lid.
     """
@@ -256,7 +258,7 @@ def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: flo
 
 
 def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, skin: Motion) -> Motion:
-    """The motion of a part's lashes for a lid's FAP: each vertex turns as its root on the margin does.
+    """Return the motion of a part's lashes for a lid's FAP: each vertex turns as its root on the margin does.
 
     skin: the motion of the surface for that FAP.
     """
@@ -289,7 +291,7 @@ def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, skin: Motion) 
 
 
 def _moving_range(skin: Motion) -> tuple[float, float]:
-    """(lowest, highest) value at which a motion still goes on."""
+    """Return (lowest, highest) value at which a motion still goes on."""
     moved = np.abs(np.diff(skin.shifts, axis=0)).max(axis=(1, 2)) > 0
     used = np.flatnonzero(moved)
     return (float(skin.values[used[0]]), float(skin.values[used[-1] + 1])) if len(used) else (0.0, 0.0)

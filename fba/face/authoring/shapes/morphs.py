@@ -64,7 +64,8 @@ def from_morphs(
     fit: InterpolationTable | None = None,
     notes: Mapping[str, str] | None = None,
 ) -> FaceModel:
-    """A face whose tables are made from named shapes where they suffice, otherwise from the mesh alone.
+    """Return a face whose tables are made from named shapes where they suffice, otherwise from the mesh
+    alone.
 
     parts, points, bound, name, definitions, fit, notes: as `author`. morphs: displacements float32
     (V, 3), metres, at weight 1, by the name of the shape and of the part; shapes are named as ARKit's
@@ -78,7 +79,8 @@ def from_morphs(
 
 
 def add_shapes(base: FaceModel, morphs: Morphs) -> FaceModel:
-    """A face that `author` made, with tables from named shapes where they suffice; as `from_morphs`."""
+    """Return a face that `author` made, with tables from named shapes where they suffice; as
+    `from_morphs`."""
     moving = {
         shape: moved
         for shape, moved in morphs.items()
@@ -108,7 +110,7 @@ def add_shapes(base: FaceModel, morphs: Morphs) -> FaceModel:
 
 
 def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
-    """The face with tables from ARKit's shapes."""
+    """Return the face with tables from ARKit's shapes."""
     mixer = Mixer(base, shapes)
     tables: dict[int, FaceDefTables] = dict(base.table_of)
     used: set[str] = set()
@@ -140,7 +142,7 @@ def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
 
 
 def _from_faps(base: FaceModel, shapes: Shapes, by_fap: Mapping[int, str]) -> FaceModel:
-    """The face with tables from shapes that show one FAP each, at its value in `morph_values`."""
+    """Return the face with tables from shapes that show one FAP each, at its value in `morph_values`."""
     from fba.face.gltf.morphs import morph_values
 
     tables: dict[int, FaceDefTables] = dict(base.table_of)

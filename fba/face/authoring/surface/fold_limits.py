@@ -39,17 +39,17 @@ class Limiter:
 
     @classmethod
     def from_mesh(cls, vertices: Float64, triangles: Intp) -> Limiter:
-        """The limiter of a mesh; triangles without area are left out: they cannot fold."""
+        """Return the limiter of a mesh; triangles without area are left out: they cannot fold."""
         areas = Patch(vertices, triangles).areas
         typical = float(np.median(areas)) if len(areas) else 0.0
         return cls(vertices, triangles[areas > DEGENERATE * typical])
 
     def without(self, vertices: Intp) -> Limiter:
-        """A limiter that ignores the triangles around the given vertices."""
+        """Return a limiter that ignores the triangles around the given vertices."""
         return Limiter(self.vertices, self.triangles[~np.isin(self.triangles, vertices).any(axis=1)])
 
     def spread(self, vertices: Intp, shifts: Float64) -> Float64:
-        """(N, 3) shifts of all vertices: the given ones (M, 3) at some vertices (M,), 0 elsewhere."""
+        """Return (N, 3) shifts of all vertices: the given ones (M, 3) at some vertices (M,), 0 elsewhere."""
         result = np.zeros((len(self.vertices), 3))
         result[vertices] = shifts
         return result
@@ -62,7 +62,7 @@ class Limiter:
         return np.concatenate([[0], np.cumsum(count)]), order // 3
 
     def patch(self, vertices: Intp) -> Patch:
-        """The triangles with a vertex among those given (K,)."""
+        """Return the triangles with a vertex among those given (K,)."""
         if len(vertices) > FEW_VERTICES * len(self.vertices):
             moving = np.zeros(len(self.vertices), dtype=bool)
             moving[vertices] = True
@@ -136,7 +136,8 @@ class Patch:
         return corners
 
     def _facing_neighbours(self, normals: Float64) -> Float64:
-        """(M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any vertex."""
+        """Return (M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any
+        vertex."""
         around = self._sum_around(normals) - 3 * normals
         product = lengths(around) * lengths(normals)
         result: Float64 = dot(around, normals) / np.maximum(product, 1e-30)
@@ -144,7 +145,7 @@ class Patch:
         return result
 
     def _sum_around(self, normals: Float64) -> Float64:
-        """(M, 3) sums of the normals (M, 3) of all triangles at the corners of each, itself thrice."""
+        """Return (M, 3) sums of the normals (M, 3) of all triangles at the corners of each, itself thrice."""
         corners = self._local_corners
         if not len(corners):
             return np.zeros((0, 3))
@@ -166,7 +167,8 @@ class Patch:
         return tuple((square, MOST_STRETCH**2 * np.maximum(square, shortest) - square) for square in squares)
 
     def reach(self, field: Float64) -> Float64:
-        """(M,) for each triangle the largest s at which vertices + s * field (N, 3) keeps it unfolded."""
+        """Return (M,) for each triangle the largest s at which vertices + s * field (N, 3) keeps it
+        unfolded."""
         a, b, c = self.triangles.T
         first = field[a]
         d1, d2 = field[b] - first, field[c] - first
@@ -181,11 +183,11 @@ class Patch:
         return result
 
     def least_reach(self, field: Float64) -> float:
-        """The largest s at which vertices + s * field (N, 3) folds no triangle; inf without any."""
+        """Return the largest s at which vertices + s * field (N, 3) folds no triangle; inf without any."""
         return float(self.reach(field).min(initial=np.inf))
 
     def is_sound(self, shifts: Float64, *, turning: bool = False) -> bool:
-        """Whether no triangle folds or tears at vertices + shifts (N, 3).
+        """Return whether no triangle folds or tears at vertices + shifts (N, 3).
 
         turning: as in `soundness`; then tiny folds (`SPECK`) in the corners of eyes and mouth are allowed.
         """
@@ -195,7 +197,7 @@ class Patch:
         return float(self.areas[~fine].sum()) <= SPECK * float(self.areas.sum())
 
     def soundness(self, shifts: Float64, *, turning: bool = False) -> Bool:
-        """(M,) mask of the triangles that neither fold nor tear under shifts (N, 3).
+        """Return (M,) mask of the triangles that neither fold nor tear under shifts (N, 3).
 
         turning: the skin may rotate, as a lid does about the eyeball; then a triangle counts as folded if it
         faces away from its neighbours, not if it faces away from its neutral direction.
@@ -215,7 +217,8 @@ class Patch:
 
 
 def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:
-    """Smallest positive x with square x² + linear x + constant = 0, inf without one; constant > 0."""
+    """Return the smallest positive x with square x² + linear x + constant = 0, inf without one; constant >
+    0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         below = linear**2 - 4 * square * constant
         root = np.sqrt(np.maximum(below, 0.0))

@@ -21,7 +21,8 @@ CHIN = 0.3
 
 
 def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Float64]:
-    """9.3, 9.15, 8.1, 8.2, 2.10 and 2.1 on the profile of a skin, and 11.4, 11.6, 10.3, 10.4 of the head.
+    """Return 9.3, 9.15, 8.1, 8.2, 2.10 and 2.1 on the profile of a skin, and 11.4, 11.6, 10.3, 10.4 of the
+    head.
 
     located: at least the pupils (3.5, 3.6) and the lips (2.2, 2.3). Points that do not show clearly are
     left out.
@@ -80,7 +81,7 @@ def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Floa
 
 
 def _front(skin: Part, x: float, heights: Float64) -> Float64:
-    """For each height the foremost z where the skin cuts the plane at x; NaN where it does not."""
+    """Return for each height the foremost z where the skin cuts the plane at x; NaN where it does not."""
     vertices = skin.vertices.astype(np.float64)
     # a plane through vertices cuts twice or not at all; one beside them cuts once
     beside = x + 1e-5 * float(np.ptp(vertices[:, 0]))
@@ -106,14 +107,14 @@ def _front(skin: Part, x: float, heights: Float64) -> Float64:
 
 
 def _hill(front: Float64, inside: Bool) -> int | None:
-    """Index of the foremost local maximum of the profile within a stretch, or None."""
+    """Return the index of the foremost local maximum of the profile within a stretch, or None."""
     around = np.stack([np.roll(front, shift) for shift in (-6, -3, -1, 1, 3, 6)])
     hills = inside & np.isfinite(front) & (front[None] >= np.nan_to_num(around, nan=-np.inf)).all(axis=0)
     return int(np.where(hills, front, -np.inf).argmax()) if hills.any() else None
 
 
 def _head(vertices: Float64, pupils: Float64, apart: float) -> dict[str, Float64]:
-    """Crown and back of a whole head, and the ears where they stand out."""
+    """Return crown and back of a whole head, and the ears where they stand out."""
     result: dict[str, Float64] = {}
     crown = vertices[int(vertices[:, 1].argmax())]
     if abs(crown[0] - pupils[0]) < 0.3 * apart and crown[1] > pupils[1] + apart:

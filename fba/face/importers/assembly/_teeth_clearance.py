@@ -62,7 +62,7 @@ class Arch:
     depth: Float64
 
     def depth_at(self, points: Float64) -> Float64:
-        """(N,) z of the teeth at the x and y of points (N, 3); far back or -inf beside them."""
+        """Return (N,) z of the teeth at the x and y of points (N, 3); far back or -inf beside them."""
         from scipy.ndimage import map_coordinates
 
         cells = ((points[:, :2] - self.corner) / self.cell - 0.5).T[::-1]
@@ -72,7 +72,7 @@ class Arch:
 
 
 def clear_teeth(model: FaceModel) -> FaceModel:
-    """The model, whose skin slides over the teeth where the corners of the mouth move inwards.
+    """Return the model, whose skin slides over the teeth where the corners of the mouth move inwards.
 
     Where that would turn triangles over, the skin around comes along further, or the way is shorter.
     """
@@ -101,7 +101,7 @@ def _count_errors(poser: Poser, stretch: list[int]) -> int:
 def _with_pushes(
     model: FaceModel, surface: Surface, poser: Poser, stretch: list[int], pushes: list[Float64]
 ) -> FaceModel:
-    """The model whose skin comes forward by (N,) metres at each of the `KNOTS` but the first."""
+    """Return the model whose skin comes forward by (N,) metres at each of the `KNOTS` but the first."""
     tables = [
         _with_push(model, table, _divide(poser, surface, stretch, fap, pushes), surface)
         if fap in stretch
@@ -112,7 +112,7 @@ def _with_pushes(
 
 
 def _measure_arch(model: FaceModel) -> Arch | None:
-    """The arch of all rows of teeth, seen from the front; None without teeth."""
+    """Return the arch of all rows of teeth, seen from the front; None without teeth."""
     from scipy.ndimage import gaussian_filter, grey_closing
 
     rows = [part for part in model.parts if part.kind == "teeth" and len(part.triangles)]
@@ -140,14 +140,14 @@ def _measure_arch(model: FaceModel) -> Arch | None:
 
 
 def _shifts(poser: Poser, surface: Surface, stretch: list[int], value: float) -> Float64:
-    """(N, 3) displacements of the surface by some FAPs at one value."""
+    """Return (N, 3) displacements of the surface by some FAPs at one value."""
     shifts = np.zeros((len(surface), 3))
     shifts[surface.number] = poser.shift(dict.fromkeys(stretch, value))[surface.pool]
     return shifts
 
 
 def _push(surface: Surface, arch: Arch, shifts: Float64, slope: float) -> Float64:
-    """(N,) metres by which the surface, moved by some shifts (N, 3), has to come forward.
+    """Return (N,) metres by which the surface, moved by some shifts (N, 3), has to come forward.
 
     Lips keep their thickness: what lies one behind the other comes forward alike, and around it, ever less:
     by `slope` metres for each metre.
@@ -174,7 +174,7 @@ def _push(surface: Surface, arch: Arch, shifts: Float64, slope: float) -> Float6
 
 
 def _thin(needs: Float64) -> Float64:
-    """The largest of the needs, rows x, y, metres, of each square of 1 mm."""
+    """Return the largest of the needs, rows x, y, metres, of each square of 1 mm."""
     order = np.argsort(-needs[:, 2], kind="stable")
     cells = np.floor(needs[order, :2] / NEED_SQUARE).astype(np.intp)
     _, first = np.unique(cells, axis=0, return_index=True)
@@ -182,7 +182,7 @@ def _thin(needs: Float64) -> Float64:
 
 
 def _envelope(points: Float64, needs: Float64, slope: float) -> Float64:
-    """(N,) the largest need, rows x, y, metres, less `slope` of its distance, at points (N, 2)."""
+    """Return (N,) the largest need, rows x, y, metres, less `slope` of its distance, at points (N, 2)."""
     result = np.zeros(len(points))
     for x, y, need in needs:
         away = np.hypot(points[:, 0] - x, points[:, 1] - y)
@@ -193,7 +193,7 @@ def _envelope(points: Float64, needs: Float64, slope: float) -> Float64:
 def _divide(
     poser: Poser, surface: Surface, stretch: list[int], fap: int, pushes: list[Float64]
 ) -> dict[float, Float64]:
-    """(N,) metres that one FAP brings the surface forward by value: that of its side, half of it each.
+    """Return (N,) metres that one FAP brings the surface forward by value: that of its side, half of it each.
 
     By half, and not by its share in the sideways motion: an inner contour that came forward alone would turn
     the skin between it and the outer one over.
@@ -210,7 +210,7 @@ def _divide(
 def _with_push(
     model: FaceModel, table: FaceDefTables, push: Mapping[float, Float64], surface: Surface
 ) -> FaceDefTables:
-    """The table of a FAP with a forward motion of the surface, (N,) metres by value."""
+    """Return the table of a FAP with a forward motion of the surface, (N,) metres by value."""
     unit = model.fapu[faps()[table.fap - 1].unit]
     meshes = {mesh.part: mesh for mesh in table.meshes}
     for part, number in surface.members.items():
@@ -221,7 +221,8 @@ def _with_push(
 
 
 def _add_forward(mesh: FaceDefMesh, push: Mapping[float, Float64], unit: float) -> FaceDefMesh:
-    """A mesh's motion with one along z, (V,) metres of each vertex of the part by value; constant beyond."""
+    """Return a mesh's motion with one along z, (V,) metres of each vertex of the part by value; constant
+    beyond."""
     values = np.array(sorted(push))
     pushed = np.flatnonzero(np.max([push[value] for value in values], axis=0) > UNMOVED_DISTANCE)
     vertices = np.union1d(mesh.vertices, pushed).astype(np.int32)
@@ -241,7 +242,7 @@ def _add_forward(mesh: FaceDefMesh, push: Mapping[float, Float64], unit: float) 
 
 
 def _interpolate(values: Float64, ways: Float64, value: float) -> Float64:
-    """(V,) ways (K, V) at rising values (K,), linear between them and constant beyond."""
+    """Return (V,) ways (K, V) at rising values (K,), linear between them and constant beyond."""
     x = float(np.clip(value, values[0], values[-1]))
     k = int(np.clip(np.searchsorted(values, x) - 1, 0, len(values) - 2))
     share = (x - values[k]) / (values[k + 1] - values[k])

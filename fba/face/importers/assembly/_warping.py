@@ -28,7 +28,7 @@ def warp_points(
     symmetric: bool = False,
     own: Collection[str] = (),
 ) -> Float64:
-    """(84, 3) the adult head's points, warped to those located and moved onto parts of their kind.
+    """Return (84, 3) the adult head's points, warped to those located and moved onto parts of their kind.
 
     symmetric: points of the right side stand on the vertices that mirror those of the left. own: those of the
     right side that stay where they were located.
@@ -103,7 +103,8 @@ def _put_folds_beyond_lids(pieces: Sequence[Piece], points: Float64) -> None:
 
 
 def _outside(piece: Piece, centre: Float64) -> Float64:
-    """(N, 3) vertices of a part that face away from the head's centre: not those of sockets and throat."""
+    """Return (N, 3) vertices of a part that face away from the head's centre: not those of sockets and
+    throat."""
     vertices = piece.part.vertices.astype(np.float64)
     if piece.part.kind != "skin" or piece.part.normals is None:
         return vertices

@@ -32,7 +32,8 @@ GREY = 0.03
 
 
 def apply_default_materials(pieces: Sequence[Piece], points: Float64) -> list[Piece]:
-    """The pieces, with default materials for those without texture and colours, and irises on white eyes.
+    """Return the pieces, with default materials for those without texture and colours, and irises on white
+    eyes.
 
     points: (84, 3), in the same frame.
     """
@@ -53,7 +54,8 @@ def _is_grey(material: Material) -> bool:
 
 
 def _with_iris(part: Part, points: Float64) -> Part:
-    """The eye with the standard's neutral iris: as wide as the lids are apart, its pupil a third of it."""
+    """Return the eye with the standard's neutral iris: as wide as the lids are apart, its pupil a third of
+    it."""
     side = "left" if "left" in part.name else "right"
     pupil = points[row_of()[PUPIL_POINT[side]]]
     upper, lower = (float(points[row_of()[name], 1]) for name in LID_POINTS[side])

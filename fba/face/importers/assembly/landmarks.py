@@ -61,7 +61,7 @@ MIN_FAPS = 20
 def find_points(
     pieces: Sequence[Piece], path: str, *, symmetric: bool = False, exactly: bool = False
 ) -> Float64:
-    """Feature points (84, 3) of a head, in its own unit; +y up, looking to +z.
+    """Return the feature points (84, 3) of a head, in its own unit; +y up, looking to +z.
 
     symmetric: the points of the right side are the mirror images of those of the left. exactly: those of the
     margin of the lids too, whose rows of vertices otherwise need not be the same.
@@ -90,7 +90,7 @@ def find_points(
 
 
 def _open_alike(points: Mapping[str, Float64]) -> bool:
-    """Whether both eyes are open equally far, as the one unit of their lids' FAPs needs."""
+    """Return whether both eyes are open equally far, as the one unit of their lids' FAPs needs."""
     if any(name not in points for pair in LID_POINTS.values() for name in pair):
         return False
     left, right = (float(points[upper][1] - points[lower][1]) for upper, lower in LID_POINTS.values())
@@ -98,7 +98,7 @@ def _open_alike(points: Mapping[str, Float64]) -> bool:
 
 
 def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
-    """The pupils and lids (84, 3) of a head whose eyes can be found, NaN for all other points.
+    """Return the pupils and lids (84, 3) of a head whose eyes can be found, NaN for all other points.
 
     Shells that cannot be two eyes, such as a bun of hair, give nothing: they overlap, or differ in size.
     """
@@ -121,7 +121,8 @@ def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
 
 
 def _tongue(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str, Float64]:
-    """Tip, middle and borders of a tongue; the last a third of the pupils' distance behind the tip."""
+    """Return the tip, middle and borders of a tongue; the last a third of the pupils' distance behind the
+    tip."""
     tongues = [piece.part.vertices for piece in pieces if piece.part.kind == "tongue"]
     if not tongues:
         return {}
@@ -140,7 +141,7 @@ def _tongue(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str
 
 
 def _teeth(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str, Float64]:
-    """Edges of the upper and the lower front teeth, in the middle of the row."""
+    """Return the edges of the upper and the lower front teeth, in the middle of the row."""
     left, right = float(located["3.5"][0]), float(located["3.6"][0])
     apart, middle = left - right, (left + right) / 2
     points = {}
@@ -156,7 +157,7 @@ def _teeth(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str,
 
 
 def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, float, Float64]]:
-    """Centre, radius and pupil of the left and right eyeball."""
+    """Return the centre, radius and pupil of the left and right eyeball."""
     eyes = {}
     for piece in pieces:
         if piece.part.kind == "eye":
@@ -193,7 +194,7 @@ POINTS = Remedy(
 
 
 def _from_faps(vertices: Float64, by_fap: Mapping[int, Float32]) -> dict[str, Float64]:
-    """Points of the skin, each where the shape named after its FAP moves it furthest."""
+    """Return the points of the skin, each where the shape named after its FAP moves it furthest."""
     points: dict[str, Float64] = {}
     for fap in faps():
         morph = by_fap.get(fap.number)
@@ -213,7 +214,7 @@ def _from_arkit(
     eyes: Mapping[str, tuple[Float64, float, Float64]],
     path: str,
 ) -> dict[str, Float64]:
-    """Points of the lids and the mouth, by shapes named as ARKit's."""
+    """Return the points of the lids and the mouth, by shapes named as ARKit's."""
     moving = [name for name, morph in skin.morphs.items() if np.abs(morph).max(initial=0.0) > 0]
     shapes = {shape: skin.morphs[name].astype(np.float64) for shape, name in canonical_names(moving).items()}
     points = _lids_by_loops(pieces, eyes)
@@ -236,7 +237,8 @@ def _from_arkit(
 def _lids(
     vertices: Float64, blink: Float64, eye: tuple[Float64, float, Float64], side: str
 ) -> dict[str, Float64]:
-    """Middles of the lids' margins, what a blink lowers most and what it then meets, and their corners."""
+    """Return the middles of the lids' margins, what a blink lowers most and what it then meets, and their
+    corners."""
     centre, radius, _ = eye
     distance = np.linalg.norm(vertices - centre, axis=1)
     near = distance < 1.3 * radius
@@ -274,7 +276,7 @@ def _lids(
 def _lids_by_loops(
     pieces: Sequence[Piece], eyes: Mapping[str, tuple[Float64, float, Float64]]
 ) -> dict[str, Float64]:
-    """Middles of the lids and corners of the eyes, on the loops of edges around their openings."""
+    """Return the middles of the lids and corners of the eyes, on the loops of edges around their openings."""
     surface = weld_parts([piece.part for piece in pieces], SURFACE_KINDS)
     points: dict[str, Float64] = {}
     for side, (centre, radius, pupil) in eyes.items():
@@ -299,7 +301,8 @@ def _mouth(
     eyes: Mapping[str, tuple[Float64, float, Float64]],
     path: str,
 ) -> dict[str, Float64]:
-    """Middles of the lips, corners of the mouth, and points between. facing: vertices that face forwards."""
+    """Return the middles of the lips, corners of the mouth, and points between. facing: vertices that face
+    forwards."""
     vertices = skin.vertices.astype(np.float64)
     left, right = eyes["left"][0], eyes["right"][0]
     apart = left[0] - right[0]
@@ -354,7 +357,7 @@ def _mouth(
 def _end_of_slit(
     vertices: Float64, drop: Float64, near: Bool, middle: float, sign: int, apart: float
 ) -> int | None:
-    """The vertex at a corner of the mouth: beyond the last at which an opening jaw parts the lips.
+    """Return the vertex at a corner of the mouth: beyond the last at which an opening jaw parts the lips.
 
     near: vertices that may be of the lips. middle: the x of the midline. sign: +1 for the left corner. None
     where the lips lie too far apart at rest for that.
@@ -384,7 +387,8 @@ def _end_of_slit(
 def _lip_pair(
     vertices: Float64, drop: Float64, ahead: Bool, x: float, apart: float
 ) -> tuple[int, int] | None:
-    """Upper and lower lip at some x: vertices close together that an opening jaw parts the furthest."""
+    """Return the upper and lower lip at some x: vertices close together that an opening jaw parts the
+    furthest."""
     column = np.flatnonzero((np.abs(vertices[:, 0] - x) < 0.04 * apart) & ahead)
     if not len(column) or not drop[column].max() > 0:
         return None

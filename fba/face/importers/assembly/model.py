@@ -47,7 +47,7 @@ class ImportOptions:
 
 
 def turn_upright(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piece], Float64]:
-    """Pieces and points of a file whose vertical axis is "y" or "z", with y up."""
+    """Return the pieces and points of a file whose vertical axis is "y" or "z", with y up."""
     if up not in AXES:
         raise OptionError(f"up must be one of {', '.join(AXES)}, not {up!r}")
     if up == "y":
@@ -72,7 +72,7 @@ def finish_import(
     *,
     given: bool = True,
 ) -> FaceModel:
-    """A face from the pieces of a file and its feature points (84, 3), both in the file's unit.
+    """Return a face from the pieces of a file and its feature points (84, 3), both in the file's unit.
 
     vertices: numbers of the vertices in the file that points stand on. given: the points were given, not
     found, and tell whether the head is turned aside or tilted. The face is converted to
@@ -111,7 +111,8 @@ def finish_import(
 def author_pieces(
     pieces: Sequence[Piece], points: Float64, bound: Int32, *, name: str, notes: Mapping[str, str]
 ) -> FaceModel:
-    """The face of finished pieces, its tables made from their shapes if there are any, else from the mesh."""
+    """Return the face of finished pieces, its tables made from their shapes if there are any, else from the
+    mesh."""
     parts = tuple(piece.part for piece in pieces)
     # without any vertex, `author` binds points to the nearest, and separates upper and lower lip
     known = bound if (bound >= 0).any() else None
@@ -133,7 +134,7 @@ def author_pieces(
 
 
 def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:
-    """int32 (84,): vertex of each feature point counted through the pieces, -1 for those without one.
+    """Return int32 (84,): vertex of each feature point counted through the pieces, -1 for those without one.
 
     vertices: their numbers in the file, by point.
     """
@@ -153,7 +154,7 @@ def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int3
 
 
 def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, str]:
-    """(metres per unit of the mesh, how that was found out, in words).
+    """Return (metres per unit of the mesh, how that was found out, in words).
 
     points: (84, 3). unit: given by the user, used unchanged. Otherwise the unit with which the pupils
     (3.5, 3.6; without them the eyes) stand as far apart as on a real head; where none does, as with
@@ -171,7 +172,8 @@ def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, 
 
 
 def pupil_distance(points: Float64) -> float:
-    """Distance of the pupils, or of the middles between the eye corners; ModelError where unknown."""
+    """Return the distance of the pupils, or of the middles between the eye corners; ModelError where
+    unknown."""
     row = row_of()
     for left, right in ((("3.5",), ("3.6",)), (("3.7", "3.11"), ("3.8", "3.12")), (("3.1",), ("3.2",))):
         ends = [points[[row[name] for name in names]].mean(axis=0) for names in (left, right)]
@@ -217,13 +219,13 @@ def _flip(triangles: Int32, wrong: Bool) -> Int32:
 
 
 def _facing(vertices: Float64, triangles: Int32, centre: Float64) -> Float64:
-    """(F,) positive for triangles that face away from a centre, in proportion to their areas."""
+    """Return (F,) positive for triangles that face away from a centre, in proportion to their areas."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), (a + b + c) / 3 - centre))
 
 
 def _opposing(triangles: Int32) -> Bool:
-    """bool (F,): triangles to turn so that neighbours agree, at most half of each connected piece."""
+    """Return bool (F,): triangles to turn so that neighbours agree, at most half of each connected piece."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 

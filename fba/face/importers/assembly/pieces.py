@@ -47,7 +47,8 @@ EYE_SIZES = (0.02, 0.12)
 def assemble(
     pieces: Sequence[Piece], kinds: Mapping[str, str] | None = None, *, middle: float | None = None
 ) -> tuple[Piece, ...]:
-    """Parts of a face: kinds from names, all skin in one, each eyeball in one, teeth upper and lower.
+    """Return the parts of a face: kinds from names, all skin in one, each eyeball in one, teeth upper and
+    lower.
 
     kinds: what the user says, by the name of a group, object, mesh or material. middle: the x of the
     plane between left and right, by default between the eyes. Where names do not say, round shells in pairs
@@ -78,7 +79,7 @@ def assemble(
 
 
 def _is_white(piece: Piece, kind: str | None, pieces: Sequence[tuple[Piece, str | None]]) -> bool:
-    """Whether a piece is the white of drawn eyes, which stays while their irises turn."""
+    """Return whether a piece is the white of drawn eyes, which stays while their irises turn."""
     whites = [
         own for own, each in pieces if each == "eye" and WHITE.search(f"{own.part.name} {own.material}")
     ]
@@ -90,7 +91,7 @@ def _is_white(piece: Piece, kind: str | None, pieces: Sequence[tuple[Piece, str 
 
 
 def _middle(pieces: Sequence[tuple[Piece, str | None]]) -> float:
-    """The x between the eyes; where there are not two, of the middle of the skin."""
+    """Return the x between the eyes; where there are not two, of the middle of the skin."""
     eyes = [piece.part.vertices for piece, kind in pieces if kind == "eye"]
     if eyes:
         size = np.ptp(np.concatenate(eyes), axis=0)
@@ -101,13 +102,13 @@ def _middle(pieces: Sequence[tuple[Piece, str | None]]) -> float:
 
 
 def _centre(vertices: Sequence[Float32]) -> float:
-    """The x of the middle between the outermost of some vertices, arrays (V, 3)."""
+    """Return the x of the middle between the outermost of some vertices, arrays (V, 3)."""
     across = np.concatenate(vertices)[:, 0]
     return float(across.min() + across.max()) / 2
 
 
 def shift_piece(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
-    """The piece scaled, then shifted."""
+    """Return the piece scaled, then shifted."""
     vertices = piece.part.vertices.astype(np.float64) * scale + np.asarray(shift)
     part = replace(piece.part, vertices=vertices.astype(np.float32))
     return replace(piece, part=part, morphs={name: m * np.float32(scale) for name, m in piece.morphs.items()})
@@ -116,7 +117,7 @@ def shift_piece(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
 def _with_eyes(
     pieces: Sequence[Piece], kinds: Mapping[int, str | None], middle: float | None
 ) -> list[tuple[Piece, str | None]]:
-    """The pieces, with mirrored pairs of round components split off as eyes.
+    """Return the pieces, with mirrored pairs of round components split off as eyes.
 
     middle: the x of the mirror; without it, that of x = 0 and that in the middle of the pieces are tried.
     """
@@ -161,7 +162,8 @@ def _with_eyes(
 
 
 def _is_set_in(vertices: Float32, centre: Float64, radius: float) -> bool:
-    """Whether vertices (N, 3) lie around a ball on most sides, as lids do, but none around a bun of hair."""
+    """Return whether vertices (N, 3) lie around a ball on most sides, as lids do, but none around a bun of
+    hair."""
     x, y, z = ((vertices - centre) / radius).T
     far = np.hypot(x, y)
     near = (far > AROUND[0]) & (far < AROUND[1]) & (np.abs(z) < AROUND[1])
@@ -170,7 +172,8 @@ def _is_set_in(vertices: Float32, centre: Float64, radius: float) -> bool:
 
 
 def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[Piece, ...]:
-    """One piece each for skin, eyes, brows, lashes, rows of teeth, tongue and mouth; others as they are."""
+    """Return one piece each for skin, eyes, brows, lashes, rows of teeth, tongue and mouth; others as they
+    are."""
     result: list[Piece] = []
 
     def add(kind: str, name: str, own: Sequence[Piece]) -> None:
@@ -207,7 +210,7 @@ def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[P
 
 
 def _are_one_row(teeth: Sequence[Piece]) -> bool:
-    """Whether teeth are of one jaw only: then those in front lie at one height."""
+    """Return whether teeth are of one jaw only: then those in front lie at one height."""
     lows, highs, fronts = [], [], []
     for piece in teeth:
         vertices = piece.part.vertices
@@ -226,7 +229,7 @@ def _are_one_row(teeth: Sequence[Piece]) -> bool:
 
 
 def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], Bool]) -> list[Piece]:
-    """The components of each piece whose centre lies on the wanted side.
+    """Return the components of each piece whose centre lies on the wanted side.
 
     wanted: takes centres (N, 3), returns bool (N,).
     """
@@ -245,7 +248,7 @@ def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], Bool]) -> list[Pi
 
 
 def _cut(piece: Piece, mask: Bool, name: str) -> Piece:
-    """The vertices of a mask, with the triangles that have all corners among them."""
+    """Return the vertices of a mask, with the triangles that have all corners among them."""
     part = piece.part
     number = np.cumsum(mask) - 1
     triangles = number[part.triangles[mask[part.triangles].all(axis=1)]].astype(np.int32)
@@ -265,7 +268,7 @@ def _cut(piece: Piece, mask: Bool, name: str) -> Piece:
 
 
 def part_names(taken: Iterable[str] = ()) -> UniqueNames:
-    """Names for the parts of a face; "head" is reserved: it stands for all parts."""
+    """Return the names for the parts of a face; "head" is reserved: it stands for all parts."""
     return UniqueNames(("head", *taken))
 
 
@@ -276,7 +279,7 @@ def _words() -> tuple[tuple[str, str], ...]:
 
 
 def guess_kind(*names: str) -> str | None:
-    """The kind of a part by its names, the most specific first; None where no name is known.
+    """Return the kind of a part by its names, the most specific first; None where no name is known.
 
     The first word of `kinds.csv` that is in a name decides; "ear" and "hat" must be words of their own,
     as they are inside "pearl" and "that".
@@ -291,13 +294,14 @@ def guess_kind(*names: str) -> str | None:
 
 
 def kind_of(piece: Piece, given: Mapping[str, str]) -> str | None:
-    """The kind of a piece that a user gave by its name or material, else that of its names, or None."""
+    """Return the kind of a piece that a user gave by its name or material, else that of its names, or
+    None."""
     kind = given.get(piece.part.name, given.get(piece.material))
     return guess_kind(piece.part.name, piece.material) if kind is None else kind
 
 
 def check_kinds(kinds: Mapping[str, str] | None) -> dict[str, str]:
-    """The kinds that a user gave by name; OptionError for one that does not exist."""
+    """Return the kinds that a user gave by name; OptionError for one that does not exist."""
     for name, kind in (kinds or {}).items():
         if kind not in PART_KINDS and kind != DROPPED:
             raise OptionError(f"kind of {name!r}: {kind!r} is not one of {', '.join((*PART_KINDS, DROPPED))}")

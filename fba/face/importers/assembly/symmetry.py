@@ -45,7 +45,7 @@ CENTRAL = (3, 4, 5, 14, 16, 17, 18, 51, 52, 63)
 def stand_upright(
     pieces: Sequence[Piece], left: Float64, right: Float64, assembled: Sequence[Piece]
 ) -> tuple[list[Piece], float]:
-    """(pieces turned so that a symmetric head's plane of symmetry is upright, the angle in radians).
+    """Return (pieces turned so that a symmetric head's plane of symmetry is upright, the angle in radians).
 
     left, right: (3,) centres of the eyes. assembled: the same pieces as parts of a face. The angle is 0 where
     nothing was turned.
@@ -65,7 +65,8 @@ def stand_upright(
 
 
 def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[list[Piece], Float64, float]:
-    """(pieces and their feature points (84, 3) turned so that both sides are level, the angle in radians).
+    """Return (pieces and their feature points (84, 3) turned so that both sides are level, the angle in
+    radians).
 
     The angle is 0 where nothing was turned: where points of both sides say nothing, or not the same.
     """
@@ -88,7 +89,7 @@ def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[l
 
 
 def _turned(pieces: Sequence[Piece], turn: Float64, middle: Float64) -> list[Piece]:
-    """The pieces turned by a matrix (3, 3) about a point."""
+    """Return the pieces turned by a matrix (3, 3) about a point."""
     result = []
     for piece in pieces:
         part = piece.part
@@ -101,7 +102,7 @@ def _turned(pieces: Sequence[Piece], turn: Float64, middle: Float64) -> list[Pie
 
 
 def asymmetry(pieces: Sequence[Piece], left: Float64, right: Float64) -> float:
-    """How far 98 % of the face's skin is from its mirror image at most, in distances of the eyes.
+    """Return how far 98 % of the face's skin is from its mirror image at most, in distances of the eyes.
 
     left, right: (3,) centres of the eyes.
     """
@@ -113,7 +114,8 @@ def asymmetry(pieces: Sequence[Piece], left: Float64, right: Float64) -> float:
 
 
 def mirror_points(points: dict[str, Float64], middle: float, own: Collection[str] = ()) -> dict[str, Float64]:
-    """Located points with those of the right side, and those of the midline, from the left and the middle.
+    """Return the located points with those of the right side, and those of the midline, from the left and the
+    middle.
 
     middle: the x of the plane of symmetry. own: points of the right side that stay where they were located.
     """
@@ -130,7 +132,7 @@ def mirror_points(points: dict[str, Float64], middle: float, own: Collection[str
 
 
 def mirror_tables(model: FaceModel, *, lids: bool = True) -> FaceModel:
-    """The model with the tables of each pair of FAPs mirror images, and those of the middle symmetric.
+    """Return the model with the tables of each pair of FAPs mirror images, and those of the middle symmetric.
 
     The side is kept on which FAPs reach further. The face must be symmetric. lids: those of the lids, too.
     """
@@ -161,7 +163,8 @@ def mirror_tables(model: FaceModel, *, lids: bool = True) -> FaceModel:
 
 
 def mirror_faulty_lids(model: FaceModel) -> FaceModel:
-    """The model; where the lids of one eye break more rules than those of the other, these are mirrored.
+    """Return the model; where the lids of one eye break more rules than those of the other, these are
+    mirrored.
 
     That is undone where the mirror images break as many.
     """
@@ -185,7 +188,7 @@ def _count_errors(poser: Poser, lids: list[int]) -> int:
 
 
 def _face(pieces: Sequence[Piece], left: Float64, right: Float64) -> Float64:
-    """(N, 3) vertices of the skin around the eyes."""
+    """Return (N, 3) vertices of the skin around the eyes."""
     skin = [piece.part.vertices for piece in pieces if piece.part.kind == "skin"]
     if not skin:
         return np.zeros((0, 3))
@@ -195,7 +198,7 @@ def _face(pieces: Sequence[Piece], left: Float64, right: Float64) -> Float64:
 
 
 def _mirror_distances(vertices: Float64, middle: Float64, normal: Float64) -> Float64:
-    """(N,) distances of mirrored vertices from the nearest."""
+    """Return (N,) distances of mirrored vertices from the nearest."""
     from scipy.spatial import cKDTree
 
     mirrored = vertices - 2 * ((vertices - middle) @ normal)[:, None] * normal
@@ -204,7 +207,7 @@ def _mirror_distances(vertices: Float64, middle: Float64, normal: Float64) -> Fl
 
 
 def _counterparts(model: FaceModel) -> Intp:
-    """(V,) for each vertex that of the same kind of part nearest to its mirror image."""
+    """Return (V,) for each vertex that of the same kind of part nearest to its mirror image."""
     from scipy.spatial import cKDTree
 
     pupils = model.points[[row_of()["3.5"], row_of()["3.6"]], 0]
@@ -226,7 +229,7 @@ def _counterparts(model: FaceModel) -> Intp:
 
 
 def _neighbour_arms(model: FaceModel) -> Float64:
-    """(V, 3) from each vertex to the middle of its triangles."""
+    """Return (V, 3) from each vertex to the middle of its triangles."""
     arms = []
     for part in model.parts:
         vertices = part.vertices.astype(np.float64)
@@ -239,7 +242,7 @@ def _neighbour_arms(model: FaceModel) -> Float64:
 
 
 def _fields(model: FaceModel, table: FaceDefTables) -> dict[tuple[int, ...], Float64]:
-    """Displacements (V, K - 1, 3) of all vertices, by the borders of the table's meshes."""
+    """Return the displacements (V, K - 1, 3) of all vertices, by the borders of the table's meshes."""
     fields: dict[tuple[int, ...], Float64] = {}
     for mesh in table.meshes:
         key = tuple(mesh.borders.tolist())
@@ -268,7 +271,7 @@ def _table(model: FaceModel, fap: int, fields: dict[tuple[int, ...], Float64]) -
 
 
 def _mirrored(model: FaceModel, table: FaceDefTables, fap: int, other: Intp) -> FaceDefTables:
-    """The tables of a FAP as the mirror image of those of another."""
+    """Return the tables of a FAP as the mirror image of those of another."""
     fields = {borders: field[other] * (-1.0, 1.0, 1.0) for borders, field in _fields(model, table).items()}
     return _table(model, fap, fields)
 
@@ -281,7 +284,7 @@ def _average(model: FaceModel, table: FaceDefTables, mirrored: FaceDefTables) ->
 
 
 def _reach(table: FaceDefTables) -> float:
-    """How far a FAP moves its vertices at both ends of its range, summed over all."""
+    """Return how far a FAP moves its vertices at both ends of its range, summed over all."""
     total = 0.0
     for mesh in table.meshes:
         widths = np.diff(mesh.borders.astype(np.float64))

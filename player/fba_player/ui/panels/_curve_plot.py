@@ -228,13 +228,13 @@ def _make_lines(curve: Envelope, key: tuple[object, ...], low: float, high: floa
 
 
 def _darken(colour: theme.Colour) -> theme.Colour:
-    """A darker colour, for a curve so dense that it fills its lane."""
+    """Return a darker colour, for a curve so dense that it fills its lane."""
     red, green, blue, alpha = colour
     return red * 0.6, green * 0.6, blue * 0.6, alpha
 
 
 def _widen(points: list[imgui.ImVec2]) -> list[imgui.ImVec2]:
-    """A run of points; a single point becomes a visible dash."""
+    """Return a run of points; a single point becomes a visible dash."""
     if len(points) > 1:
         return points
     x, y = points[0].x, points[0].y

@@ -43,7 +43,7 @@ class CurvesPanel(Panel):
         self.chooser = Chooser()
 
     def available(self, session: Session) -> bool:
-        """Whether the scene has FAPs or BAPs."""
+        """Return whether the scene has FAPs or BAPs."""
         return _timeline(session) is not None
 
     def draw(self, session: Session) -> None:
@@ -110,7 +110,7 @@ class CurvesPanel(Panel):
 
 
 def _timeline(session: Session, which: int = 0) -> Any:
-    """The timeline of the scene, or of one of several animations that are compared."""
+    """Return the timeline of the scene, or of one of several animations that are compared."""
     scene = session.scene
     if isinstance(scene, CompareScene):
         return scene.scenes[which].timeline
@@ -129,7 +129,7 @@ def _lane(course: Any, number: int) -> Lane:
 
 
 def _now(session: Session, chosen: list[tuple[str, int]], which: int) -> dict[tuple[str, int], float]:
-    """Current values of parameters, after the hooks."""
+    """Return the current values of parameters, after the hooks."""
     kinds = {kind for kind, _ in chosen}
     if session.before_frame:
         faps, baps = session.values

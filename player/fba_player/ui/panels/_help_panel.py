@@ -41,7 +41,7 @@ class HelpPanel(Panel):
 
 
 def _columns(count: int) -> list[list[str]]:
-    """Names of the groups in each of `count` columns, 2 to 4."""
+    """Return the names of the groups in each of `count` columns, 2 to 4."""
     if count == 2:
         return [["Play", "Save", "Window"], ["View", "Switches", "Mouse"]]
     if count == 3:
@@ -50,7 +50,7 @@ def _columns(count: int) -> list[list[str]]:
 
 
 def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
-    """(keys, what they do) by name of the group."""
+    """Return (keys, what they do) by name of the group."""
     groups: dict[str, list[tuple[str, str]]] = {}
     for row in keys():
         groups.setdefault(row.group, []).append((row.shown, row.does))

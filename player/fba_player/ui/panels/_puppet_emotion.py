@@ -73,7 +73,7 @@ class EmotionTab:
         self.hidden = imgui.get_scroll_max_y()
 
     def _height_below(self, mood: PuppetMood, columns: int) -> float:
-        """Points that a heading, the sliders, the row of buttons and two lines of text take."""
+        """Return the points that a heading, the sliders, the row of buttons and two lines of text take."""
         rows = -(-len(mood.weights) // columns) + 1
         return rows * imgui.get_frame_height_with_spacing() + 3.5 * imgui.get_text_line_height_with_spacing()
 
@@ -122,13 +122,13 @@ class EmotionTab:
             to.add_circle(point, HANDLE, theme.packed(theme.TEXT), thickness=1.5)
 
     def _place(self, activation: float, evaluation: float) -> tuple[float, float]:
-        """Where a point of the plane is drawn: evaluation to the right, activation upwards."""
+        """Return where a point of the plane is drawn: evaluation to the right, activation upwards."""
         left, top, right, bottom = self.plane
         along, up = ((value - LOWEST) / (HIGHEST - LOWEST) for value in (evaluation, activation))
         return left + along * (right - left), bottom - up * (bottom - top)
 
     def _value(self, x: float, y: float) -> tuple[float, float]:
-        """Activation and evaluation at a place, in points; `PuppetMood.move_point` limits them."""
+        """Return the activation and evaluation at a place, in points; `PuppetMood.move_point` limits them."""
         left, top, right, bottom = self.plane
         along, up = (x - left) / max(right - left, 1.0), (bottom - y) / max(bottom - top, 1.0)
         return LOWEST + up * (HIGHEST - LOWEST), LOWEST + along * (HIGHEST - LOWEST)
@@ -163,7 +163,7 @@ def place_labels(
     within: Box,
     taken: Sequence[Box] = (),
 ) -> dict[str, Box]:
-    """Places for the names of dots where they cover no dot and no other name, the nearest first.
+    """Return the places for the names of dots where they cover no dot and no other name, the nearest first.
 
     dots: x and y by name. sizes: width and height of each name. taken: boxes that are to stay free as well.
     Where there is no free place, the one that covers least is taken.
@@ -191,12 +191,12 @@ def place_labels(
 
 
 def _overlap(one: Box, other: Box) -> float:
-    """Area that two boxes share."""
+    """Return the area that two boxes share."""
     wide = min(one[2], other[2]) - max(one[0], other[0])
     high = min(one[3], other[3]) - max(one[1], other[1])
     return max(wide, 0.0) * max(high, 0.0)
 
 
 def _width(text: str, size: float) -> float:
-    """Width of a text in letters of a size, in points."""
+    """Return the width of a text in letters of a size, in points."""
     return float(imgui.calc_text_size(text).x * size / imgui.get_font_size())

@@ -60,7 +60,7 @@ class Group:
 
 @cache
 def groups() -> tuple[Group, ...]:
-    """All groups: those of the face, then those of the body."""
+    """Return all groups: those of the face, then those of the body."""
     text = (files(__package__) / "puppet.csv").read_text(encoding="utf-8")
     groups = []
     for line in csv.DictReader(text.splitlines()):
@@ -72,7 +72,7 @@ def groups() -> tuple[Group, ...]:
 
 @cache
 def reach(number: int) -> float:
-    """Amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
+    """Return the amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
     text = (files("fba_player.export") / "contact_sheet.csv").read_text(encoding="utf-8")
     return next(
         abs(float(row["value"])) for row in csv.DictReader(text.splitlines()) if int(row["fap"]) == number
@@ -129,7 +129,7 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
 
 
 def _codable_degrees(numbers: tuple[int, ...], end: int) -> float:
-    """Largest (end 1) or smallest (end 0) angle that a stream can code, in whole degrees."""
+    """Return the largest (end 1) or smallest (end 0) angle that a stream can code, in whole degrees."""
     degrees = 0.0
     for number in numbers:
         bap = baps()[number - 1]
@@ -139,7 +139,7 @@ def _codable_degrees(numbers: tuple[int, ...], end: int) -> float:
 
 
 def _is_flipped(number: int) -> bool:
-    """Whether the BAP of the other side needs the opposite sign for the mirrored motion.
+    """Return whether the BAP of the other side needs the opposite sign for the mirrored motion.
 
     Mirroring left and right keeps rotations about X and reverses those about Y and Z.
     """
@@ -157,7 +157,7 @@ def _other_side(name: str) -> str:
 
 
 def _title(name: str) -> str:
-    """The title of a FAP: "raise inner eyebrow L" for "raise_l_i_eyebrow".
+    """Return the title of a FAP: "raise inner eyebrow L" for "raise_l_i_eyebrow".
 
     It omits the outer contour of the lips, which is in the name of the group.
     """
@@ -171,7 +171,7 @@ def _title(name: str) -> str:
 
 
 def _body_title(name: str) -> str:
-    """The title of a limit or a BAP, such as "upper arm flexion L"."""
+    """Return the title of a limit or a BAP, such as "upper arm flexion L"."""
     for word, short in (("HumanoidRoot_tr_", ""), ("HumanoidRoot_rt_", ""), ("spine 3", "upper spine"),
                         ("spine 2", "middle spine"), ("spine 1", "lower spine")):  # fmt: skip
         name = name.replace(word, short)

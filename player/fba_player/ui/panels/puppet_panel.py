@@ -44,11 +44,11 @@ class PuppetPanel(Panel):
         """Centres of buttons and tabs by name, in points; for tests."""
 
     def available(self, session: Session) -> bool:
-        """Whether a single animation is shown."""
+        """Return whether a single animation is shown."""
         return isinstance(session.scene, Scene)
 
     def performer(self, session: Session) -> Performer:
-        """The performer of the session, made when it is first needed."""
+        """Return the performer of the session, made when it is first needed."""
         if self._performer is None or self._performer.session is not session:
             self._performer = Performer(session)
         return self._performer
@@ -223,7 +223,7 @@ class PuppetPanel(Panel):
             tooltip("release: follow the animation again")
 
     def _both(self, group: Group, row: Row) -> list[tuple[Row, float]]:
-        """The rows that a slider moves, each with its sign."""
+        """Return the rows that a slider moves, each with its sign."""
         if not self.together or row.mirror is None:
             return [(row, 1.0)]
         return [(row, 1.0), (group.rows[row.mirror], -1.0 if row.flipped else 1.0)]
@@ -249,7 +249,7 @@ def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None
 
 
 def _parameter_names(row: Row) -> str:
-    """The parameters that a row moves, as text."""
+    """Return the parameters that a row moves, as text."""
     names = [parameter(row.kind, number).name for number in row.numbers]
     pairs = zip(row.numbers, names, strict=True)
     return f"{row.kind.upper()} " + ", ".join(f"{number} {name}" for number, name in pairs)
