@@ -59,7 +59,7 @@ class Reader:
         """Position of the next bit."""
         self.size = len(data) * 8
         self.disputed: int | None = None
-        """First bit at which the two ways to look for start codes see different things."""
+        """First bit at which the two methods of looking for start codes disagree."""
         self.plane: int | None = None
         self._elements: list[Element] = []
 

@@ -101,14 +101,9 @@ def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
     on_sphere = np.ones(len(vertices), dtype=bool)
     centre, radius = vertices.mean(axis=0), 0.0
     for _ in range(8):
-        origin = vertices[on_sphere].mean(axis=0)
-        near = vertices[on_sphere] - origin
-        system = np.column_stack([2 * near, np.ones(len(near))])
-        solution, _, rank, _ = np.linalg.lstsq(system, (near**2).sum(axis=1), rcond=None)
-        if rank < 4:
+        centre, radius, determined = fit_sphere(vertices[on_sphere])
+        if not determined:
             return None
-        centre = solution[:3] + origin
-        radius = float(np.sqrt(max(solution[3] + solution[:3] @ solution[:3], 0.0)))
         away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
         limit = max(3 * float(np.median(away)), 1e-6 * radius)
         inliers = away <= limit
@@ -119,6 +114,16 @@ def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
         return None
     away = np.abs(np.linalg.norm(vertices[on_sphere] - centre, axis=1) - radius)
     return centre, radius, float(np.sqrt((away**2).mean())), float(on_sphere.mean())
+
+
+def fit_sphere(points: Float64) -> tuple[Float64, float, bool]:
+    """Return centre (3,) and radius of the sphere closest to points (N, 3), and whether they determine it."""
+    origin = points.mean(axis=0)
+    near = points - origin
+    system = np.column_stack([2 * near, np.ones(len(near))])
+    solution, _, rank, _ = np.linalg.lstsq(system, (near**2).sum(axis=1), rcond=None)
+    radius = float(np.sqrt(max(solution[3] + solution[:3] @ solution[:3], 0.0)))
+    return solution[:3] + origin, radius, bool(rank == 4)
 
 
 def gaze(model: FaceModel, eye: Eyeball) -> Float64 | None:

@@ -15,7 +15,7 @@ LARGEST_GAZE = 0.6
 
 Eyes reach about 55 degrees at the very most (Guitton and Volle, 1987); beyond 30, people turn their heads."""
 UNIT = 1e5
-"""Units of the FAPs that turn eyeballs, a radian."""
+"""FAP units per radian, of the FAPs that turn eyeballs."""
 
 
 def limit_gaze(values: Float64, *, warn: bool = True) -> None:

@@ -31,12 +31,18 @@ DIRECTIONS = {
 }
 """The standard's words for a positive motion, as vectors."""
 
-OPEN_JAW, THRUST_JAW, SHIFT_JAW = 3, 14, 15
-YAW_EYE, PITCH_EYE, DILATE_PUPIL = (23, 24), (25, 26), (29, 30)
+OPEN_JAW = 3
+THRUST_JAW = 14
+SHIFT_JAW = 15
+YAW_EYE = (23, 24)
+PITCH_EYE = (25, 26)
+DILATE_PUPIL = (29, 30)
 THRUST_EYE = {27: "3.5", 28: "3.6"}
 """Feature point of each eyeball, by the FAP that moves it forward."""
 TONGUE_ROLL = 47
-HEAD_PITCH, HEAD_YAW, HEAD_ROLL = 48, 49, 50
+HEAD_PITCH = 48
+HEAD_YAW = 49
+HEAD_ROLL = 50
 ROTATING = {OPEN_JAW, *YAW_EYE, *PITCH_EYE, *DILATE_PUPIL, TONGUE_ROLL, HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
 """FAPs that rotate or scale; `shift_table` leaves them out."""
 
@@ -147,7 +153,7 @@ class FeaturePointFace:
         return (rotated[0] if single else rotated).astype(np.float32)
 
     def local(self, faps: npt.ArrayLike) -> Float32:
-        """Like calling, but in the frame of the head: without head pitch, yaw and roll."""
+        """Return what calling gives, but in the frame of the head: without head pitch, yaw and roll."""
         values, single = _as_frames(faps)
         moved = self._local(values)
         return (moved[0] if single else moved).astype(np.float32)

@@ -18,9 +18,9 @@ from fba.parameters import FIRST_LOW_LEVEL_FAP, faps
 
 SIDES = {"l": "left", "r": "right", "lft": "left", "rgt": "right"}
 MOST_COMMON_WORDS = 3
-"""Most words before all names of a file that are left out."""
+"""Largest number of words before all names of a file that are left out."""
 FEWEST_ALIKE = 4
-"""Fewest names of which it is said that they begin alike."""
+"""Fewer names than this never count as beginning alike."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 

@@ -1,6 +1,6 @@
 """Buffer views packed by meshoptimizer: EXT_meshopt_compression, by appendices A and B of its specification.
 
-Own code, as meshoptimizer's own package for Python comes without wheels.
+Written here, as meshoptimizer's package for Python has no wheels.
 """
 
 from __future__ import annotations

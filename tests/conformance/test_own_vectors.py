@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fba_conformance.suite.archive import write_archive
-from fba_conformance.suite.index import OWN, Vector, read_vectors
+from fba_conformance.suite.index import SHIPPED_VECTORS, Vector, read_vectors
 from fba_conformance.suite.runner import check, expected_listing
 from fba_conformance.values import read_values
 from tools.vectors import broken, coverage
@@ -37,8 +37,8 @@ def made() -> list[Made]:
 
 def test_the_committed_vectors_are_those_that_the_generator_makes(made: list[Made], tmp_path: Path) -> None:
     assert write_vectors(tmp_path, made) == len(VECTORS)
-    assert files(tmp_path) == files(OWN)
-    assert sum(map(len, files(OWN).values())) < 200_000
+    assert files(tmp_path) == files(SHIPPED_VECTORS)
+    assert sum(map(len, files(SHIPPED_VECTORS).values())) < 200_000
 
 
 def test_there_are_enough_of_them_each_with_a_line_that_says_what_it_tests() -> None:
@@ -105,8 +105,8 @@ def test_the_zip_has_everything_and_always_the_same_bytes() -> None:
         held = {info.filename.removeprefix("fba-conformance/"): read.read(info) for info in read.infolist()}
         assert {info.compress_type for info in read.infolist()} == {zipfile.ZIP_STORED}
     streams = {name: data for name, data in held.items() if name.endswith(".fba")}
-    assert streams == {name: data for name, data in files(OWN).items() if name.endswith(".fba")}
-    assert json.loads(held["index.json"]) == json.loads((OWN / "index.json").read_text())
+    assert streams == {name: data for name, data in files(SHIPPED_VECTORS).items() if name.endswith(".fba")}
+    assert json.loads(held["index.json"]) == json.loads((SHIPPED_VECTORS / "index.json").read_text())
     for line in held["SHA256SUMS"].decode().splitlines():
         digest, name = line.split("  ")
         assert sha256(held[name]).hexdigest() == digest

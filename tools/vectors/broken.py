@@ -20,7 +20,7 @@ from typing import NamedTuple
 from fba.errors import FbaError, FbaWarning
 from fba_conformance import trace
 from fba_conformance.suite.index import Vector, read_vectors
-from fba_conformance.suite.judgement import find_fault
+from fba_conformance.suite.programs import find_fault
 from fba_conformance.suite.runner import expected_listing
 from fba_conformance.values import Listing, PlaneValues, trace_values
 

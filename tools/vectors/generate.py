@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
-from fba_conformance.suite.index import OWN, index_text
+from fba_conformance.suite.index import SHIPPED_VECTORS, index_text
 from fba_conformance.trace import Walker, planes
 from fba_conformance.values import Listing, PlaneValues, trace_values
 from tools.vectors.definitions.case import Case, Fault
@@ -111,6 +111,6 @@ def _planes_of_aligned_reader(data: bytes, bap_steps: str) -> int | None:
 
 
 if __name__ == "__main__":
-    target = Path(sys.argv[1]) if len(sys.argv) > 1 else OWN
+    target = Path(sys.argv[1]) if len(sys.argv) > 1 else SHIPPED_VECTORS
     count = write_vectors(target, made_vectors())
     sys.stdout.write(f"{count} vectors in {target}\n")

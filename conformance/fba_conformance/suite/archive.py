@@ -1,4 +1,4 @@
-"""The suite as a zip, for those who have no Python: streams, expected values as text, checksums, a README.
+"""The suite as a zip, for use without Python: streams, expected values as text, checksums, a README.
 
 Nothing in it is compressed, and all times are the same, so that its bytes do not depend on the machine:
 versions of zlib compress differently.
@@ -17,7 +17,7 @@ from fba_conformance.suite.runner import expected_listing
 NAME = "fba-conformance"
 """The folder in the zip."""
 _TIME = (1980, 1, 1, 0, 0, 0)
-"""The earliest that a zip can say."""
+"""The earliest time that a zip can contain."""
 
 _README = """\
 FBA CONFORMANCE SUITE

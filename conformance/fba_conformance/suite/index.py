@@ -16,7 +16,7 @@ from typing import Any
 from fba.errors import FormatError
 from fba_conformance.values import Listing, read_values
 
-OWN = Path(__file__).parents[1] / "vectors"
+SHIPPED_VECTORS = Path(__file__).parents[1] / "vectors"
 OTHER_GROUP = "vectors"
 """Group of vectors whose index does not name one."""
 
@@ -90,7 +90,7 @@ def index_text(entries: Sequence[dict[str, Any]]) -> str:
 
 def read_vectors(folder: Path | None = None) -> list[Vector]:
     """Return the vectors of a folder, or those that come with fba. FormatError without a valid index."""
-    folder = folder or OWN
+    folder = folder or SHIPPED_VECTORS
     index = folder / "index.json"
     try:
         entries = json.loads(index.read_text(encoding="utf-8"))

@@ -78,7 +78,7 @@ def carry_tables(
 
 
 def _lid_stretches(model: FaceModel, parts: tuple[Part, ...]) -> dict[str, Float64]:
-    """By part name: (V, 3, 3) stretch of the skin, for skin and for the parts on it."""
+    """Return the stretch of the skin (V, 3, 3), for skin and for the parts on it, by name."""
     from scipy.spatial import cKDTree
 
     stretches = {

@@ -15,9 +15,10 @@ APART = 0.012
 TOGETHER = 0.1
 """Points nearer to each other than this share of their distance on the face coincide."""
 FAR_OFF = 0.75
-"""A point is a mistake if its error exceeds this share of the pupils' distance ..."""
+"""A point is a mistake if its error exceeds this share of the pupils' distance and `FAR_OFF_USUAL`, and its
+mate differs."""
 FAR_OFF_USUAL = 6.0
-"""... and this many times the median error, and its mate on the other side differs."""
+"""Multiple of the median error, see `FAR_OFF`."""
 TURNED = np.radians(20.0)
 """The plane of symmetry is computed from the points unless it deviates from x = 0 by more than this."""
 PUPIL = 0.2

@@ -27,7 +27,7 @@ RIGID = {HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
 MAX_STRETCH = 8.0
 """Factor by which an edge may grow."""
 SHORT_EDGE = 0.3
-"""Share of the typical edge; shorter edges may grow by that factor from this length."""
+"""Share of the typical edge length, which stands for shorter edges there."""
 SPECK = 0.003
 """Share of the moving surface that may turn over in the folds of skin at the corners of eyes."""
 DEGENERATE = 1e-5

@@ -43,7 +43,7 @@ TEETH: Limits = (0.02, 0.06)
 TONGUE: Limits = (0.08, 0.25)
 """Shares of the width of the mouth."""
 SYMMETRY = 0.04
-"""Mean deviation from the mirror image, as a share of the distance between the pupils, that is a warning."""
+"""A larger mean deviation from the mirror image, as a share of the pupils' distance, is a warning."""
 
 
 def check_neutral(model: FaceModel) -> list[Finding]:
@@ -125,7 +125,7 @@ def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
 
 
 def _check_lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator[Finding]:
-    """Yield the iris, as big as IRISD0 and centred on the pupil, touches both lid margins."""
+    """Yield findings unless an iris as big as IRISD0 and centred on the pupil touches both lid margins."""
     iris = model.fapu.IRISD * PER_DISTANCE
     pupil = _point(model, PUPIL_POINT[side])
     for name, edge in ((upper, 0.5 * iris), (lower, -0.5 * iris)):
@@ -176,7 +176,8 @@ def _check_teeth(model: FaceModel) -> Iterator[Finding]:
 
 
 def _check_touching(model: FaceModel, upper: str, lower: str, rule: str, limits: Limits) -> Iterator[Finding]:
-    """Two feature points are at one height; limits: shares of the width of the mouth."""
+    """Yield a finding unless two feature points are at the same height. limits: shares of the mouth's
+    width."""
     width = model.fapu.MW * PER_DISTANCE
     gap = float(_point(model, upper)[1] - _point(model, lower)[1])
     yield from _judge(

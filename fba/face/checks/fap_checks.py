@@ -51,7 +51,7 @@ def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Find
 
 
 def check_posed(poser: Poser, wanted: Iterable[int], *, combined: bool = True) -> list[Finding]:
-    """`check_faps` for a model that already has a `Poser`, which makes repeated checks faster.
+    """Return what `check_faps` does for a model that already has a `Poser`: repeated checks are faster.
 
     combined: also what several FAPs do together.
     """
@@ -96,7 +96,7 @@ def _check_combinations(poser: Poser, wanted: set[int]) -> Iterator[Finding]:
 
 @cache
 def region_table() -> dict[int, tuple[tuple[str, ...], float]]:
-    """By FAP: the points of its region, and how far from them its motion may reach, in ES0."""
+    """Return the points of each FAP's region, and how far from them its motion may reach, in ES0."""
     regions = {}
     with (files(__package__) / "fap_regions.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):

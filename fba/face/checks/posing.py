@@ -43,8 +43,8 @@ class Poser:
     def findings(
         self, rule: str, faps: Iterable[int], check: Callable[[], Iterator[Finding]]
     ) -> tuple[Finding, ...]:
-        """Return what a check finds that depends on the neutral face and the tables of these FAPs alone;
-        kept."""
+        """Return what a check finds, cached: it depends only on the neutral face and the tables of these
+        FAPs."""
         key = (rule, *(self.model.table_of.get(fap, fap) for fap in faps))
         if key not in self._landmarks.findings:
             self._landmarks.findings[key] = tuple(check())

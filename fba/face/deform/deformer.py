@@ -125,7 +125,7 @@ class Deformer:
     def local(
         self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None
     ) -> Float32:
-        """Like calling, but in the frame of the head: without the transforms of `HEAD`."""
+        """Return what calling gives, but in the frame of the head: without the transforms of `HEAD`."""
         return self._run(faps, out, normals, with_head=False)
 
     def head_matrices(self, faps: npt.ArrayLike) -> Float64:

@@ -1,4 +1,4 @@
-"""How far a face's vertices are from where others put them: `Displacements`."""
+"""How far the vertices of a face are apart when it shows two sets of FAPs."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float64, Int64
+from fba.arrays import Float32, Float64, Int64
 from fba.face.deform.deformer import Deformer, frame_values
 from fba.face.deform.flat_tables import KIND_ORDER, Shifts, Transforms
 from fba.face.model import FaceModel
 
 BLOCK = 256
 """Frames per call of the compiled loop: Ctrl-C takes effect between calls only."""
+VERTEX_BLOCK = 16
+"""Frames whose vertices are in memory at once."""
 BINS = 4000
-"""Of the histogram of distances, up to `FURTHEST`."""
+"""Bins of the histogram of distances, up to `FURTHEST`."""
 FURTHEST = 0.02
-"""Metres: beyond that, percentiles are this."""
+"""Metres: larger percentiles are given as this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,7 @@ class Displacements:
 
 
 class DisplacementMeter:
-    """Measures how far the vertices of a face are off: much faster than two calls of `Deformer.local`.
+    """Measures how far vertices are apart, much faster than two calls of `Deformer.local`.
 
     Only what differs is computed: a vertex is where `Deformer.local` puts it, up to rounding in 32 bits.
     """
@@ -108,3 +110,18 @@ class DisplacementMeter:
             step = float(np.degrees(np.linalg.norm(transforms.amount[number])))
             most[part] = max(most[part], float(off[transforms.column[number]]) * step)
         return most[0], most[1]
+
+
+def vertex_distances(deformer: Deformer, one: npt.ArrayLike, other: npt.ArrayLike) -> Float64:
+    """Return the largest distance between a vertex in one pose and in the other: float64 (T,), metres.
+
+    In the frame of the head, whose rotation counts nothing. one, other: (T, 68), as `Deformer` takes them.
+    """
+    first, second = np.asarray(one), np.asarray(other)
+    result = np.zeros(len(first))
+    differs = np.flatnonzero((first != second).any(axis=1))
+    for start in range(0, len(differs), VERTEX_BLOCK):
+        rows = differs[start : start + VERTEX_BLOCK]
+        shifts: Float32 = deformer.local(first[rows]) - deformer.local(second[rows])
+        result[rows] = np.sqrt(np.einsum("tvi,tvi->tv", shifts, shifts).max(axis=1))
+    return result

@@ -17,7 +17,8 @@ VALUE_MAX = 2**31 - 1
 """FAPs beyond this are refused: no stream carries more than 32 bits."""
 KIND_ORDER = ("translation", "rotation", "scale")
 """The order in which the transforms of a part are nested, outermost first, as in a Transform node."""
-HEAD_PITCH, HEAD_ROLL = 48, 50
+HEAD_PITCH = 48
+HEAD_ROLL = 50
 
 
 class Shifts(NamedTuple):

@@ -14,7 +14,7 @@ SEAM_COSINE = 0.7
 """Coincident vertices share a normal where their neutral normals differ by less than about 45 degrees. Along
 the seam of a texture they differ a little where each side was shaded by itself."""
 SEAM_MOTION = 0.01
-"""... and where FAPs move them equally but for this share. Lips touch, but move apart."""
+"""They also share it only where FAPs move them equally but for this share: lips touch, but move apart."""
 SURFACES_MAX = 16
 """Surfaces that may meet at one point; a mesh with more there is damaged."""
 

@@ -66,7 +66,7 @@ def build(model: FaceModel) -> Builder:
 
 
 def _targets(builder: Builder, model: FaceModel) -> list[dict[str, int]]:
-    """Return for each part, the accessors of its morph targets by FAP name."""
+    """Return the accessors of the morph targets of each part, by FAP name."""
     targets: list[dict[str, int]] = [{} for _ in model.parts]
     ends = np.cumsum([len(part.vertices) for part in model.parts])[:-1]
     for number, shift in displacements(model):

@@ -31,8 +31,7 @@ BLEND = 0.1
 
 
 def split_sides(pieces: Sequence[Piece]) -> list[Piece]:
-    """Return the pieces, with shapes of both sides as shapes of each, too, where the file has none of
-    those."""
+    """Return the pieces, with shapes of both sides also cut into shapes of each side that the file lacks."""
     result = list(pieces)
     known = canonical_names(sorted({name for piece in pieces for name in piece.morphs}))
     for name in sorted({name for piece in pieces for name in piece.morphs}):

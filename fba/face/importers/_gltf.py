@@ -239,7 +239,7 @@ def name_shapes(
 
 
 def _vrm_expressions(gltf: Gltf) -> Iterator[tuple[str, list[Value], float]]:
-    """Of each expression of VRM 0 and VRM 1 the preset, the binds to morph targets, and their full weight."""
+    """Yield preset, binds to morph targets and their full weight of each expression of VRM 0 and VRM 1."""
     extensions = gltf.document.get("extensions")
     if extensions is None:
         return

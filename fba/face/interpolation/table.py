@@ -102,7 +102,7 @@ class InterpolationTable:
 
 
 def sources_of(links: Iterable[Link]) -> dict[int, set[int]]:
-    """By destination FAP: the source FAPs of all links to it."""
+    """Return the source FAPs of all links to each destination FAP."""
     numbers = fap_numbers()
     sources: dict[int, set[int]] = {}
     for link in links:

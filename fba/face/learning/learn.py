@@ -12,8 +12,15 @@ from fba.arrays import Bool, Float64, Int32
 from fba.errors import FbaError, FbaWarning, ModelError
 from fba.face.deform.deformer import Deformer
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.learning._moments import HEAD, add_up, measure
-from fba.face.learning._regression import choose_order, fewest, fit_coefficients, make_table
+from fba.face.learning._regression import (
+    HEAD,
+    add_up,
+    choose_order,
+    fewest,
+    fit_coefficients,
+    make_table,
+    measure,
+)
 from fba.face.learning.errors import ErrorSum, FitError
 from fba.face.learning.reduction import linked_columns, send_sources
 from fba.face.learning.sensitivity import displacements

@@ -16,9 +16,9 @@ from fba.atomic import PathLike, atomic_path, write_error
 from fba_player.sound.pyav import import_av
 
 SMOOTH = Fraction(25)
-"""Most frames per second where none are asked for; some browsers slow down above 50."""
+"""Largest default frame rate; some browsers slow down above 50."""
 IN_MEMORY = 64 << 20
-"""Bytes of pictures held in memory until the palette is known; more go to disk."""
+"""Bytes of pictures kept in memory until the palette is made; further ones go to disk."""
 TICKS = 100
 """A GIF's times are hundredths of a second."""
 DITHER = "paletteuse=dither=sierra2_4a:diff_mode=rectangle"
@@ -30,7 +30,7 @@ def gif_rate(rate: Fraction) -> Fraction:
 
 
 class Gif:
-    """A `Sink` that writes a GIF which loops for ever. Pictures are stored until the last one is known.
+    """A `Sink` that writes a GIF which loops for ever. Pictures are stored until the last has been added.
 
     The arguments are those of `Recorder`.
     """

@@ -21,8 +21,10 @@ from fba_player.playback.timeline import clock_text
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 
-WIDTH, SHAPE = 480, 4 / 3
-"""Width of the film in pixels, and width / height."""
+WIDTH = 480
+"""Default width of the film in pixels."""
+ASPECT = 4 / 3
+"""Width / height of the film."""
 MAX_FILM_SECONDS = Fraction(15)
 """Longest film: longer ones would make the page large, and the reader wait."""
 RATE = Fraction(30)
@@ -62,7 +64,7 @@ class Preview:
         self._subject = subject
         shown: Any = subject
         self._animation: Animation = subject if isinstance(subject, Animation) else shown.animation
-        self._size = (width // 2 * 2, round(width / SHAPE) // 2 * 2)
+        self._size = (width // 2 * 2, round(width / ASPECT) // 2 * 2)
         self._camera, self._start, self._end = camera, start, end
         self._audio, self._audio_offset = audio, audio_offset
         self._html: str | None = None

@@ -119,7 +119,7 @@ class Offscreen:
         width, height = self.size
         pixels = np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)
         if view.extras is not None:
-            pixels[..., 3] = 255  # extras mark their pixels there for the target
+            pixels[..., 3] = 255  # annotations mark their pixels there for the target
         return pixels[::-1]
 
     def close(self) -> None:
@@ -158,8 +158,7 @@ def looks_at_head(camera: Camera | str | None) -> bool:
 
 
 def follow_camera(camera: Camera, scene: Scene, time: float, *, of_head: bool = False) -> Camera:
-    """Return the camera, moved along with a figure that walks away. of_head: with its head, wherever that
-    goes."""
+    """Return the camera, moved along with a figure that walks away. of_head: follow its head instead."""
     moved = scene.head_travel(time) if of_head else scene.travel(time)
     if not any(moved):
         return camera

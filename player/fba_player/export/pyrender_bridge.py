@@ -34,15 +34,18 @@ if TYPE_CHECKING:
 
 NUMPY_1 = {"infty": np.inf, "Inf": np.inf, "NaN": np.nan, "float_": np.float64}
 """Names that NumPy 2 has dropped and that pyrender, or trimesh, may use."""
-WHITE, PUPIL = (0.62, 0.58, 0.55), (0.004, 0.004, 0.004)
-"""Colours of an eye, linear."""
+WHITE = (0.62, 0.58, 0.55)
+PUPIL = (0.004, 0.004, 0.004)
+"""Linear colours of an eye."""
 IRIS_LIGHT = 2.2
 """Factor on the colour of the iris, which is that under the cornea: the cornea gathers light on it."""
 WET = 0.15
 """Roughness of a wet eye."""
 EXPOSURE = 0.72
 """Factor on all lights: unlike ours, pyrender's pictures have no tone mapping."""
-EYE_ROWS, EYE_AROUND = 64, 48
+EYE_ROWS = 64
+EYE_AROUND = 48
+"""Vertices of an eyeball from pole to pole, and around."""
 
 
 def to_pyrender(

@@ -40,8 +40,9 @@ SLACK = 0.001
 """Seconds that a given time may lie outside the animation: people round times."""
 PICTURE_SAMPLES = 4
 """Samples per pixel of a single picture, which need not be fast."""
-SIZE, GIF_SIZE = (1280, 720), (480, 270)
-"""Default sizes; a GIF of full size would be huge."""
+SIZE = (1280, 720)
+GIF_SIZE = (480, 270)
+"""Default sizes in pixels; a GIF of full size would be huge."""
 
 
 def render(

@@ -31,12 +31,18 @@ ROUGH = 0.36
 """Strength of the skin's relief."""
 NECK = 2.3
 """Length over which the neck bends, in multiples of the eye-nose separation (ENS)."""
-MAX_BENT_SHARE, BENT_COSINE, LONG_EDGE = 0.1, 0.8, 0.005
-"""Light is computed for every pixel if more than this share of a part's edges bend by more than the angle
-with this cosine and are longer than this (m)."""
-NORMAL_WEIGHT, TEXTURE_WEIGHT, COLOUR_WEIGHT = 0.002, 0.5, 0.004
-"""Weights for simplification: the error in metres that equals a normal off by its length, a texture off by a
-metre, and a colour off by its whole range."""
+MAX_BENT_SHARE = 0.1
+"""Light is computed for every pixel if more than this share of a part's edges are long and bent."""
+BENT_COSINE = 0.8
+"""An edge is bent if the cosine between the normals at its ends is below this."""
+LONG_EDGE = 0.005
+"""An edge is long from this length on, metres."""
+NORMAL_WEIGHT = 0.002
+"""Error in metres that weighs as much in simplification as a normal off by its length."""
+TEXTURE_WEIGHT = 0.5
+"""The same for texture coordinates off by a metre on the surface."""
+COLOUR_WEIGHT = 0.004
+"""The same for a colour off by its whole range."""
 
 
 def compute_sway(model: FaceModel) -> Float32:

@@ -66,7 +66,7 @@ class BodyLight:
         """Return float32 (V, 4), as in `FaceMesh.light`; meaningless at parts that are not drawn.
 
         positions, normals: (V, 3) of the body in the world. joints: (J, 4, 4), its joint matrices. Without
-        numba, nothing is in the light's way.
+        numba, nothing blocks the light.
         """
         if not len(positions) == len(normals) == len(self.body.vertices):
             raise ValueError(f"{len(positions)} positions for a body of {len(self.body.vertices)} vertices")
@@ -83,7 +83,7 @@ class BodyLight:
 
     @cached_property
     def _prepared(self) -> Prepared:
-        """What does not change with the pose, for the V vertices of all parts.
+        """Data for the V vertices of all parts that do not change with the pose.
 
         (N,) vertices at which light is computed; (V, NEIGHBOURS) indices into these from which each vertex
         is interpolated, and (V, NEIGHBOURS) their weights; (V,) share of the sky that folds leave.
@@ -175,7 +175,8 @@ def _capsules(ends: Float64, radii: Float64) -> Float32:
 def _shade_by_capsules(
     positions: Float32, normals: Float32, rows: Int32, capsules: Float32, past: Float32
 ) -> None:
-    """Write past (N, 2): the shares of the key light and of the sky that come past the capsules to rows (N,).
+    """Write `past` (N, 2): the shares of key light and sky that the capsules let through to vertices `rows`
+    (N,).
 
     One capsule after another and without branches, so that the loops over vertices are vectorised.
 

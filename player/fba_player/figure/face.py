@@ -28,7 +28,7 @@ from fba_player.view.geometry import rotation_vector
 from fba_player.view.view import Eye, FaceMesh, FaceShape
 
 CUT = 0.45
-"""On a body, what turns with the head by less than this is left out: the body has its own neck."""
+"""On a body, vertices that turn with the head by less than this share are left out: the body has a neck."""
 
 GRIMACE = {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300,
            6: 200, 7: 200, 53: 200, 54: 200}  # fmt: skip

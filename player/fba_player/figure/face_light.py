@@ -18,7 +18,8 @@ from fba_player.figure._face_light_loops import Table, blend_swaying, light_vert
 from fba_player.figure._face_parts import part_rows
 from fba_player.figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
 
-KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
+KEY_DIRECTION = (0.70, 0.68, 0.80)
+RIM_DIRECTION = (-0.55, 0.50, -0.85)
 """Directions of key and rim light; the same as in shaders/lighting.glsl."""
 LIGHTS = np.array([KEY_DIRECTION, RIM_DIRECTION])
 MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
@@ -169,10 +170,10 @@ def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, wi
 
 @dataclass(frozen=True, eq=False)
 class _PartLight:
-    """What the light at the vertices of one part is computed from.
+    """Data for the light at the vertices of one part.
 
-    rows: of the part in the model. table: of its N vertices. swaying: those (M,) that do not go with the head
-    all the way, sway: (M,), how far, and still: their table.
+    rows: the part in the model. table: visibility of its N vertices. swaying: the vertices (M,) that follow
+    the head only partly; sway: (M,), how far; still: their visibility.
     """
 
     rows: slice
@@ -185,8 +186,8 @@ class _PartLight:
         """Write light (N, 4): key light, sky, through, rim light.
 
         share: how far the mouth is wide open. lights: (2, 16), weights of the harmonics for key and rim light
-        for what goes with the head, then, where they differ, two more rows for what stands still. on_teeth:
-        the share of the missing light that is added.
+        at vertices that move with the head; where the head has turned, two more rows for vertices at rest.
+        on_teeth: the share of the missing light that is added.
         """
         light_vertices(self.table, lights[:2], share, on_teeth, light)
         if len(lights) > 2 and len(self.swaying):

@@ -30,9 +30,9 @@ BAKING = "1"
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """light: float32 (V, 16), harmonics of the visibility of each direction, 1 if free. through: float32
-    (V, 16), harmonics of the light through the skin from behind. open: float32 (V,), the free share of the
-    hemisphere above each vertex, weighted by the cosine."""
+    """light: float32 (V, 16), harmonics of the visibility of each direction, 1 if free. through: float32 (V,
+    16), harmonics of the light through the skin from behind. open: float32 (V,), the unobstructed share of
+    the hemisphere above each vertex, weighted by the cosine."""
 
     light: Float32
     through: Float32
@@ -167,8 +167,8 @@ def _mirror(visible: Float32, normals: Float32, directions: Float32) -> None:
 def _draw_depths(seen: Float32, triangles: Int32, depth: Float32) -> None:
     """Draw the depths of front-facing triangles. seen: (V, 3), x and y in -1..1, z towards the viewer.
 
-    Bounds: pixels are limited to the square of depths after they have become integers, whatever they were;
-    corners are vertices of the mesh, which `bake` is given for a model that is checked.
+    Bounds: pixels are clamped to the map after conversion to integers, whatever they were before; corners are
+    vertices of the mesh, which `bake` gets from a checked model.
     """
     size = depth.shape[0]
     depth[:] = -10.0
@@ -211,8 +211,8 @@ def _read_depths(
 ) -> None:
     """Write for vertices `rows` their visibility in a depth map, and the light that comes through to them.
 
-    Bounds: rows are vertices, of which all arrays have one each. Pixels are limited as in `_draw_depths`, and
-    the next ones are there: a map has 16 or more.
+    Bounds: rows are vertices, and all arrays have a row for each. Pixels are clamped as in `_draw_depths`,
+    and have neighbours: a map has 16 or more.
     """
     size = depth.shape[0]
     half = 0.5 * size

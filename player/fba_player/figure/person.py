@@ -18,11 +18,14 @@ from fba_player.figure.wrinkles import wrinkle_strengths
 from fba_player.view.view import Eye, FaceMesh, FaceShape
 
 SCATTER = {"skin": 1.0, "neck": 1.0}
-SEEN_WEIGHTS, BEND = 6, 0.02
-"""Simplification preserves skin weights in this many random projections, scaled to this many metres."""
+WEIGHT_PROJECTIONS = 6
+"""Number of random projections of the skin weights that simplification preserves."""
+WEIGHT_SCALE = 0.02
+"""Metres as which a skin weight of 1 counts in simplification."""
 HEAD_SHARE = 0.3
 """A part of a body with its own head is drawn in full detail if more than this share of it is on the head."""
-WORLD, NOWHERE = np.eye(4), np.zeros(3)
+WORLD = np.eye(4)
+NO_TURN = np.zeros(3)
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
 
@@ -44,7 +47,7 @@ class Person:
 
     @property
     def headroom(self) -> float:
-        """Metres from the joint that carries the head to the top of the body's own; 0 without one."""
+        """Metres from the joint that carries the head to the top of the body's own head; 0 without one."""
         rows = head_rows(self.body)
         if self.head is not None or not rows.any():
             return 0.0
@@ -103,10 +106,10 @@ class Person:
 
 
 def build_person(body: BodyModel, figure: FaceFigure) -> Person:
-    """Return a person of a body and a face, which is put where the body says that the pupils are.
+    """Return a person of a body and a face, placed where the body says that the pupils are.
 
     Triangles of the face under the body's clothes are left out, and so are parts of kind "other" that lie
-    wholly below the chin. A body that does not say so keeps its own head, which FAPs turn.
+    wholly below the chin. A body without such a place keeps its own head, which FAPs turn.
     """
     model = figure.model
     if body.eyes is None:
@@ -134,7 +137,7 @@ def head_rows(body: BodyModel) -> Bool:
 
 
 def head_middle(body: BodyModel) -> Float64:
-    """Return (3,): the middle of the head of a body that has one, as modelled; else the joint that carries
+    """Return the middle (3,) of the body's own head, as modelled; without one, the joint that carries
     heads."""
     rows = head_rows(body)
     if not rows.any():
@@ -182,8 +185,8 @@ def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]
 def _shape(part: BodyPart, joints: int) -> FaceShape:
     shape = make_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
     # Vertices must remain where joints bend the body: preserve the weights, in a few fixed projections.
-    random = np.random.default_rng(7).standard_normal((joints, SEEN_WEIGHTS)) / SEEN_WEIGHTS**0.5
-    carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * BEND
+    random = np.random.default_rng(7).standard_normal((joints, WEIGHT_PROJECTIONS)) / WEIGHT_PROJECTIONS**0.5
+    carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * WEIGHT_SCALE
     coarser = detail_levels(part, [part.vertices], carried.astype(np.float32))
     open_surface = part.material.two_sided
     return replace(
@@ -201,4 +204,4 @@ def _mesh_in_world(
 ) -> FaceMesh:
     """Return a part, cut from its model's arrays (V, 3), (V, 3) and (V, 4), which are in the world
     already."""
-    return FaceMesh(shape, positions[rows], normals[rows], light[rows], WORLD, NOWHERE, NOWHERE)
+    return FaceMesh(shape, positions[rows], normals[rows], light[rows], WORLD, NO_TURN, NO_TURN)

@@ -18,7 +18,7 @@ from fba.face.model import FaceModel, Part, point_row
 from fba_player.mesh.wrinkle_map import WRINKLES
 
 BEGINNING = 0.5
-"""Share of the motion that brings a wrinkle out fully at which it begins: half of a frown shows none."""
+"""A wrinkle begins at this share of the motion at which it is full: half a frown shows none."""
 
 MAP_POINTS = {
     "3.7": (0.690, -0.020), "3.11": (0.286, -0.048), "3.9": (0.515, -0.165), "3.13": (0.514, 0.159),
@@ -39,7 +39,7 @@ NEEDED = ("3.7", "3.11", "4.1", "4.3", "9.3", "8.3", "8.1")
 DEEPEST = 0.75
 """How far behind the pupils the map reaches, in eye separations: not onto ears and neck."""
 OUTSIDE = 9.0
-"""How far beside the map a vertex lies that has no wrinkles."""
+"""Coordinate, far outside of the map, of vertices without wrinkles."""
 STIFFNESS = 1e-4
 """How far the map may miss feature points to bend less (regularisation of the spline)."""
 
@@ -56,9 +56,9 @@ def _table() -> tuple[Intp, Intp, Float64]:
 
 
 def wrinkle_strengths(faps: Float32) -> Float32:
-    """Return float32 (2, 4), 0..1: how strong each of `WRINKLES` is on the left and on the right side.
+    """Return the strength of each of `WRINKLES` on the left and the right side: float32 (2, 4), 0..1.
 
-    faps: (68,). A FAP counts in its own direction only; what several of them do adds up.
+    faps: (68,). A FAP counts only in the direction of its row; effects of several FAPs add up.
     """
     kinds, columns, full = _table()
     shares = np.maximum(faps[columns] / full, 0.0)
@@ -70,8 +70,8 @@ def wrinkle_strengths(faps: Float32) -> Float32:
 
 def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
     """Return float32 (V, 2): where the vertices of a part lie in the map, x positive on the face's left;
-    outside of it where they have no wrinkles. None for a part that is no skin, and for a face that shall have
-    none or lacks the points needed."""
+    outside of it where they have no wrinkles. None for parts other than skin, and for faces that show no
+    wrinkles or lack the points needed."""
     if not model.wrinkles or part.kind != "skin":
         return None
     own, shown = _known_points(model)

@@ -30,13 +30,17 @@ from fba_player.view.camera import Camera
 from fba_player.view.geometry import world_normals, world_positions
 from fba_player.view.view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend, Lines
 
-REFERENCE_HEIGHT, MIN_SCALE = 720, 0.35
+REFERENCE_HEIGHT = 720
+"""Pixels: annotations have their nominal size in a picture this high."""
+MIN_SCALE = 0.35
 CROWDED = 7.0
-"""Lines shorter than this (pixels) are drawn fainter, so that a fine mesh is a tint and no black spot."""
+"""Lines shorter than this (pixels) are drawn fainter, so that a fine mesh is a tint, not a black spot."""
 HIDDEN = 0.2
 """Opacity of a dot behind a surface."""
 MIN_DOT_RADIUS = 0.8
-NAME_SIZE, MIN_NAME_SIZE = 13, 10
+NAME_SIZE = 13
+MIN_NAME_SIZE = 10
+"""Pixels."""
 MIN_LEGEND_SCALE = 0.65
 MARGIN = 14
 CACHED_LABELS = 16

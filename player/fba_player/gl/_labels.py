@@ -11,8 +11,10 @@ from fba_player.view.view import Legend
 TEXT = (240, 242, 245, 255)
 FAINT = (186, 192, 200, 255)
 SHADE = (18, 21, 26, 190)
-MIN_NAMES_HEIGHT, MIN_LEGEND_HEIGHT = 96, 240
-"""Heights (pixels) below which a picture has no names, and no legend."""
+MIN_NAMES_HEIGHT = 96
+"""Pixels: lower pictures have no names."""
+MIN_LEGEND_HEIGHT = 240
+"""Pixels: lower pictures have no legend."""
 MAX_NAMES = 45
 """If more points are in view, none is named."""
 GAP = 2.0

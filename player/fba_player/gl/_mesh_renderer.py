@@ -25,7 +25,8 @@ from fba_player.view.view import FaceMesh, FaceShape
 CACHED_SHAPES = 64
 """Number of parts whose buffers are cached; the least recently used goes first."""
 CORE = 0.9
-"""Opacity from which pixels of blended parts are drawn as opaque ones, before all others are blended."""
+"""Pixels of blended parts with at least this opacity are drawn first, as opaque; then the others are
+blended."""
 MIN_WRINKLE = 0.01
 """Strength from which wrinkles are drawn."""
 MIN_RELIEF = 0.25
@@ -71,7 +72,8 @@ class FaceRenderer:
             gl.enable_only(gl.DEPTH_TEST)
 
     def _draw_cores(self, meshes: list[FaceMesh]) -> None:
-        """Draw what is nearly opaque of blended parts, which then hides what is behind, in any order."""
+        """Draw the nearly opaque pixels of blended parts, which then hide what is behind them, in any
+        order."""
         for mesh in meshes:
             if mesh.shape.alpha == "blend":
                 self._draw(mesh, core=True)

@@ -85,7 +85,7 @@ class Outliner:
         """Mark the outlines of a mesh. matrix: (4, 4), world to clip space."""
         if not len(mesh.positions):
             return
-        if len(mesh.positions) != len(mesh.shape.sway):  # which the loops go by
+        if len(mesh.positions) != len(mesh.shape.sway):  # the loops use one index for both
             raise ValueError(
                 f"{len(mesh.positions)} positions for a shape of {len(mesh.shape.sway)} vertices"
             )
@@ -198,8 +198,8 @@ def _outline(
 ) -> None:
     """Mark the tiles along borders and along edges between a front-facing and a back-facing triangle.
 
-    Bounds: see `_add`. Pixels are limited to 0..size - 1 before they become tiles; those that are no finite
-    numbers end the edge before: no sum of them is below a limit.
+    Bounds: see `_add`. Pixels are clamped to 0..size - 1 before they become tiles; edges with pixels that are
+    not finite are skipped before: no comparison with a limit holds for them.
     """
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]

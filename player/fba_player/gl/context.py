@@ -59,7 +59,8 @@ def offscreen_context() -> Any:
 
 
 def missing_libraries(names: Iterable[str] = OPENGL) -> list[str]:
-    """Return those of the named libraries that cannot be loaded; none on other systems than Linux."""
+    """Return those of the named libraries that cannot be loaded; on systems other than Linux, an empty
+    list."""
     if not sys.platform.startswith("linux"):
         return []
     missing = []

@@ -52,7 +52,8 @@ def matrix_bytes(matrix: Array) -> bytes:
 
 
 def write_buffer(buffer: Any, array: Array) -> None:
-    """Write an array as float32 into a buffer, orphaned first: what draws from it need not be waited for."""
+    """Write an array as float32 into a buffer, orphaned first, so that nothing waits for draws in
+    progress."""
     buffer.orphan()
     buffer.write(np.ascontiguousarray(array, dtype="f4"))
 
@@ -67,7 +68,7 @@ def make_texture(context: Any, pixels: UInt8, *, smooth: bool = True) -> Any:
 
 
 class RecentlyUsed(Generic[Value]):
-    """A cache of the values that were used last. most: their number. release: frees a value that goes."""
+    """Cache of the most recently used values. most: how many it holds. release: frees a dropped value."""
 
     def __init__(self, most: int, release: Callable[[Value], object]) -> None:
         self._most = most

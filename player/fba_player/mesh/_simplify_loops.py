@@ -244,7 +244,7 @@ def candidates(
             error /= max(w[u], 1e-30)
             if not error < best:
                 continue
-            joint = 0  # neighbours of both ends: more than the edge has triangles would make a non-manifold
+            joint = 0  # common neighbours of the ends: more than triangles at the edge make it non-manifold
             for k in range(count):
                 other = near[k]
                 if other == v:

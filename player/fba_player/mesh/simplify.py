@@ -71,21 +71,20 @@ class DetailLevels:
 def simplify(
     points: Float64, poses: int, triangles: Int32, tolerances: Sequence[float] = TOLERANCES
 ) -> tuple[Int32, Int32]:
-    """Return for each vertex, int32 (V,) twice: the vertex that it collapses onto, and the level at which it
-    does.
+    """Return the vertex that each vertex collapses onto, and the level at which it does: int32 (V,) twice.
 
     The level is an index into tolerances (m, rising), or their number for a vertex that stays. points, poses,
     triangles: as in `DetailLevels`. Borders keep their course; vertices that share a position stay.
-    ValueError for triangles of other vertices, and for poses that points do not have.
+    ValueError for triangles that name other vertices, and for more poses than the points hold.
     """
     from fba_player.mesh import _simplify_loops as loops
 
     count, size = points.shape
     left = np.ascontiguousarray(triangles, dtype=np.int32).copy()
     if left.size and not 0 <= left.min() <= left.max() < count:
-        raise ValueError(f"triangles name vertices that there are not: there are {count}")
+        raise ValueError(f"triangles name vertices beyond the {count} that exist")
     if not 0 <= 3 * poses <= size:
-        raise ValueError(f"points of {size} coordinates have no {poses} poses")
+        raise ValueError(f"points of {size} coordinates cannot hold {poses} poses")
     start = np.zeros(count + 1, dtype=np.int64)
     owners = np.empty(3 * len(left), dtype=np.int32)
     loops.around(left, count, start, owners)

@@ -21,8 +21,12 @@ from fba.limits import DEFAULT_LIMITS, Limits
 
 MAX_PICTURE_SIZE = 4096
 """Pixels to which wider or higher pictures are scaled down."""
-PIXEL_BYTES, SCALED_BYTES, COEFFICIENT_BYTES = 4, 8, 6
-"""Memory of a pixel while it is decoded, and scaled down; of a progressive JPEG, that of its coefficients."""
+PIXEL_BYTES = 4
+"""Memory of a decoded pixel."""
+SCALED_BYTES = 8
+"""Memory of a pixel while the picture is scaled down."""
+COEFFICIENT_BYTES = 6
+"""Memory of the coefficients of a pixel of a progressive JPEG."""
 BAND = 256
 """Rows that are converted at once."""
 MIN_CACHED_BYTES = 100_000

@@ -16,17 +16,22 @@ from fba.cache import load_or_make, make_key
 
 WRINKLES = ("forehead", "frown", "eye corner", "cheek")
 """One channel of the map each."""
-WIDTH, TOP, BOTTOM = 1.25, 1.25, -1.55
-"""What the map shows, in eye separations: to the left of the middle, above and below the pupils."""
+WIDTH = 1.25
+"""Left edge of the map: eye separations from the middle of the pupils."""
+TOP = 1.25
+BOTTOM = -1.55
+"""Upper and lower edge: eye separations above the pupils."""
 TEXELS = 256
 """Texels of an eye separation."""
 SHAPE = (round((TOP - BOTTOM) * TEXELS), round(WIDTH * TEXELS))
 PLAIN = 128
 """Value where there is no wrinkle; lower is darker."""
 EDGE = 0.42
-"""Brightness of the lower edge, of the groove's darkness."""
-EDGE_BELOW, EDGE_BREADTH = 1.7, 1.5
-"""How far below the groove the edge is brightest, and its breadth, in widths of the groove."""
+"""Brightness of the lower edge, as a share of the groove's darkness."""
+EDGE_BELOW = 1.7
+"""Distance of the brightest line of the edge below the groove, in widths of the groove."""
+EDGE_BREADTH = 1.5
+"""Breadth of the edge, in widths of the groove."""
 FADE = 4.0
 """How steeply lines thin out towards their ends: over a quarter of their length each."""
 MAKING = 1

@@ -31,8 +31,8 @@ a face and a body."""
 CHECK_BAP_STEPS_AFTER = 4
 """Seconds of a body after which it is checked, once, whether they look right with these BAP steps."""
 CHOOSE_BAP_STEPS_AFTER = 1.25
-"""Seconds of a body that are held back until the BAP steps are chosen by the way it moves, unless it comes
-faster: a file in a pipe has come to its end, where its mark is, within `PATIENCE`."""
+"""Seconds of a body after which the BAP steps are chosen by how it moves; nothing is shown before. A file in
+a pipe arrives faster: its end, with the mark, comes within `PATIENCE`."""
 
 
 MARK_BYTES = 64
@@ -43,7 +43,7 @@ class Readable(Protocol):
     """A source of bytes: standard input's buffer, a FIFO, a socket's file."""
 
     def read1(self, size: int = -1, /) -> bytes:
-        """Return at most `size` bytes that have arrived; waits for at least one. b"" at the end."""
+        """Return at most `size` bytes that have arrived, after waiting for at least one; b"" at the end."""
 
 
 class LiveAnimation:
@@ -84,7 +84,7 @@ class LiveAnimation:
         self._at_end = at_end
         self.bap_steps = BAP_STEPS_DEFAULT if bap_steps == BAP_STEPS_AUTO else bap_steps
         self.steps_explanation = ""
-        # What came until they are chosen:
+        # What arrives before they are chosen:
         self._held: bytearray | None = bytearray() if bap_steps == BAP_STEPS_AUTO else None
         self._held_blocks: list[Block] = []
         self._held_since: float | None = None  # when the first block came
@@ -245,7 +245,7 @@ class LiveAnimation:
     def _choose_bap_steps(self, *, whole: bool = False) -> None:
         """Choose the BAP steps, if they are not chosen yet, and add what was held back.
 
-        whole: the decoder has not read all of it.
+        whole: decode all of it again, as the decoder has not read the last chunk.
         """
         if self._held is None:
             return
@@ -282,7 +282,7 @@ class LiveAnimation:
             self._changed.notify_all()
 
     def _check_mark(self) -> None:
-        """Say if a mark at the end of the stream names other BAP steps than those with which it was shown."""
+        """Report a mark at the end of the stream that names other BAP steps than those shown."""
         named = self._decoder.mark
         if named is None or named == self.bap_steps or self._now.body is None:
             return

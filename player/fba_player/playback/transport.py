@@ -19,7 +19,7 @@ SPEEDS = (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
 BUFFER = 0.25
 """Seconds of a live stream that must have arrived before it plays, and again after a gap."""
 AT_ONCE = 0.1
-"""Seconds: a mark out set this shortly before the current time is meant to be there."""
+"""Seconds: a mark out this shortly before the current time counts as set at it."""
 
 
 class Transport:
@@ -280,7 +280,7 @@ class Transport:
     def timecode(self, time: float | None = None) -> str:
         """Return the time code "h:mm:ss:ff" of a time, by default the current one.
 
-        It is that of the stream, if the stream carries time codes: the times of its frames follow them.
+        If the stream carries time codes, it is theirs: the times of frames follow them.
         Hours, minutes and seconds are those of the time itself at any rate; ff counts the frame periods that
         have begun in that second, from 00.
         """

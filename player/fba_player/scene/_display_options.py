@@ -28,9 +28,13 @@ HAIRS = ("lash", "brow")
 INSIDE = (*HAIRS, "teeth", "tongue", "mouth", "eye")
 """Kinds of parts that a transparent body leaves out."""
 DOT: Colour = (0.98, 0.62, 0.20, 1.0)
-DOT_RADIUS, DOT_SIZE = 3.2, 0.0022
-"""Radius in pixels of a picture 720 high, and at most in metres."""
-DOT_LIFT, NAME_LIFT = 0.004, 0.006
+DOT_RADIUS = 3.2
+"""Radius of a dot, pixels in a picture 720 high."""
+MAX_DOT_RADIUS = 0.0022
+"""Largest radius of a dot, metres."""
+DOT_LIFT = 0.004
+NAME_LIFT = 0.006
+"""Depth (m) of skin through which dots and names show."""
 GRID_REACH = 7.0
 """Radius of the grid under a body, in steps."""
 
@@ -163,7 +167,7 @@ class DisplayOptions:
             (DOT_LIFT if over else NAME_LIFT) * self._scale,
             point_names,
             facing.astype(np.float32),
-            DOT_SIZE * self._scale,
+            MAX_DOT_RADIUS * self._scale,
         )
 
 

@@ -18,13 +18,15 @@ from fba_player.mesh.textures import linear_light
 from fba_player.view.geometry import rotation_vector, turn_partly
 from fba_player.view.view import Eye, FaceMesh, FaceShape, Legend, Mesh, MeshShape
 
-STEPS, ANGLE = 100, 10_000
-"""The FAP's value: about a tenth of the unit for distances, 0.1 rad for angles."""
+MEASURED_STEPS = 100
+"""Value of a FAP with a unit of length: about a tenth of the unit."""
+MEASURED_ANGLE = 10_000
+"""Value of a FAP that is an angle: 0.1 rad."""
 GLOSS = 0.15
 SHADES = 33
 """Number of colours in the legend."""
 MIN_MOVEMENT = 1e-6
-"""Movements smaller than this (m) count as none."""
+"""Movements smaller than this (m) count as 0."""
 
 
 class FapHeatmap:
@@ -33,7 +35,7 @@ class FapHeatmap:
     def __init__(self, figure: FaceFigure, number: int) -> None:
         self._figure = figure
         self.fap = faps()[number - 1]
-        self.value = ANGLE if self.fap.unit == "AU" else STEPS
+        self.value = MEASURED_ANGLE if self.fap.unit == "AU" else MEASURED_STEPS
         self._values = np.zeros(FAP_COUNT, dtype=np.float32)
         self._values[number - 1] = self.value
         self._shapes: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()

@@ -15,8 +15,10 @@ Colour = tuple[float, float, float]
 
 JOINT = 1e-3
 """Capsules shorter than this (m) are joints, not bones."""
-BONE_WIDTH, BONE_LIFT = 2.6, 0.3
-"""Bones as lines: width in pixels of a picture 720 high, and depth (m) through which they show."""
+BONE_WIDTH = 2.6
+"""Width of bones drawn as lines, pixels in a picture 720 high."""
+BONE_LIFT = 0.3
+"""Depth (m) through which bones show."""
 LINE_LIFT = 0.02
 """Depth (m) by which another face may hide the lines of a face."""
 

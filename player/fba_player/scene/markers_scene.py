@@ -28,12 +28,14 @@ FREE: Colour = (0.93, 0.94, 0.96, 0.55)
 CURRENT: Colour = (0.25, 0.75, 1.0, 1.0)
 LINE: Colour = (0.25, 0.75, 1.0, 0.55)
 """Moving, fixed and unmapped markers, the current one, and the line from it to its vertex."""
-RADIUS, CENTRE_RADIUS, CURRENT_RADIUS = 4.2, 2.6, 6.0
-"""Of dots, pixels in a picture 720 high."""
+RADIUS = 4.2
+CENTRE_RADIUS = 2.6
+CURRENT_RADIUS = 6.0
+"""Radii of dots, pixels in a picture 720 high."""
 LIFT = 0.006
 """Metres of skin through which dots are seen."""
 MAX_CLICK_DISTANCE = 10.0
-"""Pixels, in a picture 720 high, from a dot within which a click means it."""
+"""A click this close to a dot, in pixels of a picture 720 high, means the dot."""
 CLOUD_GAP = 0.35
 """Room between cloud and head, as a share of the head's width."""
 ROOM = 1.2
@@ -99,7 +101,7 @@ class MarkersScene(Timed[CaptureTimes]):
         return x, y, z
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Return the same."""
+        """Return the same as `travel`."""
         return self.travel(time)
 
     def vertex_under(
@@ -140,7 +142,8 @@ class MarkersScene(Timed[CaptureTimes]):
 
     @cached_property
     def _middle(self) -> Float64:
-        """(3,) what is the world's origin, in the head's unit: a face model's own, else the middle."""
+        """The point (3,) at the world's origin, in the head's unit: a face model's origin, else the head's
+        middle."""
         if self.editing.head.model is not None:
             return np.zeros(3)
         used = self.editing.head.vertices[np.unique(self.editing.head.triangles)]
@@ -177,7 +180,7 @@ class MarkersScene(Timed[CaptureTimes]):
 
     @cached_property
     def _representatives(self) -> Intp:
-        """(S,) a vertex of the head for each of its skin."""
+        """A vertex of the head for each vertex of its skin, (S,)."""
         skin = self.editing.head.skin
         rows = np.zeros(len(skin), dtype=np.intp)
         rows[skin.number] = np.arange(len(skin.number))

@@ -26,7 +26,7 @@ from fba_player.view.switches import Switches
 from fba_player.view.view import Colour, Dots, Extras, FaceMesh, FaceShape, View
 
 HEIGHT = 0.26
-"""Metres that a head of no known unit is shown high."""
+"""Height in metres at which a head of unknown unit is shown."""
 PLACED: Colour = (0.95, 0.62, 0.25, 1.0)
 CURRENT: Colour = (0.25, 0.75, 1.0, 1.0)
 GUESSED: Colour = (0.25, 0.75, 1.0, 0.75)
@@ -73,11 +73,11 @@ class PlacementScene(Timed[Timeline]):
         return Camera.preset("front" if preset in (None, "body") else str(preset), self._subject, aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """Zeros: a head does not walk away."""
+        """Return zeros: a head does not walk away."""
         return 0.0, 0.0, 0.0
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Zeros, likewise."""
+        """Return zeros."""
         return 0.0, 0.0, 0.0
 
     def vertex_under(self, camera: Camera, x: float, y: float, size: tuple[int, int]) -> int | None:
@@ -213,7 +213,7 @@ def _picture(part: Part) -> FacePicture | None:
 
 
 def _stillness() -> Animation:
-    """Return one neutral frame: the window wants times."""
+    """Return one neutral frame: a window needs times."""
     return Animation(
         Fraction(25), np.zeros(1, np.int64), FaceTrack(np.zeros((1, 68), np.int32), np.zeros((1, 68), bool))
     )

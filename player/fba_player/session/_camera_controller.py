@@ -102,7 +102,7 @@ class Viewpoint:
         self._preset = name
 
     def uncover(self, left: float, right: float, *, smoothly: bool = True) -> None:
-        """Shift the figure to between panels that hide these shares of the picture's width."""
+        """Shift the figure into the space between panels that hide these shares of the picture's width."""
         if (left, right) == self._sides:
             return
         self._shift_before = self._shift_now()

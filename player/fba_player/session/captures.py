@@ -86,10 +86,11 @@ class Captures:
             self._sound.advance(self.session.recording)
 
     def add_picture(self, start: Callable[[], Callable[[], UInt8]]) -> None:
-        """Have the picture drawn since `begin_picture` in the film.
+        """Add the picture drawn since `begin_picture` to the film.
 
-        start: begins to read it, and returns what gives it, uint8 (H, W, 4). That is called when the next
-        picture begins, so that none is waited for. Not called where the film needs no frame.
+        start: begins to read it, and returns a function that gives its pixels, uint8 (H, W, 4), which is
+        called when the next picture begins, so that nothing waits. start is not called if the film needs no
+        frame.
         """
         seconds = self.session.recording
         if self._recorder is not None and seconds is not None and self._recorder.wants(seconds):
@@ -120,7 +121,8 @@ class Captures:
             self.session.say(f"Recording stopped: {error}", "error", 8.0)
 
     def _open_sound(self) -> FilmSound | None:
-        """Return the sound for a new film; None without sound, with a notice if the file cannot be used."""
+        """Return the sound for a new film; None without sound, or, with a notice, if the file cannot be
+        used."""
         session = self.session
         if session.sound is None:
             return None

@@ -75,7 +75,7 @@ def _rows(name: str) -> list[dict[str, str]]:
 
 
 def tables() -> str:
-    """Return the Markdown: a table for each group of keys, for switches and for the mouse."""
+    """Return a table in Markdown for each group of keys, for switches and for the mouse."""
     lines: list[str] = []
     group = ""
     for row in keys():

@@ -85,7 +85,7 @@ class Session:
     requests: what the window shall do after this picture, see `request`. recording: seconds of the film so
     far, None if none is being recorded. values: FAPs and BAPs of the last picture, after the hooks. sound:
     path of the sound file; audio: its player, None without a sound device; the sound begins sound_offset
-    seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures all the time.
+    seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures without input.
     unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next, see `drop`.
     popup: whether a list is open over the picture; set to False to close it.
     """

@@ -18,8 +18,9 @@ CHANNELS = 2
 RATES = (8000, 192_000)
 """Samples per second, least and most; other rates are resampled to `USUAL_RATE`."""
 USUAL_RATE = 48_000
-MIN_RATE, MAX_RATE = 1000, 1_000_000
-"""Samples per second that are read: resampling takes time and memory in proportion to the change."""
+MIN_RATE = 1000
+MAX_RATE = 1_000_000
+"""Limits of the samples per second that are read: resampling costs time and memory by the change of rate."""
 RUN_UP = 0.5
 """Seconds decoded before the first sample that is read: MP3 and AAC frames need the ones before them."""
 MIN_GAP_SECONDS = 0.02

@@ -28,8 +28,10 @@ from fba_player.sound.soundtrack import find_sound_beside
 
 __all__ = ["Audio", "find_sound_beside", "open_audio"]
 
-PERIOD, PERIODS = 0.04, 3
-"""Seconds that a device asks for at a time, and how many such periods it buffers."""
+PERIOD = 0.04
+"""Seconds of sound that a device asks for at a time."""
+PERIODS = 3
+"""Number of periods that a device buffers."""
 CLOCK_GAIN = 0.05
 """Share of the measured error by which each call of the device corrects the clock: calls are irregular."""
 CLOCK_CALLS = 10

@@ -222,7 +222,7 @@ class Bar:
 
 
 def _ticks(ruler: Ruler) -> tuple[list[float], list[tuple[float, float, str]]]:
-    """Return x of the small ticks; and (x, left edge of the label, label) of the large ones."""
+    """Return the x of small ticks, and (x, left edge of the label, label) of large ones."""
     step = ruler.step(APART)
     large = []
     for time in ruler.ticks(step):

@@ -8,12 +8,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-EDGE, GAP, FOLDED_GAP = 14.0, 10.0, 4.0
-"""Points around columns, between panels, and below folded panels."""
+EDGE = 14.0
+"""Points around a column."""
+GAP = 10.0
+"""Points between two panels."""
+FOLDED_GAP = 4.0
+"""Points below a folded panel."""
 TITLE = 32.0
 """Height of a folded panel, which shows only its title."""
-MIDDLE, MIN_MIDDLE = 0.3, 240.0
-"""Least width between the columns: a share of the display's, and points."""
+MIN_MIDDLE_SHARE = 0.3
+"""Least width between the columns, as a share of the display's."""
+MIN_MIDDLE = 240.0
+"""Least width between the columns, in points."""
 MIN_COLUMN = 280.0
 """Least width of a column; if two do not fit beside the middle, there is only the right one."""
 
@@ -67,7 +73,7 @@ class Docks:
         self._sides = {name: side for name, side in self._sides.items() if name in names}
         self._used = [name for name in self._used if name in names]
         room = wide - 2 * EDGE
-        middle = max(MIDDLE * wide, MIN_MIDDLE)
+        middle = max(MIN_MIDDLE_SHARE * wide, MIN_MIDDLE)
         both = room - middle >= 2 * MIN_COLUMN
         columns: dict[str, list[DockRequest]] = {"left": [], "right": []}
         known = [name for name in self._sides if name in names]  # in the order in which they opened

@@ -22,7 +22,7 @@ class Ruler:
     right: float
 
     def x(self, time: float) -> float:
-        """Return x of a time, limited to left..right."""
+        """Return the x of a time, limited to left..right."""
         share = (time - self.low) / (self.high - self.low) if self.high > self.low else 0.0
         return self.left + min(max(share, 0.0), 1.0) * (self.right - self.left)
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Floating
+from fba.rotations import quaternions
 from fba_player.view.camera import Camera
 from fba_player.view.view import FaceMesh
 
@@ -52,25 +53,7 @@ def turn_partly(positions: Floating, sway: Floating, turn: Float64, centre: Floa
 
 def rotation_vector(matrix: Float64) -> Float64:
     """Return (3,): the axis of a rotation matrix (3, 3) times its angle, 0..pi."""
-    # Through the quaternion and its largest component, which is exact near half a turn, too.
-    trace = float(np.trace(matrix))
-    squares = np.array([trace, *np.diag(matrix)])
-    largest = int(squares.argmax())
-    if largest == 0:
-        q = np.array([
-            1 + trace,
-            matrix[2, 1] - matrix[1, 2],
-            matrix[0, 2] - matrix[2, 0],
-            matrix[1, 0] - matrix[0, 1],
-        ])  # fmt: skip
-    else:
-        i = largest - 1
-        j, k = (i + 1) % 3, (i + 2) % 3
-        q = np.zeros(4)
-        q[0] = matrix[k, j] - matrix[j, k]
-        q[1 + i] = 1 + 2 * matrix[i, i] - trace
-        q[1 + j], q[1 + k] = matrix[j, i] + matrix[i, j], matrix[k, i] + matrix[i, k]
-    q = q / np.linalg.norm(q)
+    q = quaternions(matrix)  # exact near half a turn, too
     sine = float(np.linalg.norm(q[1:]))
     if sine < 1e-12:
         return np.zeros(3)

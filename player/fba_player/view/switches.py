@@ -14,7 +14,8 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
 Value = bool | str | int | None
 """A flag's bool, a choice's word, or a FAP's number (None for none)."""
 
-ON, OFF = ("on", "yes", "true", "1"), ("off", "no", "false", "0", "none")
+ON = ("on", "yes", "true", "1")
+OFF = ("off", "no", "false", "0", "none")
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,7 @@ from fba_player.gl.context import (
     missing_libraries,
     missing_text,
 )
-from fba_player.gl.framebuffer import Target
-from fba_player.gl.readback import Readback
+from fba_player.gl.framebuffer import Readback, Target
 from fba_player.gl.renderer import Renderer
 from fba_player.playback.live import LiveTimeline
 from fba_player.playback.transport import Transport
@@ -30,8 +29,7 @@ from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.view.camera import Camera
 from fba_player.window._glfw_input import GlfwInput
-from fba_player.window._opening import draw_opening
-from fba_player.window._plain_overlay import Overlay
+from fba_player.window._plain_overlay import Overlay, draw_opening
 from fba_player.window.display import HOW_WITHOUT, FullScreen, start_glfw
 
 if TYPE_CHECKING:

@@ -114,7 +114,7 @@ def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
 
 
 def follow_newest(session: Session, newest: Newest) -> None:
-    """Let pictures show the newest values of a capture, which the stream's last frame has only later.
+    """Let pictures show the newest values of a capture before the stream contains them.
 
     They do while the stream arrives and is played at its end. A user who pauses or seeks back sees the
     stream instead, until it is played to its end again.

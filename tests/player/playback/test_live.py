@@ -437,7 +437,7 @@ def test_a_marked_file_that_comes_through_a_pipe_has_the_right_steps(size: int, 
     assert (live.body.values == values).all()
 
 
-def test_what_a_mark_at_the_end_says_otherwise_is_told() -> None:
+def test_a_mark_at_the_end_that_names_other_steps_is_reported() -> None:
     data = fba.encode(performance(both=True), EncoderOptions(bap_steps="visage", clamp=True))
     with warnings.catch_warnings(record=True):
         warnings.simplefilter("always")

@@ -121,7 +121,7 @@ def test_between_columns_the_face_stands_in_what_is_free(talking: Animation, clo
     assert viewpoint.camera_at(0.0) == whole
 
 
-def test_a_view_of_ones_own_keeps_its_distance_between_columns(clock: Clock) -> None:
+def test_a_given_camera_keeps_its_distance_between_columns(clock: Clock) -> None:
     viewpoint = Viewpoint(Walking(), 2.0, Camera(distance=5.0), clock=clock)  # type: ignore[arg-type]
     viewpoint.uncover(0.3, 0.0, smoothly=False)
     assert viewpoint.camera_at(0.0).distance == 5.0

@@ -39,7 +39,7 @@ def apart(docks: dict[str, Dock]) -> bool:
     )
 
 
-def test_one_has_what_it_likes_at_its_side() -> None:
+def test_a_single_panel_gets_the_size_it_asks_for_at_its_side() -> None:
     docks = Docks()
     assert docks.arrange([request("a")], 1280, TOP, 530) == {"a": Dock(EDGE, TOP, 400, 250)}
     docks = Docks()
@@ -48,7 +48,7 @@ def test_one_has_what_it_likes_at_its_side() -> None:
     }
 
 
-def test_what_does_not_fit_as_it_likes_goes_to_the_other_side() -> None:
+def test_a_panel_without_room_at_its_side_goes_to_the_other() -> None:
     found = Docks().arrange([request("a"), request("b"), request("c")], 1280, TOP, 530)
     assert (found["a"].left, found["b"].left) == (EDGE, EDGE)
     assert found["b"].top == TOP + 250 + GAP
@@ -69,7 +69,7 @@ def test_where_both_sides_are_full_they_share_the_height() -> None:
     assert not any(dock.folded for dock in found.values())
 
 
-def test_the_one_used_longest_ago_is_folded() -> None:
+def test_the_least_recently_used_panel_is_folded() -> None:
     requests = [request(name, height=400, least=200) for name in "abcdef"]
     docks = Docks()
     found = docks.arrange(requests, 1280, TOP, 530)

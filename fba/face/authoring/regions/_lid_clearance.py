@@ -20,7 +20,7 @@ CLEARANCE = 0.012
 FULL_CLEARANCE = 0.3
 """Share of the way after which a lid has its full clearance."""
 BULGE = np.radians(12.0)
-"""Angle by which the cornea may be elsewhere, because the eye turns."""
+"""Angle by which the cornea may have moved, because the eye turns."""
 STRICT = np.radians(4.0)
 """Half the width of the directions over which the eyeball's own radius is measured."""
 ANGLES = np.linspace(0, np.pi, 73)
@@ -30,7 +30,7 @@ OUTSIDE = 0.97
 DEEPEST = 0.02
 """Largest correction for an edge that dips into the eyeball, as a share of its radius."""
 BRIDGINGS = 3
-"""Moving a vertex off the eyeball may pull another edge into it: number of passes."""
+"""Number of passes: moving a vertex off the eyeball may pull another edge into it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class Profile:
         outside = self.is_outside(points, OUTSIDE)
         pushed = (outside if always is None else outside | always) & (way > 1e-9)
         result = np.zeros_like(shifted)
-        # what hardly moves, as the lining of the other lid, stays where it is
+        # vertices that hardly move, as in the lining of the other lid, stay
         most = way if always is None else np.where(always, np.inf, way)
         result[:, 2] = np.where(pushed, np.minimum(self.shortfall(shifted, edges=edges), most), 0.0)
         return result

@@ -18,9 +18,9 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 GAMMA = 2.2
 """Exponent from pictures' values to the linear light of vertices' colours, near enough to compare them."""
 STRIPS = 8
-"""Strips of the lid, side by side, each of which is looked at by itself."""
+"""Number of strips, side by side, into which a lid is cut; each is measured separately."""
 STEPS = 24
-"""Distances from the margin at which each is looked at, up to `FURTHEST`."""
+"""Number of distances from the margin, up to `FURTHEST`, at which a strip is measured."""
 FURTHEST = 2.0
 """Distance from the margin, in distances of the crease, up to which paint is looked for; skin begins at 1."""
 DARK = 0.5

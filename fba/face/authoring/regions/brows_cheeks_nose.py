@@ -31,8 +31,6 @@ from fba.parameters import faps
 
 SMOOTHINGS = 5
 """Rounds of averaging the motion of surfaces behind the skin."""
-HEM = 0.006
-"""Shares of a motion below this are set to 0."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +38,9 @@ class Region:
     """Points that pull at the same skin.
 
     points: that pull. still, contours: points and contours that stay. reach: of the motion, in ES0. share: of
-    the way to fixed vertices that moves. slack: distance in ES0
-    beyond which the skin does not overshoot. through: depth in ES0 to which surfaces behind the skin move
-    with it, or 0. behind: these surfaces, the inside of the "mouth" or "all".
+    the distance to fixed vertices that moves. slack: distance in ES0 beyond which the skin does not
+    overshoot. through: depth in ES0 to which surfaces behind the skin move with it, or 0. behind: these
+    surfaces, the inside of the "mouth" or "all".
     """
 
     name: str
@@ -141,7 +139,7 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64,
             for _ in range(SMOOTHINGS):
                 lifted[targets] = average_with_neighbours(surface, lifted, 1)[targets]
             solved[:, k] = lifted
-    return trim_small(solved, HEM), surface.mask(fixed)
+    return trim_small(solved), surface.mask(fixed)
 
 
 def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, pinned: Bool) -> Motion:

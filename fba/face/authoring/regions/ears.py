@@ -1,4 +1,5 @@
-"""The ears: FAPs 65-68. Raised, an ear moves as one about its soft root; pulled, its rim moves furthest."""
+"""The ears: FAPs 65-68. A raised ear moves rigidly about its soft root; of a pulled ear, the rim moves
+furthest."""
 
 from __future__ import annotations
 
@@ -34,8 +35,6 @@ LEAST_PULL = 0.1
 """Share of a pull that the root of the ear makes."""
 SMOOTHINGS = 6
 """Rounds of averaging shares with those of neighbours."""
-HEM = 0.006
-"""Shares of a motion below this are set to 0."""
 
 
 def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
@@ -74,7 +73,7 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
         far = 1 - ((surface.vertices - back) @ out) / (out @ out)
         share = share * (LEAST_PULL + (1 - LEAST_PULL) * np.clip(far, 0.0, 1.2))
     own = marks.vertex[names["back" if pull else "top"]]
-    return trim_small(share / max(share[own], 1e-9), HEM)
+    return trim_small(share / max(share[own], 1e-9))
 
 
 def _rim(marks: Landmarks, names: dict[str, str]) -> Intp:

@@ -31,7 +31,7 @@ class Opening:
 def measure_opening(marks: Landmarks, eye: Eye) -> Opening | None:
     """Return the columns of an eye's opening, or None where its lids are not one above the other.
 
-    Nor are there any where a margin is not on the skin, as where a feature point of it is missing.
+    None also if a margin is not on the skin, as when one of its feature points is missing.
     """
     lines = []
     for lid in ("upper", "lower"):

@@ -37,7 +37,7 @@ LIP_RIDE = 0.5
 FAPs of its own."""
 SLACK = 0.2
 """Distance in ES0 beyond which the skin does not overshoot."""
-HEM = 0.004
+MIN_SHARE = 0.004
 """Shares of a motion below this are set to 0."""
 TEETH_MARGIN = 0.12
 """Height about the teeth's edge over which the jaw's share goes from 0 to 1, in MNS0."""
@@ -156,7 +156,7 @@ ROWS = {0.0: "upper", 1.0: "lower"}
 
 
 def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
-    """1 for the lower teeth, 0 for the upper, where the feature points of only one row are on a part."""
+    """Return 1 for the lower teeth, 0 for the upper, if the feature points of only one row are on a part."""
     close: dict[float, bool] = {}
     for row, names in ((0.0, ("9.8", "9.10")), (1.0, ("9.9", "9.11"))):
         known = [point for name in names if np.isfinite(point := marks.point(name)).all()]
@@ -202,7 +202,7 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
         free |= inside
     order = np.unique(fixed, return_index=True)[1]
     field = solve_smooth_field(surface, free, fixed[order], given[order][:, None], slack=SLACK * es)
-    return trim_small(np.clip(field[:, 0], 0.0, 1.0), HEM)
+    return trim_small(np.clip(field[:, 0], 0.0, 1.0), MIN_SHARE)
 
 
 def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
@@ -233,7 +233,7 @@ def _with_lip(marks: Landmarks, share: Float64) -> Float64:
     given[upper] = 0.0
     given[lower] = LIP_RIDE * along
     field = solve_smooth_field(surface, close, fixed, given[fixed][:, None], slack=SLACK * es)[:, 0]
-    return trim_small(np.clip(field, 0.0, 1.0), HEM)
+    return trim_small(np.clip(field, 0.0, 1.0), MIN_SHARE)
 
 
 def _from_corners(marks: Landmarks, vertices: Intp) -> Float64:

@@ -33,7 +33,7 @@ from fba.face.authoring.surface.weights import average_with_neighbours, trim_sma
 from fba.face.model import Part
 
 STEP = 128
-"""Values between two borders of the tables: an eighth of the way from open to closed."""
+"""FAP units between two borders of the tables: an eighth of the motion from open to closed."""
 REACH = 0.6
 """Largest reach of a lid's motion into the skin around it, in ES0."""
 CREASE = 0.11
@@ -50,9 +50,9 @@ AT_CREASE = 0.25
 ENDS = 3.5
 """Multiple of the crease's distance beyond which the skin does not move."""
 EDGE = 0.4
-"""Share of the distance to the crease up to which the lid's edge moves as one..."""
+"""Share of the distance to the crease up to which the lid's edge moves rigidly."""
 MOST_EDGE = 0.8
-"""... and up to which it does at most where lashes or a liner are painted on it: only bare skin stretches."""
+"""The same, at most, for a lid with painted lashes or a liner: only bare skin stretches."""
 FURTHER = 0.2
 """Share by which the front edge of a lid may move further than the margin."""
 OWN_SIDE = 0.6
@@ -66,13 +66,12 @@ UNMOVED_POINTS = {
     "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
 }
 WIDE = 0.35
-"""Columns of the eye's opening this high, as a share of the highest, show how far a shape moves a margin."""
+"""Only columns of the eye's opening at least this high, as a share of the highest, show how far a shape moves
+a margin."""
 LEAST_SCULPTED = 0.08
 """Least share of the opening by which a shape moves a margin that it shows how to move."""
 LEAST_TURN = 0.3
 """Least motion of a margin, as a share of its largest, against which that of other vertices is measured."""
-HEM = 0.006
-"""Shares of a motion below this are set to 0."""
 SUNK = 0.03
 """Shortfall of a margin from the clearance of moved lids, in radii of the eyeball, above which both margins
 meet where they are, as a gap would be seen otherwise."""
@@ -134,7 +133,7 @@ def lid_motion(
     limited = stop_at_folds(limiter.without(corners), motion, turning=True)
     if not follows and _moving_range(limited)[1] >= CLOSED:
         return limited
-    # an eye closes although its lids' edges roll in; the way up is no sculptor's
+    # an eye closes although its lids' edges roll in; no sculptor made the motion upwards
     closing = stop_at_folds(sculptors.without(np.union1d(margins, corners)), motion, turning=True)
     up, down = limited.values < 0, closing.values >= 0
     return Motion(
@@ -172,7 +171,7 @@ def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift
     share *= smoothstep(2 - 2 * np.minimum(marks.surface.distances(own, reach), reach) / reach)
     share[own] = 1.0
     share[np.setdiff1d(other, own)] = 0.0
-    return trim_small(share, HEM)
+    return trim_small(share)
 
 
 def _folded_vertices(limiter: Limiter, shift: Float64) -> Intp:
@@ -239,7 +238,7 @@ def _share(
     share[stays] = 0.0
     pinned |= (away < painted) & (opposite > away)
     share = np.where(pinned, share, average_with_neighbours(surface, share, SMOOTHINGS))
-    return trim_small(share, HEM)
+    return trim_small(share)
 
 
 def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: float) -> Float64:

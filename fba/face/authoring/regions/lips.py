@@ -62,8 +62,6 @@ UNMOVED_POINTS = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.
 """Feature points that the lips do not move."""
 SLACK = 0.25
 """Distance in ES0 beyond which the skin does not overshoot."""
-HEM = 0.006
-"""Shares of a motion below this are set to 0."""
 TANGENT = 1.0
 """Slope of the curve at its points: with 1, straight lines through the points stay straight; with 0, shares
 never get negative."""
@@ -177,7 +175,7 @@ def _fields(marks: Landmarks) -> _Lips:
     free = reachable_region(near, far, REACH * es)
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
     solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
-    field = {name: trim_small(solved[:, k], HEM) for k, name in enumerate(names)}
+    field = {name: trim_small(solved[:, k]) for k, name in enumerate(names)}
     return _Lips(field, _inward(marks))
 
 

@@ -27,7 +27,7 @@ SURFACE_KINDS = ("skin", "mouth")
 TOLERANCE = 0.15
 """A point may lie this far from its part, as a share of the face's size."""
 LIP_SLACK = 0.02
-"""How much further away than the nearest lip a point's own lip may be, as a share of the face's size."""
+"""A point's own lip may be further away than the nearest lip by this share of the face's size."""
 JAW_OF_TEETH = {"9.8": 1, "9.10": 1, "9.9": -1, "9.11": -1}
 UPPER_LIP = ("2.2", "2.6", "2.7")
 LOWER_LIP = ("2.3", "2.8", "2.9")

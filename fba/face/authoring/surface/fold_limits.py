@@ -14,9 +14,10 @@ from fba.rotations import cross, dot, lengths
 LEAST_AREA = 0.12
 """Least share of its area that a triangle keeps, seen along its neutral normal."""
 MOST_STRETCH = 5.0
-"""Largest length of an edge, in multiples of its neutral length..."""
+"""Largest length of an edge, in multiples of its neutral length."""
 TINY_EDGE = 0.25
-"""... or, for short edges, of this share of the typical edge length among the moving triangles."""
+"""Share of the typical edge length among the moving triangles, which stands for shorter neutral lengths
+there."""
 FOLDED = -0.3
 """A triangle is folded if its normal has a smaller cosine than this with that of its neighbours."""
 SPECK = 0.0015

@@ -34,7 +34,7 @@ LIP_CONTOURS = tuple(name for name in CONTOURS if name.endswith("lip"))
 LIP_ROOM = 0.03
 """Distance from the inner contour of the lips, in ES0, that the outer contour keeps where it can."""
 CLOSE_COST = 4.0
-"""Factor of lengths within that distance."""
+"""Factor on the lengths of edges within `LIP_ROOM` of the inner contour."""
 OPENINGS = {name for name in CONTOURS if name.endswith(" lid") or "inner" in name}
 """Contours around an opening of the face, which in many meshes is a hole."""
 
@@ -89,7 +89,7 @@ class Landmarks:
         return self._contours[name]
 
     def _walk(self, through: tuple[str, ...], *, rim: bool, around: Intp | None = None) -> Intp:
-        """around: vertices that the walk keeps away from where it can."""
+        """Return the vertices of a walk through feature points. around: vertices that it avoids if it can."""
         known = [self.vertex[name] for name in through if name in self.vertex]
         if len(known) < 3 or not self.has(through[0], through[-1]):
             return np.zeros(0, dtype=np.intp)

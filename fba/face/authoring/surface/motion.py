@@ -13,7 +13,7 @@ from fba.face.tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
 
 UNMOVED_DISTANCE = 2e-6
-"""Metres up to which a vertex moves that is left out of the tables."""
+"""Vertices that move by at most this (m) are left out of the tables."""
 
 
 @dataclass(frozen=True, eq=False)

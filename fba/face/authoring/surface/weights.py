@@ -8,6 +8,9 @@ from fba.arrays import Bool, Float64, Intp
 from fba.errors import ModelError
 from fba.face.authoring.surface.surface import Surface
 
+MIN_SHARE = 0.006
+"""Shares of a motion below this are set to 0."""
+
 
 def solve_smooth_field(
     surface: Surface, free: Bool, fixed: Intp, values: Float64, *, slack: float, harmonic: bool = False
@@ -59,10 +62,10 @@ def reachable_region(near: Float64, far: Float64, reach: float, share: float = 0
         return (near < reach) & (near < share * (near + far))
 
 
-def trim_small(field: Float64, hem: float) -> Float64:
-    """Return a field with values below `hem` set to 0 and 1 staying 1, so that vertices that barely move
+def trim_small(field: Float64, least: float = MIN_SHARE) -> Float64:
+    """Return a field with values below `least` set to 0 and 1 staying 1, so that vertices that barely move
     rest."""
-    result: Float64 = np.sign(field) * np.maximum(np.abs(field) - hem, 0.0) / (1 - hem)
+    result: Float64 = np.sign(field) * np.maximum(np.abs(field) - least, 0.0) / (1 - least)
     return result
 
 

@@ -81,7 +81,7 @@ def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Floa
 
 
 def _front(skin: Part, x: float, heights: Float64) -> Float64:
-    """Return for each height the foremost z where the skin cuts the plane at x; NaN where it does not."""
+    """Return the foremost z at each height where the skin cuts the plane at x; NaN where it does not."""
     vertices = skin.vertices.astype(np.float64)
     # a plane through vertices cuts twice or not at all; one beside them cuts once
     beside = x + 1e-5 * float(np.ptp(vertices[:, 0]))

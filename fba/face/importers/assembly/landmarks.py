@@ -39,7 +39,7 @@ MAX_HALF_MOUTH = 0.7
 SLIT_STEP = 0.02
 """Width of a step along the line between the lips, in distances of the eyes."""
 SLIT_END = 0.2
-"""Share of what lips part in the middle by which they still part at the corner."""
+"""Lips still part at the corner by this share of their gap in the middle."""
 MIN_LOOP_VERTICES = 6
 """Number of vertices that the opening of an eye has around it at least."""
 FRONT_TEETH = 0.12
@@ -55,7 +55,7 @@ RIGHT_LID = ("3.2", "3.4", "3.8", "3.12")
 LIDS_ALIKE = 0.02
 """Share by which the heights of both eyes' openings differ, at most, where lids stay as located."""
 MIN_FAPS = 20
-"""Number of shapes named after FAPs from which points are where these move most."""
+"""With at least this many shapes named after FAPs, points are where these move most."""
 
 
 def find_points(

@@ -154,7 +154,7 @@ def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int3
 
 
 def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, str]:
-    """Return (metres per unit of the mesh, how that was found out, in words).
+    """Return metres per unit of the mesh, and in words how they were determined.
 
     points: (84, 3). unit: given by the user, used unchanged. Otherwise the unit with which the pupils
     (3.5, 3.6; without them the eyes) stand as far apart as on a real head; where none does, as with

@@ -35,11 +35,11 @@ SAME_HEIGHT = 0.6
 PAIR = 1.7
 """Two eyes are together at least this many times as wide as tall; one eye is round."""
 WHITE = re.compile("white|sclera", re.IGNORECASE)
-"""In the names of the whites of eyes."""
+"""Part of the names of the whites of eyes."""
 AROUND = (0.7, 2.0)
-"""Least and greatest distance, in radii, at which the lids around an eyeball have vertices..."""
+"""Least and greatest distance, in radii, at which the lids around an eyeball have vertices."""
 SIDES_OF_EYE = 3
-"""... on at least this many of its four sides."""
+"""Lids have vertices on at least this many of an eyeball's four sides."""
 EYE_SIZES = (0.02, 0.12)
 """Radius of an eyeball by the height of the mesh, head alone to head and shoulders."""
 

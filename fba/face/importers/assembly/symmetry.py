@@ -18,12 +18,12 @@ from fba.parameters import faps
 from fba.rotations import between
 
 MIRRORED_POINTS = 0.02
-"""Asymmetry, up to which 98 % of a face's vertices are off the mirror image, in distances of the eyes, below
-which points are mirrored."""
+"""Points are mirrored below this asymmetry: the 98th percentile of the vertices' distances from the mirror
+image, by the distance of the eyes."""
 MIRRORED_TABLES = 0.006
-"""Asymmetry below which tables are mirrored, too, but those of the lids."""
+"""Below this asymmetry, tables are mirrored, too, except those of the lids."""
 MIRRORED_LIDS = 0.003
-"""Asymmetry below which the tables of the lids are mirrored, too."""
+"""Below this asymmetry, the tables of the lids are mirrored, too."""
 LIDS = ((19, 20), (21, 22))
 """FAPs of the lids, left and right: their rows of vertices are the first that differ."""
 BETTER = 0.5
@@ -102,7 +102,7 @@ def _turned(pieces: Sequence[Piece], turn: Float64, middle: Float64) -> list[Pie
 
 
 def asymmetry(pieces: Sequence[Piece], left: Float64, right: Float64) -> float:
-    """Return how far 98 % of the face's skin is from its mirror image at most, in distances of the eyes.
+    """Return the 98th percentile of the skin's distances from its mirror image, by the distance of the eyes.
 
     left, right: (3,) centres of the eyes.
     """

@@ -16,8 +16,10 @@ BLOCK = 512
 """Frames of a face resolved at once: about two milliseconds."""
 FILLED_IN_WEIGHT = 0.5
 """Weight of a FAP that is only filled in, where 1 is that of a FAP that is sent."""
-TYPICAL_ANGLE, TYPICAL_SHIFT = 45.0, 300.0
-"""Degrees and millimetres of a BAP that count as much as the typical motion of a FAP."""
+TYPICAL_ANGLE = 45.0
+"""Degrees of a BAP that count as much as the typical motion of a FAP."""
+TYPICAL_SHIFT = 300.0
+"""Millimetres of a BAP that count as much."""
 
 MIN_SHOWN_SECONDS = 0.05
 """Shortest range of time that is shown."""

@@ -14,16 +14,21 @@ from fba_player.session.mood import PuppetMood
 from fba_player.ui import theme
 from fba_player.ui.panels.panel import choose_name, heading, shorten, tooltip
 
-MAX_PLANE_HEIGHT, MIN_PLANE_HEIGHT = 240.0, 130.0
-"""Height of the plane in points, at most and at least; between them it leaves room for what is below it."""
+MAX_PLANE_HEIGHT = 240.0
+MIN_PLANE_HEIGHT = 130.0
+"""Limits of the plane's height in points; within them it leaves room for what is below it."""
 WIDE = 300.0
 """Width in points from which the sliders stand in two columns."""
 TITLE = 130.0
 """Width in points of a slider's title, at most."""
-DOT, HANDLE = 2.5, 7.0
-"""Radii of a named emotion and of the point, in points."""
-LABEL, CAPTION = 12.0, 11.0
-"""Sizes of letters in points: names of emotions, and the ends of the axes."""
+EMOTION_RADIUS = 2.5
+"""Radius of the dot of a named emotion, in points."""
+HANDLE_RADIUS = 7.0
+"""Radius of the point that the mouse drags, in points."""
+EMOTION_TEXT = 12.0
+"""Size of the names of emotions, in points."""
+AXIS_TEXT = 11.0
+"""Size of the names at the ends of the axes, in points."""
 SIDE = 10.0
 """Space around the plane for the dots at its edge, in points."""
 
@@ -101,25 +106,25 @@ class EmotionTab:
             ("active", middle_x + 4, y + 2),
             ("passive", middle_x + 4, y + high - 14),
             ("negative", x + 6, y + high - 14),
-            ("positive", x + wide - _width("positive", CAPTION) - 6, y + high - 14),
+            ("positive", x + wide - _width("positive", AXIS_TEXT) - 6, y + high - 14),
         )
         for text, at, above in ends:
-            to.add_text(font, CAPTION, (at, above), theme.packed(theme.FAINT), text)
-        taken = [(at, above, at + _width(text, CAPTION), above + CAPTION) for text, at, above in ends]
+            to.add_text(font, AXIS_TEXT, (at, above), theme.packed(theme.FAINT), text)
+        taken = [(at, above, at + _width(text, AXIS_TEXT), above + AXIS_TEXT) for text, at, above in ends]
         places = {name: self._place(*point) for name, point in known_points().items()}
         self.labels = place_labels(
             places,
-            {name: (_width(name, LABEL), LABEL) for name in places},
+            {name: (_width(name, EMOTION_TEXT), EMOTION_TEXT) for name in places},
             (x, y, x + wide, y + high),
             taken,
         )
         for name, place in places.items():
-            to.add_circle_filled(place, DOT, theme.packed(theme.WARM))
-            to.add_text(font, LABEL, self.labels[name][:2], theme.packed(theme.TEXT, 0.8), name)
+            to.add_circle_filled(place, EMOTION_RADIUS, theme.packed(theme.WARM))
+            to.add_text(font, EMOTION_TEXT, self.labels[name][:2], theme.packed(theme.TEXT, 0.8), name)
         if mood.point is not None:
             point = self._place(*mood.point)
-            to.add_circle_filled(point, HANDLE, theme.packed(theme.ACCENT))
-            to.add_circle(point, HANDLE, theme.packed(theme.TEXT), thickness=1.5)
+            to.add_circle_filled(point, HANDLE_RADIUS, theme.packed(theme.ACCENT))
+            to.add_circle(point, HANDLE_RADIUS, theme.packed(theme.TEXT), thickness=1.5)
 
     def _place(self, activation: float, evaluation: float) -> tuple[float, float]:
         """Return where a point of the plane is drawn: evaluation to the right, activation upwards."""
@@ -168,7 +173,7 @@ def place_labels(
     dots: x and y by name. sizes: width and height of each name. taken: boxes that are to stay free as well.
     Where there is no free place, the one that covers least is taken.
     """
-    clear = DOT + 2
+    clear = EMOTION_RADIUS + 2
     points = [(x - clear, y - clear, x + clear, y + clear) for x, y in dots.values()]
     used = [*taken, *points]
     placed: dict[str, Box] = {}

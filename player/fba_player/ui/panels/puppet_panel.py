@@ -17,7 +17,9 @@ from fba_player.ui.panels._puppet_rows import Group, Row, groups
 from fba_player.ui.panels._puppet_speech import draw_expressions, draw_visemes
 from fba_player.ui.panels.panel import Panel, shorten, tooltip
 
-TITLE, VALUE, RELEASE = 148.0, 68.0, 18.0
+TITLE_WIDTH = 148.0
+VALUE_WIDTH = 68.0
+RELEASE_WIDTH = 18.0
 """Widths in points of the title of a row, its value, and its release button."""
 MIN_SLIDER = 84.0
 """Least width of a slider in points: titles are cut first."""
@@ -178,14 +180,14 @@ class PuppetPanel(Panel):
         if self.together and row.mirror is not None:
             title = title.removesuffix(" L").removesuffix(" R")
         width = imgui.get_content_region_avail().x
-        name_wide = min(TITLE, max(width - RELEASE - VALUE - MIN_SLIDER, MIN_TITLE))
+        name_wide = min(TITLE_WIDTH, max(width - RELEASE_WIDTH - VALUE_WIDTH - MIN_SLIDER, MIN_TITLE))
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.TEXT if touched else theme.FAINT, shorten(title, name_wide - 6))
         if imgui.is_item_hovered():
             tooltip(_parameter_names(row))
         imgui.same_line(name_wide)
-        right = x + width - RELEASE
-        wide = max(width - name_wide - RELEASE - VALUE, 16.0)
+        right = x + width - RELEASE_WIDTH
+        wide = max(width - name_wide - RELEASE_WIDTH - VALUE_WIDTH, 16.0)
         imgui.set_next_item_width(wide)
         if touched:
             imgui.push_style_color(imgui.Col_.slider_grab, theme.ACCENT)
