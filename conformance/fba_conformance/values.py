@@ -106,8 +106,7 @@ class Listing:
         return sha256(self.text().encode()).hexdigest()
 
     def difference(self, other: Listing) -> str:
-        """Return the first difference of another listing, "" if there is none. The other may lack all
-        times."""
+        """Return the first difference of another listing, "" without one. The other may lack all times."""
         timed = any(plane.time is not None for plane in other.planes)
         for number, (ours, theirs) in enumerate(zip(self.planes, other.planes, strict=False)):
             text = _plane_difference(ours, theirs, timed=timed)

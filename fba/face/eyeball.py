@@ -20,7 +20,7 @@ PUPIL_FAP = {"left": 29, "right": 30}
 PUPIL_POINT = {"left": "3.5", "right": "3.6"}
 LID_POINTS = {"left": ("3.1", "3.3"), "right": ("3.2", "3.4")}
 """Middles of the upper and the lower lid margin."""
-FLAT = 0.3
+FLAT_RATIO = 0.3
 """Depth of an eye by its width below which it is a drawn iris, not a ball; of half a ball it is 0.5."""
 FEWEST_VERTICES = 8
 """Fewest vertices that determine a sphere."""
@@ -81,7 +81,7 @@ def flat_width(part: Part) -> float | None:
     if len(vertices) < FEWEST_VERTICES:
         return None
     extents = np.ptp(vertices @ principal_axes(vertices)[0].T, axis=0)
-    return float(extents.max()) if extents[2] < FLAT * extents.max() else None
+    return float(extents.max()) if extents[2] < FLAT_RATIO * extents.max() else None
 
 
 def _middle_x(points: Float64) -> float:

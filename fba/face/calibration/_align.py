@@ -14,13 +14,13 @@ from fba.geometry import fit_similarity, principal_axes
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of length of files, in metres."""
-HUMAN = (0.7, 1.4)
+HUMAN_SIZES = (0.7, 1.4)
 """Range of a person's size relative to the model, from a child of two to a giant. Beyond it, the unit is
 wrong."""
-OWN_AXES = np.radians(15.0)
+RIGHT_ANGLE_TOLERANCE = np.radians(15.0)
 """Rotations this close to multiples of 90 degrees are rounded to them: the rest is a difference of faces."""
 FEWEST_POINTS = 4
-FLAT = 0.02
+FLAT_RATIO = 0.02
 """Ratio of smallest to largest spread below which points lie in a plane, as those of a photograph do."""
 MIRRORED_FIT = 0.6
 """Points are taken as mirrored if their mirror image fits with less than this share of the error."""
@@ -55,7 +55,7 @@ def align(given: Float64, reference: Float64, *, unit: str | float | None = None
     _check(given, known)
     here, there = given[known], reference[known]
     flatness = [spread[2] / spread[0] for _, spread in (principal_axes(here), principal_axes(there))]
-    flat = bool(flatness[0] < FLAT and flatness[1] > 2 * FLAT)
+    flat = bool(flatness[0] < FLAT_RATIO and flatness[1] > 2 * FLAT_RATIO)
     if flat:
         rotation, mirrored = _find_flat_pose(here, there), False
         angle = _angle(rotation)
@@ -145,8 +145,7 @@ def _find_flat_pose(here: Float64, there: Float64) -> Float64:
 
 
 def _snap_to_axes(matrix: Float64) -> Float64:
-    """Return the nearest rotation by multiples of 90 degrees if within `OWN_AXES`, else the matrix
-    unchanged."""
+    """Return the nearest rotation by right angles within `RIGHT_ANGLE_TOLERANCE`, else the matrix itself."""
     right_angled = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
@@ -155,7 +154,7 @@ def _snap_to_axes(matrix: Float64) -> Float64:
             if np.linalg.det(turn) > 0:
                 right_angled.append(turn)
     nearest = min(right_angled, key=lambda turn: _angle(matrix @ turn.T))
-    return nearest if _angle(matrix @ nearest.T) < OWN_AXES else matrix
+    return nearest if _angle(matrix @ nearest.T) < RIGHT_ANGLE_TOLERANCE else matrix
 
 
 def _angle(matrix: Float64) -> float:
@@ -186,7 +185,7 @@ def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
         return float(unit), ""
     for name in ("mm", "cm", "m"):
         # `size` scales the points to the model; the true unit may differ from it by as much as people do.
-        if HUMAN[0] <= UNITS[name] / size <= HUMAN[1]:
+        if HUMAN_SIZES[0] <= UNITS[name] / size <= HUMAN_SIZES[1]:
             return UNITS[name], name
     return size, ""
 

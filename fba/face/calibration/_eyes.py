@@ -13,17 +13,17 @@ from fba.errors import FbaWarning
 from fba.face.calibration._field import linear_field
 from fba.face.eyeball import Eyeball
 
-LID = 1.10
+LID_RADII = 1.10
 """Skin within this many radii of the eyeball's centre is on it: the lids and their lining."""
 REACH = 1.6
 """Beyond this many radii the eyeball has no influence on the skin."""
-SIZES = (0.75, 1.35)
+SIZE_LIMITS = (0.75, 1.35)
 """Limits of an eyeball's size relative to the face around it."""
 WIDEST_IRIS = np.radians(42.0)
 """Largest angle at the eyeball's centre between gaze and edge of the iris."""
-BARELY = 1.003
+JUST_OUTSIDE_RADII = 1.003
 """Radii from the centre at which a lid is just outside the eyeball."""
-DEEP = 0.0005
+MAX_SILENT_SETBACK = 0.0005
 """Metres by which an eyeball may be set back without a warning."""
 MIN_WEIGHT = 0.02
 """Weight (`eyeball_weight`) up to which points are ignored for the eyeball."""
@@ -85,7 +85,7 @@ def fit_eye(
     from scipy.optimize import least_squares
 
     distance = np.linalg.norm(skin - eye.centre, axis=1)
-    lids = distance < LID * eye.radius
+    lids = distance < LID_RADII * eye.radius
     clearance, lid_vertices = distance[lids] / eye.radius, fitted[lids]
     depth = float(np.linalg.norm(pupil[0] - eye.centre)) / eye.radius
     front = pupil[1]
@@ -99,7 +99,7 @@ def fit_eye(
         usual = np.array([0.5 * (radius - size * eye.radius), 0.3 * (values[1] + depth * radius - front[2])])
         return np.concatenate([away / np.sqrt(max(len(away), 1)), usual])
 
-    low, high = (bound * size * eye.radius for bound in SIZES)
+    low, high = (bound * size * eye.radius for bound in SIZE_LIMITS)
     start = np.array([size * eye.radius, front[2] - depth * size * eye.radius])
     if pupil_given:
         best = least_squares(
@@ -117,7 +117,7 @@ def fit_eye(
         float(np.arcsin(min(across / 2 / ball, np.sin(WIDEST_IRIS))))
         for across, ball in ((iris[0], eye.radius), (iris[1], radius))
     ]
-    clear = np.minimum(np.linalg.norm(given[0] - eye.centre, axis=1) / eye.radius, BARELY)
+    clear = np.minimum(np.linalg.norm(given[0] - eye.centre, axis=1) / eye.radius, JUST_OUTSIDE_RADII)
     values[1] -= _setback(given[1], clear * radius, centre(values), eye.side)
     fitted_eye = FittedEye(eye, centre(values), radius, angles[1], angles[0])
     # The pupil's own vertex may be a little off the axis.
@@ -131,7 +131,7 @@ def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> floa
     across = np.hypot(*(given - centre)[:, :2].T)
     room = np.sqrt(np.maximum(least**2 - across**2, 0.0))
     back = float(np.where(room > 0, centre[2] + room - given[:, 2], 0.0).max(initial=0.0))
-    if back > DEEP:
+    if back > MAX_SILENT_SETBACK:
         warnings.warn(
             f"the lids of the {side} eye lie {back * 1000:.1f} mm inside its eyeball: "
             "the eyeball and its pupil were set back",
@@ -175,7 +175,7 @@ def _lay_on(eye: FittedEye, skin: Float64, fitted: Float64) -> Float64:
 def eyeball_weight(eye: FittedEye, points: Float64) -> Float64:
     """Return (N,) influence of the eyeball on points (N, 3): 1 on it, 0 beyond `REACH`."""
     distance = np.linalg.norm(points - eye.was.centre, axis=1)
-    weight: Float64 = 1 - smoothstep((distance / eye.was.radius - LID) / (REACH - LID))
+    weight: Float64 = 1 - smoothstep((distance / eye.was.radius - LID_RADII) / (REACH - LID_RADII))
     return weight
 
 

@@ -12,16 +12,16 @@ from fba.face.feature_points import names
 from fba.geometry import nearest_orthonormal
 from fba.mesh.meshes import vertex_normals
 
-WELL_KNOWN = 0.02
+MIN_SPREAD = 0.02
 """Metres: the affine part covers directions in which the points spread by more than this."""
 ANCHOR_DISTANCE = 0.08
 """Metres from every source, for an adult head, beyond which only the affine part acts."""
 ANCHORS = 60
 SAME_PLACE = 1e-5
 """Sources within this many metres are merged into one."""
-DIFFERENCE = 1e-4
+DERIVATIVE_STEP = 1e-4
 """Metres between a point and those at which its derivatives are computed."""
-SLACK = 1e-9
+ANCHOR_SMOOTHING = 1e-9
 """Smoothing of the anchors: they keep the far field near zero, not exactly at it."""
 LEAST_VOLUME = 0.04
 """The deformation folds where its local volume is below this share of the usual one."""
@@ -53,8 +53,8 @@ class Field:
     def jacobians(self, points: Floating) -> Float64:
         """Return (N, 3, 3) Jacobian of the deformation at each point, by central differences."""
         flat = np.asarray(points, dtype=np.float64)
-        columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * DIFFERENCE]
-        return np.stack(columns, axis=2) / (2 * DIFFERENCE)
+        columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * DERIVATIVE_STEP]
+        return np.stack(columns, axis=2) / (2 * DERIVATIVE_STEP)
 
 
 def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str, size: float) -> Field:
@@ -69,13 +69,13 @@ def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str,
     sources, targets = _merge_coincident(sources, targets)
     origin, target = sources.mean(axis=0), targets.mean(axis=0)
     here, there = sources - origin, targets - target
-    spread = here.T @ here / len(here) + WELL_KNOWN**2 * np.eye(3)
-    pull = there.T @ here / len(here) + size * WELL_KNOWN**2 * np.eye(3)
+    spread = here.T @ here / len(here) + MIN_SPREAD**2 * np.eye(3)
+    pull = there.T @ here / len(here) + size * MIN_SPREAD**2 * np.eye(3)
     matrix = pull @ np.linalg.inv(spread)
     anchors = anchors_far_from(np.asarray(mesh, dtype=np.float64), sources)
     centres = np.vstack([sources, anchors])
     left = np.vstack([there - here @ matrix.T, np.zeros((len(anchors), 3))])
-    smoothing = np.concatenate([np.zeros(len(sources)), np.full(len(anchors), SLACK)])
+    smoothing = np.concatenate([np.zeros(len(sources)), np.full(len(anchors), ANCHOR_SMOOTHING)])
     affine = np.linalg.matrix_rank(centres - centres[0], tol=1e-4) == 3 and len(centres) > 4
     rest = RBFInterpolator(centres, left, kernel=kernel, smoothing=smoothing, degree=1 if affine else 0)
     return Field(matrix, origin, target, rest)

@@ -30,9 +30,9 @@ INNER = ("3.5", "3.6", *TEETH["upper"], *TEETH["lower"], *TONGUE, "7.1", "11.5")
 ON_LIDS = ("lash", "brow", "hair", "other")
 """Kinds of parts that move with the skin under them."""
 LIPS = ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9")
-SNAP = 2e-5
+SNAP_DISTANCE = 2e-5
 """Metres: vertices this close to a target are moved onto it; the difference is invisible."""
-BESIDE = 0.005
+BEHIND_LIPS_DISTANCE = 0.005
 """Teeth within this many metres of a point of the lips, in x and y, are behind it."""
 TONGUE_WIDTH = 0.012
 """A given point moves the tongue within about this many metres."""
@@ -114,7 +114,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
 
 
 def _snap_to_points(model: FaceModel, vertices: dict[str, Float64], targets: Float64) -> None:
-    """Move vertices of feature points that are within SNAP of their target exactly onto it, in place.
+    """Move vertices of feature points that are within SNAP_DISTANCE of their target onto it, in place.
 
     Points that nearly coincide, such as those of two lips, share one source point of the deformation.
     """
@@ -123,7 +123,7 @@ def _snap_to_points(model: FaceModel, vertices: dict[str, Float64], targets: Flo
             own = int(model.bound[row]) - model.starts[part.name]
             if part.kind not in ("skin", "mouth") or not 0 <= own < len(part.vertices):
                 continue
-            if np.linalg.norm(vertices[part.name][own] - targets[row]) < SNAP:
+            if np.linalg.norm(vertices[part.name][own] - targets[row]) < SNAP_DISTANCE:
                 vertices[part.name][own] = targets[row]
 
 
@@ -181,7 +181,7 @@ def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarit
 
 def _foremost_z(points: Float64, point: Float64) -> float:
     """Return the greatest z of points (N, 3) right behind or before a point; -inf without such points."""
-    near = np.hypot(points[:, 0] - point[0], points[:, 1] - point[1]) < BESIDE
+    near = np.hypot(points[:, 0] - point[0], points[:, 1] - point[1]) < BEHIND_LIPS_DISTANCE
     return float(points[near, 2].max()) if near.any() else -np.inf
 
 

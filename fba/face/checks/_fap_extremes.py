@@ -21,18 +21,18 @@ HAIR = ("lash", "hair")
 """Kinds of parts that are two-sided: their triangles cannot turn over."""
 LIDS = {19, 20, 21, 22}
 EYE_CORNERS = ("3.7", "3.11", "3.8", "3.12")
-CORNER = 0.12
+CORNER_RADIUS = 0.12
 """Radius about the eye's corners that is not checked, as a share of the eye's width."""
 RIGID = {HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
 MAX_STRETCH = 8.0
 """Factor by which an edge may grow."""
 SHORT_EDGE = 0.3
 """Share of the typical edge length, which stands for shorter edges there."""
-SPECK = 0.003
+MAX_TURNED_SHARE = 0.003
 """Share of the moving surface that may turn over in the folds of skin at the corners of eyes."""
 DEGENERATE = 1e-5
 """Triangles smaller than this share of the median area are ignored."""
-FACING = -0.3
+TURNED_COSINE = -0.3
 """A triangle has turned over if the cosine between its normal and its neighbours' is below this."""
 
 
@@ -56,7 +56,7 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
             )
             if part.kind in HAIR:
                 over = 0
-            if over and not (fap in TURNING and share <= SPECK):
+            if over and not (fap in TURNING and share <= MAX_TURNED_SHARE):
                 yield Finding(
                     entry.label,
                     "no triangle turns over at the limits of its range",
@@ -81,7 +81,7 @@ def _checked_triangles(poser: Poser, part: Part, fap: int) -> Integer:
     corners = np.array([poser.point(name) for name in EYE_CORNERS])
     wide = np.linalg.norm(corners[0] - corners[1]), np.linalg.norm(corners[2] - corners[3])
     away = np.linalg.norm(part.vertices[:, None] - corners, axis=2)
-    within = (np.nan_to_num(away, nan=np.inf) < CORNER * np.nan_to_num(np.repeat(wide, 2))).any(axis=1)
+    within = (np.nan_to_num(away, nan=np.inf) < CORNER_RADIUS * np.nan_to_num(np.repeat(wide, 2))).any(axis=1)
     counted: Integer = part.triangles[~_touching(within, part.triangles)]
     return counted
 
@@ -110,7 +110,7 @@ def count_damage(
     not_degenerate = areas > DEGENERATE * np.median(areas) if len(areas) else areas > 0
     if turning:
         facing = [_facing(normal, moved_triangles, len(before)) for normal in normals]
-        over = (facing[0] > 0) & (facing[1] < FACING)
+        over = (facing[0] > 0) & (facing[1] < TURNED_COSINE)
     else:
         over = dot(normals[0], normals[1]) <= 0
     over &= not_degenerate

@@ -17,13 +17,13 @@ SIDES = {"left": (19, 21), "right": (20, 22)}
 CLOSED = 1024
 SPLITS = (1024, 896, 768, 640, 512, 424)
 """Values of the upper lid's FAP that are tried, each with the rest to 1024 for the lower lid."""
-GAP = 0.02
+MAX_GAP = 0.02
 """Widest gap allowed, as a share of IRISD0."""
-CORNER = 0.04
+CORNER_WIDTH = 0.04
 """Share of the opening's width at each end that is not checked."""
-CUT = 0.01
+MAX_CUT = 0.01
 """Depth to which a closed lid may cut into the eyeball beyond the open one, as a share of its radius."""
-OUTSIDE = 0.97
+OUTSIDE_RADII = 0.97
 """Only vertices that are at least this many radii from the eyeball's centre on the open lid are checked."""
 
 
@@ -32,22 +32,22 @@ def check_lids(poser: Poser, side: str) -> Iterator[Finding]:
     upper, lower = SIDES[side]
     subject = f"FAP {upper} and {lower}, {side} lids"
     gap, split = max((lid_gap(poser, side, split), split) for split in SPLITS)
-    if not gap <= GAP:
+    if not gap <= MAX_GAP:
         yield Finding(
             subject,
             "lids meet where their values add up to 1024",
             f"a gap of {gap:.1%} of IRISD0 at {split} + {CLOSED - split}",
-            f"under {GAP:.0%}",
+            f"under {MAX_GAP:.0%}",
         )
     if not poser.eyes[side].measured or poser.eyes[side].flat:
         return
     cut, split = max((lid_cut(poser, side, split), split) for split in SPLITS)
-    if not cut <= CUT:
+    if not cut <= MAX_CUT:
         yield Finding(
             subject,
             "lids do not cut the eyeball",
             f"{cut:.1%} of its radius deep at {split} + {CLOSED - split}",
-            f"at most {CUT:.0%}",
+            f"at most {MAX_CUT:.0%}",
         )
 
 
@@ -65,7 +65,7 @@ def lid_gap(poser: Poser, side: str, split: float) -> float:
         return float("nan")
     # At the corners the lids are one skin.
     ends = sorted((lines[0][0, 0], lines[0][-1, 0]))
-    margin = CORNER * (ends[1] - ends[0])
+    margin = CORNER_WIDTH * (ends[1] - ends[0])
     widest = 0.0
     for line, other in (lines, lines[::-1]):
         between = (line[:, 0] > ends[0] + margin) & (line[:, 0] < ends[1] - margin)
@@ -97,7 +97,7 @@ def lid_cut(poser: Poser, side: str, split: float) -> float:
     moving = np.abs(after - before).max(axis=1) > 1e-6
     profile = _measure_profile(poser, side)
     # The inner side of a lid may run into the eyeball where it cannot be seen.
-    outside = profile.depth(before) < (1 - OUTSIDE) * eye.radius
+    outside = profile.depth(before) < (1 - OUTSIDE_RADII) * eye.radius
     triangles = surface.triangles[
         moving[surface.triangles].any(axis=1) & outside[surface.triangles].all(axis=1)
     ]

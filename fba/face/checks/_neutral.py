@@ -35,14 +35,14 @@ PUPIL: Limits = (0.15, 0.5)
 """Relative deviation of the pupil's diameter from a third of the iris's."""
 IRIS_OF_EYEBALL = (0.38, 0.62)
 """Range of the iris's diameter as a share of the eyeball's; a typical one is 11.7 mm of 24 mm."""
-ROUND = 0.02
+MAX_ROUNDNESS_ERROR = 0.02
 """Root mean square deviation of an eyeball from a sphere, as a share of its radius."""
 LIPS: Limits = (0.01, 0.03)
 LIP_LINE: Limits = (0.05, 0.15)
 TEETH: Limits = (0.02, 0.06)
 TONGUE: Limits = (0.08, 0.25)
 """Shares of the width of the mouth."""
-SYMMETRY = 0.04
+MAX_ASYMMETRY = 0.04
 """A larger mean deviation from the mirror image, as a share of the pupils' distance, is a warning."""
 
 
@@ -89,12 +89,12 @@ def _check_eyes(model: FaceModel) -> Iterator[Finding]:
 
 def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
     subject = f"{eye.side} eye"
-    if eye.error > ROUND * eye.radius:
+    if eye.error > MAX_ROUNDNESS_ERROR * eye.radius:
         yield Finding(
             subject,
             "eyeball is a sphere",
             f"{_mm(eye.error)} off it on average",
-            f"at most {_mm(ROUND * eye.radius)}",
+            f"at most {_mm(MAX_ROUNDNESS_ERROR * eye.radius)}",
             "warning",
         )
     direction = gaze(model, eye)
@@ -250,13 +250,13 @@ def _check_symmetry(points: Float64) -> Iterator[Finding]:
     apart = left[known] - right[known]
     apart[:, 0] -= np.median(apart[:, 0])  # the face need not be centred on x = 0
     distance = np.linalg.norm(apart, axis=1)
-    if distance.mean() > SYMMETRY * unit:
+    if distance.mean() > MAX_ASYMMETRY * unit:
         worst = list(MIRRORED.items())[int(np.flatnonzero(known)[int(distance.argmax())])]
         yield Finding(
             "left and right",
             "symmetry",
             f"{_mm(distance.mean())} on average, {_mm(distance.max())} for {worst[0]} and {worst[1]}",
-            f"{_mm(SYMMETRY * unit)} on average, unless the face is meant so",
+            f"{_mm(MAX_ASYMMETRY * unit)} on average, unless the face is meant so",
             "warning",
         )
 

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from fba.face.model import FaceModel
 
 
-MODERATE = 300.0
+TESTED_VALUE = 300.0
 """Value at which regions are checked; for FAPs in units of angle, 100 times it."""
 EYE_FAPS = range(23, 31)
 """FAPs that move eyeballs."""
-SHARE = 0.03
+STILL_SHARE = 0.03
 """Vertices that move less than this share of the largest motion count as still."""
 
 
@@ -115,11 +115,11 @@ def _check_region(poser: Poser, fap: int) -> Iterator[Finding]:
     if not len(points):
         return
     entry = fap_table()[fap - 1]
-    value = MODERATE if entry.unit != "AU" else MODERATE * 100
+    value = TESTED_VALUE if entry.unit != "AU" else TESTED_VALUE * 100
     moved = np.linalg.norm(poser.shift({fap: value}), axis=1)
     if not moved.max() > 0:
         return
-    moving = np.flatnonzero(moved > SHARE * moved.max())
+    moving = np.flatnonzero(moved > STILL_SHARE * moved.max())
     eyes = np.zeros(len(moved), dtype=np.bool_)
     for part in poser.model.of_kind("eye"):  # an eyeball belongs to its eye, however big it is
         start = poser.model.starts[part.name]

@@ -116,7 +116,7 @@ class Poser:
 
 
 class _NeutralLandmarks:
-    """Landmarks and eyes of a model's neutral face, found when they are first needed.
+    """Landmarks and eyes of a model's neutral face, located on first use.
 
     findings: by the name of the rule and the tables (the FAP where it has none) that were checked.
     """

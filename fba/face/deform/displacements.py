@@ -17,8 +17,8 @@ BLOCK = 256
 VERTEX_BLOCK = 16
 """Frames whose vertices are in memory at once."""
 BINS = 4000
-"""Bins of the histogram of distances, up to `FURTHEST`."""
-FURTHEST = 0.02
+"""Bins of the histogram of distances, up to `MAX_DISTANCE`."""
+MAX_DISTANCE = 0.02
 """Metres: larger percentiles are given as this."""
 
 
@@ -27,7 +27,7 @@ class Displacements:
     """Distances between the vertices that two sequences of FAPs give, in the frame of the head.
 
     largest: float64 (T,), metres, in each frame; worst: int64 (T,), its vertex. counts: int64 (B,), how
-    often any vertex was so far off, in bins of FURTHEST / BINS, vertices that did not move in the first.
+    often any vertex was so far off, in bins of MAX_DISTANCE / BINS, vertices that did not move in the first.
     """
 
     largest: Float64
@@ -41,7 +41,7 @@ class Displacements:
         """
         wanted = percent / 100 * self.counts.sum()
         number = int(np.searchsorted(np.cumsum(self.counts), wanted))
-        return number * FURTHEST / BINS
+        return number * MAX_DISTANCE / BINS
 
 
 class DisplacementMeter:
@@ -82,7 +82,7 @@ class DisplacementMeter:
             own_largest, own_worst = np.zeros(len(frames)), np.zeros(len(frames), dtype=np.int64)
             self._loops.measure_frames(
                 first[frames], second[frames], model.vertices, tables.part_start, tables.shifts,
-                tables.transforms, self._scratch, own_largest, own_worst, FURTHEST / BINS, counts,
+                tables.transforms, self._scratch, own_largest, own_worst, MAX_DISTANCE / BINS, counts,
             )  # fmt: skip
             largest[frames], worst[frames] = own_largest, own_worst
         counts[0] += max(self._count_movable() * count - int(counts.sum()), 0)

@@ -89,7 +89,7 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
 
 
 def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceModel:
-    """Return a face from pieces whose feature points are to be found."""
+    """Return a face from pieces whose feature points must be located."""
     upright, points, uneven, notes = locate(pieces, options)
     model = finish_import(upright, points, {}, replace(options, up="y"), notes, given=False)
     if uneven >= MIRRORED_TABLES:

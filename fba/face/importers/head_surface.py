@@ -1,4 +1,4 @@
-"""The surface of a head as its file has it, with the feature points that are known of it so far.
+"""The surface of a head as in its file, with the feature points given or located so far.
 
 For placing the others by hand: vertices keep the numbers, unit and axes of the file.
 """

@@ -35,7 +35,7 @@ BLOCKS = 5
 """Parts of a single stream that are held out in turn."""
 MOST_FOLDS = 50
 """Most times that learning is repeated without a part of the streams."""
-UNSEEN = 1e-9
+UNSEEN_WEIGHT = 1e-9
 """mm^2 by which a step of a FAP counts more, so that those that the model does not show count at all."""
 _LOW_LEVEL = np.arange(1, FAP_COUNT + 1) >= FIRST_LOW_LEVEL_FAP
 """Which columns are not a viseme or an expression."""
@@ -117,7 +117,7 @@ class _Learner:
         self._deformer = Deformer(model)
         self._motion = displacements(self._deformer)
         flat = self._motion.reshape(FAP_COUNT, -1)
-        self.metric: Float64 = flat @ flat.T + np.diag(UNSEEN / fap_steps().astype(np.float64) ** 2)
+        self.metric: Float64 = flat @ flat.T + np.diag(UNSEEN_WEIGHT / fap_steps().astype(np.float64) ** 2)
         self.moments = add_up(self._part_moments)
         self._check_model(np.asarray(flat.any(axis=1)))
 

@@ -15,18 +15,18 @@ from fba.arrays import UInt8
 from fba.atomic import PathLike, atomic_path, write_error
 from fba_player.sound.pyav import import_av
 
-SMOOTH = Fraction(25)
+MAX_DEFAULT_RATE = Fraction(25)
 """Largest default frame rate; some browsers slow down above 50."""
 IN_MEMORY = 64 << 20
 """Bytes of pictures kept in memory until the palette is made; further ones go to disk."""
-TICKS = 100
+TICKS_PER_SECOND = 100
 """A GIF's times are hundredths of a second."""
 DITHER = "paletteuse=dither=sierra2_4a:diff_mode=rectangle"
 
 
 def gif_rate(rate: Fraction) -> Fraction:
     """Return the frame rate of a GIF: that of the film, divided by an integer so that it is at most 25."""
-    return rate / math.ceil(rate / SMOOTH)
+    return rate / math.ceil(rate / MAX_DEFAULT_RATE)
 
 
 class Gif:
@@ -39,8 +39,8 @@ class Gif:
         self._av = import_av()
         if min(size) < 1 or max(size) > 65535:
             raise ValueError(f"a GIF has 1x1 to 65535x65535 pixels, not {size[0]}x{size[1]}")
-        if rate > TICKS:
-            raise ValueError(f"a GIF has at most {TICKS} frames a second, not {rate}")
+        if rate > TICKS_PER_SECOND:
+            raise ValueError(f"a GIF has at most {TICKS_PER_SECOND} frames a second, not {rate}")
         self.stopped = False
         self._path, self._size, self._rate = Path(path), size, rate
         self._numbers: list[int] = []
@@ -62,7 +62,7 @@ class Gif:
         """Finish the film, count / rate seconds long; return its path."""
         self._into[0].push(None)
         palette = self._palette.pull()
-        times = [round(number / self._rate * TICKS) for number in (*self._numbers, count)]
+        times = [round(number / self._rate * TICKS_PER_SECOND) for number in (*self._numbers, count)]
         last = max(times[-1] - times[-2], 1)
         options = {"loop": "0", "final_delay": str(last)}
         try:
@@ -82,9 +82,9 @@ class Gif:
 
     def _encode(self, container: Any, palette: Any, times: list[int]) -> None:
         width, height = self._size
-        stream = container.add_stream("gif", rate=TICKS)
+        stream = container.add_stream("gif", rate=TICKS_PER_SECOND)
         stream.width, stream.height, stream.pix_fmt = width, height, "pal8"
-        stream.codec_context.time_base = Fraction(1, TICKS)
+        stream.codec_context.time_base = Fraction(1, TICKS_PER_SECOND)
         _graph, into, out = self._graph(DITHER, 2)
         into[1].push(palette)
         into[1].push(None)
@@ -100,7 +100,7 @@ class Gif:
             pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 3)
             into[0].push(self._frame(pixels, "rgb24", number))
             reduced = out.pull()
-            reduced.pts, reduced.time_base = time, Fraction(1, TICKS)
+            reduced.pts, reduced.time_base = time, Fraction(1, TICKS_PER_SECOND)
             container.mux(stream.encode(reduced))
         container.mux(stream.encode(None))
 

@@ -22,7 +22,7 @@ from fba_player.view.view import View
 
 TILE = (400, 480)
 """Width and height of one of the two pictures of a frame, in pixels."""
-FINER = 2
+SUPERSAMPLING = 2
 """Everything is painted this many times larger, and then reduced, which smooths edges."""
 HIDDEN_KINDS = ("teeth", "tongue", "lash", "mouth")
 """Parts of a face that are too small to see, or behind the lips."""
@@ -36,7 +36,7 @@ INK = "#20242c"
 FAINT = "#6b7280"
 GRADES = {"good": "#2e7d32", "fair": "#a86500", "poor": "#c62828"}
 LIGHT = np.array([0.35, 0.75, 0.56])
-FILL = 0.45
+FILL_SHARE = 0.45
 """Share of the light that reaches surfaces facing away from the lamp."""
 YAW = 32.0
 PITCH = 7.0
@@ -95,7 +95,7 @@ def _draw_pair(view: View, sight: Sight) -> list[Image.Image]:
     triangles, colours = _person(view)
     corners = np.concatenate([sight.stick.corners, triangles.reshape(-1, 3)])
     camera = _camera(corners, triangles, sight)
-    size = (TILE[0] * FINER, TILE[1] * FINER)
+    size = (TILE[0] * SUPERSAMPLING, TILE[1] * SUPERSAMPLING)
     result = []
     for what in ("source", "result"):
         picture = Image.new("RGB", size, PAPER)
@@ -132,10 +132,10 @@ def _left(stick: Stick) -> Float64:
         return np.array([1.0, 0.0, 0.0])
     # the first bones of each side end at the hips: the clearest ends
     begin = [stick.lines[sides == side][0].mean(axis=0) for side in "lr"]
-    way = begin[0] - begin[1]
-    if np.hypot(way[0], way[2]) < 1e-3:
-        way = places[sides == "l"].mean(axis=0) - places[sides == "r"].mean(axis=0)
-    return np.array([way[0], 0.0, way[2]])
+    vector = begin[0] - begin[1]
+    if np.hypot(vector[0], vector[2]) < 1e-3:
+        vector = places[sides == "l"].mean(axis=0) - places[sides == "r"].mean(axis=0)
+    return np.array([vector[0], 0.0, vector[2]])
 
 
 def _project(points: Float64, camera: Camera, size: tuple[int, int]) -> tuple[Float64, Float64]:
@@ -177,7 +177,7 @@ def _draw_triangles(
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     axes = camera.view_matrix()[:3, :3]
-    shade = FILL + (1 - FILL) * np.clip(normals @ axes.T @ LIGHT, 0.0, 1.0)
+    shade = FILL_SHARE + (1 - FILL_SHARE) * np.clip(normals @ axes.T @ LIGHT, 0.0, 1.0)
     shown = (np.clip(colours * shade[:, None], 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)
     chosen = np.flatnonzero(seen)
     for number in chosen[np.argsort(-away[chosen].mean(axis=1))].tolist():
@@ -191,7 +191,7 @@ def _draw_floor(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int]
         for ends in (((step, -1.5), (step, 1.5)), ((-1.5, step), (1.5, step))):
             points = np.array([[middle[0] + x, 0.0, middle[1] + z] for x, z in ends])
             pixels, _ = _project(points, camera, size)
-            draw.line(pixels.ravel().tolist(), FLOOR, FINER)
+            draw.line(pixels.ravel().tolist(), FLOOR, SUPERSAMPLING)
 
 
 def _draw_stick(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick) -> None:
@@ -212,13 +212,21 @@ def _draw_lines(
     draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick, *, thin: bool
 ) -> None:
     pixels, away = _project(stick.lines, camera, size)
-    width = FINER if thin else 4 * FINER
+    width = SUPERSAMPLING if thin else 4 * SUPERSAMPLING
     for number in np.argsort(-away.mean(axis=1)).tolist():
         colour = COLOURS[stick.sides[number]]
         draw.line(pixels[number].ravel().tolist(), colour, width, joint="curve")
         if not thin:
             x, y = pixels[number, 1].tolist()
-            draw.ellipse((x - 2.5 * FINER, y - 2.5 * FINER, x + 2.5 * FINER, y + 2.5 * FINER), colour)
+            draw.ellipse(
+                (
+                    x - 2.5 * SUPERSAMPLING,
+                    y - 2.5 * SUPERSAMPLING,
+                    x + 2.5 * SUPERSAMPLING,
+                    y + 2.5 * SUPERSAMPLING,
+                ),
+                colour,
+            )
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:

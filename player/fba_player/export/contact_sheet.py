@@ -26,7 +26,7 @@ SHEETS = ("faps", "visemes", "expressions", "all", "review")
 COLUMNS = {"faps": 11, "visemes": 7, "expressions": 3, "review": 8}
 TILE = {"faps": (160, 160), "visemes": (220, 220), "expressions": (360, 360), "review": (200, 200)}
 """Columns, and width and height of a picture in pixels."""
-FULL = 63
+FULL_INTENSITY = 63
 """Intensity of the expressions: the largest that a stream can carry."""
 
 
@@ -87,7 +87,9 @@ def tiles(kind: str, scene: Scene) -> list[Tile]:
         rows = zip(VISEMES[1:], definitions.visemes[1:], strict=True)
         return [Tile(name, f"viseme {n}", row, "cheeks") for n, (name, row) in enumerate(rows, start=1)]
     rows = zip(EXPRESSIONS[1:], definitions.expressions[1:], strict=True)
-    return [Tile(name, f"expression {n}, {FULL}", row) for n, (name, row) in enumerate(rows, start=1)]
+    return [
+        Tile(name, f"expression {n}, {FULL_INTENSITY}", row) for n, (name, row) in enumerate(rows, start=1)
+    ]
 
 
 @cache

@@ -28,7 +28,7 @@ MAX_WAITING_BYTES = 96 << 20
 MAX_FILM_RATE = 1000
 """Largest rate of a film in frames per second."""
 FILMS = (".mp4", ".gif")
-TURN = 0.0005
+SWITCH_INTERVAL = 0.0005
 """Seconds after which a running thread yields to a waiting one: a tenth of Python's default."""
 
 
@@ -53,7 +53,7 @@ class PromptThreads:
         with self._lock:
             if not self._users:
                 self._before = self._read()
-                self._change(min(TURN, self._before))
+                self._change(min(SWITCH_INTERVAL, self._before))
             self._users += 1
         return self
 

@@ -17,7 +17,7 @@ MAX_ROUNDNESS_ERROR = 0.03
 """A part whose median distance from its sphere exceeds this share of the radius is drawn as a mesh."""
 MIN_BALL_VERTICES = 12
 """A part with fewer vertices is not an eyeball; with fewer behind the pupil, all give its rotation."""
-SAMPLED = 96
+SAMPLED_VERTICES = 96
 """Vertices from which an eyeball's rotation is computed."""
 DILATE = (29, 30)
 LIDS = (("3.1", "3.3", "3.7", "3.11"), ("3.2", "3.4", "3.12", "3.8"))
@@ -93,7 +93,7 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     behind = np.flatnonzero((vertices[:, 2] - centre[2]) < 0.75 * radius)
     if len(behind) < MIN_BALL_VERTICES:
         behind = np.arange(len(vertices))
-    rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED).astype(int))]
+    rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED_VERTICES).astype(int))]
     unit = model.fapu.IRISD
     lids = tuple(int(model.bound[point_row(name)]) for name in LIDS[side])
     return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit)

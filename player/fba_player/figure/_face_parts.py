@@ -27,9 +27,9 @@ TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
 HAIRY = ("lash", "brow", "hair")
 MAX_HAIR_WIDTH = 0.0012
 """Strips wider than this (m) are not single hairs."""
-ROUGH = 0.36
+RELIEF_STRENGTH = 0.36
 """Strength of the skin's relief."""
-NECK = 2.3
+NECK_LENGTH = 2.3
 """Length over which the neck bends, in multiples of the eye-nose separation (ENS)."""
 MAX_BENT_SHARE = 0.1
 """Light is computed for every pixel if more than this share of a part's edges are long and bent."""
@@ -52,7 +52,7 @@ def compute_sway(model: FaceModel) -> Float32:
     lobe = known_middle(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
     if chin is None or lobe is None:
         return np.ones(len(model.vertices), dtype=np.float32)
-    reach = NECK * model.fapu.ENS * 1024
+    reach = NECK_LENGTH * model.fapu.ENS * 1024
     y, z = model.vertices[:, 1].astype(np.float64), model.vertices[:, 2].astype(np.float64)
     # The border between head and neck rises from below the chin to below the ears, and is level behind them.
     along = np.clip((z - lobe[2]) / max(chin[2] - lobe[2], 1e-6), 0.0, 1.0)
@@ -178,7 +178,7 @@ def _relief(part: Part) -> tuple[float, float]:
     if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
         return (0.0, 1.0)
     metres = texture_breadth(part.vertices, part.texcoords, part.triangles)
-    return (ROUGH, min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
+    return (RELIEF_STRENGTH, min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
 
 
 def _is_smooth(part: Part) -> bool:

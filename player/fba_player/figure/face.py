@@ -27,7 +27,7 @@ from fba_player.view.camera import Subject
 from fba_player.view.geometry import rotation_vector
 from fba_player.view.view import Eye, FaceMesh, FaceShape
 
-CUT = 0.45
+MIN_SWAY_ON_BODY = 0.45
 """On a body, vertices that turn with the head by less than this share are left out: the body has a neck."""
 
 GRIMACE = {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300,
@@ -161,7 +161,7 @@ class FaceFigure:
         """The parts without the lower neck and shoulders."""
         shapes = {}
         for name, shape in self.shapes.items():
-            above = (shape.sway[shape.triangles] > CUT).all(axis=1)
+            above = (shape.sway[shape.triangles] > MIN_SWAY_ON_BODY).all(axis=1)
             if above.any():
                 shapes[name] = with_triangles(shape, shape.triangles[above])
         return shapes

@@ -16,7 +16,7 @@ from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba_player.figure._face_light_loops import Table, blend_swaying, light_vertices
 from fba_player.figure._face_parts import part_rows
-from fba_player.figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
+from fba_player.figure.occlusion import CACHE_VERSION, HARMONICS, Visibility, bake, weights
 
 KEY_DIRECTION = (0.70, 0.68, 0.80)
 RIM_DIRECTION = (-0.55, 0.50, -0.85)
@@ -25,11 +25,11 @@ LIGHTS = np.array([KEY_DIRECTION, RIM_DIRECTION])
 MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
               51: -250, 55: -200, 56: -200, 52: -900, 57: -700, 58: -700}  # fmt: skip
 """FAPs of a mouth so wide open that light falls in."""
-FREE = (0.9, 0.8, 0.0, 0.3)
+FREE_LIGHT = (0.9, 0.8, 0.0, 0.3)
 """Light on a tongue that is put out: key, sky, through, rim."""
-ON_TEETH = 0.3
+TEETH_FILL_SHARE = 0.3
 """Share of the missing light that is added on teeth when the mouth is open."""
-STEP = 2
+TURN_DECIMALS = 2
 """Decimals to which the head's rotation is rounded; the light changes invisibly little."""
 MIN_SWAY = 0.05
 """Occlusion is not computed at vertices that turn with the head by less than this."""
@@ -71,7 +71,7 @@ class FaceLight:
         share = round(self._mouth_open(positions, self.baked.gaps), 2)
         out = [self._out_of_mouth(positions[rows, 2], positions) for rows in self._tongues]
         # In steps too small to be seen, so that a pose looks the same whatever was shown before it.
-        turned, still = np.round((matrix @ turn).T, STEP), np.round(matrix.T, STEP)
+        turned, still = np.round((matrix @ turn).T, TURN_DECIMALS), np.round(matrix.T, TURN_DECIMALS)
         key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
         if self._last is None or self._last[0] != key:
             lights = _basis(turned) if np.array_equal(turned, still) else _basis(turned, still)
@@ -83,10 +83,12 @@ class FaceLight:
         light = np.empty((len(self._sway), 4), dtype=np.float32)
         for part, baked in zip(self._model.parts, self._part_lights, strict=True):
             # Teeth get more light than falls in, as a photographer would have it.
-            baked.shade(share, lights, ON_TEETH * share if part.kind == "teeth" else 0.0, light[baked.rows])
+            baked.shade(
+                share, lights, TEETH_FILL_SHARE * share if part.kind == "teeth" else 0.0, light[baked.rows]
+            )
         for rows, outside in zip(self._tongues, out, strict=True):
             if outside.any():
-                light[rows] += (np.array(FREE, dtype=np.float32) - light[rows]) * outside[:, None]
+                light[rows] += (np.array(FREE_LIGHT, dtype=np.float32) - light[rows]) * outside[:, None]
         return light
 
     @cached_property
@@ -159,7 +161,7 @@ def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, wi
     def make() -> list[Float16]:
         return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
 
-    digest = hashlib.sha256(BAKING.encode())
+    digest = hashlib.sha256(CACHE_VERSION.encode())
     for array in (positions, normals, triangles, within):
         digest.update(np.ascontiguousarray(array).data)
     count = len(within)

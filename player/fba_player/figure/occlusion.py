@@ -16,7 +16,7 @@ from fba.compiled import compiled, is_compiled
 
 DIRECTIONS = 72
 """Number of directions from which the mesh is rendered."""
-PIXEL = 0.0014
+PIXEL_SIZE = 0.0014
 """Size of a depth map's pixel, metres: finer than the folds that are to be shaded."""
 MAX_DEPTH_PIXELS = 400
 SOFTNESS = (1.0, 0.92, 0.72, 0.46)
@@ -24,7 +24,7 @@ SOFTNESS = (1.0, 0.92, 0.72, 0.46)
 SKIN_DEPTH = 0.0045
 """Depth (m) at which light through skin has faded to 1/e."""
 HARMONICS = 16
-BAKING = "1"
+CACHE_VERSION = "1"
 """Cache version; increment when `bake` gives other results."""
 
 
@@ -66,7 +66,7 @@ def bake(
         baked = vertices[rows]
         centre = (baked.min(axis=0) + baked.max(axis=0)) / 2
         reach = float(np.linalg.norm(baked - centre, axis=1).max()) * 1.01
-        size = int(np.clip(2 * reach / PIXEL, 16, MAX_DEPTH_PIXELS))
+        size = int(np.clip(2 * reach / PIXEL_SIZE, 16, MAX_DEPTH_PIXELS))
         depth = np.empty((size, size), dtype=np.float32)
         for column, direction in enumerate(directions):
             frame = _frame(direction).astype(np.float32)

@@ -17,7 +17,7 @@ from fba.easing import smoothstep
 from fba.face.model import FaceModel, Part, point_row
 from fba_player.mesh.wrinkle_map import WRINKLES
 
-BEGINNING = 0.5
+BEGINNING_SHARE = 0.5
 """A wrinkle begins at this share of the motion at which it is full: half a frown shows none."""
 
 MAP_POINTS = {
@@ -36,9 +36,9 @@ MIRRORED = {
 """The points of the right side."""
 NEEDED = ("3.7", "3.11", "4.1", "4.3", "9.3", "8.3", "8.1")
 """Points without which a face shows no wrinkles."""
-DEEPEST = 0.75
+MAX_DEPTH = 0.75
 """How far behind the pupils the map reaches, in eye separations: not onto ears and neck."""
-OUTSIDE = 9.0
+OUTSIDE_OF_MAP = 9.0
 """Coordinate, far outside of the map, of vertices without wrinkles."""
 STIFFNESS = 1e-4
 """How far the map may miss feature points to bend less (regularisation of the spline)."""
@@ -65,7 +65,7 @@ def wrinkle_strengths(faps: Float32) -> Float32:
     strengths = np.zeros((2, len(WRINKLES)))
     for side in range(2):
         np.add.at(strengths[side], kinds, shares[side])
-    return smoothstep((strengths - BEGINNING) / (1 - BEGINNING)).astype(np.float32)
+    return smoothstep((strengths - BEGINNING_SHARE) / (1 - BEGINNING_SHARE)).astype(np.float32)
 
 
 def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
@@ -80,8 +80,8 @@ def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
     spline = _ThinPlate(own, shown)
     flat = _in_front(model, part.vertices.astype(np.float64))
     places = spline(flat[:, :2])
-    behind = flat[:, 2] < -DEEPEST
-    places[behind, 0] += np.copysign(OUTSIDE, places[behind, 0])
+    behind = flat[:, 2] < -MAX_DEPTH
+    places[behind, 0] += np.copysign(OUTSIDE_OF_MAP, places[behind, 0])
     return places.astype(np.float32)
 
 
@@ -93,7 +93,7 @@ def _in_front(model: FaceModel, positions: Float64) -> Float64:
 
 
 def _known_points(model: FaceModel) -> tuple[Float64, Float64] | tuple[None, None]:
-    """Return the points (N, 2) of a face that the map knows, and their places in the map (N, 2)."""
+    """Return the points (N, 2) of a face that have places in the map, and these places (N, 2)."""
     own, shown = [], []
     for name, (x, y) in MAP_POINTS.items():
         for side, point in ((1, name), (-1, MIRRORED.get(name, ""))):

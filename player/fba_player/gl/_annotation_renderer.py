@@ -33,9 +33,9 @@ from fba_player.view.view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend
 REFERENCE_HEIGHT = 720
 """Pixels: annotations have their nominal size in a picture this high."""
 MIN_SCALE = 0.35
-CROWDED = 7.0
+CROWDED_LENGTH = 7.0
 """Lines shorter than this (pixels) are drawn fainter, so that a fine mesh is a tint, not a black spot."""
-HIDDEN = 0.2
+HIDDEN_OPACITY = 0.2
 """Opacity of a dot behind a surface."""
 MIN_DOT_RADIUS = 0.8
 NAME_SIZE = 13
@@ -191,7 +191,7 @@ class ExtrasRenderer:
         program = self._programs["line"]
         set_uniform(program, "width", max(lines.width * scale, 0.8))
         set_uniform(program, "lift", lines.lift)
-        set_uniform(program, "crowded", CROWDED * scale)
+        set_uniform(program, "crowded", CROWDED_LENGTH * scale)
         corners = self._fill_buffer("corners", np.array([0, -1, 1, -1, 0, 1, 1, 1], dtype="f4"))
         ends = self._fill_buffer("ends", lines.ends.astype("f4"))
         names = ("in_from_colour", "in_to_colour")
@@ -216,7 +216,7 @@ class ExtrasRenderer:
             (self._square, "2f", "in_corner"),
             (self._fill_buffer("places", dots.positions.astype("f4")), "3f/i", "in_place"),
         ]
-        for opacity, depth in ((HIDDEN, ">"), (1.0, "<")):
+        for opacity, depth in ((HIDDEN_OPACITY, ">"), (1.0, "<")):
             set_uniform(program, "opacity", opacity)
             gl.depth_func = depth
             self._render("dot", content, len(dots.positions))

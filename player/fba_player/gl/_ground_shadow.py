@@ -24,9 +24,9 @@ CELL = 0.05
 """Size of a cell, metres."""
 SPACING = 0.036
 """Distance between the points, metres."""
-WITHIN = ("teeth", "tongue", "mouth", "eye")
+INNER_KINDS = ("teeth", "tongue", "mouth", "eye")
 """Kinds of parts that lie inside others and cast no shadow."""
-COARSE = 0.0032
+SAMPLING_ERROR = 0.0032
 """Error (m) up to which surfaces are simplified before points are spread over them."""
 KEY_RAYS = 12
 """Number of rays of the key light."""
@@ -114,9 +114,9 @@ class ShadowCaster:
 def _spread(shape: FaceShape) -> Points | None:
     """Return the points spread over a shape's surface in its rest pose; None for a shape that casts no
     shadow."""
-    if shape.coarser is None or shape.kind in WITHIN:
+    if shape.coarser is None or shape.kind in INNER_KINDS:
         return None
-    coarse = shape.coarser.triangles_within(COARSE)
+    coarse = shape.coarser.triangles_within(SAMPLING_ERROR)
     triangles = shape.triangles if coarse is None else coarse
     if not len(triangles):
         return None

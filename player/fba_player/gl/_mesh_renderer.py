@@ -24,7 +24,7 @@ from fba_player.view.view import FaceMesh, FaceShape
 
 CACHED_SHAPES = 64
 """Number of parts whose buffers are cached; the least recently used goes first."""
-CORE = 0.9
+CORE_OPACITY = 0.9
 """Pixels of blended parts with at least this opacity are drawn first, as opaque; then the others are
 blended."""
 MIN_WRINKLE = 0.01
@@ -121,7 +121,7 @@ class FaceRenderer:
         set_uniform(program, "pixel", pixel)
 
     def _draw(self, mesh: FaceMesh, *, core: bool = False) -> None:
-        """Draw a part. core: of a blended one, pixels that hide at least `CORE` of what is behind."""
+        """Draw a part. core: of a blended one, pixels that hide at least `CORE_OPACITY` of what is behind."""
         shape = mesh.shape
         if not len(shape.triangles):  # a part so small that no level of detail is left of it from afar
             return
@@ -150,7 +150,7 @@ class FaceRenderer:
         _set_shape(program, shape)
         _set_pose(program, mesh)
         if "CUT" in options:
-            set_uniform(program, "cut", CORE if core else shape.cutoff)
+            set_uniform(program, "cut", CORE_OPACITY if core else shape.cutoff)
         if picture is not None:
             picture.use(0)
         if repeats is not None:

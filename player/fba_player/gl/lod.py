@@ -14,9 +14,9 @@ from fba.compiled import compiled
 from fba_player.mesh.simplify import TOLERANCES
 from fba_player.view.view import FaceMesh, FaceShape
 
-PIXELS = 1.3
+MAX_ERROR_PIXELS = 1.3
 """Largest error of a coarser mesh, in pixels."""
-SAMPLED = 24
+SAMPLED_VERTICES = 24
 """Number of vertices from which the distance to the camera is taken."""
 
 
@@ -47,7 +47,7 @@ class Details:
         if coarser is None or not len(mesh.positions):
             return mesh
         away = distance(mesh, eye)
-        level = self._level(mesh.shape, bisect_right(TOLERANCES, PIXELS * pixel * away))
+        level = self._level(mesh.shape, bisect_right(TOLERANCES, MAX_ERROR_PIXELS * pixel * away))
         if level is None:
             return mesh
         if level.light is None or not share_memory(level.light[0], mesh.light):
@@ -89,7 +89,7 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
 def distance(mesh: FaceMesh, eye: Float64) -> float:
     """Return the distance from an eye (3,) to the nearest of some sampled vertices, in the mesh's own
     unit."""
-    sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED, 1)]
+    sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED_VERTICES, 1)]
     return float(_nearest(sample, mesh.matrix, eye))
 
 

@@ -16,13 +16,13 @@ import numpy as np
 from fba.arrays import Bool, Float64, Int32, Int64
 from fba.compiled import compiled, inlined
 
-BORDER = 2.0
+BORDER_WEIGHT = 2.0
 """Weight of a border relative to the surface."""
 MAX_TRIANGLES_AROUND = 64
 """A vertex with more triangles than this is never removed."""
-TURNED = 0.3
+MAX_TURN_COSINE = 0.3
 """No triangle may turn by more than the angle of this cosine."""
-THIN = 0.05
+MIN_HEIGHT_SHARE = 0.05
 """Least height of a triangle, as a share of its longest side, unless it was thinner before."""
 
 
@@ -137,8 +137,8 @@ def quadrics(
                 e[i] = points[two, i] - points[one, i]
             length = _unit(e)
             if length > 1e-12:
-                _add(points, one, e, f, BORDER * length * length, a, b, c, one)
-                _add(points, one, e, f, BORDER * length * length, a, b, c, two)
+                _add(points, one, e, f, BORDER_WEIGHT * length * length, a, b, c, one)
+                _add(points, one, e, f, BORDER_WEIGHT * length * length, a, b, c, two)
 
 
 @inlined
@@ -169,14 +169,14 @@ def _fits(
             ax, ay, az = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
             bx, by, bz = ey * vz - ez * vy, ez * vx - ex * vz, ex * vy - ey * vx
             before, after = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
-            if ax * bx + ay * by + az * bz <= TURNED * np.sqrt(before * after):
+            if ax * bx + ay * by + az * bz <= MAX_TURN_COSINE * np.sqrt(before * after):
                 return False
             edge = ex * ex + ey * ey + ez * ez
             u_far = (ux - ex) ** 2 + (uy - ey) ** 2 + (uz - ez) ** 2
             v_far = (vx - ex) ** 2 + (vy - ey) ** 2 + (vz - ez) ** 2
             longest_before = max(edge, ux * ux + uy * uy + uz * uz, u_far)
             longest_after = max(edge, vx * vx + vy * vy + vz * vz, v_far)
-            if np.sqrt(after) < THIN * longest_after and (
+            if np.sqrt(after) < MIN_HEIGHT_SHARE * longest_after and (
                 after * longest_before * longest_before < before * longest_after * longest_after
             ):
                 return False

@@ -20,7 +20,7 @@ MIN_TRIANGLES = 200
 MAX_PASSES = 40
 MIN_REMOVED_SHARE = 0.004
 """A pass that removes less than this share of the vertices is the last one of its level."""
-MAKING = "2"
+CACHE_VERSION = "2"
 """Cache version; increment when `simplify` gives other results."""
 
 
@@ -54,7 +54,7 @@ class DetailLevels:
     @cached_property
     def _collapses(self) -> tuple[Int32, Int32]:
         """What `simplify` returns."""
-        digest = hashlib.sha256(MAKING.encode())
+        digest = hashlib.sha256(CACHE_VERSION.encode())
         for array in (self.points, self.triangles):
             digest.update(np.ascontiguousarray(array).data)
 

@@ -27,21 +27,21 @@ SCALED_BYTES = 8
 """Memory of a pixel while the picture is scaled down."""
 COEFFICIENT_BYTES = 6
 """Memory of the coefficients of a pixel of a progressive JPEG."""
-BAND = 256
+BAND_ROWS = 256
 """Rows that are converted at once."""
 MIN_CACHED_BYTES = 100_000
 """Files of at least this many bytes are cached on disk when reduced."""
-MAKING = 2
+CACHE_VERSION = 2
 """Cache version of pictures; increment when `FacePicture` gives other pixels or measures."""
 
 RELIEF_SIZE = 256
 RELIEF = 0.022
 """Metres after which the skin's relief repeats."""
-SHARES = ((3.0, 0.35), (9.0, 0.7), (26.0, 1.0), (60.0, 0.6))
+NOISE_BANDS = ((3.0, 0.35), (9.0, 0.7), (26.0, 1.0), (60.0, 0.6))
 """Bands of the relief's noise: grains across the picture, and their weights."""
-SPREAD = 0.17
+NOISE_DEVIATION = 0.17
 """Standard deviation of a channel of the relief, as a share of its range."""
-RELIEF_MAKING = 1
+RELIEF_CACHE_VERSION = 1
 """Cache version of the relief; increment when `skin_relief` gives other pixels."""
 
 
@@ -68,7 +68,7 @@ class FacePicture:
         if factor < 2 or len(self.data) < MIN_CACHED_BYTES:
             return _reduced(self.pixels, factor)
         width, height = (-(-across // factor) for across in self.size)
-        key = make_key("texture", MAKING, factor, np.frombuffer(self.data, dtype=np.uint8))
+        key = make_key("texture", CACHE_VERSION, factor, np.frombuffer(self.data, dtype=np.uint8))
         (pixels,) = load_or_make(
             key, ((height, width, 4),), lambda: [_reduced(self.pixels, factor)], np.uint8
         )
@@ -92,7 +92,7 @@ def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture
     if len(data) < MIN_CACHED_BYTES:
         (measures,) = measure()
     else:
-        key = make_key("picture", MAKING, np.frombuffer(data, dtype=np.uint8))
+        key = make_key("picture", CACHE_VERSION, np.frombuffer(data, dtype=np.uint8))
         (measures,) = load_or_make(key, ((3,),), measure, np.int32)
         if measures.min() < 0 or measures.max() > MAX_PICTURE_SIZE:
             (measures,) = measure()
@@ -143,9 +143,9 @@ def _decode(data: bytes) -> UInt8:
         if max(image.size) > MAX_PICTURE_SIZE:
             image.thumbnail((MAX_PICTURE_SIZE, MAX_PICTURE_SIZE))
         pixels = np.empty((image.height, image.width, 4), dtype=np.uint8)
-        for top in range(0, image.height, BAND):  # a whole copy in RGBA would double the memory
-            rows = image.crop((0, top, image.width, min(top + BAND, image.height)))
-            pixels[top : top + BAND] = np.asarray(rows.convert("RGBA"))
+        for top in range(0, image.height, BAND_ROWS):  # a whole copy in RGBA would double the memory
+            rows = image.crop((0, top, image.width, min(top + BAND_ROWS, image.height)))
+            pixels[top : top + BAND_ROWS] = np.asarray(rows.convert("RGBA"))
         return pixels
 
 
@@ -187,7 +187,7 @@ def skin_relief() -> UInt8:
 
     From pores to the coarser grain seen from further away; always the same, stored in the disk cache.
     """
-    key = make_key("relief", RELIEF_MAKING, RELIEF_SIZE, SPREAD, SHARES)
+    key = make_key("relief", RELIEF_CACHE_VERSION, RELIEF_SIZE, NOISE_DEVIATION, NOISE_BANDS)
     (pixels,) = load_or_make(key, ((RELIEF_SIZE, RELIEF_SIZE, 3),), lambda: [_make_relief()], np.uint8)
     return pixels
 
@@ -197,10 +197,11 @@ def _make_relief() -> UInt8:
     along = np.fft.fftfreq(RELIEF_SIZE, 1 / RELIEF_SIZE)
     distance = np.hypot(along[:, None], along[None])
     bands = sum(
-        share * np.exp(-(((distance - grains) / (0.45 * grains)) ** 2)) / grains for grains, share in SHARES
+        share * np.exp(-(((distance - grains) / (0.45 * grains)) ** 2)) / grains
+        for grains, share in NOISE_BANDS
     )
     white = np.fft.fft2(random.standard_normal((3, RELIEF_SIZE, RELIEF_SIZE)))
     noise = np.real(np.fft.ifft2(white * bands))
     noise /= noise.std(axis=(1, 2), keepdims=True)
-    pixels = np.clip(127.5 + 255 * SPREAD * noise, 0, 255).astype(np.uint8)
+    pixels = np.clip(127.5 + 255 * NOISE_DEVIATION * noise, 0, 255).astype(np.uint8)
     return np.ascontiguousarray(pixels.transpose(1, 2, 0))

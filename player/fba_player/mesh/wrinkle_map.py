@@ -26,15 +26,15 @@ TEXELS = 256
 SHAPE = (round((TOP - BOTTOM) * TEXELS), round(WIDTH * TEXELS))
 PLAIN = 128
 """Value where there is no wrinkle; lower is darker."""
-EDGE = 0.42
+EDGE_BRIGHTNESS = 0.42
 """Brightness of the lower edge, as a share of the groove's darkness."""
 EDGE_BELOW = 1.7
 """Distance of the brightest line of the edge below the groove, in widths of the groove."""
 EDGE_BREADTH = 1.5
 """Breadth of the edge, in widths of the groove."""
-FADE = 4.0
+END_STEEPNESS = 4.0
 """How steeply lines thin out towards their ends: over a quarter of their length each."""
-MAKING = 1
+CACHE_VERSION = 1
 """Cache version; increment when `wrinkle_map` gives other pixels."""
 
 Stroke = tuple[Sequence[tuple[float, float]], float, float]
@@ -73,7 +73,16 @@ STROKES: dict[str, tuple[Stroke, ...]] = {
 def wrinkle_map() -> UInt8:
     """Return uint8 (H, W, 4): the wrinkles, each in its own channel, around `PLAIN`; stored in the disk
     cache."""
-    key = make_key("wrinkles", MAKING, TEXELS, EDGE, EDGE_BELOW, EDGE_BREADTH, FADE, repr(STROKES))
+    key = make_key(
+        "wrinkles",
+        CACHE_VERSION,
+        TEXELS,
+        EDGE_BRIGHTNESS,
+        EDGE_BELOW,
+        EDGE_BREADTH,
+        END_STEEPNESS,
+        repr(STROKES),
+    )
     (pixels,) = load_or_make(key, ((*SHAPE, len(WRINKLES)),), lambda: [_draw()], np.uint8)
     return pixels
 
@@ -87,7 +96,7 @@ def _draw() -> UInt8:
         for points, width, darkness in STROKES[name]:
             groove = _stroke(across, up, points, width)
             edge = _stroke(across, up + EDGE_BELOW * width, points, EDGE_BREADTH * width)
-            shade += darkness * (EDGE * edge - groove)
+            shade += darkness * (EDGE_BRIGHTNESS * edge - groove)
         pixels[..., channel] = np.clip(np.round(PLAIN + 127 * shade), 0, 255)
     return pixels
 
@@ -98,7 +107,7 @@ def _stroke(across: Float64, up: Float64, points: Sequence[tuple[float, float]],
     along = np.linspace(0, 1, len(line))
     strength = np.zeros(across.shape)
     for (x, y), where in zip(line, along, strict=True):
-        fade = min(1.0, FADE * min(where, 1 - where) + 0.05)
+        fade = min(1.0, END_STEEPNESS * min(where, 1 - where) + 0.05)
         sigma = width * (0.55 + 0.45 * fade)
         reach = 3 * sigma
         near = (np.abs(across[0] - x) < reach).nonzero()[0]

@@ -21,18 +21,18 @@ from fba.errors import BitstreamError, FbaError, FbaWarning
 from fba.formats.step_choice import choose_steps
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
 from fba_player.playback.timeline import Timeline
-from fba_player.playback.transport import BUFFER
+from fba_player.playback.transport import BUFFER_SECONDS
 
-CHUNK = 1 << 16
+CHUNK_BYTES = 1 << 16
 """Bytes read at once, at most."""
-PATIENCE = 0.5
+PATIENCE_SECONDS = 0.5
 """Seconds that `wait` gives a slow stream after its first frame to fill the buffer and to show whether it has
 a face and a body."""
 CHECK_BAP_STEPS_AFTER = 4
 """Seconds of a body after which it is checked, once, whether they look right with these BAP steps."""
 CHOOSE_BAP_STEPS_AFTER = 1.25
 """Seconds of a body after which the BAP steps are chosen by how it moves; nothing is shown before. A file in
-a pipe arrives faster: its end, with the mark, comes within `PATIENCE`."""
+a pipe arrives faster: its end, with the mark, comes within `PATIENCE_SECONDS`."""
 
 
 MARK_BYTES = 64
@@ -51,7 +51,7 @@ class LiveAnimation:
 
     source: read by a thread until its end, whatever the player does meanwhile. head: bytes that were already
     read from it. name: of the stream. bap_steps: "iso" or "visage"; or "auto": those that a mark before the
-    object names, or behind it if the end comes within `PATIENCE`; else they are chosen from the first
+    object names, or behind it if the end comes within `PATIENCE_SECONDS`; else they are chosen from the first
     `CHOOSE_BAP_STEPS_AFTER` seconds of a body, for which nothing is shown. at_end: called when nothing more
     is read, to close the source.
 
@@ -160,7 +160,7 @@ class LiveAnimation:
         return 2 * len(self) + (not self.growing)
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until it can be played: `BUFFER` seconds, or the whole stream, have arrived. timeout: seconds.
+        """Wait until it can be played: `BUFFER_SECONDS`, or the whole stream, have arrived. timeout: seconds.
 
         Returns False after the timeout. Raises BitstreamError or UnsupportedError where the stream ends, or
         is closed, without a frame that can be decoded, OSError where it cannot be read.
@@ -170,7 +170,7 @@ class LiveAnimation:
                 lambda: len(self) or self._held_blocks or not self.growing, timeout
             ):
                 return False
-            self._changed.wait_for(self._enough, PATIENCE)
+            self._changed.wait_for(self._enough, PATIENCE_SECONDS)
             self._choose_bap_steps()
             if not len(self):
                 raise self._failure or BitstreamError("the stream ended before its first I plane", plane=0)
@@ -190,16 +190,16 @@ class LiveAnimation:
     def _enough(self) -> bool:
         now = self._now
         span = int(now.index[-1] - now.index[0]) / now.rate if len(now.index) else 0
-        return not self.growing or span >= BUFFER
+        return not self.growing or span >= BUFFER_SECONDS
 
     def _read(self, head: bytes) -> None:
         try:
-            chunk = head or self._source.read1(CHUNK)
+            chunk = head or self._source.read1(CHUNK_BYTES)
             while chunk and not self._closing:
                 self.received += len(chunk)
                 self._decode(chunk)
                 self._check_bap_steps()
-                chunk = self._source.read1(CHUNK)
+                chunk = self._source.read1(CHUNK_BYTES)
             if not self._closing:
                 with self._changed:
                     self._choose_bap_steps()
@@ -214,7 +214,7 @@ class LiveAnimation:
             self._end()
 
     def _decode(self, chunk: bytes) -> None:
-        """Add what a chunk brings, or hold it back while the BAP steps are not chosen."""
+        """Add what a chunk brings, or withhold it while the BAP steps are not chosen."""
         with self._changed:
             self._checked_bap_steps |= marked_table(chunk) == self.bap_steps
             if self._held is None:
@@ -230,20 +230,20 @@ class LiveAnimation:
             if self._held_blocks:
                 now = wall.monotonic()
                 self._held_since = now if self._held_since is None else self._held_since
-                waited = seconds >= CHOOSE_BAP_STEPS_AFTER and now - self._held_since >= PATIENCE
+                waited = seconds >= CHOOSE_BAP_STEPS_AFTER and now - self._held_since >= PATIENCE_SECONDS
                 if not bodies or waited:
                     self._choose_bap_steps()
             self._changed.notify_all()
 
     def _is_marked(self, new: int) -> bool:
-        """Return whether a mark is among what is held back. new: bytes at its end that were not searched
+        """Return whether the withheld bytes contain a mark. new: number of bytes at their end not searched
         yet."""
         assert self._held is not None
         begin = max(len(self._held) - new - MARK_BYTES, 0)
         return b"bap_steps=" in self._held[begin:] and marked_table(self._held) is not None
 
     def _choose_bap_steps(self, *, whole: bool = False) -> None:
-        """Choose the BAP steps, if they are not chosen yet, and add what was held back.
+        """Choose the BAP steps, if they are not chosen yet, and add what was withheld.
 
         whole: decode all of it again, as the decoder has not read the last chunk.
         """

@@ -16,9 +16,9 @@ from fba_player.view.protocols import Times
 
 SPEEDS = (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
 """The steps of `faster` and `slower`."""
-BUFFER = 0.25
+BUFFER_SECONDS = 0.25
 """Seconds of a live stream that must have arrived before it plays, and again after a gap."""
-AT_ONCE = 0.1
+LATE_MARK_SECONDS = 0.1
 """Seconds: a mark out this shortly before the current time counts as set at it."""
 
 
@@ -33,7 +33,7 @@ class Transport:
     on the last frame. Marks limit what is played: at `mark_out` it jumps back to `mark_in`, or stops. After a
     seek beyond `mark_out` it plays to the end.
 
-    At the end of what has arrived of a live stream it shows the last frame until `BUFFER` more seconds have
+    At the end of what has arrived of a live stream it shows the last frame until `BUFFER_SECONDS` more have
     arrived, and goes on with the next frame: nothing that arrives late is skipped.
     """
 
@@ -165,8 +165,8 @@ class Transport:
         self.seek(self.start)
 
     def last(self) -> None:
-        """Go to the last frame; while a live stream is playing, `BUFFER` seconds before it."""
-        self.seek(self._last_time() - (BUFFER if self._timeline.growing and self._playing else 0.0))
+        """Go to the last frame; while a live stream is playing, `BUFFER_SECONDS` before it."""
+        self.seek(self._last_time() - (BUFFER_SECONDS if self._timeline.growing and self._playing else 0.0))
 
     @property
     def speed(self) -> float:
@@ -231,7 +231,7 @@ class Transport:
         self._mark_out = out = self._checked_mark(time, self.start, self._stop())
         if self._mark_in is not None and out is not None and out <= self._mark_in:
             self._mark_in = None
-        if out is not None and self._playing and out <= here < out + AT_ONCE:
+        if out is not None and self._playing and out <= here < out + LATE_MARK_SECONDS:
             here = out
         self._move(here)
 
@@ -339,7 +339,7 @@ class Transport:
                 self._playing = self._waiting
             self._motion = self._motion_from(now, here)
         elif self._waiting and (
-            not self._timeline.growing or self._last_time() - self._motion.here >= BUFFER
+            not self._timeline.growing or self._last_time() - self._motion.here >= BUFFER_SECONDS
         ):
             self._waiting = False
             self._motion = self._motion_from(now, self._motion.here)

@@ -14,7 +14,7 @@ from fba.face.model import FaceModel, point_row
 
 Indices = Intp
 
-FINER = 8
+STEPS_BETWEEN_POINTS = 8
 """Number of steps between two feature points."""
 RINGS = 3
 """Rings of triangles around the shortest path along edges in which a line lies: lips stay apart."""
@@ -81,7 +81,7 @@ class _SkinGraph:
             near = self._triangles_along(through[number], through[number + 1])
             if near is None:
                 return None
-            part = np.linspace(0, 1, FINER + 1)[1:-1]
+            part = np.linspace(0, 1, STEPS_BETWEEN_POINTS + 1)[1:-1]
             if curve is None:
                 points = knots[number] + part[:, None] * (knots[number + 1] - knots[number])
             else:

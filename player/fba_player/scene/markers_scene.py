@@ -38,8 +38,8 @@ MAX_CLICK_DISTANCE = 10.0
 """A click this close to a dot, in pixels of a picture 720 high, means the dot."""
 CLOUD_GAP = 0.35
 """Room between cloud and head, as a share of the head's width."""
-ROOM = 1.2
-"""Room beside head and cloud for a head that turns and moves, as a factor of the way between them."""
+ROOM_FACTOR = 1.2
+"""Room beside head and cloud for a head that turns and moves, as a factor on their distance."""
 MIN_FOLLOWED_TRAVEL = 0.3
 """Metres that a head moves before the camera follows it."""
 
@@ -169,7 +169,7 @@ class MarkersScene(Timed[CaptureTimes]):
 
     @cached_property
     def _beside(self) -> Float64:
-        """(3,) way from the head to the cloud beside it, metres."""
+        """Vector (3,) from the head to the cloud beside it, metres."""
         low, high = self._box
         return np.array([-(1 + CLOUD_GAP) * float(high[0] - low[0]), 0.0, 0.0])
 
@@ -333,7 +333,7 @@ class MarkersScene(Timed[CaptureTimes]):
             return subject
         x, y, z = subject.centre
         aside = float(self._beside[0]) / 2
-        return replace(subject, centre=(x + aside, y, z), half_width=subject.half_width - ROOM * aside)
+        return replace(subject, centre=(x + aside, y, z), half_width=subject.half_width - ROOM_FACTOR * aside)
 
 
 def _posed(points: Float64, pose: Float64) -> Float64:

@@ -40,7 +40,7 @@ LIGHT = (0.75, 0.55, 0.0, 0.5)
 CLAY = (0.42, 0.36, 0.32)
 """Colour of surfaces without one of their own, linear light."""
 MARGIN = 1.25
-"""How much larger than the known points the shown part is, at least."""
+"""The part shown is at least this many times as large as the box of the placed points."""
 
 
 class PlacementScene(Timed[Timeline]):
@@ -127,7 +127,7 @@ class PlacementScene(Timed[Timeline]):
 
     @cached_property
     def _subject(self) -> Subject:
-        """What the camera is fitted to: the points known at first and what is around them, else all."""
+        """What the camera is fitted to: the points placed at first and their surroundings, else all."""
         corners = self._corners.reshape(-1, 3)
         low, high = corners.min(axis=0), corners.max(axis=0)
         points = self.to_world(self.placement.positions())

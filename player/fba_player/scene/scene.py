@@ -238,7 +238,8 @@ class Scene(Timed[Timeline]):
         return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Return the way (x, y, z) of the head from the start to a time, metres; zeros without a body."""
+        """Return the displacement (x, y, z) of the head from the start to a time, metres; zeros without a
+        body."""
         x, y, z = np.subtract(self._face_at(time).centre, self.face_subject.centre).tolist()
         return (x, y, z)
 

@@ -11,7 +11,7 @@ from fba.easing import smoothstep
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 
-GLIDE = 0.35
+GLIDE_SECONDS = 0.35
 """Seconds that a glide to another view takes."""
 NOT_SHIFTED = (0.0, 1.0)
 """Shift of the middle as a share of the width, and factor on the distance, where no panels are open."""
@@ -94,7 +94,7 @@ class Viewpoint:
 
     def glide(self, camera: Camera) -> None:
         """Glide to another view."""
-        self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE
+        self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE_SECONDS
 
     def preset(self, name: str) -> None:
         """Glide to a preset. Raises ValueError for an unknown name."""
@@ -108,7 +108,7 @@ class Viewpoint:
         self._shift_before = self._shift_now()
         self._sides = (left, right)
         self._shift = self._shift_between(left, right)
-        self._shift_until = self._clock() + GLIDE if smoothly else -math.inf
+        self._shift_until = self._clock() + GLIDE_SECONDS if smoothly else -math.inf
 
     def reset(self) -> None:
         """Glide back to the first view."""
@@ -138,7 +138,7 @@ class Viewpoint:
     def _progress(self, until: float) -> float:
         """Return the progress, 0 to 1, of a glide that ends at a reading of the clock; it starts and ends
         slowly."""
-        return float(smoothstep(1.0 - (until - self._clock()) / GLIDE))
+        return float(smoothstep(1.0 - (until - self._clock()) / GLIDE_SECONDS))
 
     def _shift_now(self) -> tuple[float, float]:
         share = self._progress(self._shift_until)

@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 Hook = Callable[[Float32, Float64], None]
 
 NOTICE_SECONDS = 4.0
-LEAVING = 6.0
+LEAVING_SECONDS = 6.0
 """Seconds in which closing again discards unsaved work."""
-IDLE_MOUSE = 3.0
+IDLE_MOUSE_SECONDS = 3.0
 """Seconds without input after which a full screen hides the mouse cursor while it plays."""
-NOTICE_FADES = 0.5
+NOTICE_FADE_SECONDS = 0.5
 """Last seconds of a notice, in which it fades."""
 
 
@@ -167,9 +167,9 @@ class Session:
     def leave(self) -> None:
         """Close the window; with unsaved work, warn first and close at the second call."""
         if self.unsaved and self.clock() > self._leave_again_until:
-            self._leave_again_until = self.clock() + LEAVING
+            self._leave_again_until = self.clock() + LEAVING_SECONDS
             what = " and ".join(sorted(self.unsaved))
-            self.say(f"Unsaved: {what}. Close again to discard", "warning", LEAVING, about="leave")
+            self.say(f"Unsaved: {what}. Close again to discard", "warning", LEAVING_SECONDS, about="leave")
             return
         self.closing = True
 
@@ -202,12 +202,12 @@ class Session:
     @property
     def hides_mouse(self) -> bool:
         """Whether a full screen shows no mouse cursor: it plays, and the user leaves the mouse alone."""
-        return self.transport.playing and self.idle > IDLE_MOUSE
+        return self.transport.playing and self.idle > IDLE_MOUSE_SECONDS
 
     @property
     def restless(self) -> bool:
         """Whether the picture changes without input of the user."""
-        fades_from = self.clock() + NOTICE_FADES
+        fades_from = self.clock() + NOTICE_FADE_SECONDS
         return (
             self.transport.playing
             or self.viewpoint.gliding

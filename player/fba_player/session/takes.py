@@ -21,7 +21,7 @@ MAX_TAKE_SECONDS = 3600.0
 """Longest duration of a take."""
 HOLD_SECONDS = 0.2
 """Seconds without a picture after which values are held, not interpolated, until the next one."""
-ALWAYS = slice(180, 186)
+ROOT_BAPS = slice(180, 186)
 """BAPs of the root, which a take with a body always sends."""
 
 
@@ -89,7 +89,7 @@ class TakeRecorder:
         if self._body:
             turned = np.rint(np.stack(self._baps)).astype(np.int32)
             sent = np.zeros(BAP_COUNT, bool)
-            sent[ALWAYS] = True
+            sent[ROOT_BAPS] = True
             body = BodyTrack(turned, np.tile(sent | turned.any(axis=0), (count, 1)))
         return Animation(self.rate, np.arange(count), face, body, name)
 

@@ -21,7 +21,7 @@ USUAL_RATE = 48_000
 MIN_RATE = 1000
 MAX_RATE = 1_000_000
 """Limits of the samples per second that are read: resampling costs time and memory by the change of rate."""
-RUN_UP = 0.5
+RUN_UP_SECONDS = 0.5
 """Seconds decoded before the first sample that is read: MP3 and AAC frames need the ones before them."""
 MIN_GAP_SECONDS = 0.02
 """Seconds by which the times in a file must exceed its count of samples to be taken as a gap."""
@@ -92,7 +92,10 @@ class SoundFile:
         ends."""
         start, missing = max(start, 0), max(count, 0)
         at = self._next
-        if at is None or not 0 <= start - at + len(self._rest) <= len(self._rest) + RUN_UP * self.rate:
+        if (
+            at is None
+            or not 0 <= start - at + len(self._rest) <= len(self._rest) + RUN_UP_SECONDS * self.rate
+        ):
             at = self._seek(start)
         pieces: list[Int16] = []
         while missing > 0:
@@ -138,7 +141,7 @@ class SoundFile:
     def _seek(self, start: int) -> int:
         """Let `_parts` begin at or before a sample; return the number of the sample after `_rest`."""
         self._rest = self._rest[:0]
-        before = max(start / self.rate - RUN_UP, 0.0)
+        before = max(start / self.rate - RUN_UP_SECONDS, 0.0)
         stream = self._stream
         if self._next is not None or before > 0:  # not for a file that has just been opened
             try:

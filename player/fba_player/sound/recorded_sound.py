@@ -18,7 +18,7 @@ from fba_player.sound.audio_file import CHANNELS, SoundFile
 from fba_player.sound.pyav import import_av
 from fba_player.sound.soundtrack import AAC_RATES, BLOCK, make_frame
 
-PIECE = 1.0
+PIECE_SECONDS = 1.0
 """Most seconds mixed at once."""
 
 
@@ -59,7 +59,7 @@ class FilmSound:
         self._mixer.muted = self._muted()
         missing = round(seconds * self.rate) - self._done
         while missing > 0:
-            count = min(missing, round(PIECE * self.rate))
+            count = min(missing, round(PIECE_SECONDS * self.rate))
             samples = self._mixer.fill(now - missing / self.rate, count)
             with self._lock:
                 self._mixed.append(samples)

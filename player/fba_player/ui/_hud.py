@@ -13,7 +13,7 @@ from fba_player.ui import theme
 from fba_player.ui._docks import EDGE
 from fba_player.ui.panels.panel import STANDING, Panel, tooltip
 
-ABOVE = 40.0
+NOTICE_DISTANCE = 40.0
 """Points from the bar to notices, which leaves room for the text under the mouse of the timeline."""
 FADE_SECONDS = 0.4
 """Seconds in which a notice fades."""
@@ -108,7 +108,7 @@ def _flat_button(label: str, *, lit: bool) -> bool:
 def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:
     """Draw the notices, centred above the bar."""
     to = imgui.get_foreground_draw_list()
-    y = display[1] - above - ABOVE
+    y = display[1] - above - NOTICE_DISTANCE
     for notice in reversed(session.notices()):
         alpha = min((notice.until - session.clock()) / FADE_SECONDS, 1.0)
         colour = {"error": theme.ALERT, "warning": theme.WARM}.get(notice.kind, theme.ACCENT)

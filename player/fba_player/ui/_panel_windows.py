@@ -16,7 +16,7 @@ _FLAGS = imgui.WindowFlags_
 FREE = int(_FLAGS.no_saved_settings | _FLAGS.no_collapse)
 DOCKED = int(FREE | _FLAGS.no_resize | _FLAGS.no_bring_to_front_on_focus)
 FOLDED = int(_FLAGS.no_scrollbar | _FLAGS.no_scroll_with_mouse)
-OVER = 0.985
+COVERING_OPACITY = 0.985
 """Opacity of a panel that covers others."""
 
 
@@ -74,7 +74,7 @@ class PanelWindows:
             place = ((display[0] - wide) / 2, TOP + max(room - high, 0.0) / 2)
             imgui.set_next_window_pos(place, imgui.Cond_.always)
             imgui.set_next_window_size((wide, high), imgui.Cond_.always)
-            imgui.set_next_window_bg_alpha(OVER)
+            imgui.set_next_window_bg_alpha(COVERING_OPACITY)
         imgui.set_next_window_size_constraints((min(200, wide), 60), (display[0], max(room, 60)))
         if not self._window(panel, session, FREE, folded=False):
             session.open.discard(panel.name)

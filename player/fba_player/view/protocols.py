@@ -111,4 +111,5 @@ class Showable(Protocol):
         """Return the offset of a following camera at a time, metres; zeros if it does not follow."""
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Return the way of the head from the start to a time, metres, for a camera that looks at it."""
+        """Return the displacement of the head from the start to a time, metres, for a camera that looks at
+        it."""

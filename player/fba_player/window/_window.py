@@ -46,7 +46,7 @@ MIN_PICTURE_SECONDS = 1 / 250
 """Shortest time from one picture to the next, for displays that do not limit the rate."""
 WARNING_SECONDS = 12.0
 """Seconds for which warnings about the file are shown."""
-SETTLES = 4
+SETTLING_PICTURES = 4
 """Pictures drawn after an input: imgui needs some until the panels have settled."""
 
 
@@ -85,7 +85,7 @@ class Window:
         self._gl: Any = None
         self._window: Any = None
         self._problems: list[str] = []
-        self._pictures_due, self._restless = SETTLES, False
+        self._pictures_due, self._restless = SETTLING_PICTURES, False
         self._timeline = timeline
         self._arrived = timeline.arrived
         self._doubted = False
@@ -239,7 +239,7 @@ class Window:
         self.input = GlfwInput(self._glfw, self._window, session, self.controls, self._gui, self._redraw)
 
     def _redraw(self) -> None:
-        self._pictures_due = SETTLES
+        self._pictures_due = SETTLING_PICTURES
 
     def _reason(self, otherwise: str) -> str:
         return self._problems[-1] if self._problems else otherwise

@@ -50,10 +50,10 @@ def long_face(frames: int) -> Animation:
 def test_an_hour_is_worked_out_piece_by_piece() -> None:
     courses = Courses(Timeline(long_face(3 * BLOCK + 5)))
     assert courses.advance()
-    assert 0.3 < courses.known < 0.34
+    assert 0.3 < courses.resolved_share < 0.34
     assert len(courses.course("fap", 3).values) == BLOCK
     complete(courses)
-    assert courses.known == 1.0
+    assert courses.resolved_share == 1.0
     course = courses.course("fap", 3)
     np.testing.assert_array_equal(course.values, np.arange(3 * BLOCK + 5) % 1001)
 

@@ -7,9 +7,9 @@ import pytest
 from fba_player.ui._docks import (
     EDGE,
     GAP,
-    MIDDLE,
     MIN_COLUMN,
     MIN_MIDDLE,
+    MIN_MIDDLE_SHARE,
     TITLE,
     Dock,
     DockRequest,
@@ -99,7 +99,7 @@ def test_closing_one_gives_its_room_to_the_others() -> None:
 def test_the_middle_stays_free(wide: float) -> None:
     found = Docks().arrange([request("a", width=430), request("b", "right", width=380)], wide, TOP, 410)
     left, right = free_middle(found.values(), wide)
-    assert (1 - left - right) * wide >= max(MIDDLE * wide, MIN_MIDDLE) - 1e-6
+    assert (1 - left - right) * wide >= max(MIN_MIDDLE_SHARE * wide, MIN_MIDDLE) - 1e-6
     assert min(dock.width for dock in found.values()) >= MIN_COLUMN
 
 

@@ -18,18 +18,18 @@ from fba.face.model import Part
 CLEARANCE = 0.012
 """Clearance between a moved lid and the eyeball, as a share of the eyeball's radius."""
 FULL_CLEARANCE = 0.3
-"""Share of the way after which a lid has its full clearance."""
-BULGE = np.radians(12.0)
+"""Share of its motion after which a lid has its full clearance."""
+MAX_CORNEA_ANGLE = np.radians(12.0)
 """Angle by which the cornea may have moved, because the eye turns."""
-STRICT = np.radians(4.0)
+RADIUS_HALF_WIDTH = np.radians(4.0)
 """Half the width of the directions over which the eyeball's own radius is measured."""
 ANGLES = np.linspace(0, np.pi, 73)
 """Angles from the gaze at which an eyeball's radius is measured."""
-OUTSIDE = 0.97
+OUTSIDE_RADII = 0.97
 """Vertices this far out, in radii of the eyeball, count as outside."""
-DEEPEST = 0.02
+MAX_DIP_CORRECTION = 0.02
 """Largest correction for an edge that dips into the eyeball, as a share of its radius."""
-BRIDGINGS = 3
+BRIDGING_PASSES = 3
 """Number of passes: moving a vertex off the eyeball may pull another edge into it."""
 
 
@@ -39,7 +39,7 @@ class Profile:
 
     centre, gaze: (3,). size: radius of the eyeball. clearance: of the lids from it. dip: depth by which the
     middle of a lid's edge lies below its ends. straight: the eyeball's largest radius at each angle of
-    `ANGLES` from the gaze; nearby: the largest within `BULGE` of it. Lengths in metres.
+    `ANGLES` from the gaze; nearby: the largest within `MAX_CORNEA_ANGLE` of it. Lengths in metres.
     """
 
     centre: Float64
@@ -73,7 +73,7 @@ class Profile:
         """
         shifted = points + shifts
         way = np.linalg.norm(shifts, axis=1)
-        outside = self.is_outside(points, OUTSIDE)
+        outside = self.is_outside(points, OUTSIDE_RADII)
         pushed = (outside if always is None else outside | always) & (way > 1e-9)
         result = np.zeros_like(shifted)
         # vertices that hardly move, as in the lining of the other lid, stay
@@ -102,7 +102,7 @@ def measure_profile(eye: Eye, parts: Sequence[Part], edge: float) -> Profile:
             continue
         angle, reach = _polar(part.vertices.astype(np.float64), eye.centre, eye.gaze)
         for k, direction in enumerate(ANGLES):
-            for radii, within in ((straight, STRICT), (nearby, BULGE)):
+            for radii, within in ((straight, RADIUS_HALF_WIDTH), (nearby, MAX_CORNEA_ANGLE)):
                 near = np.abs(angle - direction) < within
                 radii[k] = max(radii[k], float(reach[near].max(initial=0.0)))
     straight[straight == 0.0] = eye.radius
@@ -128,10 +128,11 @@ def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
 def push_vertices_outside(
     profile: Profile, points: Float64, shifts: Float64, values: Float64, margins: Bool | None = None
 ) -> Float64:
-    """Return the shifts (K, N, 3) corrected so that no vertex cuts the eyeball, increasingly along the way.
+    """Return the shifts (K, N, 3) corrected, increasingly along the motion, so that no vertex cuts the
+    eyeball.
 
     margins: (N,) mask of the vertices of both lids' margins where these must meet also if the eyeball is so
-    large that some lie in it. They are kept outside on the way, and end on the other margin where it is.
+    large that some lie in it. They are kept outside while they move, and end on the other margin where it is.
     """
     result = shifts.copy()
     ways = np.abs(values) / CLOSED
@@ -158,12 +159,12 @@ def push_edges_outside(
     local, points = positions_in(vertices, len(surface))[edges], surface.vertices[vertices]
     result = shifts.copy()
     for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FULL_CLEARANCE)):
-        for _ in range(BRIDGINGS):
+        for _ in range(BRIDGING_PASSES):
             middles = points[local].mean(axis=1)
             push = profile.lift(middles, result[k][local].mean(axis=1), edges=False)[:, 2]
             # only edges with both ends outside are corrected
             push[~profile.is_outside(points + result[k])[local].all(axis=1)] = 0.0
-            push = np.minimum(push, DEEPEST * profile.size)
+            push = np.minimum(push, MAX_DIP_CORRECTION * profile.size)
             worst = np.zeros(len(vertices))
             np.maximum.at(worst, local[free], np.repeat(2 * share * push, 2)[free.ravel()])
             if not worst.any():

@@ -20,12 +20,12 @@ GAMMA = 2.2
 STRIPS = 8
 """Number of strips, side by side, into which a lid is cut; each is measured separately."""
 STEPS = 24
-"""Number of distances from the margin, up to `FURTHEST`, at which a strip is measured."""
-FURTHEST = 2.0
+"""Number of distances from the margin, up to `MAX_DISTANCE`, at which a strip is measured."""
+MAX_DISTANCE = 2.0
 """Distance from the margin, in distances of the crease, up to which paint is looked for; skin begins at 1."""
-DARK = 0.5
+DARK_SHARE = 0.5
 """Brightness, as a share of that of the skin beside, below which paint begins."""
-BRIGHT = 0.7
+BRIGHT_SHARE = 0.7
 """Brightness, as a share of that of the skin beside, above which paint ends."""
 SAMPLES = 12
 """Points across each edge of a triangle at which its colour is read."""
@@ -40,9 +40,9 @@ def painted_width(
     crease: distance of the lid's crease from the margin, metres. The colour is that of the skin's texture and
     of its vertices; a picture that cannot be read is taken for plain.
     """
-    away, column, brightness = _samples(marks, opening, eye, lid, parts, FURTHEST * crease)
+    away, column, brightness = _samples(marks, opening, eye, lid, parts, MAX_DISTANCE * crease)
     strip = np.floor((column - opening.x[0]) / (opening.x[-1] - opening.x[0]) * STRIPS)
-    step = np.minimum(away / (FURTHEST * crease) * STEPS, STEPS - 1).astype(np.intp)
+    step = np.minimum(away / (MAX_DISTANCE * crease) * STEPS, STEPS - 1).astype(np.intp)
     widths = []
     for number in range(STRIPS):
         here = strip == number
@@ -51,9 +51,9 @@ def painted_width(
         seen = np.flatnonzero(np.isfinite(line))
         if len(seen) and skin > 0:
             line = np.interp(np.arange(STEPS), seen, line[seen]) / skin
-            ends = np.flatnonzero(line > BRIGHT)
-            dark = line[0] < DARK and len(ends) > 0
-            widths.append(ends[0] * FURTHEST * crease / STEPS if dark else 0.0)
+            ends = np.flatnonzero(line > BRIGHT_SHARE)
+            dark = line[0] < DARK_SHARE and len(ends) > 0
+            widths.append(ends[0] * MAX_DISTANCE * crease / STEPS if dark else 0.0)
     return float(np.median(widths)) if widths else 0.0
 
 

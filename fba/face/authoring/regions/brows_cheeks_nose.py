@@ -29,7 +29,7 @@ from fba.face.feature_points import MIRRORED
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
-SMOOTHINGS = 5
+SMOOTHING_ROUNDS = 5
 """Rounds of averaging the motion of surfaces behind the skin."""
 
 
@@ -136,7 +136,7 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64,
         targets = np.setdiff1d(np.flatnonzero(behind), pulled)  # points stay where they are given
         for k in range(len(own)):
             lifted = carry_through(surface, solved[:, k], targets, area.through * es)
-            for _ in range(SMOOTHINGS):
+            for _ in range(SMOOTHING_ROUNDS):
                 lifted[targets] = average_with_neighbours(surface, lifted, 1)[targets]
             solved[:, k] = lifted
     return trim_small(solved), surface.mask(fixed)

@@ -27,13 +27,13 @@ RIGID_WIDTH = 0.55
 """Share of the ear's width from its rim up to which it moves as a whole."""
 ROOT_WIDTH = 1.15
 """Share of the ear's width from its rim beyond which it does not move."""
-AROUND = (1.1, 1.7)
+FADE_RADII = (1.1, 1.7)
 """Multiples of the ear's size between which the motion of the head around it fades out."""
-WIDER = 1.2
+DEPTH_FACTOR = 1.2
 """The ear is taken to be deeper, front to back, than its points say by this factor."""
 LEAST_PULL = 0.1
 """Share of a pull that the root of the ear makes."""
-SMOOTHINGS = 6
+SMOOTHING_ROUNDS = 6
 """Rounds of averaging shares with those of neighbours."""
 
 
@@ -63,11 +63,11 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
     rim = _rim(marks, names)
     away = surface.distances(rim, 1.5 * width) / width
     share = 1 - smoothstep((np.nan_to_num(away, posinf=9.0) - RIGID_WIDTH) / (ROOT_WIDTH - RIGID_WIDTH))
-    share = average_with_neighbours(surface, share, SMOOTHINGS)
+    share = average_with_neighbours(surface, share, SMOOTHING_ROUNDS)
     centre = ((top + lobe) / 2 + (back + root) / 2) / 2
-    half = np.array([np.inf, np.linalg.norm(top - lobe) / 2, abs(back[2] - root[2]) / 2 * WIDER])
+    half = np.array([np.inf, np.linalg.norm(top - lobe) / 2, abs(back[2] - root[2]) / 2 * DEPTH_FACTOR])
     beside = np.linalg.norm((surface.vertices - centre) / half, axis=1)
-    share *= 1 - smoothstep((beside - AROUND[0]) / (AROUND[1] - AROUND[0]))
+    share *= 1 - smoothstep((beside - FADE_RADII[0]) / (FADE_RADII[1] - FADE_RADII[0]))
     if pull:
         out = root - back
         far = 1 - ((surface.vertices - back) @ out) / (out @ out)

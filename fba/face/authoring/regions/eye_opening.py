@@ -66,8 +66,8 @@ def slide_lid(
     *,
     columns: Float64 | None = None,
 ) -> Float64:
-    """Return (K, N, 3) shifts of points (N, 3), metres, when a lid has made shares (K,) of the way to the
-    other.
+    """Return (K, N, 3) shifts of points (N, 3), metres, when a lid has moved by shares (K,) of the distance
+    to the other.
 
     share: (N,), share of the margin's motion in each point's column. columns: (N,), x of the columns, where
     they are not the points' own, as of a lash that goes with its root.

@@ -22,15 +22,15 @@ UNMOVED_POINTS = (*EARS, "3.9", "3.10", "5.3", "5.4", "8.1", "9.1", "9.2", "9.3"
 """Feature points that the jaw does not move."""
 REACH = 1.5
 """Reach of the jaw's motion into cheeks and neck, in ES0."""
-NECK = 0.1
+NECK_DISTANCE = 0.1
 """Open edges of the skin further below the chin than this, in ES0, are where the neck was cut."""
-CORNER = 0.6
+CORNER_SHARE = 0.6
 """Share of the jaw's rotation that the skin over its corners makes."""
 MAX_OPENING = np.radians(30.0)
 """Radians by which the jaw opens at most."""
-SLIDE = (0.35, 0.1)
+HINGE_SLIDE = (0.35, 0.1)
 """Motion of the hinge forwards and down per radian, in ES0: some 11 mm when wide open."""
-INTERVAL = np.radians(3.0)
+MAX_INTERVAL = np.radians(3.0)
 """Longest interval into which the arc is cut, radians."""
 LIP_RIDE = 0.5
 """Share of a sliding jaw's motion that the lower lip makes. An opening jaw does not move the lip, which has
@@ -43,7 +43,7 @@ TEETH_MARGIN = 0.12
 """Height about the teeth's edge over which the jaw's share goes from 0 to 1, in MNS0."""
 CHEEK_MARGIN = 0.4
 """Height above and below the teeth's edge over which the inside of the mouth may stretch, in MNS0."""
-MIXED = 0.15
+ONE_JAW_MARGIN = 0.15
 """Teeth of which half plus this share lies on one side of their common edge belong to one jaw."""
 LIP_DEPTH = 0.16
 """Distance from the lips beyond which the inside of the mouth moves as the jaws do, in ES0."""
@@ -86,7 +86,7 @@ def opening_angles(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
     fine = fine[: int(sunk.argmax()) + 1]
     sunk = np.maximum.accumulate(sunk[: len(fine)])
     deepest = min(float(sunk[-1]) / unit, high)
-    count = max(5, int(np.ceil(fine[-1] / INTERVAL)))
+    count = max(5, int(np.ceil(fine[-1] / MAX_INTERVAL)))
     values = np.unique(np.round(np.linspace(0, deepest, count + 1)))
     angles = np.interp(values * unit, sunk, fine)
     if values[-1] < high:
@@ -104,7 +104,7 @@ def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
     y, z = points[:, 1] - jaw.hinge[0], points[:, 2] - jaw.hinge[1]
     cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
     zero = np.zeros((len(angles), len(points)))
-    forward, down = (step * jaw.size * angles[:, None] for step in SLIDE)
+    forward, down = (step * jaw.size * angles[:, None] for step in HINGE_SLIDE)
     return np.stack([zero, y * cos - z * sin - y - down, y * sin + z * cos - z + forward], axis=-1)
 
 
@@ -141,11 +141,11 @@ def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
         if row is not None:
             return np.full(len(part.vertices), row)
         # decided for the whole row first, then for each piece: an overbite must not move upper teeth
-        if abs(float(each.mean()) - 0.5) > MIXED:
+        if abs(float(each.mean()) - 0.5) > ONE_JAW_MARGIN:
             return np.full(len(part.vertices), float(each.mean() > 0.5))
         count = np.bincount(shape.component)
         mean = np.bincount(shape.component, each) / count
-        in_one_jaw = np.abs(mean - 0.5) > MIXED
+        in_one_jaw = np.abs(mean - 0.5) > ONE_JAW_MARGIN
         each = np.where(in_one_jaw[shape.component], (mean > 0.5)[shape.component], each)
     result: Float64 = each[shape.number]
     return result
@@ -180,12 +180,12 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
     values: dict[int, float] = {}
     if len(line):
         values |= dict(zip(line.tolist(), _along_jaw(marks, line).tolist(), strict=True))
-    values |= dict.fromkeys(marks.vertices_of(("2.13", "2.14")).tolist(), CORNER)
+    values |= dict.fromkeys(marks.vertices_of(("2.13", "2.14")).tolist(), CORNER_SHARE)
     values |= dict.fromkeys(marks.vertices_of(CHIN).tolist(), 1.0)
     source = np.array(sorted(values))
     lips = marks.on_contours(*LIP_CONTOURS) | marks.lips
     # the neck's lower end joins a body that does not move
-    end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - NECK * es)
+    end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - NECK_DISTANCE * es)
     still = np.union1d(np.flatnonzero(lips | end), marks.vertices_of(UNMOVED_POINTS))
     inside = marks.inside_mouth
     near, far = surface.distances(source, REACH * es), surface.distances(still, 3 * REACH * es)
@@ -214,7 +214,7 @@ def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
     first, last = length[chin[0]], length[chin[-1]]
     left = np.where(length < first, (first - length) / max(first, 1e-9), 0.0)
     right = np.where(length > last, (length - last) / max(length[-1] - last, 1e-9), 0.0)
-    return 1 - (1 - CORNER) * smoothstep(np.maximum(left, right))
+    return 1 - (1 - CORNER_SHARE) * smoothstep(np.maximum(left, right))
 
 
 def _with_lip(marks: Landmarks, share: Float64) -> Float64:

@@ -46,36 +46,36 @@ FOLD = {
 }
 """The feature points on the creases."""
 AT_CREASE = 0.25
-"""Share of the margin's way that the crease makes."""
-ENDS = 3.5
+"""Share of the margin's motion that the crease makes."""
+MOTION_END = 3.5
 """Multiple of the crease's distance beyond which the skin does not move."""
 EDGE = 0.4
 """Share of the distance to the crease up to which the lid's edge moves rigidly."""
 MOST_EDGE = 0.8
 """The same, at most, for a lid with painted lashes or a liner: only bare skin stretches."""
-FURTHER = 0.2
+MAX_OVERHANG = 0.2
 """Share by which the front edge of a lid may move further than the margin."""
 OWN_SIDE = 0.6
 """Share of the distance between the lids: vertices that are nearer to the other lid follow less."""
-NARROW = 0.4
+CORNER_FACTOR = 0.4
 """Factor of distances at the corners of the eye."""
-SMOOTHINGS = 4
+SMOOTHING_ROUNDS = 4
 """Rounds of averaging shares with those of neighbours."""
 UNMOVED_POINTS = {
     "left": ("4.1", "4.3", "4.5", "9.7", "9.13", "5.3", "9.12"),
     "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
 }
-WIDE = 0.35
+MIN_MEASURED_HEIGHT = 0.35
 """Only columns of the eye's opening at least this high, as a share of the highest, show how far a shape moves
 a margin."""
 LEAST_SCULPTED = 0.08
 """Least share of the opening by which a shape moves a margin that it shows how to move."""
 LEAST_TURN = 0.3
 """Least motion of a margin, as a share of its largest, against which that of other vertices is measured."""
-SUNK = 0.03
+MAX_SUNK = 0.03
 """Shortfall of a margin from the clearance of moved lids, in radii of the eyeball, above which both margins
 meet where they are, as a gap would be seen otherwise."""
-CORNER = 0.12
+CORNER_WIDTH = 0.12
 """Distance from the corners, as a share of the eye's width, within which folds do not stop a lid."""
 
 
@@ -90,7 +90,7 @@ def lid_motion(
     """Return the motion of the surface for a lid's FAP, or the reason why it cannot be made.
 
     sculpted: (N, 3) displacements of the surface by which somebody closed this eye, metres: then each vertex
-    makes the share of the margin's way that it makes there, and folds that are in it are no reason to stop.
+    makes the share of the margin's motion that it makes there, and folds in it are no reason to stop.
     """
     side, lid = LIDS[fap]
     own, other = marks.contour(f"{side} {lid} lid"), marks.contour(f"{side} {_other(lid)} lid")
@@ -117,7 +117,7 @@ def lid_motion(
     else:
         profile = measure_profile(eye, parts, edge_length(marks, own, other))
         # margins that lie in the eyeball, or close to it, meet where they are
-        sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > SUNK * profile.size
+        sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > MAX_SUNK * profile.size
         shifts = push_vertices_outside(profile, points, shifts, values, pinned[vertices] if sunk else None)
         motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
         points = marks.surface.vertices[motion.vertices]
@@ -129,7 +129,7 @@ def lid_motion(
     # in the corners of the eye, skin closes on itself, behind its margins too
     ends = marks.surface.vertices[own[[0, -1]]]
     near = np.linalg.norm(marks.surface.vertices[:, None] - ends, axis=2).min(axis=1)
-    corners = np.flatnonzero(near < CORNER * np.linalg.norm(ends[1] - ends[0]))
+    corners = np.flatnonzero(near < CORNER_WIDTH * np.linalg.norm(ends[1] - ends[0]))
     limited = stop_at_folds(limiter.without(corners), motion, turning=True)
     if not follows and _moving_range(limited)[1] >= CLOSED:
         return limited
@@ -159,14 +159,14 @@ def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift
     gap = np.interp(arms[line, 0] + eye.centre[0], opening.x, opening.upper[:, 0] - opening.lower[:, 0])
     most = float(gap.max())
     # towards the corners, where both margins are close together, shares of little are no measure
-    wide = gap > WIDE * most
+    wide = gap > MIN_MEASURED_HEIGHT * most
     if wide.sum() < 2 or np.median(turn[line][wide] * eye.radius / gap[wide]) < LEAST_SCULPTED:
         return None
     at_margin = np.interp(arms[:, 0], arms[line, 0][wide], turn[line][wide])
     at_margin = np.maximum(at_margin, LEAST_TURN * float(turn[line].max()))
     out = np.interp(arms[:, 0], arms[line, 0], np.hypot(arms[line, 1], arms[line, 2]))
     away = np.hypot(arms[:, 1], arms[:, 2]) / np.maximum(out, 1e-12)
-    share = np.clip(turn * np.maximum(away, 1.0) / at_margin, 0.0, 1 + FURTHER)
+    share = np.clip(turn * np.maximum(away, 1.0) / at_margin, 0.0, 1 + MAX_OVERHANG)
     reach = REACH * marks.fapu.ES * 1024
     share *= smoothstep(2 - 2 * np.minimum(marks.surface.distances(own, reach), reach) / reach)
     share[own] = 1.0
@@ -218,9 +218,9 @@ def _share(
         crease = float(np.clip(away[marks.vertex[FOLD[side, lid]]], 0.8 * crease, 1.5 * crease))
     gap = np.maximum(opening.upper[:, 0] - opening.lower[:, 0], 0.0)
     high = np.interp(surface.vertices[:, 0], opening.x, gap / gap.max())
-    end = max(min(ENDS, 0.85 * float(away[still].min(initial=np.inf)) / crease), EDGE + 0.3)
+    end = max(min(MOTION_END, 0.85 * float(away[still].min(initial=np.inf)) / crease), EDGE + 0.3)
     painted = painted_width(marks, opening, eye, lid, parts, crease)
-    near = np.maximum(crease * (NARROW + (1 - NARROW) * high), painted / MOST_EDGE)
+    near = np.maximum(crease * (CORNER_FACTOR + (1 - CORNER_FACTOR) * high), painted / MOST_EDGE)
     edge = np.maximum(painted / near, EDGE)
     folds = away / near
     inner = np.where(folds < edge, folds * EDGE / edge, EDGE + (folds - edge) * (1 - EDGE) / (1 - edge))
@@ -237,7 +237,7 @@ def _share(
     share[own] = 1.0
     share[stays] = 0.0
     pinned |= (away < painted) & (opposite > away)
-    share = np.where(pinned, share, average_with_neighbours(surface, share, SMOOTHINGS))
+    share = np.where(pinned, share, average_with_neighbours(surface, share, SMOOTHING_ROUNDS))
     return trim_small(share)
 
 
@@ -252,7 +252,7 @@ def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: flo
     gap = np.interp(points[:, 0], opening.x, opening.upper[:, 0] - opening.lower[:, 0])
     before = points[:, 2] - eye.centre[2] > depth
     back = np.maximum(sign * (points[:, 1] - eye.centre[1] - height), 0.0)
-    further = np.clip(2 * back / np.maximum(gap, 0.2 * widest), 0.0, FURTHER)
+    further = np.clip(2 * back / np.maximum(gap, 0.2 * widest), 0.0, MAX_OVERHANG)
     return np.where(before, further, 0.0)
 
 

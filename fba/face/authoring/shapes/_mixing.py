@@ -13,7 +13,7 @@ from fba.face.authoring.shapes._shapes import Shapes
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion, build_tables, fap_limits, split_by_part
-from fba.face.authoring.surface.motion_limits import EASE, MODERATE, coupled_motions, linear_motion
+from fba.face.authoring.surface.motion_limits import EASE, MODERATE_VALUE, coupled_motions, linear_motion
 from fba.face.authoring.surface.surface import Surface
 from fba.face.authoring.surface.unfold import ease_field
 from fba.face.feature_points import row_of
@@ -319,7 +319,7 @@ def _on_surface(surface: Surface, moves: Float64) -> Float64:
 
 def _goal(end: float) -> float:
     """Return the value that a motion with an end of its range there should reach."""
-    return float(np.sign(end)) * min(MODERATE / EASE[0], abs(end))
+    return float(np.sign(end)) * min(MODERATE_VALUE / EASE[0], abs(end))
 
 
 def _one_way(surface: Surface, field: Float64, end: float, pinned: Bool) -> Motion:

@@ -18,13 +18,13 @@ MOST_STRETCH = 5.0
 TINY_EDGE = 0.25
 """Share of the typical edge length among the moving triangles, which stands for shorter neutral lengths
 there."""
-FOLDED = -0.3
+FOLDED_COSINE = -0.3
 """A triangle is folded if its normal has a smaller cosine than this with that of its neighbours."""
-SPECK = 0.0015
+MAX_FOLDED_SHARE = 0.0015
 """Share of the moving area that may be folded where skin closes on itself."""
 FEW_VERTICES = 0.1
 """Up to this share of all vertices, triangles are looked up vertex by vertex, which is faster."""
-DEGENERATE = 1e-5
+DEGENERATE_AREA = 1e-5
 """Triangles of less than this share of the typical area count as lines, which cannot fold."""
 
 
@@ -43,7 +43,7 @@ class Limiter:
         """Return the limiter of a mesh; triangles without area are left out: they cannot fold."""
         areas = Patch(vertices, triangles).areas
         typical = float(np.median(areas)) if len(areas) else 0.0
-        return cls(vertices, triangles[areas > DEGENERATE * typical])
+        return cls(vertices, triangles[areas > DEGENERATE_AREA * typical])
 
     def without(self, vertices: Intp) -> Limiter:
         """Return a limiter that ignores the triangles around the given vertices."""
@@ -190,12 +190,12 @@ class Patch:
     def is_sound(self, shifts: Float64, *, turning: bool = False) -> bool:
         """Return whether no triangle folds or tears at vertices + shifts (N, 3).
 
-        turning: as in `soundness`; then tiny folds (`SPECK`) in the corners of eyes and mouth are allowed.
+        turning: as in `soundness`; then tiny folds (`MAX_FOLDED_SHARE`) at eyes and mouth are allowed.
         """
         fine = self.soundness(shifts, turning=turning)
         if not turning or fine.all():
             return bool(fine.all())
-        return float(self.areas[~fine].sum()) <= SPECK * float(self.areas.sum())
+        return float(self.areas[~fine].sum()) <= MAX_FOLDED_SHARE * float(self.areas.sum())
 
     def soundness(self, shifts: Float64, *, turning: bool = False) -> Bool:
         """Return (M,) mask of the triangles that neither fold nor tear under shifts (N, 3).
@@ -209,7 +209,7 @@ class Patch:
         f1, f2 = second - first, third - first
         after = cross(f1, f2)
         if turning:
-            fine: Bool = (self._facing_neighbours(after) >= FOLDED) | self._folded_before
+            fine: Bool = (self._facing_neighbours(after) >= FOLDED_COSINE) | self._folded_before
         else:
             fine = dot(self._normals, after) >= 0.8 * LEAST_AREA * self._square_areas
         for edge, most in zip((f1, f2, f2 - f1), self._most_lengths, strict=True):

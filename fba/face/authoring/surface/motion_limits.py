@@ -17,7 +17,7 @@ from fba.face.authoring.surface.unfold import ease_field
 
 EASE = (0.75, 1.25)
 """Shares of the largest value without folds at which a motion slows to half speed, and at which it stops."""
-MODERATE = 320.0
+MODERATE_VALUE = 320.0
 """Value (or limit of the FAP, if lower) up to which motions are kept linear by easing the skin around."""
 HALVINGS = 7
 """Steps of bisection for the point at which a motion must stop."""
@@ -76,7 +76,9 @@ def eased_linear_motion(
 def values_to_reach(fap: int) -> list[float]:
     """Return the values that a FAP should be able to reach."""
     return [
-        float(np.sign(end)) * min(MODERATE / EASE[0], abs(end)) for end in fap_limits(fap) if abs(end) > 1
+        float(np.sign(end)) * min(MODERATE_VALUE / EASE[0], abs(end))
+        for end in fap_limits(fap)
+        if abs(end) > 1
     ]
 
 
@@ -194,7 +196,7 @@ def _stop_one_side(
 
 
 def _last_sound_share(start: Float64, end: Float64, is_sound: Callable[[Float64], bool]) -> float:
-    """Return the share of the way between two shifts at which no triangle has folded yet, by bisection."""
+    """Return the largest share between two shifts at which no triangle has folded yet, by bisection."""
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = (low + high) / 2

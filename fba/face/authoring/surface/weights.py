@@ -54,7 +54,8 @@ def solve_smooth_field(
 
 
 def reachable_region(near: Float64, far: Float64, reach: float, share: float = 0.8) -> Bool:
-    """Return (N,) mask of vertices within `reach` and at most `share` of the way to vertices that must stay.
+    """Return (N,) mask of vertices within `reach` and at most `share` of the distance to vertices that must
+    stay.
 
     near, far: (N,) distances from moved and from fixed vertices, metres.
     """

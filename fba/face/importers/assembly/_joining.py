@@ -157,7 +157,7 @@ def _plain_tile() -> _Tile:
 
 
 def _tile(texture: bytes, texcoords: Sequence[Float32], most: int) -> _Tile | None:
-    """Return what texture coordinates, arrays (V, 2), show of a texture, at most `size` pixels each way.
+    """Return what texture coordinates, arrays (V, 2), show of a texture, at most `most` pixels wide and high.
 
     None where that cannot be cut out.
     """

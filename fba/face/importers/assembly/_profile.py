@@ -13,10 +13,10 @@ from fba.face.model import Part
 STEPS = 400
 """Number of heights at which the profile is sampled."""
 FLAT_LIP = 0.48
-"""Share of the way from the line of the lips to the tip of the nose beyond which no lip is foremost."""
-NOSE = 0.01
+"""Beyond this share of the height from the line of the lips to the tip of the nose, no lip is foremost."""
+MIN_NOSE_DEPTH = 0.01
 """Least depth of the bottom of a nose behind the line from its tip to the lip, in distances of the pupils."""
-CHIN = 0.3
+MIN_CHIN_DISTANCE = 0.3
 """Distance of the chin from the lower lip at least, by that of the lips from the eyes; nearer is the lip."""
 
 
@@ -56,11 +56,12 @@ def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Floa
         along = (heights - heights[start]) / (heights[tip] - heights[start])
         behind = front[start] + along * (front[tip] - front[start]) - front
         between = (np.arange(STEPS) > start) & (np.arange(STEPS) < tip) & np.isfinite(front)
-        if between.any() and float(np.nanmax(behind[between])) > NOSE * apart:
+        if between.any() and float(np.nanmax(behind[between])) > MIN_NOSE_DEPTH * apart:
             result |= {"8.1": point(upper)} if has_lip else {}
             result["9.15"] = point(int(np.where(between, behind, -np.inf).argmax()))
     chin = _hill(
-        front, (heights > located["2.3"][1] - 0.8 * tall) & (heights < located["2.3"][1] - CHIN * tall)
+        front,
+        (heights > located["2.3"][1] - 0.8 * tall) & (heights < located["2.3"][1] - MIN_CHIN_DISTANCE * tall),
     )
     if chin is None:
         return result

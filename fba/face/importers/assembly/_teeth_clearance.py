@@ -26,25 +26,25 @@ STRETCH = (6, 7, 53, 54)
 """FAPs of the corners of the mouth, inner and outer."""
 KNOTS = (-20.0, -80.0, -140.0, -200.0, -260.0, -320.0)
 """Values at which the clearance is measured. Up to the first one, the corners move straight."""
-CELL = 0.0005
+CELL_SIZE = 0.0005
 """Metres: spacing of the picture of the teeth's depth."""
 MAX_CELLS = 1 << 20
 CLOSED_GAP = 0.002
 """Metres up to which gaps between teeth are closed; their arch is smoothed by half of it."""
-GAP = 0.0008
+CLEARANCE = 0.0008
 """Metres of skin that stay in front of the arch; skin that is nearer at rest keeps its distance."""
-BEHIND = 0.004
+MAX_DEPTH_BEHIND = 0.004
 """Metres: skin further behind the arch at rest is that of the mouth's inside, and stays as it is."""
-WITHIN = ((1.0, 0.0, 0.0), (0.5, 0.5, 0.0), (0.0, 0.5, 0.5), (0.5, 0.0, 0.5), (1 / 3, 1 / 3, 1 / 3))
+SAMPLE_SHARES = ((1.0, 0.0, 0.0), (0.5, 0.5, 0.0), (0.0, 0.5, 0.5), (0.5, 0.0, 0.5), (1 / 3, 1 / 3, 1 / 3))
 """Shares of the corners of a triangle at which it has to clear the teeth."""
-BRIDGINGS = 3
+BRIDGING_PASSES = 3
 """Passes, as what is between vertices needs more than they do."""
 TRIALS = ((0.7, 1.0), (0.45, 1.0), (0.3, 1.0), (0.7, 0.7), (0.45, 0.7), (0.45, 0.4))
-"""How much less the skin comes forward for each metre from where it has to, and share of the way it goes:
-the first pair that turns nothing over is taken."""
+"""Slope at which the forward motion falls off around the teeth, and share of the motion that is made: the
+first pair that turns nothing over is taken."""
 NEED_SQUARE = 0.001
 """Metres, side of a square; of the needs in it, the largest counts."""
-FULL = 0.15
+FULL_SHARE = 0.15
 """Share of the largest motion above which skin comes forward in full."""
 MIN_OVERLAP = 2e-4
 """Metres below which skin may get into the teeth without being pushed."""
@@ -74,7 +74,7 @@ class Arch:
 def clear_teeth(model: FaceModel) -> FaceModel:
     """Return the model, whose skin slides over the teeth where the corners of the mouth move inwards.
 
-    Where that would turn triangles over, the skin around comes along further, or the way is shorter.
+    Where that would turn triangles over, more of the skin around moves, or the motion is shorter.
     """
     arch = _measure_arch(model)
     stretch = [fap for fap in STRETCH if fap in model.table_of]
@@ -120,7 +120,7 @@ def _measure_arch(model: FaceModel) -> Arch | None:
         return None
     corners = np.concatenate([part.vertices.astype(np.float64)[part.triangles] for part in rows])
     low, high = corners.min(axis=(0, 1))[:2] - 3 * CLOSED_GAP, corners.max(axis=(0, 1))[:2] + 3 * CLOSED_GAP
-    cell = max(CELL, float(np.sqrt(np.prod(high - low) / MAX_CELLS)))
+    cell = max(CELL_SIZE, float(np.sqrt(np.prod(high - low) / MAX_CELLS)))
     size = np.ceil((high - low) / cell).astype(np.intp) + 1
     depth = np.full((size[1], size[0]), -np.inf)
     longest = float(np.linalg.norm(np.ptp(corners[:, :, :2], axis=1), axis=1).max())
@@ -153,19 +153,19 @@ def _push(surface: Surface, arch: Arch, shifts: Float64, slope: float) -> Float6
     by `slope` metres for each metre.
     """
     way = np.linalg.norm(shifts, axis=1)
-    share = smoothstep(way / max(FULL * float(way.max()), 1e-9))
+    share = smoothstep(way / max(FULL_SHARE * float(way.max()), 1e-9))
     triangles = surface.triangles[(share[surface.triangles] > 0).any(axis=1)]
     push = np.zeros(len(surface))
     needs = np.zeros((0, 3))
-    for _ in range(BRIDGINGS):
+    for _ in range(BRIDGING_PASSES):
         moved = surface.vertices + shifts + push[:, None] * (0.0, 0.0, 1.0)
-        for shares in WITHIN:
+        for shares in SAMPLE_SHARES:
             mix = np.array(shares)
             rest = np.einsum("k,fkc->fc", mix, surface.vertices[triangles])
             points = np.einsum("k,fkc->fc", mix, moved[triangles])
             gap = rest[:, 2] - arch.depth_at(rest)
-            short = arch.depth_at(points) + np.minimum(gap, GAP) - points[:, 2]
-            wanted = np.flatnonzero(np.isfinite(short) & (short > 0) & (gap > -BEHIND))
+            short = arch.depth_at(points) + np.minimum(gap, CLEARANCE) - points[:, 2]
+            wanted = np.flatnonzero(np.isfinite(short) & (short > 0) & (gap > -MAX_DEPTH_BEHIND))
             total = short[wanted] + push[triangles[wanted]] @ mix
             needs = _thin(np.concatenate([needs, np.c_[rest[wanted, :2], total]]))
         moving = np.flatnonzero(share > 0)

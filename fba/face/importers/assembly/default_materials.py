@@ -27,7 +27,7 @@ LOOKS = {
 WHITE = (0.80, 0.78, 0.75)
 IRIS = (0.16, 0.09, 0.05)
 PUPIL = (0.004, 0.004, 0.004)
-GREY = 0.03
+MAX_GREY_DIFFERENCE = 0.03
 """Light colours whose channels differ by less are programs' defaults, and are replaced."""
 
 
@@ -50,7 +50,7 @@ def apply_default_materials(pieces: Sequence[Piece], points: Float64) -> list[Pi
 
 
 def _is_grey(material: Material) -> bool:
-    return max(material.colour) - min(material.colour) < GREY and min(material.colour) > 0.5
+    return max(material.colour) - min(material.colour) < MAX_GREY_DIFFERENCE and min(material.colour) > 0.5
 
 
 def _with_iris(part: Part, points: Float64) -> Part:

@@ -28,12 +28,12 @@ from fba.face.points import EYEBALL_PER_IRIS
 from fba.face.shape_names import canonical_names, fap_of
 from fba.parameters import faps
 
-OUTSIDE = 0.2
+MIN_OUTSIDE_Z = 0.2
 """Skin whose normal has a smaller z than this is the inside of the mouth, or an ear."""
 MAX_IN_COLUMN = 3000
 """Number of vertices, at most, of one column of the face that are compared with each other."""
-PARTED = 0.25
-"""Share of the jaw's way by which lips part at least."""
+MIN_PARTED_SHARE = 0.25
+"""Lips part by at least this share of the jaw's motion."""
 MAX_HALF_MOUTH = 0.7
 """Width that half a mouth has at most, in distances of the eyes."""
 SLIT_STEP = 0.02
@@ -46,13 +46,13 @@ FRONT_TEETH = 0.12
 """Distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils."""
 CORNER_WIDTH = 0.055
 """Distance of the outer corner of the lips from the inner one, as a share of that of the pupils."""
-UNLIKE = 1.3
+MAX_RADIUS_RATIO = 1.3
 """Ratio of the radii above which two shells are not a pair of eyes."""
-IN_FRONT = 0.7
+MIN_PUPIL_DISTANCE = 0.7
 """Distance that a pupil is in front of its eyeball's centre at least, in radii."""
 RIGHT_LID = ("3.2", "3.4", "3.8", "3.12")
 """Points of the right lids' margins and of the corners between them."""
-LIDS_ALIKE = 0.02
+MAX_OPENING_DIFFERENCE = 0.02
 """Share by which the heights of both eyes' openings differ, at most, where lids stay as located."""
 MIN_FAPS = 20
 """With at least this many shapes named after FAPs, points are where these move most."""
@@ -94,7 +94,7 @@ def _open_alike(points: Mapping[str, Float64]) -> bool:
     if any(name not in points for pair in LID_POINTS.values() for name in pair):
         return False
     left, right = (float(points[upper][1] - points[lower][1]) for upper, lower in LID_POINTS.values())
-    return abs(right - left) < LIDS_ALIKE * left
+    return abs(right - left) < MAX_OPENING_DIFFERENCE * left
 
 
 def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
@@ -108,12 +108,12 @@ def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
     except ModelError:
         return points
     (left, size_left, _), (right, size_right, _) = eyes["left"], eyes["right"]
-    alike = max(size_left, size_right) < UNLIKE * min(size_left, size_right)
+    alike = max(size_left, size_right) < MAX_RADIUS_RATIO * min(size_left, size_right)
     if not alike or left[0] - right[0] < size_left + size_right:
         return points
     found = _lids_by_loops(pieces, eyes)
     for side, (centre, radius, pupil) in eyes.items():
-        if pupil[2] - centre[2] > IN_FRONT * radius:
+        if pupil[2] - centre[2] > MIN_PUPIL_DISTANCE * radius:
             found[PUPIL_POINT[side]] = pupil
     for name, position in found.items():
         points[row_of()[name]] = position
@@ -174,7 +174,10 @@ def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, fl
                 away = np.hypot(vertices[:, 0] - centre[0], vertices[:, 1] - centre[1])
                 ahead = vertices[:, 2] - centre[2]
                 # the flat back of half a ball has a vertex on the axis, too
-                away[ahead < (IN_FRONT * radius if ahead.max() > IN_FRONT * radius else 0.0)] = np.inf
+                away[
+                    ahead
+                    < (MIN_PUPIL_DISTANCE * radius if ahead.max() > MIN_PUPIL_DISTANCE * radius else 0.0)
+                ] = np.inf
                 eyes[side] = (centre, radius, vertices[int(away.argmin())])
     missing = [f"the {side} eye" for side in ("left", "right") if side not in eyes]
     if missing:
@@ -228,7 +231,7 @@ def _from_arkit(
             f"(2.2, 2.3, 8.3, 8.4) would be found{has}"
         ).with_remedies(POINTS)
     assert skin.part.normals is not None
-    facing = skin.part.normals[:, 2].astype(np.float64) > OUTSIDE
+    facing = skin.part.normals[:, 2].astype(np.float64) > MIN_OUTSIDE_Z
     for side in lidless:
         points |= _lids(vertices, shapes[f"eyeBlink{side.title()}"], eyes[side], side)
     return points | _mouth(skin.part, facing, shapes, eyes, path)
@@ -372,7 +375,7 @@ def _end_of_slit(
         parted = np.where(between < 0.04 * apart, drop[column][None] - drop[column][:, None], 0.0)
         above = np.unravel_index(int(parted.argmax()), parted.shape)[0]
         first = max(first, float(parted.max()))
-        if not first > PARTED * float(drop.max()):
+        if not first > MIN_PARTED_SHARE * float(drop.max()):
             return None
         if parted.max() > SLIT_END * first:
             last = int(column[above])
@@ -400,7 +403,7 @@ def _lip_pair(
     for reach in (0.04, 0.08, 0.16):
         near = np.where(between < reach * apart, differs, -np.inf)
         above, below = np.unravel_index(int(near.argmax()), near.shape)
-        if near[above, below] > PARTED * falls.max():
+        if near[above, below] > MIN_PARTED_SHARE * falls.max():
             break
     else:
         return None

@@ -15,19 +15,19 @@ from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly._teeth_clearance import clear_teeth
 from fba.face.importers.assembly.default_materials import apply_default_materials
 from fba.face.importers.assembly.definitions import define_by_shapes
-from fba.face.importers.assembly.pieces import FREE, assemble, shift_piece
+from fba.face.importers.assembly.pieces import FREE_POINTS, assemble, shift_piece
 from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.assembly.repair import drop_false_pupils, repair_tables
 from fba.face.importers.assembly.symmetry import stand_upright_by_points
 from fba.face.model import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
 
-PUPILS = 0.062
+ADULT_PUPIL_DISTANCE = 0.062
 """Metres between the pupils of an adult."""
-USUAL = (0.04, 0.08)
+PUPIL_DISTANCES = (0.04, 0.08)
 """Limits of the distance between the pupils of a real head, metres."""
 UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
-HEAD = 2.5
+HEAD_RADIUS = 2.5
 """Distance from the middle of the head within which skin is that of the head, in distances of the pupils."""
 AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
 """Rotations to +x left, +y up, +z forward, by the vertical axis of a file; faces with z up look to -y."""
@@ -96,7 +96,7 @@ def finish_import(
     # a point in the middle of the head, behind the pupils or the lids
     eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
     apart = pupil_distance(points) * size
-    parts, turned = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * apart), HEAD * apart)
+    parts, turned = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * apart), HEAD_RADIUS * apart)
     points = (points - origin) * size
     parts = apply_default_materials(parts, points)
     bound = bind_by_number(parts, vertices)
@@ -148,7 +148,7 @@ def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int3
                 first.setdefault(number, start + vertex)
         start += len(piece.part.vertices)
     for name, vertex in vertices.items():
-        if name not in FREE and vertex in first:
+        if name not in FREE_POINTS and vertex in first:
             bound[row_of()[name]] = first[vertex]
     return bound
 
@@ -166,9 +166,12 @@ def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, 
         return float(unit), f"1 unit is {unit:g} m, as given"
     apart = pupil_distance(points)
     for name, size in UNITS.items():
-        if USUAL[0] <= apart * size <= USUAL[1]:
+        if PUPIL_DISTANCES[0] <= apart * size <= PUPIL_DISTANCES[1]:
             return size, f"in {name}: the pupils are {apart * size * 1000:.1f} mm apart"
-    return PUPILS / apart, f"of no known unit: scaled so that the pupils are {PUPILS * 1000:.0f} mm apart"
+    return (
+        ADULT_PUPIL_DISTANCE / apart,
+        f"of no known unit: scaled so that the pupils are {ADULT_PUPIL_DISTANCE * 1000:.0f} mm apart",
+    )
 
 
 def pupil_distance(points: Float64) -> float:

@@ -22,21 +22,21 @@ from fba.mesh.names import UniqueNames
 
 DROPPED = "none"
 """Kind of parts that are left out: transparent shells in front of the eye, which would hide it."""
-FREE = ("7.1", "11.5")
+FREE_POINTS = ("7.1", "11.5")
 """Feature points that stand on no surface."""
 EYE_ROUND = 0.1
 """Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
 MIN_SINGLE_TEETH = 6
 """Number of pieces from which they are single teeth rather than rows."""
-FRONT = 0.25
+FRONT_SHARE = 0.25
 """Share of the depth of a row of teeth in which the front teeth lie."""
-SAME_HEIGHT = 0.6
+MAX_HEIGHT_DIFFERENCE = 0.6
 """Share of their height by which the middles of front teeth of one jaw differ at most."""
-PAIR = 1.7
+MIN_PAIR_ASPECT = 1.7
 """Two eyes are together at least this many times as wide as tall; one eye is round."""
 WHITE = re.compile("white|sclera", re.IGNORECASE)
 """Part of the names of the whites of eyes."""
-AROUND = (0.7, 2.0)
+LID_RADII = (0.7, 2.0)
 """Least and greatest distance, in radii, at which the lids around an eyeball have vertices."""
 SIDES_OF_EYE = 3
 """Lids have vertices on at least this many of an eyeball's four sides."""
@@ -86,7 +86,11 @@ def _is_white(piece: Piece, kind: str | None, pieces: Sequence[tuple[Piece, str 
     if kind != "eye" or piece not in whites or len(whites) == sum(each == "eye" for _, each in pieces):
         return False
     size, middle = np.ptp(piece.part.vertices, axis=0), _centre([piece.part.vertices])
-    of_one = [piece] if size[0] < PAIR * size[1] else _side([piece], lambda centres: centres[:, 0] > middle)
+    of_one = (
+        [piece]
+        if size[0] < MIN_PAIR_ASPECT * size[1]
+        else _side([piece], lambda centres: centres[:, 0] > middle)
+    )
     return all(flat_width(eye.part) is not None for eye in of_one)
 
 
@@ -95,7 +99,7 @@ def _middle(pieces: Sequence[tuple[Piece, str | None]]) -> float:
     eyes = [piece.part.vertices for piece, kind in pieces if kind == "eye"]
     if eyes:
         size = np.ptp(np.concatenate(eyes), axis=0)
-        if size[0] > PAIR * size[1]:
+        if size[0] > MIN_PAIR_ASPECT * size[1]:
             return _centre(eyes)
     skin = [piece.part.vertices for piece, kind in pieces if kind == "skin"]
     return _centre(skin) if skin else 0.0
@@ -166,7 +170,7 @@ def _is_set_in(vertices: Float32, centre: Float64, radius: float) -> bool:
     hair."""
     x, y, z = ((vertices - centre) / radius).T
     far = np.hypot(x, y)
-    near = (far > AROUND[0]) & (far < AROUND[1]) & (np.abs(z) < AROUND[1])
+    near = (far > LID_RADII[0]) & (far < LID_RADII[1]) & (np.abs(z) < LID_RADII[1])
     sides = (y > np.abs(x), -y > np.abs(x), x >= np.abs(y), -x >= np.abs(y))
     return sum(bool((near & side).any()) for side in sides) >= SIDES_OF_EYE
 
@@ -223,9 +227,9 @@ def _are_one_row(teeth: Sequence[Piece]) -> bool:
     if len(lows) < MIN_SINGLE_TEETH:
         return False
     low, high, front = np.array(lows), np.array(highs), np.array(fronts)
-    foremost = front > front.max() - FRONT * (front.max() - front.min())
+    foremost = front > front.max() - FRONT_SHARE * (front.max() - front.min())
     middles = (low + high)[foremost] / 2
-    return bool(np.ptp(middles) < np.median((high - low)[foremost]) * SAME_HEIGHT)
+    return bool(np.ptp(middles) < np.median((high - low)[foremost]) * MAX_HEIGHT_DIFFERENCE)
 
 
 def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], Bool]) -> list[Piece]:

@@ -18,13 +18,13 @@ from fba.face.points import DILATE_PUPIL
 from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.parameters import faps
 
-EDGE = (0.75, 0.97)
+FADE_SHARES = (0.75, 0.97)
 """Shares of the reach of a region between which a motion that leaves it is faded out."""
 FALSE_PUPIL = 0.5
 """Relative deviation of a pupil's size from the usual size above which it is not a pupil."""
 MESH = ("mesh", "shapes break the standard's rules for {}: made from the mesh")
 """Name and text of the note about FAPs whose tables were replaced."""
-STOPS = (0.85, 0.7, 0.55, 0.4)
+STOP_SHARES = (0.85, 0.7, 0.55, 0.4)
 """Shares of the range of a motion at which it is made to stop, until its triangles are sound."""
 
 
@@ -89,7 +89,7 @@ def _candidates(
 ) -> Iterator[FaceDefTables]:
     if table.fap in region_table():
         yield _within_region(model, table)
-    for share in STOPS:
+    for share in STOP_SHARES:
         for sides in ((-1,), (1,), (-1, 1)):
             yield FaceDefTables(
                 table.fap, tuple(_stopped(mesh, share, sides) for mesh in table.meshes), table.transforms
@@ -109,7 +109,7 @@ def _within_region(model: FaceModel, table: FaceDefTables) -> FaceDefTables:
     for mesh in table.meshes:
         vertices = model.part(mesh.part).vertices[mesh.vertices].astype(np.float64)
         away = np.linalg.norm(vertices[:, None] - points, axis=2).min(axis=1) / (reach * model.fapu.ES * 1024)
-        share = smoothstep((EDGE[1] - away) / (EDGE[1] - EDGE[0]))[:, None, None]
+        share = smoothstep((FADE_SHARES[1] - away) / (FADE_SHARES[1] - FADE_SHARES[0]))[:, None, None]
         moves = (mesh.displacements * share).astype(np.float32)
         meshes.append(FaceDefMesh(mesh.part, mesh.borders, mesh.vertices, moves))
     return FaceDefTables(table.fap, tuple(meshes), table.transforms)

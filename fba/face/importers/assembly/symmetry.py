@@ -26,7 +26,7 @@ MIRRORED_LIDS = 0.003
 """Below this asymmetry, the tables of the lids are mirrored, too."""
 LIDS = ((19, 20), (21, 22))
 """FAPs of the lids, left and right: their rows of vertices are the first that differ."""
-BETTER = 0.5
+MAX_REMAINING_SHARE = 0.5
 """A head is turned if this share of the distances from the mirror image remains at most."""
 ANGLES = np.radians((0.2, 15.0))
 """Angles between the plane of symmetry and the upright one within which a head is turned."""
@@ -34,11 +34,11 @@ POINT_ANGLES = np.radians((2.0, 40.0))
 """The same for points that are given, which are no more exact than a hand."""
 MIN_PAIRS = 4
 """Number of pairs of points, left and right, from which they tell how a head is turned."""
-AROUND = 1.6
+FACE_RADIUS = 1.6
 """Distance from the middle of the eyes, in those of the eyes, within which vertices belong to the face."""
-TOUCHING = 0.1
-"""Share of the way to the neighbours that counts, beside the position, when mirror images are sought."""
-CENTRAL = (3, 4, 5, 14, 16, 17, 18, 51, 52, 63)
+NEIGHBOUR_WEIGHT = 0.1
+"""Weight of the vector to the neighbours, beside the position, when mirror images are sought."""
+CENTRAL_FAPS = (3, 4, 5, 14, 16, 17, 18, 51, 52, 63)
 """FAPs that move both sides alike."""
 
 
@@ -59,7 +59,7 @@ def stand_upright(
     before, after = (
         float(np.median(_mirror_distances(vertices, middle, axis))) for axis in (np.eye(3)[0], normal)
     )
-    if after > BETTER * before or after > MIRRORED_POINTS * float(np.linalg.norm(left - right)):
+    if after > MAX_REMAINING_SHARE * before or after > MIRRORED_POINTS * float(np.linalg.norm(left - right)):
         return list(pieces), 0.0
     return _turned(pieces, between(normal, np.eye(3)[0]), middle), angle
 
@@ -82,7 +82,7 @@ def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[l
     before, after = (
         float(np.linalg.norm(ways - wide[:, None] * axis, axis=1).sum()) for axis in (np.eye(3)[0], normal)
     )
-    if not POINT_ANGLES[0] < angle < POINT_ANGLES[1] or after > BETTER * before:
+    if not POINT_ANGLES[0] < angle < POINT_ANGLES[1] or after > MAX_REMAINING_SHARE * before:
         return list(pieces), points, 0.0
     turn, middle = between(normal, np.eye(3)[0]), pairs.mean(axis=(0, 1))
     return _turned(pieces, turn, middle), (points - middle) @ turn.T + middle, angle
@@ -151,7 +151,7 @@ def mirror_tables(model: FaceModel, *, lids: bool = True) -> FaceModel:
     kept = int(reach[1] > reach[0])
     made = dict(model.table_of)
     lost = dict(model.lost)
-    for fap in CENTRAL:
+    for fap in CENTRAL_FAPS:
         if fap in made:
             made[fap] = _average(model, made[fap], _mirrored(model, made[fap], fap, other))
     for pair in pairs:
@@ -193,7 +193,7 @@ def _face(pieces: Sequence[Piece], left: Float64, right: Float64) -> Float64:
     if not skin:
         return np.zeros((0, 3))
     vertices = np.concatenate(skin).astype(np.float64)
-    reach = AROUND * float(np.linalg.norm(left - right))
+    reach = FACE_RADIUS * float(np.linalg.norm(left - right))
     return np.asarray(vertices[np.linalg.norm(vertices - (left + right) / 2, axis=1) < reach])
 
 
@@ -212,8 +212,8 @@ def _counterparts(model: FaceModel) -> Intp:
 
     pupils = model.points[[row_of()["3.5"], row_of()["3.6"]], 0]
     middle = float(pupils.mean()) if np.isfinite(pupils).all() else 0.0
-    # lips that touch have vertices at one place: the way to their neighbours tells which is of which lip
-    arms = TOUCHING * _neighbour_arms(model)
+    # vertices of touching lips coincide: the vector to their neighbours tells the lips apart
+    arms = NEIGHBOUR_WEIGHT * _neighbour_arms(model)
     vertices = np.hstack([model.vertices.astype(np.float64) - (middle, 0.0, 0.0), arms])
     mirrored = vertices * (-1.0, 1.0, 1.0, -1.0, 1.0, 1.0)
     kinds = np.concatenate([[part.kind] * len(part.vertices) for part in model.parts])

@@ -70,7 +70,7 @@ class Courses:
         return self._timeline.animation.body is not None
 
     @property
-    def known(self) -> float:
+    def resolved_share(self) -> float:
         """Share of the frames whose FAPs have been resolved."""
         return self._done / max(self._timeline.frames, 1) if self.has_face else 1.0
 
@@ -78,7 +78,7 @@ class Courses:
         """Resolve the next blocks of frames; return whether there are more. Fast enough for each picture."""
         timeline = self._timeline
         frames, animation = timeline.frames, timeline.animation
-        if frames == len(self._times) and self.known >= 1.0:
+        if frames == len(self._times) and self.resolved_share >= 1.0:
             return False
         if frames != len(self._times):
             index = np.asarray(animation.index[:frames])

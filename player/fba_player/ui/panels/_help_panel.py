@@ -9,9 +9,9 @@ from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels.panel import Panel, heading
 
-WIDE = 296.0
+MIN_COLUMN_WIDTH = 296.0
 """Least width of a column in points."""
-KEY = 104.0
+KEY_WIDTH = 104.0
 """Width of the keys in a column, in points."""
 
 
@@ -25,7 +25,7 @@ class HelpPanel(Panel):
     def draw(self, session: Session) -> None:
         """Draw the content."""
         groups = _groups(session)
-        columns = min(int(imgui.get_content_region_avail().x // WIDE), 4)
+        columns = min(int(imgui.get_content_region_avail().x // MIN_COLUMN_WIDTH), 4)
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
         if columns > 1 and imgui.begin_table("columns", columns):
             imgui.table_next_row()
@@ -64,7 +64,7 @@ def _group(name: str, rows: list[tuple[str, str]]) -> None:
         return
     heading(name)
     imgui.begin_table(name, 2, imgui.TableFlags_.sizing_fixed_fit)
-    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY)
+    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY_WIDTH)
     imgui.table_setup_column("does", imgui.TableColumnFlags_.width_stretch)
     for key, does in rows:
         _line(key, does)

@@ -17,9 +17,9 @@ from fba_player.ui.panels.panel import choose_name, heading, shorten, tooltip
 MAX_PLANE_HEIGHT = 240.0
 MIN_PLANE_HEIGHT = 130.0
 """Limits of the plane's height in points; within them it leaves room for what is below it."""
-WIDE = 300.0
+TWO_COLUMNS_WIDTH = 300.0
 """Width in points from which the sliders stand in two columns."""
-TITLE = 130.0
+MAX_TITLE_WIDTH = 130.0
 """Width in points of a slider's title, at most."""
 EMOTION_RADIUS = 2.5
 """Radius of the dot of a named emotion, in points."""
@@ -29,7 +29,7 @@ EMOTION_TEXT = 12.0
 """Size of the names of emotions, in points."""
 AXIS_TEXT = 11.0
 """Size of the names at the ends of the axes, in points."""
-SIDE = 10.0
+SIDE_SPACE = 10.0
 """Space around the plane for the dots at its edge, in points."""
 
 
@@ -52,7 +52,7 @@ class EmotionTab:
     def draw(self, mood: PuppetMood) -> None:
         """Draw the content."""
         heading("Activation and evaluation")
-        columns = 2 if imgui.get_content_region_avail().x >= WIDE else 1
+        columns = 2 if imgui.get_content_region_avail().x >= TWO_COLUMNS_WIDTH else 1
         self._plane(mood, self._height_below(mood, columns))
         heading("Moods")
         self.sliders = {}
@@ -90,7 +90,7 @@ class EmotionTab:
         wide, room = imgui.get_content_region_avail()
         high = min(max(min(MAX_PLANE_HEIGHT, room - below), MIN_PLANE_HEIGHT), wide * 0.8)
         x, y = imgui.get_cursor_screen_pos()
-        self.plane = (x + SIDE, y + SIDE, x + wide - SIDE, y + high - SIDE)
+        self.plane = (x + SIDE_SPACE, y + SIDE_SPACE, x + wide - SIDE_SPACE, y + high - SIDE_SPACE)
         imgui.invisible_button("plane", (max(wide, 1), high))
         if imgui.is_item_active():
             mood.move_point(*self._value(*imgui.get_io().mouse_pos))
@@ -141,7 +141,7 @@ class EmotionTab:
     def _slider(self, mood: PuppetMood, name: str, intensity: float, wide: float) -> None:
         x, y = imgui.get_cursor_screen_pos()
         start = imgui.get_cursor_pos_x()
-        title = min(TITLE, wide * 0.45)
+        title = min(MAX_TITLE_WIDTH, wide * 0.45)
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.TEXT if intensity else theme.FAINT, shorten(name, title - 6))
         imgui.same_line()

@@ -11,10 +11,10 @@ import numpy as np
 
 from fba.parameters import bap_numbers, baps, fap_numbers, faps
 
-BEYOND = 1.5
+RANGE_FACTOR = 1.5
 """Range of a FAP's slider relative to the value that the gallery shows."""
 DEGREES = float(np.degrees(1e-5))
-SHIFT = 1000.0
+SHIFT_RANGE = 1000.0
 """Millimetres that the body moves to either side."""
 
 
@@ -86,7 +86,7 @@ def _fap_rows(names: list[str]) -> tuple[Row, ...]:
         fap = faps()[number - 1]
         unit = "deg" if fap.unit == "AU" else fap.unit
         scale = DEGREES if unit == "deg" else 1.0
-        most = float(np.ceil(reach(number) * BEYOND * scale / 5) * 5)
+        most = float(np.ceil(reach(number) * RANGE_FACTOR * scale / 5) * 5)
         words = fap.name.split("_")
         side = next((word[0] for word in words if word in ("l", "r", "lm", "rm")), "")
         mate = fap.left_right_mate
@@ -113,7 +113,7 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
         else:
             number = bap_numbers()[word]
             numbers, unit = (number,), baps()[number - 1].unit
-            low, high = -SHIFT, SHIFT
+            low, high = -SHIFT_RANGE, SHIFT_RANGE
             if unit != "mm":
                 (low, high), unit = widest_limits()[number - 1].tolist(), "deg"
         if unit == "deg":
