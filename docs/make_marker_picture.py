@@ -11,8 +11,7 @@ import numpy as np
 from PIL import Image
 
 import fba
-from fba.capture import from_markers
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture import MarkerMotion, from_markers
 from fba.capture.virtual_markers import propose_mapping, read_head
 from fba.formats.c3d.reader import read_markers
 from fba_player.export.offscreen import Offscreen

@@ -28,7 +28,7 @@ sys.path.insert(0, str(ROOT))
 
 from fba.capture.blendshapes.shape_table import amounts_of  # noqa: E402
 from fba.errors import FbaError  # noqa: E402
-from fba.face.deform.deformer import Deformer  # noqa: E402
+from fba.face import Deformer  # noqa: E402
 from fba.face.feature_points import row_of  # noqa: E402
 from fba.face.importers._gltf import gltf_pieces, locate  # noqa: E402
 from fba.face.importers.assembly.model import ImportOptions, finish_import, metres_per_unit  # noqa: E402

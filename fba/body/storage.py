@@ -18,9 +18,9 @@ from fba.body.model import BODY_PART_KINDS, BodyModel, BodyPart
 from fba.body.skeleton import MAX_JOINTS, Skeleton
 from fba.body.skin.skin_weights import INFLUENCES
 from fba.errors import ModelError
+from fba.gltf import Gltf, Primitive
 from fba.gltf.document import Document
 from fba.gltf.part_materials import PartWriter, read_material
-from fba.gltf.scene import Gltf, Primitive
 from fba.gltf.values import Value, locating_errors, optional_member
 from fba.gltf.writer import Builder
 from fba.limits import DEFAULT_LIMITS, Limits

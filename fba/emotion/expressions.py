@@ -18,7 +18,7 @@ from fba.emotion.mixing import mix
 from fba.emotion.rules import Rules, limited
 from fba.emotion.whissel import whissel_points
 from fba.errors import OptionError, did_you_mean
-from fba.face.expressions import Definitions
+from fba.face import Definitions
 from fba.face.mates import fill
 from fba.parameters import EXPRESSIONS, FAP_COUNT, fap_numbers
 

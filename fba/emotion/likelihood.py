@@ -24,8 +24,7 @@ from fba.emotion.expression import FAMILIES
 from fba.emotion.expressions import expressions
 from fba.emotion.features import features, known_features, measure
 from fba.emotion.profiles import measured_faps, measurements
-from fba.face.expressions import Definitions
-from fba.face.resolve import resolve
+from fba.face import Definitions, resolve
 from fba.parameters import FAP_COUNT, fap_numbers
 
 INTENSITIES = (0.3, 0.42, 0.56, 0.7, 0.85, 1.0, 1.25)

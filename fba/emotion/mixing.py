@@ -10,7 +10,7 @@ from fba.arrays import Float32, Float64
 from fba.emotion.expression import NEUTRAL_POINT, Expression
 from fba.emotion.rules import Part, Rules, limited, mix_families, mix_within_family, part
 from fba.emotion.whissel import family_point
-from fba.face.expressions import Definitions
+from fba.face import Definitions
 from fba.parameters import EXPRESSIONS, FAP_COUNT
 
 

@@ -21,9 +21,9 @@ from fba.emotion.expressions import expressions
 from fba.emotion.moods import Mood, MoodCurve, check_spans, intensity_curves
 from fba.emotion.rules import Rules, limited
 from fba.errors import OptionError
-from fba.face.expressions import Definitions
+from fba.face import Definitions, resolve
 from fba.face.mates import fill
-from fba.face.resolve import FaceSettings, resolve
+from fba.face.resolve import FaceSettings
 from fba.parameters import FAP_COUNT, fap_numbers
 from fba.tracks import FaceTrack
 

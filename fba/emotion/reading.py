@@ -12,7 +12,8 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.emotion.recogniser import NEUTRAL, UNKNOWN, Reading, Recogniser
 from fba.errors import OptionError
-from fba.face.resolve import FaceSettings, known_faps, resolve
+from fba.face import resolve
+from fba.face.resolve import FaceSettings, known_faps
 from fba.parameters import faps
 from fba.tracks import FaceTrack
 

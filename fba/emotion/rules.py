@@ -17,7 +17,7 @@ from fba.easing import smoothstep
 from fba.emotion.expression import Expression
 from fba.emotion.profiles import measurements, vocabulary
 from fba.errors import OptionError
-from fba.face.expressions import Definitions
+from fba.face import Definitions
 from fba.parameters import FAP_COUNT, faps
 
 LEAST_ACTIVATION = 2.0

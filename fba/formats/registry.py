@@ -22,7 +22,7 @@ from fba.recognition import recognition_hint
 from fba.source import Path, read_head
 
 if TYPE_CHECKING:
-    from fba.capture.motion import SkeletonMotion
+    from fba.capture import SkeletonMotion
     from fba.codec import StreamInfo
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo

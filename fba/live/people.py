@@ -13,9 +13,9 @@ from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64, Intp
 from fba.body import Skeleton
+from fba.capture import SkeletonMotion
 from fba.capture.blendshapes.shape_table import amounts_of
 from fba.capture.live import LiveBlendshapes, LiveSkeleton
-from fba.capture.motion import SkeletonMotion
 from fba.capture.sampling import GAP, TIME_TOLERANCE, find_rate
 from fba.errors import ModelError
 from fba.face.shape_names import arkit_of

@@ -9,10 +9,10 @@ import numpy as np
 
 from fba.arrays import Array, Float64
 from fba.atomic import atomic
-from fba.capture.points import PointMotion
+from fba.capture import PointMotion
 from fba.errors import FormatError, ModelError
+from fba.formats import format_of
 from fba.formats.numpy_archives import ZIP, read_arrays
-from fba.formats.registry import format_of
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.persona.points import TrackedFace, from_point_motion
 from fba.persona.points.layout import TRACKED

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32, Int64
-from fba.face.interpolation.table import InterpolationTable, sources_of
+from fba.face import InterpolationTable
+from fba.face.interpolation.table import sources_of
 from fba.face.mates import donors, fill
 from fba.face.resolve import fit_values
 from fba.parameters import FAP_COUNT, fap_groups

@@ -13,8 +13,8 @@ from fba.animation import Animation, Frame
 from fba.arrays import Bool, Int64
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, levels, quantise, range_limit, step_scale
 from fba.errors import FbaWarning
+from fba.face import Resolver
 from fba.face.mates import fill
-from fba.face.resolve import Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT, baps
 from fba.planning.derived_faps import derive_others, interpolated_faps, related_faps, subsets
 from fba.planning.frame_order import check_order

@@ -13,10 +13,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
+from fba.face import FaceModel
 from fba.face.deform.displacements import DisplacementMeter
 from fba.face.deform.flat_tables import KIND_ORDER, Shifts, Transforms
 from fba.face.mates import donors
-from fba.face.model import FaceModel
 from fba.parameters import FAP_COUNT
 from fba.planning.tolerance import Tolerance
 

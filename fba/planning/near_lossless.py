@@ -12,10 +12,10 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.codec import EncoderOptions, EncoderStatistics, decode
 from fba.errors import FbaWarning, RangeError
+from fba.face import FaceModel, resolve
 from fba.face.deform.displacements import DisplacementMeter, Displacements
 from fba.face.mates import donors
-from fba.face.model import FaceModel
-from fba.face.resolve import known_faps, resolve
+from fba.face.resolve import known_faps
 from fba.parameters import fap_steps
 from fba.planning.body_tolerance import (
     BodyErrors,

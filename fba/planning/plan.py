@@ -23,7 +23,8 @@ from fba.codec import (
     quantise,
 )
 from fba.errors import FbaWarning
-from fba.face.resolve import FaceSettings, known_faps, resolve
+from fba.face import resolve
+from fba.face.resolve import FaceSettings, known_faps
 from fba.limits import Limits
 from fba.parameters import FAP_COUNT, fap_steps
 from fba.planning.derived_faps import (

@@ -14,8 +14,8 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
+from fba.body import BapSolver
 from fba.body.solve.motions import BapMotion, bap_motions
-from fba.body.solve.solver import BapSolver
 from fba.body.stance import SIDES, find_stance, sole_points
 from fba.codec import EncoderOptions, step_scale
 from fba.compiled import compiled

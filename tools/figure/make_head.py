@@ -26,9 +26,9 @@ from subdivide import Refined, refine
 import figure
 from fba.arrays import Float64, Int32
 from fba.easing import smoothstep
+from fba.face import FaceModel, Material, Part
 from fba.face.authoring import author
 from fba.face.compact import compact
-from fba.face.model import FaceModel, Material, Part
 from fba.mesh.meshes import vertex_normals
 
 HERE = Path(__file__).parent

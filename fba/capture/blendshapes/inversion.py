@@ -15,9 +15,7 @@ from fba.capture.blendshapes.motion import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
 from fba.compiled import compiled
 from fba.errors import ModelError
-from fba.face.fapu import Fapu
-from fba.face.feature_points import neutral_points
-from fba.face.resolve import resolve
+from fba.face import Fapu, neutral_points, resolve
 from fba.parameters import FAP_COUNT, fap_numbers, faps
 
 EYEBALL_RADIUS = 0.012

@@ -16,9 +16,8 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64
+from fba.body import BodyModel, Skeleton
 from fba.body.footing import OUTLINE, TIP
-from fba.body.model import BodyModel
-from fba.body.skeleton import Skeleton
 from fba.body.stance import HEEL, SIDES, find_standing, sole_points
 from fba.capture.limbs._coupled_paths import chain
 from fba.capture.motion import SkeletonMotion

@@ -15,16 +15,17 @@ import numpy as np
 from fba.arrays import Float64, Int32, Intp
 from fba.capture.virtual_markers.influence import WalkedMesh
 from fba.errors import ModelError
+from fba.face import Deformer, FaceModel, Part
+from fba.face import feature_point_names as names
 from fba.face.authoring.surface.attached_parts import attach
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface
-from fba.face.deform.deformer import Deformer
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import row_of
 from fba.face.importers import import_model, sniff
 from fba.face.importers.assembly.model import metres_per_unit
 from fba.face.importers.head_surface import HeadSurface, read_head_surface
-from fba.face.model import FaceModel, Part, point_row
+from fba.face.model import point_row
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import FAP_COUNT, feature_points
 

@@ -20,8 +20,8 @@ from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
     from fba.arrays import Float64
+    from fba.face import FaceModel
     from fba.face.checks import Finding
-    from fba.face.model import FaceModel
 
 SOURCE = ExistingPath()
 KINDS = ("makehuman", "gltf", "obj", "ply", "wfm", "fdp")
@@ -113,7 +113,7 @@ def _read_or_default(file: Path | None, default: bool) -> FaceModel:
 
 
 def _read(file: Path | None) -> FaceModel:
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
 
     if file is None:
         return FaceModel.default()

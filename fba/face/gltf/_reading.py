@@ -15,11 +15,11 @@ from fba.face.gltf._extension import NAME, VERSION
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Part
 from fba.face.tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
+from fba.gltf import Gltf
 from fba.gltf.document import Document
 from fba.gltf.packed import unpack
 from fba.gltf.part_materials import read_material
 from fba.gltf.reader import read_document
-from fba.gltf.scene import Gltf
 from fba.gltf.values import Budget, Value, locating_errors, optional_member
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
 

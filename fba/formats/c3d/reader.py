@@ -14,7 +14,8 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.arrays import Array, Float64, to_float64
-from fba.capture.markers.motion import MAX_MARKERS, METRES, MarkerMotion, regular_times
+from fba.capture import MarkerMotion
+from fba.capture.markers.motion import MAX_MARKERS, METRES, regular_times
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.c3d._parameters import BLOCK, KEY, Parameters, read_parameters
 from fba.formats.markers.encoding import read_face

@@ -14,16 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fba.arrays import Bool, UInt8
-from fba.codec.settings import (
-    QUANT_MAX,
-    RANGE_CODE_MAX,
-    RANGE_UNIT,
-    FrameRate,
-    PartSettings,
-    PlaneSettings,
-    RangeLists,
-    TimeCode,
-)
+from fba.codec import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
+from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT
 from fba.errors import FbaWarning
 from fba.formats.epf._tags import BODY, FACE, PARTS, TAGS, Part
 from fba.formats.text.lines import Lines, content, decoded

@@ -7,7 +7,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.atomic import atomic
-from fba.capture.blendshapes import to_blendshapes
+from fba.capture import to_blendshapes
 from fba.errors import FormatError, ModelError
 from fba.formats.face_tables.livelink_udp import join_values
 from fba.formats.time_codes import DAY

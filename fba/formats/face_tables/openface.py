@@ -16,7 +16,7 @@ import numpy as np
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64, Int64
-from fba.capture.action_units import ActionUnitMotion
+from fba.capture import ActionUnitMotion
 from fba.errors import FormatError
 from fba.formats.face_tables._faces import (
     angle_unit,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from fba.animation import Animation
-from fba.capture.points import PointMotion
+from fba.capture import PointMotion
 from fba.formats.face_tables import points_arrays, points_csv, points_json
 from fba.formats.face_tables._points import Neutral, points_to_animation
 from fba.limits import DEFAULT_LIMITS, Limits

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.points.motion import COUNTS, OTHERS, PointMotion, check_count
+from fba.capture import PointMotion
+from fba.capture.points.motion import COUNTS, OTHERS, check_count
 from fba.capture.sampling import find_rate
 from fba.errors import FormatError, ModelError, Remedy
 from fba.formats.face_tables._points import build_points

@@ -16,7 +16,8 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.arrays import Float64, Int64
-from fba.capture.points.motion import COUNTS, OTHERS, PointMotion, check_count
+from fba.capture import PointMotion
+from fba.capture.points.motion import COUNTS, OTHERS, check_count
 from fba.errors import FormatError, ModelError
 from fba.formats.face_tables._faces import choose_rows, row_times, tracked_rows
 from fba.formats.face_tables._points import build_points

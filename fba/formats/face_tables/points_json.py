@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.points.motion import COUNTS, PointMotion, check_count
+from fba.capture import PointMotion
+from fba.capture.points.motion import COUNTS, check_count
 from fba.errors import FormatError, ModelError, Remedy
 from fba.formats.face_tables._points import build_points
 from fba.formats.face_tables.shapes_json import frame_time, frame_times, read_json

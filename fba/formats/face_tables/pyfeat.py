@@ -21,9 +21,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64, Int64
-from fba.capture.action_units import ActionUnitMotion
-from fba.capture.blendshapes import ShapeMotion
-from fba.capture.points import PointMotion
+from fba.capture import ActionUnitMotion, PointMotion, ShapeMotion
 from fba.capture.points.conversion import find_point_face
 from fba.errors import FbaWarning, ModelError
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW

@@ -17,7 +17,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture.blendshapes import ShapeMotion
+from fba.capture import ShapeMotion
 from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_rate
 from fba.errors import FormatError, ModelError, Remedy

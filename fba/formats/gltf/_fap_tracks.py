@@ -16,8 +16,7 @@ import numpy as np
 from fba.animation import FaceTrack
 from fba.arrays import Bool, Float32, Float64
 from fba.errors import FbaWarning
-from fba.face.model import FaceModel
-from fba.face.resolve import resolve
+from fba.face import FaceModel, resolve
 from fba.formats.gltf._fap_joints import FapJoint
 from fba.formats.gltf._morph_targets import Targets
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample

@@ -12,8 +12,7 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Float64
-from fba.body import BapSolver, Skeleton
-from fba.body.solve.conventions import convention_names
+from fba.body import BapSolver, Skeleton, convention_names
 from fba.body.solve.solver import solve_track
 from fba.errors import FormatError
 from fba.formats.gltf._fap_joints import MAX_COORDINATE

@@ -19,12 +19,13 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float32, Float64, Int32
-from fba.body.model import BodyModel, BodyPart
+from fba.body import BodyModel, Skeleton
+from fba.body.model import BodyPart
 from fba.body.own_head import OwnHead
-from fba.body.skeleton import ROOT, Skeleton
+from fba.body.skeleton import ROOT
 from fba.body.skin.skin_weights import strongest_weights
+from fba.capture import SkeletonMotion
 from fba.capture.blendshapes.shape_table import amounts_of
-from fba.capture.motion import SkeletonMotion
 from fba.capture.rest import Rest, find_rest
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head

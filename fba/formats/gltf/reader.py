@@ -16,7 +16,7 @@ import numpy as np
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.body.skeleton import Skeleton
+from fba.body import Skeleton
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.bones import find_bones
 from fba.capture.skeleton import MAX_FRAMES, check_memory

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture.blendshapes import to_blendshapes
+from fba.capture import to_blendshapes
 from fba.errors import FormatError, ModelError
 from fba.gltf.writer import Builder
 from fba.source import Path

@@ -22,9 +22,8 @@ from fba.source import Path
 from fba.tracks import hold
 
 if TYPE_CHECKING:
-    from fba.body import BapSolver, Skeleton
-    from fba.body.model import BodyModel
-    from fba.face.model import FaceModel
+    from fba.body import BapSolver, BodyModel, Skeleton
+    from fba.face import FaceModel
     from fba.formats.gltf._head import HeadParts
 
 
@@ -102,8 +101,7 @@ def _add_person(
     axes: str,
 ) -> list[int]:
     """Add a person or a skeleton with its animation, and complete the note; return the root nodes."""
-    from fba.body import BapSolver, Skeleton
-    from fba.body.model import BodyModel
+    from fba.body import BapSolver, BodyModel, Skeleton
     from fba.gltf.part_materials import PartWriter
 
     person = (body or BodyModel.default()) if mesh else body
@@ -185,7 +183,7 @@ def _make_head(
     builder: Builder, clip: Clip, animation: Animation, person: BodyModel, model: FaceModel | None
 ) -> HeadParts | None:
     """Return a person's head, without meshes yet; None with a warning if the body has no place for it."""
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
     from fba.formats.gltf._head import start_head
 
     if person.eyes is None:
@@ -204,7 +202,7 @@ def _add_head(
     builder: Builder, clip: Clip, animation: Animation, note: dict[str, Any], model: FaceModel | None
 ) -> list[int]:
     """Add a face by itself, in its own frame, and complete the note; return the scene's root nodes."""
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
     from fba.formats.gltf._head import start_head
     from fba.gltf.part_materials import PartWriter
 
@@ -225,7 +223,7 @@ def _note_face(
     head: HeadParts | None,
 ) -> None:
     """Add to the note which FAPs the head shows; without a head, their values."""
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
     from fba.formats.gltf._fap_tracks import face_note
 
     if animation.face is None:
@@ -240,7 +238,7 @@ def _note_face(
 
 def _shown(animation: Animation, model: FaceModel) -> Float32:
     """Return the FAPs that a model shows, float32 (T, 68)."""
-    from fba.face.resolve import resolve
+    from fba.face import resolve
     from fba.parameters import FAP_COUNT
 
     if animation.face is None:

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 
 from fba.animation import Animation
-from fba.capture.markers.faces import from_markers
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture import MarkerMotion, from_markers
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 

@@ -16,7 +16,8 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers.motion import METRES, MarkerMotion
+from fba.capture import MarkerMotion
+from fba.capture.markers.motion import METRES
 from fba.errors import FbaWarning, FormatError
 from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines
 from fba.formats.markers.encoding import read_face

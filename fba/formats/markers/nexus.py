@@ -13,7 +13,8 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from fba.capture.markers.motion import METRES, MarkerMotion
+from fba.capture import MarkerMotion
+from fba.capture.markers.motion import METRES
 from fba.errors import FormatError
 from fba.formats.markers._rows import build_motion, parse_rows, read_lines
 from fba.formats.markers.encoding import read_face

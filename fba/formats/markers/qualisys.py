@@ -12,7 +12,8 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from fba.capture.markers.motion import MarkerMotion, regular_times
+from fba.capture import MarkerMotion
+from fba.capture.markers.motion import regular_times
 from fba.errors import FormatError
 from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines, warn_if_cut
 from fba.formats.markers.encoding import read_face

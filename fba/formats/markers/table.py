@@ -15,7 +15,8 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers.motion import MAX_MARKERS, METRES, MarkerMotion, regular_times
+from fba.capture import MarkerMotion
+from fba.capture.markers.motion import MAX_MARKERS, METRES, regular_times
 from fba.errors import FormatError
 from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines
 from fba.formats.markers.encoding import read_face

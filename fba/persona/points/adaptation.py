@@ -8,12 +8,13 @@ import warnings
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.points import PointMotion
+from fba.capture import PointMotion
 from fba.capture.points.picture import face_misfit, upright_points
 from fba.capture.points.places import point_places, take_points
 from fba.capture.points.poses import fit_poses
 from fba.errors import FbaWarning, ModelError
-from fba.face.feature_points import neutral_points, row_of
+from fba.face import neutral_points
+from fba.face.feature_points import row_of
 from fba.persona.points.layout import TRACKED, point_weights
 from fba.persona.points.tracked import TrackedFace
 from fba.rotations import axis_matrices

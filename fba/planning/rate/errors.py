@@ -10,7 +10,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.body.displacement import displacements
-from fba.face.resolve import resolve
+from fba.face import resolve
 from fba.parameters import bap_steps, baps, fap_steps, faps
 from fba.planning.rate.visibility import error_weights
 from fba.tracks import hold

@@ -12,7 +12,8 @@ import numpy as np
 from fba.animation import Animation
 from fba.codec import EncoderOptions, code_lengths, decode, quantise
 from fba.errors import FbaWarning, RangeError
-from fba.face.resolve import known_faps, resolve
+from fba.face import resolve
+from fba.face.resolve import known_faps
 from fba.limits import Limits
 from fba.planning.derived_faps import choose_faps, interpolated_faps
 from fba.planning.plan import plan_compact

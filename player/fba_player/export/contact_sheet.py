@@ -12,7 +12,8 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, UInt8
-from fba.face.model import FaceModel, point_row
+from fba.face import FaceModel
+from fba.face.model import point_row
 from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
 from fba.tracks import FaceTrack
 from fba_player.export.offscreen import Offscreen

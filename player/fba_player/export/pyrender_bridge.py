@@ -28,8 +28,8 @@ from fba_player.view.geometry import turn_partly, unit_rows
 from fba_player.view.view import Eye, FaceMesh, Mesh
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyModel
-    from fba.face.model import FaceModel
+    from fba.body import BodyModel
+    from fba.face import FaceModel
 
 
 NUMPY_1 = {"infty": np.inf, "Inf": np.inf, "NaN": np.nan, "float_": np.float64}

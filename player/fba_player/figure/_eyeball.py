@@ -9,8 +9,9 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
 from fba.compiled import compiled
+from fba.face import FaceModel, Part
 from fba.face.eyeball import flat_width
-from fba.face.model import FaceModel, Part, point_row
+from fba.face.model import point_row
 from fba.geometry import fit_similarity
 from fba_player.view.view import Eye
 

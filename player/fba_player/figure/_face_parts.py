@@ -12,14 +12,16 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int32, Intp
 from fba.easing import smoothstep
 from fba.errors import FbaWarning
-from fba.face.model import FaceModel, Part, point_row
+from fba.face import FaceModel, Part
+from fba.face.model import point_row
 from fba_player.mesh.simplify import DetailLevels
 from fba_player.mesh.textures import RELIEF, FacePicture, load_picture, texture_breadth
 from fba_player.view.geometry import unit_rows
 from fba_player.view.view import FaceShape
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyModel, BodyPart
+    from fba.body import BodyModel
+    from fba.body.model import BodyPart
 
 
 SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from fba.arrays import Array, Float32, Float64, Int32, Integer, Intp
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from fba.cache import load_or_make, make_key
 from fba.compiled import compiled, is_compiled
 from fba_player.figure.face_light import KEY_DIRECTION, cached_visibility

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from fba.arrays import Float32, Float64
-from fba.face.deform.deformer import Deformer
-from fba.face.model import FaceModel, Part, point_row
+from fba.face import Deformer, FaceModel, Part
+from fba.face.model import point_row
 from fba.parameters import FAP_COUNT
 from fba_player.figure._eyeball import Eyeball, find_eyeball
 from fba_player.figure._face_parts import (

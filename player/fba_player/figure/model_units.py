@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fba.errors import FbaWarning
-from fba.face.model import FaceModel
-from fba.face.tables import FaceDefTables
+from fba.face import FaceDefTables, FaceModel
 from fba.parameters import faps
 
 SIZES = (0.01, 1.0)

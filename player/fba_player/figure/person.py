@@ -8,9 +8,11 @@ from typing import cast
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
+from fba.body import BodyModel
 from fba.body.head_attachment import AttachedHead, attach_head, skull_of
-from fba.body.model import BodyModel, BodyPart
-from fba.face.model import Part, point_row
+from fba.body.model import BodyPart
+from fba.face import Part
+from fba.face.model import point_row
 from fba_player.figure._face_parts import detail_levels, make_shape, part_rows, with_triangles
 from fba_player.figure.body_light import BodyLight, build_body_light
 from fba_player.figure.face import FaceFigure

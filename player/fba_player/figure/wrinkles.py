@@ -14,7 +14,8 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
 from fba.easing import smoothstep
-from fba.face.model import FaceModel, Part, point_row
+from fba.face import FaceModel, Part
+from fba.face.model import point_row
 from fba_player.mesh.wrinkle_map import WRINKLES
 
 BEGINNING = 0.5

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
-from fba.face.feature_points import names
+from fba.face import feature_point_names as names
 from fba_player.figure.face import FaceFigure
 from fba_player.scene._bones import Bones, Pivots, find_pivots
 from fba_player.scene._fap_heatmap import FapHeatmap

@@ -21,7 +21,7 @@ from fba_player.view.view import Extras, View, srgb
 
 if TYPE_CHECKING:
     from fba.animation import Animation
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
     from fba_player.figure.face import FaceFigure
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba.errors import FbaWarning, LimitError, ModelError
+from fba.face import Material, Part
 from fba.face.importers.assembly.model import metres_per_unit
-from fba.face.model import Material, Part
 from fba.tracks import FaceTrack
 from fba_player.mesh.textures import FacePicture, load_picture
 from fba_player.playback.timeline import Timeline

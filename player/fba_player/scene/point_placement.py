@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
+from fba.face import feature_point_names as names
+from fba.face import neutral_points
 from fba.face.fapu import FAPU_POINTS
-from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
+from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers.head_surface import HeadSurface
 from fba.face.importers.points.points_file import GivenPoints, write_points
 from fba.mesh.meshes import vertex_normals

@@ -17,8 +17,8 @@ from fba_player.view.switches import SWITCHES, Switches
 from fba_player.view.view import View
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyModel
-    from fba.face.model import FaceModel
+    from fba.body import BodyModel
+    from fba.face import FaceModel
     from fba_player.figure.face import FaceFigure
     from fba_player.figure.person import Person
     from fba_player.scene._display_options import DisplayOptions
@@ -59,7 +59,7 @@ class Scene(Timed[Timeline]):
     ) -> None:
         if not len(animation):
             raise ValueError("nothing to show: the animation has no frames")
-        from fba.face.model import FaceModel
+        from fba.face import FaceModel
         from fba_player.figure.model_units import prepare_model
 
         self.animation = animation
@@ -74,8 +74,8 @@ class Scene(Timed[Timeline]):
         self._extent: Extent | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
+            from fba.body import BodyModel
             from fba.body.footing import GroundedPoser
-            from fba.body.model import BodyModel
             from fba_player.scene._bones import Bones
 
             self._body = body or BodyModel.default()

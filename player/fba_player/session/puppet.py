@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float32, Float64
-from fba.face.expressions import Definitions
+from fba.face import Definitions
 from fba.parameters import (
     BAP_COUNT,
     EXPRESSION_SELECT_MAX,

@@ -14,7 +14,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba.atomic import PathLike
-from fba.face.resolve import Resolver
+from fba.face import Resolver
 from fba.tracks import BodyTrack, FaceTrack
 from fba_player.export.render import as_scene
 from fba_player.playback.live import LiveAnimation, LiveTimeline

@@ -16,8 +16,8 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.capture.markers.responses import JAW, JAW_VALUES, measure_responses
 from fba.errors import ModelError
-from fba.face import FaceModel, Fapu, FeaturePointFace
-from fba.face.feature_points import MIRRORED, neutral_points, row_of
+from fba.face import FaceModel, Fapu, FeaturePointFace, neutral_points
+from fba.face.feature_points import MIRRORED, row_of
 from fba.parameters import FAP_COUNT, faps
 
 DEVIATIONS = {

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from imgui_bundle import imgui
 
-from fba.emotion import expressions, known_points
-from fba.emotion.expression import NEUTRAL_POINT
+from fba.emotion import NEUTRAL_POINT, expressions, known_points
 from fba.emotion.plane import HIGHEST, LOWEST
 from fba_player.session.mood import PuppetMood
 from fba_player.ui import theme

@@ -100,7 +100,8 @@ def _fap_rows(names: list[str]) -> tuple[Row, ...]:
 
 
 def _bap_rows(names: list[str]) -> tuple[Row, ...]:
-    from fba.body.solve.limits import Limits, widest_limits
+    from fba.body import Limits
+    from fba.body.solve.limits import widest_limits
 
     limits = {limit.name: limit for limit in Limits.human().limits}
     rows: list[Row] = []
