@@ -14,7 +14,7 @@ from fba.body.model import BodyModel
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights
 from fba.body.skin.skinning import Skinner, build_skinner
 from fba.errors import ModelError
-from fba.mesh.meshes import checked_rows
+from fba.mesh import checked_rows
 
 SKULL = "skullbase"
 """The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""

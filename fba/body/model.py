@@ -16,7 +16,7 @@ from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import checked_weights
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.mesh.meshes import Material, Meshes, join_rows, mesh_arrays
+from fba.mesh import Material, Meshes, join_rows, mesh_arrays
 
 if TYPE_CHECKING:
     from fba.body.own_head import OwnHead

@@ -18,11 +18,17 @@ from fba.body.model import BODY_PART_KINDS, BodyModel, BodyPart
 from fba.body.skeleton import MAX_JOINTS, Skeleton
 from fba.body.skin.skin_weights import INFLUENCES
 from fba.errors import ModelError
-from fba.gltf import Gltf, Primitive
-from fba.gltf.document import Document
-from fba.gltf.part_materials import PartWriter, read_material
-from fba.gltf.values import Value, locating_errors, optional_member
-from fba.gltf.writer import Builder
+from fba.gltf import (
+    Builder,
+    Document,
+    Gltf,
+    PartWriter,
+    Primitive,
+    Value,
+    locating_errors,
+    optional_member,
+    read_material,
+)
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -119,14 +125,14 @@ def load(path: Path, limits: Limits = DEFAULT_LIMITS) -> BodyModel:
     damaged, contradicts itself, or lacks the extension FBA_body, LimitError where it takes more memory than
     the limits allow.
     """
-    from fba.gltf.document import open_document
+    from fba.gltf import open_document
 
     return read_body(open_document(path, limits))
 
 
 def read_body(document: Document) -> BodyModel:
     """Return the body in an opened document."""
-    from fba.gltf.reader import read_document
+    from fba.gltf import read_document
 
     content = optional_member(document.root.get("extensions"), NAME)
     if content is None:

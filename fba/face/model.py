@@ -18,7 +18,7 @@ from fba.face.fapu import Fapu
 from fba.face.feature_points import names, row_of
 from fba.face.tables import HEAD, FaceDefTables
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.mesh.meshes import Material, Meshes, mesh_arrays
+from fba.mesh import Material, Meshes, mesh_arrays
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from fba.gltf.scene import Gltf
 from fba.gltf.scene import Material as GltfMaterial
 from fba.gltf.values import Value
 from fba.gltf.writer import Builder
-from fba.mesh.meshes import Material, Mesh
+from fba.mesh import Material, Mesh
 
 WHITE = (1.0, 1.0, 1.0)
 

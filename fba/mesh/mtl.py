@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fba.errors import FbaWarning, ModelError
 from fba.mesh.meshes import Material
-from fba.mesh.text_files import find_beside, parse_number, read_bytes, read_words
+from fba.text_files import find_beside, parse_number, read_bytes, read_words
 
 MAX_PICTURE = 1 << 27
 """Largest picture, in bytes."""

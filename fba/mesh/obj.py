@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float32
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_lines
+from fba.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_lines
 
 
 def read_obj(path: str | os.PathLike[str]) -> Polygons:

@@ -11,7 +11,7 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int64, to_float64
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons, strip_triangles
-from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, read_bytes
+from fba.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, read_bytes
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",

@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_lines
+from fba.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_lines
 
 # Possessive (*+): a pattern that may take characters back remembers a place for each.
 TOKEN = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[\]{}]|[^\s,\[\]{}"]++')

@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_words
+from fba.text_files import MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_words
 
 
 def read_wfm(path: str | os.PathLike[str]) -> Polygons:

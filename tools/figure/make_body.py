@@ -29,7 +29,7 @@ from fba.body.solve.bind_pose import FINGERS
 from fba.easing import smoothstep
 from fba.face import FaceModel
 from fba.face.model import point_row
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 from fba_player.figure.occlusion import bake
 
 TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"

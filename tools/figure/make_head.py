@@ -29,7 +29,7 @@ from fba.easing import smoothstep
 from fba.face import FaceModel, Material, Part
 from fba.face.authoring import author
 from fba.face.compact import compact
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"

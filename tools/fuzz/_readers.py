@@ -33,11 +33,7 @@ from fba.formats.text.bap import read_bap, write_bap
 from fba.formats.text.fap import read_fap, write_fap
 from fba.gltf import read_gltf
 from fba.live import KINDS, Capture, StreamFile, StreamRecorder
-from fba.mesh.mtl import read_mtl
-from fba.mesh.obj import read_obj
-from fba.mesh.ply import read_ply
-from fba.mesh.vrml import read_vrml
-from fba.mesh.wfm import read_wfm
+from fba.mesh import read_mtl, read_obj, read_ply, read_vrml, read_wfm
 from fba.persona import load_persona
 from tools.fuzz._outcome import ContractError, Outcome
 from tools.fuzz._small_head import small_head_obj, small_head_points, small_head_vrml

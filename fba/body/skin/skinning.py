@@ -16,7 +16,7 @@ from fba.body.skin._girdle_loops import Girdle
 from fba.body.skin._moving_normals import normal_rings
 from fba.body.skin._twisting import find_twists
 from fba.body.skin.loops import Twisting
-from fba.mesh.meshes import result_array
+from fba.mesh import result_array
 
 METHODS = ("dual", "linear")
 """Ways to blend the motion of several joints."""

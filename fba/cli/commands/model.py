@@ -391,7 +391,7 @@ def _read_points(path: Path, model: FaceModel) -> Float64:
     from fba.face.importers.points.fdp import load_fdp
     from fba.face.importers.points.points_file import read_points
     from fba.face.importers.points.xface import xface_points
-    from fba.mesh.text_files import find_beside
+    from fba.text_files import find_beside
 
     if path.suffix.lower() in (".json", ".csv"):
         return read_points(path).points

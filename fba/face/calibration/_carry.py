@@ -166,7 +166,7 @@ def surface_stretches(part: Part, after: Floating) -> Float64:
 
     Least squares over the edges at the vertex; its normal goes to the new normal, scaled as the surface is.
     """
-    from fba.mesh.meshes import vertex_normals
+    from fba.mesh import vertex_normals
 
     before = part.vertices.astype(np.float64)
     now = np.asarray(after, dtype=np.float64)

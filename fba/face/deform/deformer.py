@@ -26,7 +26,7 @@ from fba.face.deform.flat_tables import (
 from fba.face.deform.normals import Surface, build_surface
 from fba.face.feature_points import names
 from fba.face.model import FaceModel
-from fba.mesh.meshes import result_array
+from fba.mesh import result_array
 from fba.parameters import FAP_COUNT, faps
 
 BLOCK = 64

@@ -15,12 +15,17 @@ from fba.face.gltf._extension import NAME, VERSION
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Part
 from fba.face.tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
-from fba.gltf import Gltf
-from fba.gltf.document import Document
-from fba.gltf.packed import unpack
-from fba.gltf.part_materials import read_material
-from fba.gltf.reader import read_document
-from fba.gltf.values import Budget, Value, locating_errors, optional_member
+from fba.gltf import (
+    Budget,
+    Document,
+    Gltf,
+    Value,
+    locating_errors,
+    optional_member,
+    read_document,
+    read_material,
+    unpack,
+)
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
 
 MAX_PARTS = 1000

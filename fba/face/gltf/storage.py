@@ -13,9 +13,7 @@ from fba.face.gltf._reading import read_model
 from fba.face.gltf.morphs import displacements
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
-from fba.gltf.document import open_document
-from fba.gltf.part_materials import PartWriter
-from fba.gltf.writer import Builder
+from fba.gltf import Builder, PartWriter, open_document
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import faps
 from fba.source import Path

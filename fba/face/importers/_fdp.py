@@ -17,7 +17,7 @@ from fba.face.importers.points.fdp_data import Fdp
 from fba.face.importers.points.points_file import GivenPoints
 from fba.face.importers.points.xface import NEUTRAL, xface_points
 from fba.face.model import FaceModel
-from fba.mesh.vrml import read_vrml
+from fba.mesh import read_vrml
 
 BINDS = {
     "LeftEye": "eye",

@@ -33,11 +33,9 @@ from fba.face.importers.assembly.symmetry import (
 from fba.face.importers.points.points_file import given_points, points_beside
 from fba.face.model import FaceModel, Material, Part
 from fba.face.shape_names import canonical_names
-from fba.gltf import Gltf
-from fba.gltf.part_materials import convert_material
-from fba.gltf.values import Value
+from fba.gltf import Gltf, Value, convert_material
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.mesh.text_files import MAX_VERTICES
+from fba.text_files import MAX_VERTICES
 
 EXTENSION = "FBA_face"
 POINT_FILES = (".points.csv", ".points.json", ".fdp")

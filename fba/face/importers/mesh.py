@@ -19,12 +19,8 @@ from fba.face.importers.assembly.polygon_parts import Piece, make_piece
 from fba.face.importers.points.fdp_data import repair_sides
 from fba.face.importers.points.points_file import GivenPoints, given_points, points_beside
 from fba.face.model import FaceModel, Material
-from fba.mesh.mtl import Pictures, read_mtl
-from fba.mesh.obj import read_obj
-from fba.mesh.ply import read_ply
-from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import read_lines
-from fba.mesh.wfm import read_wfm
+from fba.mesh import Pictures, Polygons, read_mtl, read_obj, read_ply, read_wfm
+from fba.text_files import read_lines
 
 READERS: Mapping[str, Callable[[str | os.PathLike[str]], Polygons]] = {
     "obj": read_obj,

@@ -11,7 +11,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.face import HEAD, FaceModel
 from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
-from fba.gltf.values import Value
+from fba.gltf import Value
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 Steps = tuple[tuple[int, Float64], ...]

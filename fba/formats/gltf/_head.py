@@ -16,8 +16,7 @@ from fba.formats.gltf._fap_joints import FapJoint
 from fba.formats.gltf._joints import Clip, adopt, move
 from fba.formats.gltf._morph_targets import Targets, make_targets
 from fba.formats.gltf._pose import nearest_rotation
-from fba.gltf.part_materials import PartWriter
-from fba.gltf.writer import Builder
+from fba.gltf import Builder, PartWriter
 
 HEAD_NODE = "head"
 """The joint that FAPs 48 to 50 turn; BAPs turn its parent, the skull base."""

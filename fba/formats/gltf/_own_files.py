@@ -21,8 +21,7 @@ from fba.formats.gltf._pose import Sampler, key_times, nearest_rotation
 from fba.formats.gltf.writer import MARK, MOST_FRAMES
 from fba.formats.text.frame_rates import parse_rate
 from fba.gltf import Animation as Clip
-from fba.gltf import Channel, Gltf
-from fba.gltf.values import Value, optional_member
+from fba.gltf import Channel, Gltf, Value, optional_member
 
 VERSION = 1
 MAX_INDEX = 1 << 62

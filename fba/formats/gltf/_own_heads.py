@@ -14,8 +14,7 @@ from fba.capture.blendshapes.shape_table import amounts_of, largest_amounts
 from fba.face.shape_names import arkit_of
 from fba.formats.gltf.face_motion import is_eye
 from fba.formats.gltf.humanoid import Humanoid
-from fba.gltf import Gltf, Primitive
-from fba.gltf.values import Value, optional_member
+from fba.gltf import Gltf, Primitive, Value, optional_member
 
 MOST_BINDS = 1 << 16
 LOCAL = 20

@@ -18,7 +18,7 @@ from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._pose import BindPose, find_bind_pose
 from fba.formats.gltf.humanoid import Humanoid, find_humanoid
 from fba.gltf import Gltf
-from fba.mesh.names import UniqueNames
+from fba.mesh import UniqueNames
 
 MAX_JOINTS = 4096
 TURNED = 1e-3

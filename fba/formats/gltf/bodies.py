@@ -31,12 +31,10 @@ from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
 from fba.formats.gltf._pose import bind_matrices
 from fba.formats.gltf._skeletons import Joints, find_joints
-from fba.gltf import Gltf, Node, Primitive, read_gltf
+from fba.gltf import Gltf, Node, Primitive, convert_material, read_gltf
 from fba.gltf import Material as GltfMaterial
-from fba.gltf.part_materials import convert_material
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.mesh.meshes import Material
-from fba.mesh.names import UniqueNames
+from fba.mesh import Material, UniqueNames
 from fba.source import Path
 
 CHUNK = 20_000

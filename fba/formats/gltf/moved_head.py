@@ -12,8 +12,7 @@ from fba.capture.virtual_markers import MarkerPerformance
 from fba.errors import FormatError
 from fba.formats.gltf._joints import Clip, adopt, move, start_clip
 from fba.formats.gltf.writer import MOST_FRAMES
-from fba.gltf.part_materials import PartWriter
-from fba.gltf.writer import Builder
+from fba.gltf import Builder, PartWriter
 from fba.source import Path
 
 STEP = 0.01

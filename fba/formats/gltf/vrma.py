@@ -13,7 +13,7 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import to_blendshapes
 from fba.errors import FormatError, ModelError
-from fba.gltf.writer import Builder
+from fba.gltf import Builder
 from fba.source import Path
 
 EXTENSION = "VRMC_vrm_animation"

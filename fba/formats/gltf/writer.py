@@ -17,7 +17,7 @@ from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import FbaWarning, FormatError
 from fba.formats.gltf._joints import Clip, move, nest, start_clip
-from fba.gltf.writer import Builder
+from fba.gltf import Builder
 from fba.source import Path
 from fba.tracks import hold
 
@@ -102,7 +102,7 @@ def _add_person(
 ) -> list[int]:
     """Add a person or a skeleton with its animation, and complete the note; return the root nodes."""
     from fba.body import BapSolver, BodyModel, Skeleton
-    from fba.gltf.part_materials import PartWriter
+    from fba.gltf import PartWriter
 
     person = (body or BodyModel.default()) if mesh else body
     skeleton = Skeleton.default() if person is None else person.skeleton
@@ -204,7 +204,7 @@ def _add_head(
     """Add a face by itself, in its own frame, and complete the note; return the scene's root nodes."""
     from fba.face import FaceModel
     from fba.formats.gltf._head import start_head
-    from fba.gltf.part_materials import PartWriter
+    from fba.gltf import PartWriter
 
     face = model or FaceModel.default()
     head = start_head(builder, clip, face, _shown(animation, face), None)

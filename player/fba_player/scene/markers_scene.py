@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 from fba_player.figure.face import FaceFigure, build_figure
 from fba_player.mesh.textures import linear_light
 from fba_player.playback.timeline import CaptureTimes

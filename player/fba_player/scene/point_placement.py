@@ -18,7 +18,7 @@ from fba.face.fapu import FAPU_POINTS
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers.head_surface import HeadSurface
 from fba.face.importers.points.points_file import GivenPoints, write_points
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 from fba.parameters import feature_points
 from fba_player.scene.hand_editing import HandEditing
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32
-from fba.mesh.meshes import Alpha
+from fba.mesh import Alpha
 from fba_player.mesh.textures import linear_light
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from fba.face.eyeball import flat_width
 from fba.face.importers.assembly._joining import join_pieces
 from fba.face.importers.assembly.polygon_parts import Piece, vertex_components
 from fba.face.model import PART_KINDS
-from fba.mesh.names import UniqueNames
+from fba.mesh import UniqueNames
 
 DROPPED = "none"
 """Kind of parts that are left out: transparent shells in front of the eye, which would hide it."""

@@ -10,8 +10,7 @@ import numpy as np
 from fba.arrays import Bool, Float32, Int32, Integer, Intp
 from fba.errors import ModelError
 from fba.face.model import Material, Part
-from fba.mesh.meshes import vertex_normals
-from fba.mesh.polygons import Polygons, triangulate
+from fba.mesh import Polygons, triangulate, vertex_normals
 
 
 @dataclass(frozen=True, eq=False)
