@@ -4,14 +4,14 @@ read_gltf(path) -> Gltf                  # meshes with morph targets, nodes with
 surfaces(gltf) -> tuple[Surface, ...]    # the surfaces of its scene, all in the frame of the scene
 """
 
-from fba.gltf.document import MAX_ITEMS, Document, open_document, parse_json
-from fba.gltf.packed import unpack
-from fba.gltf.part_materials import PartWriter, convert_material, read_material
-from fba.gltf.reader import read_document, read_gltf
-from fba.gltf.scene import Animation, Channel, Gltf, Material, Mesh, Node, Primitive, Skin
+from fba.gltf._document import MAX_ITEMS, Document, open_document, parse_json
+from fba.gltf._packed import unpack
+from fba.gltf._part_materials import PartWriter, convert_material, read_material
+from fba.gltf._reader import read_document, read_gltf
+from fba.gltf._scene import Animation, Channel, Gltf, Material, Mesh, Node, Primitive, Skin
+from fba.gltf._values import MAX_TEXT, Budget, Value, locating_errors, optional_member
+from fba.gltf._writer import Builder
 from fba.gltf.surfaces import Surface, surfaces
-from fba.gltf.values import MAX_TEXT, Budget, Value, locating_errors, optional_member
-from fba.gltf.writer import Builder
 
 __all__ = [
     "MAX_ITEMS",

@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import FbaWarning
-from fba.gltf.scene import Gltf, Material, Node, Primitive
+from fba.gltf._scene import Gltf, Material, Node, Primitive
 from fba.mesh import UniqueNames
 
 SURFACE_BYTES = 2500

@@ -3,7 +3,7 @@
 May use: errors, files, arrays. Knows no face and no body.
 """
 
-from fba.mesh.meshes import (
+from fba.mesh._meshes import (
     Alpha,
     Material,
     Mesh,
@@ -14,14 +14,14 @@ from fba.mesh.meshes import (
     result_array,
     vertex_normals,
 )
-from fba.mesh.mtl import Pictures, read_mtl
-from fba.mesh.names import UniqueNames
-from fba.mesh.obj import read_obj
-from fba.mesh.pictures import read_pixels
-from fba.mesh.ply import read_ply
-from fba.mesh.polygons import Polygons, triangulate
-from fba.mesh.vrml import read_vrml
-from fba.mesh.wfm import read_wfm
+from fba.mesh._mtl import Pictures, read_mtl
+from fba.mesh._names import UniqueNames
+from fba.mesh._obj import read_obj
+from fba.mesh._pictures import read_pixels
+from fba.mesh._ply import read_ply
+from fba.mesh._polygons import Polygons, triangulate
+from fba.mesh._vrml import read_vrml
+from fba.mesh._wfm import read_wfm
 
 __all__ = [
     "Alpha",

@@ -16,8 +16,8 @@ from fba.face.learning import Spread, send_sources
 from fba.face.learning.reduction import linked_columns
 from fba.face.learning.sensitivity import displacements
 from fba.face.resolve import known_faps
-from fba.planning.derived_faps import interpolated_faps
-from fba.planning.plan import encode_planned
+from fba.planning._derived_faps import interpolated_faps
+from fba.planning._plan import encode_planned
 from fba.tracks import FaceTrack
 
 MOST_OFF = 0.003

@@ -26,9 +26,8 @@ from subdivide import Refined, refine
 import figure
 from fba.arrays import Float64, Int32
 from fba.easing import smoothstep
-from fba.face import FaceModel, Material, Part
+from fba.face import FaceModel, Material, Part, compact
 from fba.face.authoring import author
-from fba.face.compact import compact
 from fba.mesh import vertex_normals
 
 HERE = Path(__file__).parent
@@ -178,7 +177,7 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
 
 def _nostrils(surface: Refined) -> Float64:
     """Return (V,) 1 outside, dark within the nostrils, where little light falls."""
-    from fba_player.figure.occlusion import bake
+    from fba_player._figure.occlusion import bake
 
     v = surface.vertices
     normals = vertex_normals(v, surface.triangles)

@@ -25,10 +25,10 @@ from fba.errors import FbaError, FbaWarning
 from fba.face import FaceModel
 from fba.face.importers import import_model
 from fba.face.importers.points.points_file import read_points
-from fba.formats.bvh import reader as bvh
+from fba.formats.bvh import _reader as bvh
 from fba.formats.epf.epf import read_epf, write_epf
-from fba.formats.gltf import reader as gltf
-from fba.formats.smpl import reader as smpl
+from fba.formats.gltf import _reader as gltf
+from fba.formats.smpl import _reader as smpl
 from fba.formats.text.bap import read_bap, write_bap
 from fba.formats.text.fap import read_fap, write_fap
 from fba.gltf import read_gltf

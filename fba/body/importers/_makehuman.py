@@ -21,7 +21,7 @@ from fba.arrays import Bool, Float64, Int64
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import strongest_weights
-from fba.body.solve.bind_pose import (
+from fba.body.solve._bind_pose import (
     bind_matrices,
     chain_weights,
     place_vertebrae,

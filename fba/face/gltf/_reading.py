@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
-from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
+from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
+from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names, row_of
 from fba.face.gltf._extension import NAME, VERSION
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Part
-from fba.face.tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.gltf import (
     Budget,
     Document,

@@ -18,7 +18,7 @@ from fba.errors import FormatError
 from fba.formats.gltf._fap_joints import MAX_COORDINATE
 from fba.formats.gltf._fap_tracks import read_face
 from fba.formats.gltf._pose import Sampler, key_times, nearest_rotation
-from fba.formats.gltf.writer import MARK, MOST_FRAMES
+from fba.formats.gltf._writer import MARK, MOST_FRAMES
 from fba.formats.text.frame_rates import parse_rate
 from fba.gltf import Animation as Clip
 from fba.gltf import Channel, Gltf, Value, optional_member

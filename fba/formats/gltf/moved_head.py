@@ -11,7 +11,7 @@ from fba.arrays import Float64
 from fba.capture.virtual_markers import MarkerPerformance
 from fba.errors import FormatError
 from fba.formats.gltf._joints import Clip, adopt, move, start_clip
-from fba.formats.gltf.writer import MOST_FRAMES
+from fba.formats.gltf._writer import MOST_FRAMES
 from fba.gltf import Builder, PartWriter
 from fba.source import Path
 

@@ -29,7 +29,7 @@ from fba.capture.virtual_markers.performance import Neutral, SteadyMarkers, perf
 from fba.capture.virtual_markers.proposal import usual_radius
 from fba.capture.virtual_markers.weights import find_influences
 from fba.errors import FbaError, FbaWarning
-from fba_player.scene.hand_editing import HandEditing
+from fba_player.scene._hand_editing import HandEditing
 
 
 class MarkerEditing(HandEditing[MarkerMapping]):

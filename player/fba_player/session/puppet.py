@@ -16,7 +16,7 @@ from fba.parameters import (
     INTENSITY_MAX,
     VISEME_SELECT_MAX,
 )
-from fba_player.session.mood import PuppetMood
+from fba_player.session._mood import PuppetMood
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,8 @@ from fba.tracks import BodyTrack, FaceTrack
 from fba_player.export.render import as_scene
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.scene import Scene
-from fba_player.session.session import Session
-from fba_player.session.source import Source
+from fba_player.session._session import Session
+from fba_player.session._source import Source
 from fba_player.view.camera import Camera
 from fba_player.window._window import WARNING_SECONDS, Window
 

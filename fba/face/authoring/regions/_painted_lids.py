@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from fba.arrays import Float64, Integer
-from fba.face.authoring.regions.eye_opening import Opening
-from fba.face.authoring.regions.eyes import Eye
+from fba.face.authoring.regions._eye_opening import Opening
+from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.model import Part
 from fba.mesh import read_pixels

@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.points.fdp_data import Fdp, Influence, XfaceMesh, repair_sides_with_warning
+from fba.face.importers.points._fdp_data import Fdp, Influence, XfaceMesh, repair_sides_with_warning
 from fba.mesh import read_vrml
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 from fba.text_files import find_beside, parse_integer, parse_number, read_bytes
