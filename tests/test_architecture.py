@@ -44,8 +44,8 @@ fba.face.gltf
 fba.face.builtin
 fba.face.authoring.surface
 fba.face.authoring.regions
-fba.face.authoring.author
-fba.face.authoring.shapes
+fba.face.authoring._author
+fba.face.authoring._shapes
 fba.face.authoring
 fba.face.checks
 fba.face.importers.assembly
@@ -67,7 +67,7 @@ fba.capture.markers
 fba.capture.virtual_markers
 fba.capture.motion
 fba.capture.sampling
-fba.capture.limbs
+fba.capture._limbs
 fba.capture.comparison
 fba.capture.blendshapes
 fba.capture.action_units
@@ -84,26 +84,26 @@ fba.formats.markers
 fba.formats.c3d
 fba.formats.gltf
 fba.formats.face_tables
-fba.live.protocols
+fba.live._protocols
 fba.live
 fba.persona.points
 fba.persona.recognition
 fba.persona
 fba_conformance
 fba_conformance.suite
-fba_player.mesh
+fba_player._mesh
 fba_player.view
-fba_player.figure
+fba_player._figure
 fba_player.playback
 fba_player.scene
 fba_player.gl
 fba_player.sound
 fba_player.export
 fba_player.session
-fba_player.ui.theme
-fba_player.ui.ruler
-fba_player.ui.panels
-fba_player.ui
+fba_player._ui.theme
+fba_player._ui.ruler
+fba_player._ui.panels
+fba_player._ui
 fba_player.window
 fba_player
 fba.player
@@ -131,9 +131,9 @@ FACADES = {
     ): "the table of formats: readers and writers by name",
     ("fba.planning", "fba.planning._encoding"): "the function over all ways to encode, bit rates among them",
     ("fba.cli.main", "fba.cli.commands.*"): "the subcommands by name",
-    ("fba.face.model", "fba.face.gltf.storage"): "`FaceModel.load` and `save`",
+    ("fba.face.model", "fba.face.gltf._storage"): "`FaceModel.load` and `save`",
     ("fba.face.model", "fba.face.builtin"): "`FaceModel.default`",
-    ("fba.body.model", "fba.body.storage"): "`BodyModel.load` and `save`",
+    ("fba.body.model", "fba.body._storage"): "`BodyModel.load` and `save`",
     ("fba.body.model", "fba.body.builtin"): "`BodyModel.default`",
 }
 """Imports that may point up, and why."""
@@ -245,16 +245,53 @@ def reachable(graph: dict[str, set[str]], module: str) -> set[str]:
     return found
 
 
+def house_room(module: str) -> str:
+    """The room that shares private modules: a package of `fba` with all in it, or another package."""
+    parts = module.split(".")
+    if parts[0] != "fba":
+        return parts[0]
+    return ".".join(parts[:2]) if len(parts) > 2 or is_package(module) else "fba"
+
+
+def is_private(module: str) -> bool:
+    return any(part.startswith("_") for part in module.split("."))
+
+
 def test_private_modules_are_imported_by_their_room_only() -> None:
     wrong = [
         f"{module} imports {target}"
         for module, targets in imports().items()
         for target in targets
-        if target.rpartition(".")[2].startswith("_")
-        and not is_package(target)
-        and not (room(module) == room(target) or module == "fba.formats.registry")
+        if is_private(target) and house_room(module) != house_room(target)
     ]
     assert wrong == []
+
+
+def test_modules_that_no_other_room_uses_are_private() -> None:
+    """A module without an underscore is one that other rooms import, or that a page or an example names."""
+    used = {
+        target
+        for module, targets in imports().items()
+        for target in targets
+        if house_room(module) != house_room(target)
+    }
+    files = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").rglob("*.py")]
+    pages = "\n".join(path.read_text(encoding="utf-8") for path in files)
+    named = {
+        module
+        for module in modules()
+        if re.search(rf"(?<![\w.]){re.escape(module)}(?!\w)", pages) is not None
+    }
+    public = [
+        module
+        for module in modules()
+        if module.count(".") > 1
+        and not is_package(module)
+        and not is_private(module)
+        and not module.startswith("fba.cli.")
+        and not module.endswith("__main__")
+    ]
+    assert [module for module in public if module not in used | named] == []
 
 
 @pytest.mark.parametrize("package", PACKAGES)

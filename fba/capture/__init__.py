@@ -7,8 +7,7 @@ May use: parameters, face and body, and the modules of `fba` itself.
 from fba.capture._report import BoneError, FeetError, RetargetReport, retarget_report
 from fba.capture.action_units import ActionUnitMotion, from_action_units
 from fba.capture.blendshapes import ShapeMotion, from_blendshapes, to_blendshapes
-from fba.capture.markers.faces import from_markers
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers import MarkerMotion, from_markers
 from fba.capture.motion import SkeletonMotion
 from fba.capture.points import PointMotion, from_points
 from fba.capture.skeleton import from_skeleton

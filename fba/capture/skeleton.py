@@ -16,8 +16,8 @@ from fba.arrays import Float64, Int32
 from fba.body import BapSolver, Skeleton
 from fba.body.solve.solver import solve_track
 from fba.capture import _rest_alignment as rest_alignment
+from fba.capture import _retarget as retarget
 from fba.capture import _spine as spines
-from fba.capture import retarget
 from fba.capture.bones import LIMBS
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare
@@ -254,7 +254,7 @@ def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
 def _direct_targets(
     motion: SkeletonMotion, skeleton: Skeleton, scale: float | None
 ) -> tuple[dict[str, Float64], Float64]:
-    """Return targets of a motion that `is_direct`, as `fba.capture.retarget.find_targets` does.
+    """Return targets of a motion that `is_direct`, as `fba.capture._retarget.find_targets` does.
 
     scale: as for `fba.capture.from_skeleton`.
     """

@@ -22,7 +22,7 @@ from fba.recognition import recognition_hint
 from fba.source import Path, read_head
 
 if TYPE_CHECKING:
-    from fba.capture.motion import SkeletonMotion
+    from fba.capture import SkeletonMotion
     from fba.codec import StreamInfo
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
@@ -134,7 +134,7 @@ def _lazy(module: str, name: str) -> Lazy:
 _FORMATS = (
     Format(
         "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
-        _lazy("fba", "sniff_fba"), _lazy("fba", "read_fba"), _lazy("fba", "write_fba"),
+        _lazy("_fba", "sniff_fba"), _lazy("_fba", "read_fba"), _lazy("_fba", "write_fba"),
     ),
     Format(
         "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
@@ -154,42 +154,42 @@ _FORMATS = (
     ),
     Format(
         "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
-        _lazy("bvh.reader", "sniff"), _lazy("bvh.reader", "read"), _lazy("bvh.writer", "write"), ("body",),
-        read_motion=_lazy("bvh.reader", "read_motion"),
+        _lazy("bvh._reader", "sniff"), _lazy("bvh._reader", "read"), _lazy("bvh._writer", "write"), ("body",),
+        read_motion=_lazy("bvh._reader", "read_motion"),
     ),
     Format(
         "vrma", (".vrma",), "VRM animation: read as glTF; written, the expressions of a face",
-        _lazy("gltf.vrma", "sniff"), _lazy("gltf.reader", "read"), _lazy("gltf.vrma", "write"), ("face",),
+        _lazy("gltf._vrma", "sniff"), _lazy("gltf._reader", "read"), _lazy("gltf._vrma", "write"), ("face",),
         written="VRM animation, the expressions of a face",
     ),
     Format(
         "gltf", (".glb", ".gltf", ".vrma"),
         "glTF 2.0: read, an animated skeleton; written, a skinned person",
-        _lazy("gltf.reader", "sniff"), _lazy("gltf.reader", "read"), _lazy("gltf.writer", "write"),
-        read_motion=_lazy("gltf.reader", "read_motion"), list_clips=_lazy("gltf.clips", "list_clips"),
+        _lazy("gltf._reader", "sniff"), _lazy("gltf._reader", "read"), _lazy("gltf._writer", "write"),
+        read_motion=_lazy("gltf._reader", "read_motion"), list_clips=_lazy("gltf.clips", "list_clips"),
         describe_person=_lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
     ),
     Format(
         "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
-        _lazy("smpl.reader", "sniff"), _lazy("smpl.reader", "read"), None,
-        read_motion=_lazy("smpl.reader", "read_motion"),
+        _lazy("smpl._reader", "sniff"), _lazy("smpl._reader", "read"), None,
+        read_motion=_lazy("smpl._reader", "read_motion"),
     ),
     Format(
         "openface", (".csv",), "action units, pose and gaze of OpenFace",
-        _lazy("face_tables.openface", "sniff"), _lazy("face_tables.openface", "read"), None, ("face",),
-        read_face=_lazy("face_tables.openface", "read_face"),
+        _lazy("face_tables._openface", "sniff"), _lazy("face_tables._openface", "read"), None, ("face",),
+        read_face=_lazy("face_tables._openface", "read_face"),
     ),
     Format(
         "pyfeat", (".csv",), "blendshapes or action units of py-feat",
-        _lazy("face_tables.pyfeat", "sniff"), _lazy("face_tables.pyfeat", "read"), None, ("face",),
-        read_face=_lazy("face_tables.pyfeat", "read_face"),
+        _lazy("face_tables._pyfeat", "sniff"), _lazy("face_tables._pyfeat", "read"), None, ("face",),
+        read_face=_lazy("face_tables._pyfeat", "read_face"),
     ),
     Format(
         "livelink", (".csv",), "table of blendshapes: Live Link Face's, or with ARKit's names",
-        _lazy("face_tables.livelink_csv", "sniff"), _lazy("face_tables.livelink_csv", "read"),
-        _lazy("face_tables.livelink_writer", "write"), ("face",),
+        _lazy("face_tables._livelink_csv", "sniff"), _lazy("face_tables._livelink_csv", "read"),
+        _lazy("face_tables._livelink_writer", "write"), ("face",),
         written="table of blendshapes as Live Link Face's",
-        read_face=_lazy("face_tables.livelink_csv", "read_face"),
+        read_face=_lazy("face_tables._livelink_csv", "read_face"),
     ),
     Format(
         "livelink-udp", (".udp",), "recorded datagrams of Live Link Face",
@@ -203,44 +203,44 @@ _FORMATS = (
     ),
     Format(
         "shapes-json", (".json",), "blendshapes in JSON: MediaPipe's scores, BEAT",
-        _lazy("face_tables.shapes_json", "sniff"), _lazy("face_tables.shapes_json", "read"), None,
-        ("face",), read_face=_lazy("face_tables.shapes_json", "read_face"),
+        _lazy("face_tables._shapes_json", "sniff"), _lazy("face_tables._shapes_json", "read"), None,
+        ("face",), read_face=_lazy("face_tables._shapes_json", "read_face"),
     ),
     Format(
         "points", (".csv", ".json", ".npz", ".npy", ".jsonl"),
         "points of a tracked face: MediaPipe's 478, iBUG's 68; tables, JSON, NumPy's arrays",
-        _lazy("face_tables.points", "sniff"), _lazy("face_tables.points", "read"), None,
-        read_face=_lazy("face_tables.points", "read_points"),
+        _lazy("face_tables._tracked_points", "sniff"), _lazy("face_tables._tracked_points", "read"), None,
+        read_face=_lazy("face_tables._tracked_points", "read_points"),
     ),
     Format(
         "c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face",
-        _lazy("c3d.reader", "sniff"), _lazy("c3d.reader", "read"), None,
-        read_face=_lazy("c3d.reader", "read_markers"),
+        _lazy("c3d._reader", "sniff"), _lazy("c3d._reader", "read"), None,
+        read_face=_lazy("c3d._reader", "read_markers"),
     ),
     Format(
         "trc", (".trc",), "TRC (track row column): markers of a face",
-        _lazy("markers.trc", "sniff"), _lazy("markers.trc", "read"), None,
-        read_face=_lazy("markers.trc", "read_markers"),
+        _lazy("markers._trc", "sniff"), _lazy("markers._trc", "read"), None,
+        read_face=_lazy("markers._trc", "read_markers"),
     ),
     Format(
         "motive", (".csv",), "OptiTrack Motive's CSV export: markers of a face",
-        _lazy("markers.motive", "sniff"), _lazy("markers.motive", "read"), None,
-        read_face=_lazy("markers.motive", "read_markers"),
+        _lazy("markers._motive", "sniff"), _lazy("markers._motive", "read"), None,
+        read_face=_lazy("markers._motive", "read_markers"),
     ),
     Format(
         "nexus", (".csv",), "Vicon Nexus' CSV export: markers of a face",
-        _lazy("markers.nexus", "sniff"), _lazy("markers.nexus", "read"), None,
-        read_face=_lazy("markers.nexus", "read_markers"),
+        _lazy("markers._nexus", "sniff"), _lazy("markers._nexus", "read"), None,
+        read_face=_lazy("markers._nexus", "read_markers"),
     ),
     Format(
         "qualisys", (".tsv",), "Qualisys Track Manager's TSV export: markers of a face",
-        _lazy("markers.qualisys", "sniff"), _lazy("markers.qualisys", "read"), None,
-        read_face=_lazy("markers.qualisys", "read_markers"),
+        _lazy("markers._qualisys", "sniff"), _lazy("markers._qualisys", "read"), None,
+        read_face=_lazy("markers._qualisys", "read_markers"),
     ),
     Format(
         "markers", (".csv", ".tsv"), "table of a face's markers, wide or long",
-        _lazy("markers.table", "sniff"), _lazy("markers.table", "read"), None,
-        read_face=_lazy("markers.table", "read_markers"),
+        _lazy("markers._table", "sniff"), _lazy("markers._table", "read"), None,
+        read_face=_lazy("markers._table", "read_markers"),
     ),
 )  # fmt: skip
 """In the order in which they are tried on a content: those quick to import first."""
@@ -289,6 +289,35 @@ def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
     reader = format_of(path, format)
     _check_options(reader.name, "reading", options, reader.read_options)
     return reader.read(path, **options)
+
+
+def read_motion(path: Path, *, format: str | None = None, **options: Any) -> SkeletonMotion:
+    """Return the motion of a captured skeleton as the file has it, before it is retargeted.
+
+    format and errors: as for `read`. options: those of the format, e.g. `limits`, or `clip` for glTF.
+    """
+    reader = format_of(path, format)
+    motion: SkeletonMotion = _call_reader(reader, reader.read_motion, "a captured skeleton", path, options)
+    return motion
+
+
+def read_face(path: Path, *, format: str | None = None, **options: Any) -> Any:
+    """Return a captured face as the file has it, before FAPs are made of it.
+
+    Shape weights give a ShapeMotion, action units an ActionUnitMotion, markers a MarkerMotion, points of an
+    image a PointMotion. format and errors: as for `read`. options: those of the format, e.g. `limits`.
+    """
+    reader = format_of(path, format)
+    return _call_reader(reader, reader.read_face, "a captured face", path, options)
+
+
+def _call_reader(
+    reader: Format, function: Callable[..., Any] | None, content: str, path: Path, options: dict[str, Any]
+) -> Any:
+    if function is None:
+        raise FormatError(f"is {reader.name.upper()}, which holds no such thing as {content}", path=path)
+    _check_options(reader.name, "reading", options, _option_names(function))
+    return function(path, **options)
 
 
 def write(path: Path, animation: Animation, *, format: str | None = None, **options: Any) -> None:

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from fba_conformance._values import read_values
 from fba_conformance.suite.archive import write_archive
 from fba_conformance.suite.index import SHIPPED_VECTORS, Vector, read_vectors
 from fba_conformance.suite.runner import check, expected_listing
-from fba_conformance.values import read_values
 from tools.vectors import broken, coverage
 from tools.vectors.generate import Made, made_vectors, write_vectors
 

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
+from fba_conformance._values import Listing, PlaneValues, trace_values
 from fba_conformance.suite.index import SHIPPED_VECTORS, index_text
 from fba_conformance.trace import Walker, planes
-from fba_conformance.values import Listing, PlaneValues, trace_values
 from tools.vectors.definitions.case import Case, Fault
 from tools.vectors.definitions.cases import cases
 from tools.vectors.definitions.faults import faults

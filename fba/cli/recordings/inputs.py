@@ -21,7 +21,8 @@ from fba.formats.synchronisation import SYNCS, Recording, Together, join
 from fba.formats.time_codes import parse_time_code, parse_time_of_day
 
 if TYPE_CHECKING:
-    from fba.formats.registry import FaceCapture, Format
+    from fba.formats import Format
+    from fba.formats.registry import FaceCapture
 
 
 SLOWEST = 60

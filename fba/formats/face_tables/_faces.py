@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int64
-from fba.capture.action_units import ActionUnitMotion, from_action_units
+from fba.capture import ActionUnitMotion, from_action_units
 from fba.capture.sampling import find_gaps, find_rate
 from fba.errors import FbaWarning, FormatError, ModelError, Remedy
 from fba.formats.face_tables._tables import Table, named

@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture.points import PointMotion, from_points
+from fba.capture import PointMotion, from_points
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.limits import Limits
 from fba.source import Path, naming_file

@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.capture.blendshapes import ShapeMotion, from_blendshapes
+from fba.capture import ShapeMotion, from_blendshapes
 from fba.capture.sampling import find_gaps
 from fba.errors import FbaWarning, OptionError
 from fba.face.shape_names import arkit_names

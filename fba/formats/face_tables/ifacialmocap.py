@@ -15,7 +15,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture.blendshapes import ShapeMotion
+from fba.capture import ShapeMotion
 from fba.errors import FormatError
 from fba.formats.face_tables._shape_rows import find_lacks, shape_of, to_animation
 from fba.formats.face_tables._tables import named

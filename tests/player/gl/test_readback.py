@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fba_player.gl.framebuffer import Readback
-from fba_player.session.captures import read_pixels
+from fba_player.gl._framebuffer import Readback
+from fba_player.session._captures import read_pixels
 
 
 def test_the_picture_read_is_that_of_the_moment_when_reading_began(context: Any) -> None:
