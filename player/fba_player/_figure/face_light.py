@@ -12,8 +12,8 @@ import numpy as np
 from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
 from fba.cache import load_or_make
 from fba.compiled import is_compiled
-from fba.face.deform._deformer import Deformer
-from fba.face.model import FaceModel, point_row
+from fba.face import Deformer, FaceModel
+from fba.face.model import point_row
 from fba_player._figure._face_light_loops import Table, blend_swaying, light_vertices
 from fba_player._figure._face_parts import part_rows
 from fba_player._figure.occlusion import CACHE_VERSION, HARMONICS, Visibility, bake, weights
