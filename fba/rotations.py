@@ -117,6 +117,19 @@ def lengths(vectors: Float64) -> Float64:
     return np.sqrt(dot(vectors, vectors))
 
 
+def unit(vectors: Float64) -> Float64:
+    """Return vectors (..., 3) of length 1; zero stays zero."""
+    result: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+    return result
+
+
+def degrees_between(a: Float64, b: Float64) -> Float64:
+    """Return the angles in degrees between vectors (..., 3)."""
+    sine = np.linalg.norm(np.cross(a, b), axis=-1)
+    result: Float64 = np.degrees(np.arctan2(sine, np.sum(a * b, axis=-1)))
+    return result
+
+
 def turn(axis: Float64, angle: Float64) -> Float64:
     """Return matrices (..., 3, 3) of turns about unit axes (3,) or (..., 3) by angles (...)."""
     axis = np.asarray(axis, dtype=np.float64)

@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32
+from fba.body.footing import SIDES
 from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
-from fba.body.stance import SIDES, find_stance, sole_points
+from fba.body.stance import find_stance, sole_points
 
 REACH = 0.03
 """Metres from a joint to the points at which errors are measured, along each axis of the joint's frame."""

@@ -6,6 +6,8 @@ body whose legs differ from the default skeleton's, so that its lower foot is as
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -36,21 +38,62 @@ TIP = (
 """The same for what is ahead of the ball."""
 
 
+SOLE = (*OUTLINE, *TIP)
+"""The whole edge."""
+SIDES = ("l", "r")
+FOOT = ("ankle", "subtalar", "midtarsal", "metatarsal")
+"""Joints of a foot."""
+
+
+def foot_frames(skeleton: Skeleton, matrices: Float64, side: str) -> dict[str, tuple[Float64, Float64]]:
+    """Return position (T, 3) and rotation (T, 3, 3) of the joints of a foot that a skeleton has, by name.
+
+    matrices: (T, J, 4, 4), as `BapSolver.pose` returns them. side: "l" or "r".
+    """
+    names = [f"{side}_{joint}" for joint in FOOT if f"{side}_{joint}" in skeleton]
+    rows = {name: matrices[:, skeleton.number(name)] for name in names}
+    return {name: (row[:, :3, 3], row[:, :3, :3]) for name, row in rows.items()}
+
+
+def lowest_edge(
+    skeleton: Skeleton,
+    frames: Mapping[str, tuple[Float64, Float64]],
+    side: str,
+    edge: Sequence[tuple[str, float, float, float]],
+) -> Float64:
+    """Return the height (T,) of the lowest point of a sole's edge.
+
+    frames: joint -> position (T, 3) and rotation (T, 3, 3). edge: `SOLE`, or a part of it.
+    """
+    outwards = 1.0 if side == "l" else -1.0
+    points: dict[str, list[Float64]] = {}
+    for joint, x, y, z in edge:
+        name = f"{side}_{joint}"
+        height = skeleton.centres[skeleton.number(name), 1]
+        points.setdefault(name, []).append(np.array([outwards * x, y - height, z]))
+    heights = []
+    for name, own in points.items():
+        position, frame = frames[name]
+        heights.append(position[:, 1] + (frame[..., 1, :] @ np.array(own).T).min(axis=-1))
+    lowest: Float64 = np.min(heights, axis=0)
+    return lowest
+
+
 def lowest_sole(skeleton: Skeleton, matrices: Float64) -> Float64 | None:
     """Return the height (T,) of the lower foot's lowest point; None for a skeleton without feet.
 
     matrices: (T, J, 4, 4), as `BapSolver.pose` returns them.
     """
-    lows = []
-    for side, outwards in (("l", 1.0), ("r", -1.0)):
-        if not all(f"{side}_{joint}" in skeleton for joint in ("ankle", "metatarsal")):
-            return None
-        for joint, x, y, z in (*OUTLINE, *TIP):
-            number = skeleton.number(f"{side}_{joint}")
-            point = np.array([outwards * x, y - skeleton.centres[number, 1], z])
-            lows.append(matrices[:, number, 1, 3] + matrices[:, number, 1, :3] @ point)
+    if not has_feet(skeleton):
+        return None
+    lows = [lowest_edge(skeleton, foot_frames(skeleton, matrices, side), side, SOLE) for side in SIDES]
     result: Float64 = np.min(lows, axis=0)
     return result
+
+
+def has_feet(skeleton: Skeleton) -> bool:
+    """Whether a skeleton has the joints that move the edges of the soles."""
+    return all(f"{side}_{joint}" in skeleton for side in SIDES for joint in ("ankle", "metatarsal"))
 
 
 class GroundedPoser:
@@ -61,9 +104,8 @@ class GroundedPoser:
 
     def __init__(self, skeleton: Skeleton, axes: str = "iso") -> None:
         self._solver = BapSolver(skeleton, axes)
-        feet = all(f"{side}_{joint}" in skeleton for side in "lr" for joint in ("ankle", "metatarsal"))
         default = Skeleton.default()
-        self._default = BapSolver(default, axes) if feet and skeleton is not default else None
+        self._default = BapSolver(default, axes) if has_feet(skeleton) and skeleton is not default else None
 
     def pose(self, baps: npt.ArrayLike) -> Float64:
         """Return joint matrices, see `BapSolver.pose`."""

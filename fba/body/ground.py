@@ -39,6 +39,15 @@ class Ground:
         return result
 
 
+def level_under(lowest: Float64, points: Float64) -> Float64:
+    """Return the heights (2, T) of the ground under feet.
+
+    lowest: (2, T), heights of the lowest points of the feet. points: (2, 2, T, 3), their heels and balls.
+    """
+    middles = points.mean(axis=1)
+    return find(lowest, middles).under(middles)
+
+
 def find(lowest: Float64, points: Float64) -> Ground:
     """Return the ground under feet that stand on it now and then; at height 0 if they are never near it.
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.body import ground
-from fba.body.footing import OUTLINE, TIP
+from fba.body.footing import FOOT, SIDES, SOLE, foot_frames, lowest_edge
 from fba.body.skeleton import Skeleton
 
 HEEL = 0.045
@@ -23,7 +25,6 @@ PLACED_HEIGHT = 0.025
 """Metres above the lower foot up to which a foot stands on its ground if it is still for `PLACED_SECONDS`."""
 PLACED_SECONDS = 0.5
 """Seconds for which a foot must be still to stand on ground that is higher than the lower foot."""
-SIDES = ("l", "r")
 
 
 def sole_points(skeleton: Skeleton, side: str) -> dict[str, Float64] | None:
@@ -31,9 +32,7 @@ def sole_points(skeleton: Skeleton, side: str) -> dict[str, Float64] | None:
 
     In the default posture, metres. side: "l" or "r". None for a skeleton that lacks a joint of the foot.
     """
-    ankle, heel, middle, ball = (
-        f"{side}_{joint}" for joint in ("ankle", "subtalar", "midtarsal", "metatarsal")
-    )
+    ankle, heel, middle, ball = (f"{side}_{joint}" for joint in FOOT)
     if not all(joint in skeleton for joint in (ankle, heel, middle, ball)):
         return None
     above, front = (skeleton.centres[skeleton.number(joint)] for joint in (ankle, ball))
@@ -49,22 +48,31 @@ def find_stance(skeleton: Skeleton, matrices: Float64, rate: float) -> Bool:
     matrices: (T, J, 4, 4), as `BapSolver.pose` returns them. rate: frames a second. All False for a skeleton
     without feet.
     """
-    count = len(matrices)
-    soles = [sole_points(skeleton, side) for side in SIDES]
-    if count < 2 or None in soles:
-        return np.zeros((2, count), dtype=np.bool_)
-    points = np.zeros((2, 2, count, 3))
-    lowest = np.full((2, count), np.inf)
-    for foot, (side, sole) in enumerate(zip(SIDES, soles, strict=True)):
-        for place, (joint, point) in enumerate((sole or {}).items()):
-            points[foot, place] = _moved(skeleton, matrices, joint, point)
-        for joint, x, y, z in (*OUTLINE, *TIP):
-            name = f"{side}_{joint}"
-            centre = skeleton.centres[skeleton.number(name)]
-            edge = np.array([centre[0] + (x if side == "l" else -x), y, centre[2] + z])
-            lowest[foot] = np.minimum(lowest[foot], _moved(skeleton, matrices, name, edge)[:, 1])
-    middles = points.mean(axis=1)
-    return find_standing(lowest - ground.find(lowest, middles).under(middles), points, rate)
+    feet = [foot_frames(skeleton, matrices, side) for side in SIDES]
+    ends = [heel_and_ball(skeleton, foot, side) for foot, side in zip(feet, SIDES, strict=True)]
+    if len(matrices) < 2 or ends[0] is None or ends[1] is None:
+        return np.zeros((2, len(matrices)), dtype=np.bool_)
+    lowest = np.array([
+        lowest_edge(skeleton, foot, side, SOLE) for foot, side in zip(feet, SIDES, strict=True)
+    ])  # fmt: skip
+    points = np.array(ends)
+    return find_standing(lowest - ground.level_under(lowest, points), points, rate)
+
+
+def heel_and_ball(
+    skeleton: Skeleton, frames: Mapping[str, tuple[Float64, Float64]], side: str
+) -> list[Float64] | None:
+    """Return where heel and ball of a sole are, (T, 3) each; None for a skeleton that lacks a joint of it.
+
+    frames: joint -> position (T, 3) and rotation (T, 3, 3). side: "l" or "r".
+    """
+    soles = sole_points(skeleton, side)
+    if soles is None:
+        return None
+    return [
+        frames[name][0] + frames[name][1] @ (point - skeleton.centres[skeleton.number(name)])
+        for name, point in soles.items()
+    ]
 
 
 def find_standing(above: Float64, points: Float64, rate: float) -> Bool:
@@ -94,11 +102,3 @@ def _fastest(speed: Float64, rate: float, seconds: float) -> Float64:
     around = np.pad(speed, ((0, 0), (half, half)), mode="edge")
     result: Float64 = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2)
     return result
-
-
-def _moved(skeleton: Skeleton, matrices: Float64, joint: str, point: Float64) -> Float64:
-    """Return where a point of the default posture (3,) that moves with a joint is: (T, 3)."""
-    number = skeleton.number(joint)
-    own = matrices[:, number]
-    moved: Float64 = own[:, :3, 3] + own[:, :3, :3] @ (point - skeleton.centres[number])
-    return moved
