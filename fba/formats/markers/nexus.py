@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -16,7 +15,6 @@ import numpy as np
 from fba.capture.markers.motion import METRES, MarkerMotion
 from fba.errors import FormatError
 from fba.formats.markers._rows import build_motion, parse_rows, read_lines
-from fba.formats.markers.encoding import read_face
 from fba.formats.markers.names import without_subject
 from fba.formats.markers.options import file_rate
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -33,7 +31,9 @@ def sniff(head: bytes, suffix: str) -> bool:
     return re.search(rb"Frame[,;\t]\"?Sub Frame", head, re.IGNORECASE) is not None or len(head) >= 65536
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
+def read_markers(
+    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
     """Return the trajectories of a CSV export of Nexus. fps: the rate of a file that has none.
 
     Raises FormatError, LimitError.
@@ -75,7 +75,3 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
         metres=METRES.get(unit, 0.001), unit=unit if unit in METRES else "", up="+z",
         name=FilePath(path).stem, path=path, lines=numbers,
     )  # fmt: skip
-
-
-read = partial(read_face, read_markers)
-"""Returns the FAPs of the face in a file; the options are those of `read_face`."""
