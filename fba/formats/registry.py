@@ -121,7 +121,7 @@ class Format:
     @property
     def has_markers(self) -> bool:
         """Whether files hold markers or points, whose places on the face a map can give."""
-        return "markers" in self.read_options
+        return self.kind in ("markers", "points")
 
     @property
     def capture_options(self) -> tuple[str, ...]:
@@ -169,16 +169,6 @@ def _markers(name: str, suffixes: tuple[str, ...], description: str, module: str
     )  # fmt: skip
 
 
-_GLTF: dict[str, Any] = {
-    "read_person": _lazy("gltf.reader", "read_person"),
-    "read_motion": _lazy("gltf.reader", "read_motion"),
-    "kind": "skeleton",
-    "list_clips": _lazy("gltf.clips", "list_clips"),
-    "describe_person": _lazy("gltf.bodies", "describe_person"),
-}
-"""How all files of glTF are read."""
-
-
 _FORMATS = (
     Format(
         "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
@@ -208,13 +198,16 @@ _FORMATS = (
     Format(
         "vrma", (".vrma",), "VRM animation: read as glTF; written, the expressions of a face",
         _lazy("gltf.vrma", "sniff"), _lazy("gltf.vrma", "write"), ("face",),
-        written="VRM animation, the expressions of a face", **_GLTF,
+        read_person=_lazy("gltf.reader", "read_person"), kind="skeleton",
+        written="VRM animation, the expressions of a face",
     ),
     Format(
         "gltf", (".glb", ".gltf", ".vrma"),
         "glTF 2.0: read, an animated skeleton; written, a skinned person",
         _lazy("gltf.reader", "sniff"), _lazy("gltf.writer", "write"),
-        written="glTF 2.0, a skinned person", **_GLTF,
+        read_person=_lazy("gltf.reader", "read_person"), read_motion=_lazy("gltf.reader", "read_motion"),
+        kind="skeleton", list_clips=_lazy("gltf.clips", "list_clips"),
+        describe_person=_lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
     ),
     Format(
         "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
