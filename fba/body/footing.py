@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64
-from fba.body.skeleton import Skeleton
+from fba.body.skeleton import SIDES, Skeleton
 from fba.body.solve.solver import BapSolver
 
 OUTLINE = (
@@ -40,7 +40,6 @@ TIP = (
 
 SOLE = (*OUTLINE, *TIP)
 """The whole edge."""
-SIDES = ("l", "r")
 FOOT = ("ankle", "subtalar", "midtarsal", "metatarsal")
 """Joints of a foot."""
 

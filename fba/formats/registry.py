@@ -68,7 +68,7 @@ class Format:
     A file is read by one of these: read_animation: FAPs and BAPs, or what decodes to them. read_motion: the
     motion of a skeleton. read_face: a captured face as it is, markers and points among them. Of motions and
     faces, `read` makes an animation. read_person: a file that may hold any of these.
-    kind: of the capture, see `fba.capture.capture_options`; "" for files that are none.
+    kind: of the capture, see `fba.capture.capture_options`; "" for files of FAPs and BAPs.
 
     list_clips: describes the animations of a file, for formats that hold several; `read` takes one as `clip`.
     describe_person: describes the person in a file without an animation.

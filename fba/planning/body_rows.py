@@ -16,9 +16,8 @@ from itertools import pairwise
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
-from fba.body import BapSolver, Skeleton
+from fba.body import SIDES, BapSolver, Skeleton
 from fba.body.displacement import REACH
-from fba.body.footing import SIDES
 from fba.body.stance import find_stance, sole_points
 from fba.compiled import compiled
 from fba.planning.tolerance import Tolerance

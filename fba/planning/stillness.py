@@ -14,7 +14,8 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.body.footing import SIDES, foot_frames
+from fba.body import SIDES
+from fba.body.footing import foot_frames
 from fba.body.solve.motions import BapMotion, bap_motions
 from fba.body.solve.solver import BapSolver
 from fba.body.stance import find_stance, heel_and_ball, sole_points

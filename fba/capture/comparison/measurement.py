@@ -11,8 +11,8 @@ from scipy.ndimage import minimum_filter1d
 
 from fba.animation import Animation
 from fba.arrays import Array, Float64
-from fba.body import BapSolver, Skeleton
-from fba.body.footing import SIDES, GroundedPoser
+from fba.body import SIDES, BapSolver, Skeleton
+from fba.body.footing import GroundedPoser
 from fba.body.model import BodyModel, BodyPart
 from fba.capture.comparison import figure, path_measures, pose_measures
 from fba.capture.comparison.figure import Figure

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.body.footing import SIDES
+from fba.body import SIDES
 from fba.capture.comparison.figure import Figure, degrees_turned
 from fba.capture.comparison.pose_measures import LIMBS, TURNING, WORDS, Row
 from fba.capture.comparison.standing import foot_points

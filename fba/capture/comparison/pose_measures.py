@@ -12,7 +12,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64
-from fba.body.footing import SIDES
+from fba.body import SIDES
 from fba.body.skeleton import ROOT
 from fba.capture.comparison.figure import Figure, degrees_turned, mean_rotation
 from fba.rotations import degrees_between, unit

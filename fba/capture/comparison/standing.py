@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.body.footing import SIDES
+from fba.body import SIDES
 from fba.capture.comparison.figure import Figure
 
 MAX_STANDING_SPEED = 0.25

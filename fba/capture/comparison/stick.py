@@ -10,8 +10,7 @@ import numpy as np
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.body import BapSolver
-from fba.body.footing import SIDES
+from fba.body import SIDES, BapSolver
 from fba.body.model import BodyModel
 from fba.capture.comparison import figure, measurement, path_measures, pose_measures
 from fba.capture.comparison.standing import find_floor, find_standing

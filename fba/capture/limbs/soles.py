@@ -16,7 +16,8 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64
-from fba.body.footing import SIDES, SOLE, lowest_edge
+from fba.body import SIDES
+from fba.body.footing import SOLE, lowest_edge
 from fba.body.model import BodyModel
 from fba.body.skeleton import Skeleton
 from fba.body.stance import HEEL, find_standing, heel_and_ball
