@@ -21,9 +21,9 @@ import pytest
 import fba
 from bench import linear
 from fba import Animation
-from fba.codec import encode_planes
+from fba.codec import FrameRate, PartSettings, PlaneSettings, RangeLists, encode_planes
 from fba.codec._plane.arithmetic import ALPHABET_MAX, STRIDE, Counts, decode_segment, encode_segment, learn
-from fba.codec.settings import RANGE_CODE_MAX, FrameRate, PartSettings, PlaneSettings, RangeLists
+from fba.codec.settings import RANGE_CODE_MAX
 from fba.compiled import compiled
 from fba.parameters import fap_steps
 

@@ -14,10 +14,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fba.face import neutral_points
-from fba.face.deform.deformer import Deformer
-from fba.face.model import FaceModel, Part
-from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
+from fba.face import (
+    HEAD,
+    Deformer,
+    FaceDefMesh,
+    FaceDefTables,
+    FaceDefTransform,
+    FaceModel,
+    Part,
+    neutral_points,
+)
 
 ROUNDS = 300
 VERTICES = 12_000

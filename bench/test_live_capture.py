@@ -15,8 +15,8 @@ import pytest
 from fba.capture import SkeletonMotion
 from fba.capture.live import LiveSkeleton
 from fba.live import Capture, StreamFile, StreamRecorder, find_kind
-from fba.live.people import standard_offsets
-from fba.live.protocols import unity_bones
+from fba.live._people import standard_offsets
+from fba.live._protocols import unity_bones
 from tools.captures import face_files
 
 COUNT = 1200

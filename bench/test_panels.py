@@ -14,8 +14,8 @@ import fba
 from fba import Animation
 from fba.errors import DisplayError
 from fba_player.scene.scene import Scene
-from fba_player.session.session import Session
-from fba_player.session.source import Source
+from fba_player.session._session import Session
+from fba_player.session._source import Source
 
 pytest.importorskip("imgui_bundle", exc_type=ImportError)
 

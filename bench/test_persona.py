@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fba.persona import LivePersona, Persona, TrackedFace, learn, play
-from fba.persona.persona import MEANS
+from fba.persona._persona import MEANS
 from tools.persona.actors import act, all_contents, named_styles
 
 

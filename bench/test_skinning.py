@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fba.body import BapSolver
-from fba.body.model import BodyModel
+from fba.body import BapSolver, BodyModel
 
 ROUNDS = 300
 MOST = 0.4e-3

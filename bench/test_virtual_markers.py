@@ -17,7 +17,7 @@ import pytest
 from fba.capture.virtual_markers import MarkedHead, MarkerMapping, VirtualMarker
 from fba.capture.virtual_markers.influence import WalkedMesh
 from fba.capture.virtual_markers.weights import find_weights
-from fba.face.model import Part
+from fba.face import Part
 
 WIDE, HIGH = 161, 150
 """Vertices of the mesh, a half cylinder 0.2 m high."""

@@ -11,10 +11,9 @@ import numpy as np
 from PIL import Image
 
 import fba
-from fba.capture import from_markers
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture import MarkerMotion, from_markers
 from fba.capture.virtual_markers import propose_mapping, read_head
-from fba.formats.c3d.reader import read_markers
+from fba.formats.c3d._reader import read_markers
 from fba_player.export.offscreen import Offscreen
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.scene.markers_scene import MarkersScene

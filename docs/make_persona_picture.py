@@ -10,10 +10,9 @@ from PIL import Image, ImageDraw
 from fba import player
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.persona import learn, play
-from fba.persona.observation import observe
+from fba.persona import Recogniser, learn, play
+from fba.persona._observation import observe
 from fba.persona.points.layout import TRACKED, flat_mask, standard_mask, triangles
-from fba.persona.recognition import Recogniser
 from tools.persona.actors import Act, act, all_contents, named_styles
 
 TARGET = Path(__file__).with_name("images") / "persona.jpg"

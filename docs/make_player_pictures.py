@@ -15,16 +15,16 @@ from fba.arrays import UInt8
 from fba.face import FaceModel, feature_point_names
 from fba.face.importers.head_surface import read_head_surface
 from fba.formats import merge
-from fba.formats.c3d.reader import read_markers
+from fba.formats.c3d._reader import read_markers
+from fba_player._ui.panels.puppet_panel import PuppetPanel
+from fba_player.scene._placement_scene import PlacementScene
+from fba_player.scene._point_placement import PointPlacement
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.markers_scene import MarkersScene
-from fba_player.scene.placement_scene import PlacementScene
-from fba_player.scene.point_placement import PointPlacement
 from fba_player.scene.scene import Scene
+from fba_player.session._session import Session
+from fba_player.session._source import Source
 from fba_player.session.puppet import Expression
-from fba_player.session.session import Session
-from fba_player.session.source import Source
-from fba_player.ui.panels.puppet_panel import PuppetPanel
 from tools.window_picture import SETTLES, Studio, picture
 
 SAMPLES = Path(fba.__file__).resolve().with_name("samples")

@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 import fba
 from fba import player
 from fba.arrays import Float64
-from fba.capture.points import from_points
+from fba.capture import from_points
 from tools.captures.heads import other_head
 from tools.captures.performances import perform_track
 from tools.captures.tracked_actor import film

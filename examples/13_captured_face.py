@@ -4,8 +4,8 @@ from pathlib import Path
 
 import fba
 from fba.capture import from_markers
-from fba.capture.markers.faces import find_face
-from fba.formats.c3d.reader import read_markers
+from fba.capture.markers import find_face
+from fba.formats.c3d._reader import read_markers
 
 path = Path(fba.__file__).parent / "samples" / "talk.c3d"  # made by a script in the form of a capture
 motion = read_markers(path)

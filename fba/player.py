@@ -32,12 +32,17 @@ if TYPE_CHECKING:
     from fba_player.playback.transport import Transport
     from fba_player.scene.compare import CompareScene
     from fba_player.scene.scene import Scene, default_camera
+    from fba_player.session.puppet import Expression, Puppet
+    from fba_player.session.takes import TakeRecorder
     from fba_player.sound.player import Audio, open_audio
     from fba_player.view.camera import Camera, Subject
     from fba_player.window.display import check_display
     from fba_player.window.play import play
 
 _MODULE_OF = {
+    "Expression": "fba_player.session.puppet",
+    "Puppet": "fba_player.session.puppet",
+    "TakeRecorder": "fba_player.session.takes",
     "Audio": "fba_player.sound.player",
     "Camera": "fba_player.view.camera",
     "CompareScene": "fba_player.scene.compare",
@@ -67,14 +72,17 @@ __all__ = [
     "Audio",
     "Camera",
     "CompareScene",
+    "Expression",
     "LiveAnimation",
     "LiveTimeline",
     "Offscreen",
     "Preview",
+    "Puppet",
     "Recorder",
     "Renderer",
     "Scene",
     "Subject",
+    "TakeRecorder",
     "Timeline",
     "Transport",
     "check_display",

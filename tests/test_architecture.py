@@ -44,8 +44,8 @@ fba.face.gltf
 fba.face.builtin
 fba.face.authoring.surface
 fba.face.authoring.regions
-fba.face.authoring.author
-fba.face.authoring.shapes
+fba.face.authoring._author
+fba.face.authoring._shapes
 fba.face.authoring
 fba.face.checks
 fba.face.importers.assembly
@@ -67,7 +67,7 @@ fba.capture.markers
 fba.capture.virtual_markers
 fba.capture.motion
 fba.capture.sampling
-fba.capture.limbs
+fba.capture._limbs
 fba.capture.comparison
 fba.capture.blendshapes
 fba.capture.action_units
@@ -84,27 +84,27 @@ fba.formats.markers
 fba.formats.c3d
 fba.formats.gltf
 fba.formats.face_tables
-fba.live.protocols
+fba.live._protocols
 fba.live
 fba.persona.points
 fba.persona.recognition
 fba.persona
 fba_conformance
-fba_conformance.suite.definitions
+fba_conformance.suite._definitions
 fba_conformance.suite
-fba_player.mesh
+fba_player._mesh
 fba_player.view
-fba_player.figure
+fba_player._figure
 fba_player.playback
 fba_player.scene
 fba_player.gl
 fba_player.sound
 fba_player.export
 fba_player.session
-fba_player.ui.theme
-fba_player.ui.ruler
-fba_player.ui.panels
-fba_player.ui
+fba_player._ui.theme
+fba_player._ui.ruler
+fba_player._ui.panels
+fba_player._ui
 fba_player.window
 fba_player
 fba.player
@@ -132,9 +132,9 @@ FACADES = {
     ): "the table of formats: readers and writers by name",
     ("fba.planning", "fba.planning._encoding"): "the function over all ways to encode, bit rates among them",
     ("fba.cli.main", "fba.cli.commands.*"): "the subcommands by name",
-    ("fba.face.model", "fba.face.gltf.storage"): "`FaceModel.load` and `save`",
+    ("fba.face.model", "fba.face.gltf._storage"): "`FaceModel.load` and `save`",
     ("fba.face.model", "fba.face.builtin"): "`FaceModel.default`",
-    ("fba.body.model", "fba.body.storage"): "`BodyModel.load` and `save`",
+    ("fba.body.model", "fba.body._storage"): "`BodyModel.load` and `save`",
     ("fba.body.model", "fba.body.builtin"): "`BodyModel.default`",
 }
 """Imports that may point up, and why."""

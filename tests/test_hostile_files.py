@@ -112,7 +112,7 @@ def test_a_limit_can_be_raised(tmp_path: Path) -> None:
 
 def test_a_picture_of_169_million_pixels() -> None:
     pytest.importorskip("PIL")
-    from fba_player.mesh.textures import load_picture
+    from fba_player._mesh.textures import load_picture
 
     with pytest.raises(
         LimitError, match="13000 x 13000 pixels, more than the 67108864 that the limit `pixels`"

@@ -16,7 +16,7 @@ from fba.body import BapSolver
 from fba.codec import EncoderOptions
 from fba.face import resolve
 from fba.formats import merge
-from fba.formats.bvh.reader import read_motion
+from fba.formats.bvh._reader import read_motion
 from fba.parameters import bap_numbers, baps, fap_numbers, faps
 from tools.captures.measurement import root_mean_squares
 from tools.captures.performances import perform_track

@@ -28,11 +28,11 @@ sys.path.insert(0, str(ROOT))
 
 from fba.capture.blendshapes.shape_table import amounts_of  # noqa: E402
 from fba.errors import FbaError  # noqa: E402
-from fba.face.deform.deformer import Deformer  # noqa: E402
+from fba.face import Deformer  # noqa: E402
 from fba.face.feature_points import row_of  # noqa: E402
 from fba.face.importers._gltf import gltf_pieces, locate  # noqa: E402
+from fba.face.importers.assembly._pieces import assemble, shift_piece  # noqa: E402
 from fba.face.importers.assembly.model import ImportOptions, finish_import, metres_per_unit  # noqa: E402
-from fba.face.importers.assembly.pieces import assemble, shift_piece  # noqa: E402
 from fba.face.shape_names import arkit_names, canonical_names  # noqa: E402
 from fba.parameters import FAP_COUNT, fap_numbers, faps  # noqa: E402
 

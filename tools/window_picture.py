@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fba.arrays import UInt8
-from fba_player.gl.context import offscreen_context
-from fba_player.gl.framebuffer import Target
+from fba_player.gl._context import offscreen_context
+from fba_player.gl._framebuffer import Target
 from fba_player.gl.renderer import Renderer
-from fba_player.session.session import Session
+from fba_player.session._session import Session
 
 if TYPE_CHECKING:
-    from fba_player.ui.gui import Gui
+    from fba_player._ui.gui import Gui
 
 SETTLES = 4
 """Pictures until panels have found their size and position."""
@@ -30,7 +30,7 @@ class Studio:
     """
 
     def __init__(self, session: Session) -> None:
-        from fba_player.ui.gui import Gui
+        from fba_player._ui.gui import Gui
 
         self.session = session
         self._gl: Any = offscreen_context()
@@ -137,7 +137,7 @@ def main(arguments: list[str]) -> int:
 
     import fba
     from fba_player.scene.scene import Scene
-    from fba_player.session.source import Source
+    from fba_player.session._source import Source
 
     parser = argparse.ArgumentParser(prog="python -m tools.window_picture", description=__doc__)
     parser.add_argument("file")

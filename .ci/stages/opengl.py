@@ -3,7 +3,7 @@
 import sys
 
 from fba.errors import DisplayError
-from fba_player.gl.context import offscreen_context
+from fba_player.gl._context import offscreen_context
 
 try:
     offscreen_context().release()

@@ -21,7 +21,7 @@ from bench.bitrate.rivals import installed_rivals
 from bench.bitrate.subjects import FACE, Subject
 from fba.arrays import Float32, Float64, Int64
 from fba.errors import FbaWarning, OptionError, RangeError
-from fba.face.resolve import resolve
+from fba.face import resolve
 
 
 @dataclass

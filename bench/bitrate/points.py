@@ -13,7 +13,8 @@ from bench.bitrate.errors import ROOT, TURN
 from bench.bitrate.subjects import BODY, FACE, Subject
 from fba.arrays import Float64, Int64
 from fba.codec import EncoderOptions, decode, encode_with_statistics, probe_stream
-from fba.face.resolve import known_faps, resolve
+from fba.face import resolve
+from fba.face.resolve import known_faps
 from fba.planning import LiveEncoder, Tolerance, encode_planned, encode_within_tolerance, plan_compact
 from fba.planning.rate import RateEncoder
 from fba.presets import PlannedPreset

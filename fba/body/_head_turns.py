@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Int64
-from fba.body.solve.pose_loops import UNIT
+from fba.body.solve._pose_loops import UNIT
 from fba.parameters import bap_numbers, baps
 
 MIN_TURN = np.radians(2.0)

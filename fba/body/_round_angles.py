@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Bool, Int64
+from fba.body.solve._pose_loops import UNIT
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
-from fba.body.solve.pose_loops import UNIT
 from fba.parameters import BAP_STEP_TABLES, bap_steps
 
 ROUND_DEGREES = 5.0

@@ -11,10 +11,10 @@ import numpy.typing as npt
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.body._neck_blending import blend_with_neck
 from fba.body.model import BodyModel
+from fba.body.skin._skinning import Skinner, build_skinner
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights
-from fba.body.skin.skinning import Skinner, build_skinner
 from fba.errors import ModelError
-from fba.mesh.meshes import checked_rows
+from fba.mesh import checked_rows
 
 SKULL = "skullbase"
 """The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""
@@ -84,7 +84,7 @@ class AttachedHead:
         returned. local_normals: float32 (V, 3), normals of the face in its own frame; normals: filled with
         those on the body. method: as of `BodyModel.skin`. ValueError for arrays of other shapes.
         """
-        from fba.body.skin.loops import scale_and_shift
+        from fba.body.skin._loops import scale_and_shift
 
         if local.shape != self.skinner.vertices.shape:
             raise ValueError(f"vertices must have shape {self.skinner.vertices.shape}, not {local.shape}")

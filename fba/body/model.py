@@ -16,11 +16,11 @@ from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import checked_weights
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.mesh.meshes import Material, Meshes, join_rows, mesh_arrays
+from fba.mesh import Material, Meshes, join_rows, mesh_arrays
 
 if TYPE_CHECKING:
     from fba.body.own_head import OwnHead
-    from fba.body.skin.skinning import Skinner
+    from fba.body.skin._skinning import Skinner
 
 __all__ = ["BODY_PART_KINDS", "BodyModel", "BodyPart", "Material"]
 
@@ -143,7 +143,7 @@ class BodyModel(Meshes[BodyPart]):
         damaged, contradicts itself, or lacks the extension FBA_body; LimitError where it takes more memory
         than the limits allow.
         """
-        from fba.body.storage import load
+        from fba.body._storage import load
 
         return load(path, limits)
 
@@ -152,7 +152,7 @@ class BodyModel(Meshes[BodyPart]):
 
         Raises ModelError where glTF cannot hold it, FormatError where the file cannot be written.
         """
-        from fba.body.storage import save
+        from fba.body._storage import save
 
         save(self, path)
 
@@ -177,7 +177,7 @@ class BodyModel(Meshes[BodyPart]):
     @cached_property
     def skinner(self) -> Skinner:
         """The `Skinner` that `skin` uses; made on first use."""
-        from fba.body.skin.skinning import build_skinner
+        from fba.body.skin._skinning import build_skinner
 
         return build_skinner(
             self.vertices, self.normals, self.joints, self.weights, self.bind, self.skeleton, self.triangles

@@ -27,9 +27,9 @@ from fba.arrays import Bool, Float64, Int64
 from fba.body._head_turns import head_turns_too_far
 from fba.body._round_angles import find_rounder_table
 from fba.body.skeleton import Skeleton
+from fba.body.solve._pose_loops import MILLIMETRE, UNIT
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
-from fba.body.solve.pose_loops import MILLIMETRE, UNIT
 from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
 from fba.tracks import BodyTrack, batches
 

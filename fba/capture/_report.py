@@ -12,7 +12,7 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.body import BapSolver, ground
 from fba.capture import _rest_alignment as rest_alignment
-from fba.capture.limbs import soles
+from fba.capture._limbs import soles
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import Preparation, prepare
 from fba.errors import ModelError

@@ -18,7 +18,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64
-from fba.body.skeleton import Skeleton
+from fba.body import Skeleton
 from fba.capture._spine import joints as spine_joints
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError

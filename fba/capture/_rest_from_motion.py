@@ -16,7 +16,8 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64, Intp
-from fba.body.skeleton import ROOT, Skeleton
+from fba.body import Skeleton
+from fba.body.skeleton import ROOT
 from fba.capture import _standing as standing
 from fba.capture._rest_alignment import bones
 from fba.capture._spine import joints as spine_joints

@@ -20,7 +20,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64
-from fba.body.skeleton import Skeleton
+from fba.body import Skeleton
 from fba.parameters import baps
 
 TOP = "vt1"

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fba.body.skeleton import ROOT, Skeleton
+from fba.body import Skeleton
+from fba.body.skeleton import ROOT
 from fba.capture import _named_bones as named_bones
 from fba.capture import matching
 from fba.capture.motion import SkeletonMotion

@@ -14,7 +14,8 @@ from functools import cache
 from importlib.resources import files
 from itertools import islice
 
-from fba.body.skeleton import ROOT, Skeleton
+from fba.body import Skeleton
+from fba.body.skeleton import ROOT
 from fba.errors import ModelError, Remedy
 from fba.parameters import joints
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64
-from fba.body.skeleton import ROOT, Skeleton
+from fba.body import Skeleton
+from fba.body.skeleton import ROOT
 from fba.capture import _standing as standing
 from fba.capture import matching
 from fba.capture._rest_correction import correct_rest

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fba.arrays import Float64
-from fba.body.skeleton import Skeleton
+from fba.body import Skeleton
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture._up_axis import find_upright, turn_axes
 from fba.capture.bones import find_bones

@@ -17,11 +17,11 @@ from fba.arrays import Float64, Int32
 from fba.body import BapSolver, Skeleton
 from fba.body.solve.solver import solve_track
 from fba.capture import _rest_alignment as rest_alignment
-from fba.capture import retarget
+from fba.capture import _retarget as retarget
+from fba.capture._retarget import SkeletonOptions
 from fba.capture.bones import LIMBS
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import Preparation, prepare
-from fba.capture.retarget import SkeletonOptions
 from fba.errors import FbaWarning, ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.tracks import BodyTrack
@@ -212,7 +212,7 @@ def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
 def _direct_targets(
     motion: SkeletonMotion, skeleton: Skeleton, scale: float | None
 ) -> tuple[dict[str, Float64], Float64]:
-    """Return targets of a motion that `is_direct`, as `fba.capture.retarget.find_targets` does.
+    """Return targets of a motion that `is_direct`, as `fba.capture._retarget.find_targets` does.
 
     scale: as for `fba.capture.from_skeleton`.
     """

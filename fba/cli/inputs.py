@@ -24,13 +24,13 @@ from fba.parameters import BAP_STEPS_AUTO
 from fba.source import read_whole
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyModel
+    from fba.body import BodyModel
     from fba.capture import Captured, FaceCapture
-    from fba.codec.stream_info import StreamInfo
-    from fba.face.model import FaceModel
+    from fba.codec import StreamInfo
+    from fba.face import FaceModel
+    from fba.formats import Format
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
-    from fba.formats.registry import Format
 
 NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
 

@@ -16,7 +16,7 @@ from fba.errors import OptionError
 from fba.limits import Limits
 
 if TYPE_CHECKING:
-    from fba.capture.motion import SkeletonMotion
+    from fba.capture import SkeletonMotion
 
 Pair = tuple[str, str]
 

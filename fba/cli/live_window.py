@@ -48,7 +48,7 @@ def show(
     Raises BitstreamError where it ends before them.
     """
     from fba import player
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
     from fba_player.playback.live import LiveAnimation, LiveTimeline, wait_for
 
     face = inputs.read_model(model) or FaceModel.default()

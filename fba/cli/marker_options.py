@@ -17,8 +17,7 @@ from fba.cli.joint_options import Pair
 from fba.errors import FbaWarning, OptionError
 
 if TYPE_CHECKING:
-    from fba.capture.markers.motion import MarkerMotion
-    from fba.capture.points import PointMotion
+    from fba.capture import MarkerMotion, PointMotion
 
 Neutral = str | int | tuple[float, float]
 WORDS = ("auto", "first")
@@ -102,8 +101,8 @@ def read_places(
     """Return the places of markers that `--map` gives, None without; click.UsageError for wrong ones."""
     if not maps:
         return None
+    from fba.capture import PointMotion
     from fba.capture.markers.marker_maps import change_map, check_map, read_map
-    from fba.capture.points import PointMotion
     from fba.capture.points.places import change_places
 
     saved = [each for each in maps if isinstance(each, Path)]
@@ -126,8 +125,8 @@ def read_places(
 
 def write_used_places(target: Path, places: dict[str, str] | None, motion: MarkerMotion | PointMotion) -> int:
     """Write the map that was used for a capture; return the number of its markers or points."""
+    from fba.capture import PointMotion
     from fba.capture.markers.marker_maps import find_map, write_map
-    from fba.capture.points import PointMotion
     from fba.capture.points.places import point_places, write_places
 
     if isinstance(motion, PointMotion):
@@ -141,8 +140,7 @@ def write_used_places(target: Path, places: dict[str, str] | None, motion: Marke
 
 def read_capture(path: Path, reading: Reading) -> MarkerMotion | PointMotion:
     """Return the markers or points of a capture, without warnings, which reading it again would repeat."""
-    from fba.capture.markers.motion import MarkerMotion
-    from fba.capture.points import PointMotion
+    from fba.capture import MarkerMotion, PointMotion
     from fba.formats import format_of
 
     with input_file(path) as file, warnings.catch_warnings():

@@ -13,8 +13,8 @@ import click
 from fba.cli.printing import table_lines
 
 if TYPE_CHECKING:
+    from fba.face import FaceModel
     from fba.face.checks import Finding
-    from fba.face.model import FaceModel
 
 MOST_ERRORS = 8
 """Most errors that are listed after an import."""
@@ -54,7 +54,7 @@ def lost_lines(model: FaceModel) -> list[str]:
 
 def model_as_json(model: FaceModel) -> dict[str, Any]:
     """Return a model's properties for programs; lengths in metres."""
-    from fba.face.feature_points import names
+    from fba.face import feature_point_names as names
 
     low, high = model.vertices.min(axis=0), model.vertices.max(axis=0)
     return {

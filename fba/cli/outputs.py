@@ -25,7 +25,7 @@ from fba.errors import FormatError
 
 if TYPE_CHECKING:
     from fba.animation import Animation
-    from fba.formats.registry import Format
+    from fba.formats import Format
 
 STANDARD = Path("-")
 """Standard output, or standard input."""

@@ -21,8 +21,8 @@ from fba.cli.scene_options import SceneOptions, SoundOptions
 from fba.errors import FbaWarning, FormatError
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyModel
-    from fba.face.model import FaceModel
+    from fba.body import BodyModel
+    from fba.face import FaceModel
     from fba_player.playback.live import LiveAnimation
     from fba_player.scene.scene import Scene
 
@@ -144,7 +144,7 @@ def _build_one(
     given: dict[str, Any] = {"body": body, "axes": how.axes, "view": how.view}
     if isinstance(animation, Animation):
         return Scene(animation, model, **given)
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
     from fba_player.playback.live import LiveTimeline
 
     face = model or FaceModel.default()

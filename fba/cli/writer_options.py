@@ -12,8 +12,8 @@ from fba.cli.command import Decorated
 from fba.cli.inputs import ExistingPath, read_body, read_model
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyModel
-    from fba.formats.registry import Format
+    from fba.body import BodyModel
+    from fba.formats import Format
 
 UNITS = {"cm": 100.0, "m": 1.0, "mm": 1000.0, "in": 1 / 0.0254}
 """Lengths in the file for one metre."""

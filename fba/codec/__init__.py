@@ -3,6 +3,8 @@
 May use: parameters and the data model.
 """
 
+from fba.codec._block import Block
+from fba.codec._code_length import INTRA_BITS, code_lengths, level_bits, range_limit, step_scale
 from fba.codec._decoder import Decoder
 from fba.codec._encoder import (
     ClampedParameter,
@@ -12,20 +14,18 @@ from fba.codec._encoder import (
     encode_with_statistics,
     warn_of_clamped,
 )
+from fba.codec._frame_buffer import DecodedFrames, FrameBuffer
 from fba.codec._options import EncoderOptions
 from fba.codec._plane.pricing import NextPlane
 from fba.codec._plane.slots import weights_of_slots
+from fba.codec._quantisation import coarsest_quantisers, count_rounded, exact_quantisers, levels, quantise
 from fba.codec._script import encode_planes
 from fba.codec._stream.damage import Damage
 from fba.codec._stream.mark import marked_table, write_mark, write_opening
+from fba.codec._stream_info import PartInfo, StreamInfo, probe_stream
+from fba.codec._verification import Verification, digest, verify_stream
 from fba.codec._whole_stream import decode
-from fba.codec.block import Block
-from fba.codec.code_length import INTRA_BITS, code_lengths, level_bits, range_limit, step_scale
-from fba.codec.frame_buffer import DecodedFrames, FrameBuffer
-from fba.codec.quantisation import coarsest_quantisers, count_rounded, exact_quantisers, levels, quantise
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
-from fba.codec.stream_info import PartInfo, StreamInfo, probe_stream
-from fba.codec.verification import Verification, digest, verify_stream
 
 __all__ = [
     "INTRA_BITS",

@@ -8,11 +8,11 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Array, Bool, Int64
+from fba.codec._block import Block
 from fba.codec._coded_frames import CodedFrames, Masks
 from fba.codec._plane import slots, syntax
 from fba.codec._rows import Rows
 from fba.codec._time_base import TimeBase
-from fba.codec.block import Block
 from fba.codec.settings import PartSettings
 from fba.limits import Limits
 from fba.parameters import BAP_COUNT, FAP_COUNT

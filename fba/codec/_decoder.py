@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Literal
 
 from fba.animation import Frame
+from fba.codec._block import Block
 from fba.codec._stream.damage import Damage
 from fba.codec._stream_reader import StreamReader
-from fba.codec.block import Block
 from fba.limits import DEFAULT_LIMITS, Limits
 
 

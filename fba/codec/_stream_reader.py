@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import Literal
 
+from fba.codec._block import Block
 from fba.codec._plane import loops, syntax
 from fba.codec._plane.bits import OutOfDataError
 from fba.codec._plane.reader import PlaneReader, Planes
@@ -15,7 +16,6 @@ from fba.codec._stream.damage import Damage, DamageLog
 from fba.codec._stream.mark import MAX_MARK_BYTES, START, USER_DATA, Mark, bytes_needed
 from fba.codec._stream.object_borders import ObjectBorders
 from fba.codec._stream.plane_times import PlaneTimes
-from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaWarning, LimitError, UnsupportedError
 from fba.limits import Limits
 from fba.parameters import BAP_STEP_TABLES

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from typing import Literal
 
 from fba.animation import Animation
+from fba.codec._block import Block
 from fba.codec._compact_buffer import CompactBuffer
 from fba.codec._stream.mark import find_marks
 from fba.codec._stream_reader import NO_END, StreamReader
-from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
 

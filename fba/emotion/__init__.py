@@ -4,17 +4,17 @@ After chapter 8 of the thesis in docs/emotion.md. `expression` gives one by name
 `expression_at` finds one for an activation and an evaluation, `perform` makes an `Animation` of them.
 """
 
+from fba.emotion._modification import Damping, emote, modify
+from fba.emotion._moods import Mood, MoodCurve
+from fba.emotion._performance import perform
+from fba.emotion._profiles import Measurement, Movement, measured_faps, measurements, vocabulary
+from fba.emotion._reading import Readings, read_expressions
+from fba.emotion._rules import Rules
 from fba.emotion.blending import Blend, combine, parse_weights
 from fba.emotion.expression import FAMILIES, NEUTRAL_POINT, Expression
 from fba.emotion.expressions import expression, expressions
-from fba.emotion.modification import Damping, emote, modify
-from fba.emotion.moods import Mood, MoodCurve
-from fba.emotion.performance import perform
 from fba.emotion.plane import expression_at, known_points
-from fba.emotion.profiles import Measurement, Movement, measured_faps, measurements, vocabulary
-from fba.emotion.reading import Readings, read_expressions
 from fba.emotion.recogniser import Nearest, Reading, Recogniser
-from fba.emotion.rules import Rules
 
 __all__ = [
     "FAMILIES",

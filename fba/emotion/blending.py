@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float32, Int16
+from fba.emotion._mixing import mix, point_of
+from fba.emotion._rules import Rules
 from fba.emotion.expression import NEUTRAL_POINT, Expression
 from fba.emotion.expressions import expression
-from fba.emotion.mixing import mix, point_of
-from fba.emotion.rules import Rules
 from fba.errors import OptionError
 from fba.parameters import INTENSITY_MAX
 
@@ -53,7 +53,7 @@ class Blend:
 
 
 def combine(weights: Mapping[str, float], rules: Rules | None = None) -> Blend:
-    """Return expressions mixed by the rules of `fba.emotion.rules`.
+    """Return expressions mixed by the rules of `fba.emotion._rules`.
 
     weights: intensities, 0 to 100, by name or alias; "neutral" adds nothing. rules: their parameters.
 

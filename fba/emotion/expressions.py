@@ -1,6 +1,6 @@
 """The table of named expressions: `expressions.csv`, with the FAPs in `expression_faps.csv`.
 
-The six universal expressions are FAP 2's own (`fba.face.expressions`). An expression with a recipe is made
+The six universal expressions are FAP 2's own (`fba.face._expressions`). An expression with a recipe is made
 from others by the rules; its FAPs in the table are added.
 """
 
@@ -13,12 +13,12 @@ from importlib.resources import files
 import numpy as np
 
 from fba.arrays import Bool, Float32
+from fba.emotion._mixing import mix
+from fba.emotion._rules import Rules, limited
+from fba.emotion._whissel import whissel_points
 from fba.emotion.expression import FAMILIES, Expression
-from fba.emotion.mixing import mix
-from fba.emotion.rules import Rules, limited
-from fba.emotion.whissel import whissel_points
 from fba.errors import OptionError, did_you_mean
-from fba.face.expressions import Definitions
+from fba.face import Definitions
 from fba.face.mates import fill
 from fba.parameters import EXPRESSIONS, FAP_COUNT, fap_numbers
 

@@ -5,17 +5,18 @@ points = fba.face.FeaturePointFace()(shown)    # float32 (T, 84, 3): feature poi
 vertices = fba.face.Deformer(model)(shown)     # float32 (T, V, 3): all vertices of a face, metres
 """
 
-from fba.face.deform.deformer import Deformer
-from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
+from fba.face._compact import compact
+from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
+from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
+from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names as feature_point_names
 from fba.face.feature_points import neutral_points
+from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.interpolation.terms import Function, Link, Term
 from fba.face.model import FaceModel, Material, Part
 from fba.face.points import Eyeballs, FeaturePointFace
 from fba.face.resolve import Resolver, resolve
-from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 
 __all__ = [
     "EXPRESSION_NAMES",
@@ -37,6 +38,7 @@ __all__ = [
     "Part",
     "Resolver",
     "Term",
+    "compact",
     "feature_point_names",
     "neutral_points",
     "resolve",

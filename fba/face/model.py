@@ -13,12 +13,12 @@ import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import ModelError
-from fba.face.expressions import Definitions
+from fba.face._expressions import Definitions
+from fba.face._tables import HEAD, FaceDefTables
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, row_of
-from fba.face.tables import HEAD, FaceDefTables
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.mesh.meshes import Material, Meshes, mesh_arrays
+from fba.mesh import Material, Meshes, mesh_arrays
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 
 if TYPE_CHECKING:
@@ -128,13 +128,13 @@ class FaceModel(Meshes[Part]):
         damaged, contradicts itself, or lacks the extension; LimitError where it takes more memory than the
         limits allow.
         """
-        from fba.face.gltf.storage import load
+        from fba.face.gltf._storage import load
 
         return load(path, limits)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the face as glTF 2.0 (.glb), atomically."""
-        from fba.face.gltf.storage import save
+        from fba.face.gltf._storage import save
 
         save(self, path)
 

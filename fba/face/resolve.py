@@ -15,8 +15,8 @@ import numpy as np
 
 from fba.animation import FaceTrack
 from fba.arrays import Array, Bool, Float32, Float64, Int16, Int32, Intp
-from fba.face.expressions import Definitions
-from fba.face.interpolation.evaluate import estimate, evaluate
+from fba.face._expressions import Definitions
+from fba.face.interpolation._evaluate import estimate, evaluate
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.mates import fill
 from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps

@@ -4,6 +4,28 @@ from __future__ import annotations
 
 from fba.errors import OptionError
 from fba.formats.merge import merge
-from fba.formats.registry import Format, format_of, formats, probe, read, write, writer_for
+from fba.formats.registry import (
+    Format,
+    format_of,
+    formats,
+    probe,
+    read,
+    read_face,
+    read_motion,
+    write,
+    writer_for,
+)
 
-__all__ = ["Format", "OptionError", "format_of", "formats", "merge", "probe", "read", "write", "writer_for"]
+__all__ = [
+    "Format",
+    "OptionError",
+    "format_of",
+    "formats",
+    "merge",
+    "probe",
+    "read",
+    "read_face",
+    "read_motion",
+    "write",
+    "writer_for",
+]

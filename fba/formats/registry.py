@@ -172,7 +172,7 @@ def _markers(name: str, suffixes: tuple[str, ...], description: str, module: str
 _FORMATS = (
     Format(
         "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
-        _lazy("fba", "sniff_fba"), _lazy("fba", "write_fba"), read_animation=_lazy("fba", "read_fba"),
+        _lazy("_fba", "sniff_fba"), _lazy("_fba", "write_fba"), read_animation=_lazy("_fba", "read_fba"),
     ),
     Format(
         "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
@@ -192,32 +192,32 @@ _FORMATS = (
     ),
     Format(
         "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
-        _lazy("bvh.reader", "sniff"), _lazy("bvh.writer", "write"), ("body",),
-        read_motion=_lazy("bvh.reader", "read_motion"), kind="skeleton",
+        _lazy("bvh._reader", "sniff"), _lazy("bvh._writer", "write"), ("body",),
+        read_motion=_lazy("bvh._reader", "read_motion"), kind="skeleton",
     ),
     Format(
         "vrma", (".vrma",), "VRM animation: read as glTF; written, the expressions of a face",
-        _lazy("gltf.vrma", "sniff"), _lazy("gltf.vrma", "write"), ("face",),
-        read_person=_lazy("gltf.reader", "read_person"), kind="skeleton",
+        _lazy("gltf._vrma", "sniff"), _lazy("gltf._vrma", "write"), ("face",),
+        read_person=_lazy("gltf._reader", "read_person"), kind="skeleton",
         written="VRM animation, the expressions of a face",
     ),
     Format(
         "gltf", (".glb", ".gltf", ".vrma"),
         "glTF 2.0: read, an animated skeleton; written, a skinned person",
-        _lazy("gltf.reader", "sniff"), _lazy("gltf.writer", "write"),
-        read_person=_lazy("gltf.reader", "read_person"), read_motion=_lazy("gltf.reader", "read_motion"),
+        _lazy("gltf._reader", "sniff"), _lazy("gltf._writer", "write"),
+        read_person=_lazy("gltf._reader", "read_person"), read_motion=_lazy("gltf._reader", "read_motion"),
         kind="skeleton", list_clips=_lazy("gltf.clips", "list_clips"),
         describe_person=_lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
     ),
     Format(
         "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
-        _lazy("smpl.reader", "sniff"), read_motion=_lazy("smpl.reader", "read_motion"), kind="skeleton",
+        _lazy("smpl._reader", "sniff"), read_motion=_lazy("smpl._reader", "read_motion"), kind="skeleton",
     ),
     _face("openface", ".csv", "action units, pose and gaze of OpenFace", "openface"),
     _face("pyfeat", ".csv", "blendshapes or action units of py-feat", "pyfeat"),
     _face(
         "livelink", ".csv", "table of blendshapes: Live Link Face's, or with ARKit's names", "livelink_csv",
-        write=_lazy("face_tables.livelink_writer", "write"),
+        write=_lazy("face_tables._livelink_writer", "write"),
         written="table of blendshapes as Live Link Face's",
     ),
     _face("livelink-udp", ".udp", "recorded datagrams of Live Link Face", "livelink_udp"),
@@ -226,7 +226,7 @@ _FORMATS = (
     Format(
         "points", (".csv", ".json", ".npz", ".npy", ".jsonl"),
         "points of a tracked face: MediaPipe's 478, iBUG's 68; tables, JSON, NumPy's arrays",
-        _lazy("face_tables.points", "sniff"), read_face=_lazy("face_tables.points", "read_points"),
+        _lazy("face_tables._tracked_points", "sniff"), read_face=_lazy("face_tables._tracked_points", "read_points"),
         kind="points",
     ),
     _markers("c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face", "c3d.reader"),

@@ -3,7 +3,7 @@
 May use: arrays alone.
 """
 
-from fba.geometry.fits import (
+from fba.geometry._fits import (
     FittedSimilarity,
     Similarity,
     fit_similarity,

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Array, Float32
+from fba.gltf._document import Document
 from fba.gltf._glb import MAX_BYTES
-from fba.gltf.document import Document
-from fba.gltf.values import Value
+from fba.gltf._values import Value
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """NumPy types of the component types, by number."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fba.gltf._accessors import Accessors
-from fba.gltf.document import MAX_ITEMS, Document
-from fba.gltf.scene import Animation, Channel, Mesh, Node
-from fba.gltf.values import Value
+from fba.gltf._document import MAX_ITEMS, Document
+from fba.gltf._scene import Animation, Channel, Mesh, Node
+from fba.gltf._values import Value
 
 TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 

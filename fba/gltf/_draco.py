@@ -11,8 +11,8 @@ import numpy as np
 
 from fba.arrays import Array
 from fba.gltf._accessors import Accessors
-from fba.gltf.document import Document, find_extension
-from fba.gltf.values import Value
+from fba.gltf._document import Document, find_extension
+from fba.gltf._values import Value
 
 DRACO = "KHR_draco_mesh_compression"
 TRIANGLES = 4

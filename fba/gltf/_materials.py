@@ -6,9 +6,9 @@ import warnings
 from typing import Literal
 
 from fba.errors import FbaWarning
-from fba.gltf.document import Document
-from fba.gltf.scene import Material
-from fba.gltf.values import Value, optional_member
+from fba.gltf._document import Document
+from fba.gltf._scene import Material
+from fba.gltf._values import Value, optional_member
 
 WEBP = "EXT_texture_webp"
 """The extension by which a texture has a picture in WebP."""

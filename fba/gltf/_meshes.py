@@ -10,10 +10,10 @@ import numpy as np
 from fba.arrays import Float32, Int32
 from fba.errors import FbaWarning
 from fba.gltf._accessors import Accessors
+from fba.gltf._document import MAX_ITEMS, Document
 from fba.gltf._draco import unpack_primitive
-from fba.gltf.document import MAX_ITEMS, Document
-from fba.gltf.scene import Mesh, Primitive
-from fba.gltf.values import Value
+from fba.gltf._scene import Mesh, Primitive
+from fba.gltf._values import Value
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 """Modes of primitives that are surfaces."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.arrays import Array, UInt8
 from fba.gltf._meshopt_loops import unpack_attributes, unpack_indices, unpack_triangles
-from fba.gltf.values import Budget, Value
+from fba.gltf._values import Budget, Value
 
 MARKS = {"ATTRIBUTES": 0xA0, "TRIANGLES": 0xE1, "INDICES": 0xD1}
 """First byte of a stream of each mode."""

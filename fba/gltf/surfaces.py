@@ -11,8 +11,8 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import FbaWarning
-from fba.gltf.scene import Gltf, Material, Node, Primitive
-from fba.mesh.names import UniqueNames
+from fba.gltf._scene import Gltf, Material, Node, Primitive
+from fba.mesh import UniqueNames
 
 SURFACE_BYTES = 2500
 """Memory of a surface, whatever its number of vertices."""

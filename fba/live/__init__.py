@@ -8,10 +8,10 @@
 May use: capture, codec and formats. Knows no window and no command line.
 """
 
-from fba.live.capture import Capture
-from fba.live.protocols.kinds import KINDS, Kind, find_kind
+from fba.live._capture import Capture
+from fba.live._protocols.kinds import KINDS, Kind, find_kind
+from fba.live._summary import Summary
 from fba.live.receiver import Receiver
 from fba.live.recording import StreamFile, StreamRecorder
-from fba.live.summary import Summary
 
 __all__ = ["KINDS", "Capture", "Kind", "Receiver", "StreamFile", "StreamRecorder", "Summary", "find_kind"]

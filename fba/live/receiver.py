@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any
 
 from fba.errors import FbaError
-from fba.live.capture import Capture
+from fba.live._capture import Capture
 
 MAX_DATAGRAM = 65_536
 """Bytes of the longest possible datagram."""

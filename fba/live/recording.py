@@ -9,8 +9,7 @@ from typing import BinaryIO, Protocol
 from fba.animation import Animation
 from fba.atomic import PathLike, check_target, write_error
 from fba.capture.live import widest_faces
-from fba.codec import Encoder, EncoderOptions, write_opening
-from fba.codec.settings import FrameRate
+from fba.codec import Encoder, EncoderOptions, FrameRate, write_opening
 from fba.errors import OptionError
 from fba.planning import LiveEncoder
 from fba.planning.rate import RateEncoder

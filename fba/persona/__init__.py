@@ -6,14 +6,14 @@ animation = fba.persona.play(user, persona) # FAPs, which move any face May use:
 Persona, formats, and the modules of `fba` itself.
 """
 
-from fba.persona.learning import learn
-from fba.persona.live import LivePersona
-from fba.persona.performance import Performance, perform, play
-from fba.persona.persona import PartStyle, Persona
+from fba.persona._learning import learn
+from fba.persona._live import LivePersona
+from fba.persona._performance import Performance, perform, play
+from fba.persona._persona import PartStyle, Persona
+from fba.persona._recordings import read_recording, write_recording
+from fba.persona._storage import load_persona, save_persona
 from fba.persona.points import TrackedFace, from_point_motion
 from fba.persona.recognition import Recogniser
-from fba.persona.recordings import read_recording, write_recording
-from fba.persona.storage import load_persona, save_persona
 
 __all__ = [
     "LivePersona",

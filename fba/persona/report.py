@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from fba.arrays import Float64
+from fba.persona._observation import Neutral, Observation, observe
+from fba.persona._persona import Persona
 from fba.persona.motion import describe_motion
-from fba.persona.observation import Neutral, Observation, observe
-from fba.persona.persona import Persona
 from fba.persona.points import TrackedFace
 from fba.persona.points.layout import PARTS, standard_mask, triangles
 from fba.persona.recognition import Recogniser

@@ -14,7 +14,7 @@ from fba.body.head_attachment import AttachedHead, attach_head, placement
 from fba.body.model import BodyModel
 from fba.body.skin.skin_weights import strongest_weights
 from fba.errors import ModelError
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba.parameters import baps
 from small_bodies import Float64, rod

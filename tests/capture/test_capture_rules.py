@@ -9,10 +9,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fba.body import BapSolver, Skeleton, ground
-from fba.capture import matching, retarget
-from fba.capture.limbs import foot_planting, hinges, soles
-from fba.capture.limbs.foot_planting import turn_foot
-from fba.capture.limbs.targets import Targets
+from fba.capture import _retarget as retarget
+from fba.capture import matching
+from fba.capture._limbs import foot_planting, hinges, soles
+from fba.capture._limbs.foot_planting import turn_foot
+from fba.capture._limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 

@@ -13,7 +13,7 @@ import pytest
 
 from capture_bodies import swinging_limbs
 from fba.capture import from_skeleton
-from fba.capture.limbs._coupled_paths import chain
+from fba.capture._limbs._coupled_paths import chain
 
 HELPERS = Path(__file__).parents[1] / "helpers" / "figures"
 SCRIPT = """

@@ -12,7 +12,7 @@ from test_from_skeleton import NAMES, REAL
 from capture_bodies import bone_errors, limb_bones, motion
 from fba.body import BapSolver, Skeleton
 from fba.capture import SkeletonMotion, from_skeleton, matching
-from fba.formats.bvh import reader
+from fba.formats.bvh import _reader as reader
 
 HINGED = ("shoulder", "elbow", "hip", "knee")
 

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from fba.capture import MarkerMotion, from_markers
-from fba.capture.markers import stabilisation
+from fba.capture.markers import _stabilisation as stabilisation
 from fba.capture.markers._eyes import opening_by_blinks
-from fba.capture.markers.faces import MarkerFace, find_face
-from fba.capture.markers.gaps import fill_gaps
+from fba.capture.markers._faces import MarkerFace, find_face
+from fba.capture.markers._gaps import fill_gaps
+from fba.capture.markers._responses import JAW_VALUES
+from fba.capture.markers._solving import jaw_curves
+from fba.capture.markers._targets import RIGID
 from fba.capture.markers.marker_maps import change_map, find_map, marker_sets, read_map, write_map
-from fba.capture.markers.responses import JAW_VALUES
-from fba.capture.markers.solving import jaw_curves
 from fba.capture.markers.summary import summarise
-from fba.capture.markers.targets import RIGID
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError
 from fba.face import Deformer, FaceModel
 from fba.face.authoring import author

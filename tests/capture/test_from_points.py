@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fba.capture.markers.faces import MarkerFace
+from fba.capture.markers._faces import MarkerFace
 from fba.capture.markers.marker_maps import read_map
 from fba.capture.points import from_points
-from fba.capture.points.conversion import find_point_face
+from fba.capture.points._conversion import find_point_face
 from fba.capture.points.places import change_places, write_places
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel
 from fba.face.authoring import author
-from fba.formats.face_tables.points_csv import read_points
+from fba.formats.face_tables._points_csv import read_points
 from fba.parameters import faps
 from small_head import small_head
 from tools.captures.performances import speech

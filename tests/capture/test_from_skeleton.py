@@ -17,11 +17,11 @@ from fba.body import BapSolver, Skeleton
 from fba.body.footing import GroundedPoser, lowest_sole
 from fba.body.model import BodyModel
 from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
-from fba.capture.comparison.figure import find_up, result_figure, source_figure
+from fba.capture.comparison._figure import find_up, result_figure, source_figure
+from fba.capture.comparison._standing import find_floor, find_standing
 from fba.capture.comparison.measurement import sole_heights, source_scale
-from fba.capture.comparison.standing import find_floor, find_standing
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.formats.bvh import reader
+from fba.formats.bvh import _reader as reader
 from fba.parameters import bap_numbers, baps
 
 NUMBERS = bap_numbers()

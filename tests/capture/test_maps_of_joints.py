@@ -11,7 +11,7 @@ from fba.body.skeleton import ROOT
 from fba.capture.joint_maps import change_map, find_map, read_map, write_map
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FormatError, LimitError, OptionError
-from fba.formats.bvh.reader import parse
+from fba.formats.bvh._reader import parse
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from fba.body import BapSolver, Skeleton, ground
 from fba.body.footing import lowest_sole
 from fba.body.model import BodyModel
 from fba.capture import SkeletonMotion, from_skeleton, retarget_report
-from fba.capture.limbs import foot_planting, soles
+from fba.capture._limbs import foot_planting, soles
 from fba.parameters import bap_numbers
 
 THIGH, SHANK = 0.36, 0.54

@@ -19,13 +19,13 @@ from fba.capture.virtual_markers import (
     propose_mapping,
     read_head,
 )
+from fba.capture.virtual_markers._mapping_files import read_mapping, write_mapping
 from fba.capture.virtual_markers.lids import find_rows, lid_at, turn_to_camera
-from fba.capture.virtual_markers.mapping_files import read_mapping, write_mapping
 from fba.errors import ModelError, OptionError
 from fba.face import FaceModel
 from fba.face.feature_points import row_of
 from fba.formats.gltf.moved_head import write_moved_head
-from fba.gltf.reader import read_gltf
+from fba.gltf._reader import read_gltf
 from tools.captures.marked_actor import perform as act
 
 UPPER, LOWER = "3.1", "3.3"

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from fba.face.importers.head_surface import HeadSurface
-from fba_player.scene.point_placement import PointPlacement
+from fba_player.scene._point_placement import PointPlacement
 from fba_player.window import place_points
 from mesh_files import write_obj
 from small_head import small_head

@@ -14,8 +14,8 @@ import fba
 import stored_models
 from fba import Animation, BodyTrack, FaceTrack
 from fba.codec import quantise
+from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.interpolation.terms import Function, Link, Term
 from fba.face.resolve import resolve
 from fba.planning import hold_still
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fba import compiled
-from fba_conformance.small_streams import small_streams
+from fba_conformance._small_streams import small_streams
 
 SCRIPT = """
 import sys
@@ -24,7 +24,7 @@ from fba import compiled
 from fba_conformance import _motion as motion
 from tools.fuzz import _engine as fuzz
 from tools.fuzz.targets import find_target
-from fba_conformance.small_streams import small_streams
+from fba_conformance._small_streams import small_streams
 from fractions import Fraction
 
 result = {"compiled": compiled.is_compiled(), "numba": sys.modules.get("numba") is not None}

@@ -16,8 +16,8 @@ from fba.formats import merge
 from fba.formats.epf.epf import read_epf
 from fba.formats.text.bap import read_bap
 from fba.formats.text.fap import read_fap
+from fba_conformance._values import plane_records
 from fba_conformance.trace import decode_values
-from fba_conformance.values import plane_records
 
 SHARED = Path(os.environ.get("FBA_SHARED") or Path(__file__).parents[3] / "shared")
 INDEX = SHARED / "vectors" / "index.json"

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from fba_conformance._values import read_values
 from fba_conformance.suite import broken, coverage
 from fba_conformance.suite.archive import write_archive
 from fba_conformance.suite.generate import Made, made_vectors, write_vectors
 from fba_conformance.suite.index import OWN, Vector, read_vectors
 from fba_conformance.suite.runner import check, expected_listing
-from fba_conformance.values import read_values
 
 VECTORS = read_vectors()
 LONG = {"valid/counts_halved.fba", "valid/bap_int32.fba", "valid/high_level_zeros.fba"}

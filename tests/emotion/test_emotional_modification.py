@@ -12,7 +12,7 @@ from fba.animation import Animation
 from fba.arrays import Float32
 from fba.emotion import Damping, Mood, MoodCurve, emote, expression, expressions, modify
 from fba.errors import OptionError
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba.face.resolve import resolve
 from fba.parameters import fap_numbers, faps

@@ -5,7 +5,7 @@ import pytest
 
 from fba import emotion
 from fba.emotion import Rules
-from fba.emotion.rules import Part, mix_families, mix_within_family
+from fba.emotion._rules import Part, mix_families, mix_within_family
 from fba.errors import OptionError
 from fba.parameters import fap_numbers
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fba import emotion
-from fba.emotion.rules import fap_limits
+from fba.emotion._rules import fap_limits
 from fba.errors import OptionError
 from fba.face import Deformer, FaceModel
-from fba.face.expressions import Definitions
+from fba.face._expressions import Definitions
 from fba.parameters import fap_numbers
 
 

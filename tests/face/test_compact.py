@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fba.face.compact import compact
-from fba.face.deform.deformer import Deformer
-from fba.face.gltf.storage import load, save
-from fba.face.tables import FaceDefMesh, FaceDefTables
+from fba.face._compact import compact
+from fba.face._tables import FaceDefMesh, FaceDefTables
+from fba.face.deform._deformer import Deformer
+from fba.face.gltf._storage import load, save
 from stored_models import face
 
 

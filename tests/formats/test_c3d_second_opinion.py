@@ -10,7 +10,7 @@ import pytest
 from test_marker_files import cloud
 
 from fba.errors import FbaWarning, FormatError
-from fba.formats.c3d.reader import read_markers
+from fba.formats.c3d._reader import read_markers
 from tools.captures import marker_files
 
 METRES = {"mm": 1e-3, "m": 1.0, "": 1e-3}

@@ -13,12 +13,12 @@ import pytest
 import fba
 from fba.errors import FbaError, FormatError, LimitError, ModelError
 from fba.face.importers.points.points_file import read_points
-from fba.formats.bvh.reader import read_motion
-from fba.formats.c3d.reader import read_markers
-from fba.formats.face_tables.points_arrays import read_points as read_film
-from fba.mesh.ply import read_ply
-from fba.mesh.vrml import read_vrml
-from fba.mesh.wfm import read_wfm
+from fba.formats.bvh._reader import read_motion
+from fba.formats.c3d._reader import read_markers
+from fba.formats.face_tables._points_arrays import read_points as read_film
+from fba.mesh._ply import read_ply
+from fba.mesh._vrml import read_vrml
+from fba.mesh._wfm import read_wfm
 
 CORPUS = Path(__file__).parents[1] / "fuzz/corpus"
 BVH = """HIERARCHY

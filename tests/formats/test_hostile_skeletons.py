@@ -14,7 +14,7 @@ import pytest
 import fba
 from fba.animation import Animation, BodyTrack
 from fba.errors import FbaWarning, FormatError
-from fba.formats.bvh import reader
+from fba.formats.bvh import _reader as reader
 from fba.parameters import BAP_COUNT, bap_numbers
 from gltf_edits import edited
 

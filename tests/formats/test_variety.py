@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from fba.errors import FbaWarning
-from fba.formats.bvh.reader import parse
+from fba.formats.bvh._reader import parse
 from fba.formats.text.fap import read_fap
-from fba.mesh.obj import read_obj
-from fba.mesh.ply import read_ply
+from fba.mesh._obj import read_obj
+from fba.mesh._ply import read_ply
 from format_files import mask
 
 SEEDS = range(40)

@@ -26,7 +26,7 @@ from fba.face.importers import KINDS as HEADS
 from fba.face.importers import sniff
 from fba.formats.registry import format_of, formats
 from fba.live import KINDS
-from fba_conformance.small_streams import small_streams
+from fba_conformance._small_streams import small_streams
 from tools.fuzz import __main__ as program
 from tools.fuzz import _campaign as campaign
 from tools.fuzz import _engine as engine
@@ -132,36 +132,36 @@ READING = {
     "fap": ("fba.formats.text.fap", "fba.formats.text._frame_reader"),
     "bap": ("fba.formats.text.bap", "fba.formats.text._frame_reader"),
     "epf": ("fba.formats.epf._reader",),
-    "bvh": ("fba.formats.bvh.reader",),
-    "gltf": ("fba.gltf.reader", "fba.gltf.nodes", "fba.formats.gltf.reader", "fba.formats.gltf.face_motion"),
+    "bvh": ("fba.formats.bvh._reader",),
+    "gltf": ("fba.gltf._reader", "fba.gltf._nodes", "fba.formats.gltf._reader", "fba.formats.gltf._face_motion"),
     "capture": (
-        "fba.formats.c3d.reader", "fba.formats.c3d._parameters", "fba.formats.markers.motive",
-        "fba.formats.markers.nexus", "fba.formats.markers.qualisys", "fba.formats.markers.table",
-        "fba.formats.markers.trc", "fba.formats.face_tables.livelink_csv",
+        "fba.formats.c3d._reader", "fba.formats.c3d._parameters", "fba.formats.markers._motive",
+        "fba.formats.markers._nexus", "fba.formats.markers._qualisys", "fba.formats.markers._table",
+        "fba.formats.markers._trc", "fba.formats.face_tables._livelink_csv",
         "fba.formats.face_tables.livelink_udp", "fba.formats.face_tables.ifacialmocap",
-        "fba.formats.face_tables.openface", "fba.formats.face_tables.pyfeat",
-        "fba.formats.face_tables.shapes_json", "fba.formats.face_tables.points_arrays",
-        "fba.formats.face_tables.points_csv", "fba.formats.face_tables.points_json",
+        "fba.formats.face_tables._openface", "fba.formats.face_tables._pyfeat",
+        "fba.formats.face_tables._shapes_json", "fba.formats.face_tables._points_arrays",
+        "fba.formats.face_tables._points_csv", "fba.formats.face_tables._points_json",
     ),
-    "smpl": ("fba.formats.smpl.reader", "fba.formats.numpy_archives"),
-    "persona": ("fba.persona.storage", "fba.persona.recognition.archive"),
+    "smpl": ("fba.formats.smpl._reader", "fba.formats.numpy_archives"),
+    "persona": ("fba.persona._storage", "fba.persona.recognition._archive"),
     "live": (
-        "fba.live.protocols.livelink", "fba.live.protocols.ifacialmocap", "fba.live.protocols.vtube",
-        "fba.live.protocols.vmc", "fba.live.protocols._osc",
+        "fba.live._protocols.livelink", "fba.live._protocols.ifacialmocap", "fba.live._protocols.vtube",
+        "fba.live._protocols.vmc", "fba.live._protocols._osc",
     ),
     "face": ("fba.face.gltf._reading",),
-    "body": ("fba.body.storage",),
-    "obj": ("fba.mesh.obj",),
-    "mtl": ("fba.mesh.mtl",),
-    "ply": ("fba.mesh.ply",),
-    "vrml": ("fba.mesh.vrml",),
-    "wfm": ("fba.mesh.wfm",),
+    "body": ("fba.body._storage",),
+    "obj": ("fba.mesh._obj",),
+    "mtl": ("fba.mesh._mtl",),
+    "ply": ("fba.mesh._ply",),
+    "vrml": ("fba.mesh._vrml",),
+    "wfm": ("fba.mesh._wfm",),
     "points": (
         "fba.face.importers.points.points_file", "fba.face.importers.points.fdp",
         "fba.face.importers.points.xface",
     ),
-    "mapping": ("fba.capture.virtual_markers.mapping_files",),
-    "import": ("fba.face.importers.mesh", "fba.face.importers._gltf", "fba.face.importers._fdp"),
+    "mapping": ("fba.capture.virtual_markers._mapping_files",),
+    "import": ("fba.face.importers._mesh", "fba.face.importers._gltf", "fba.face.importers._fdp"),
     "cache": ("fba.cache",),
 }  # fmt: skip
 """Modules that read what each target is fed with."""

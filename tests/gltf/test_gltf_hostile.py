@@ -15,8 +15,8 @@ import pytest
 
 from fba.errors import FbaError, FbaWarning, FormatError, LimitError, ModelError
 from fba.gltf import read_gltf
-from fba.gltf.document import parse_document
-from fba.gltf.reader import read_document
+from fba.gltf._document import parse_document
+from fba.gltf._reader import read_document
 from gltf_documents import Sheet, container
 from json_places import REMOVED, put
 

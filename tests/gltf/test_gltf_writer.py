@@ -12,7 +12,7 @@ import pytest
 
 from fba.errors import FormatError, ModelError
 from fba.gltf import read_gltf
-from fba.gltf.writer import Builder
+from fba.gltf._writer import Builder
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=np.float32)
 

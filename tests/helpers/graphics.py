@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 import pytest
 
 from fba.errors import DisplayError
-from fba_player.gl.context import offscreen_context
+from fba_player.gl._context import offscreen_context
 
 REQUIRED = "FBA_REQUIRE_GRAPHICS"
 MARK = "graphics: "

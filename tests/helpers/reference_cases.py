@@ -23,8 +23,8 @@ from fba.face.model import FaceModel, point_row
 from fba.parameters import BAP_COUNT, bap_numbers
 from fba.player import Camera, Offscreen, Scene
 from fba.tracks import BodyTrack
-from fba_player.figure.face import FaceFigure, build_figure
-from fba_player.figure.person import Person, build_person
+from fba_player._figure.face import FaceFigure, build_figure
+from fba_player._figure.person import Person, build_person
 from fba_player.view.switches import parse_switch
 
 FOLDER = Path(__file__).parents[1] / "player" / "gl" / "references"

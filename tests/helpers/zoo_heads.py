@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.face.authoring import author
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel, Part
 from fba.parameters import fap_numbers
 from gltf_documents import Sheet

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fba.errors import ModelError
-from fba.mesh.meshes import Meshes, mesh_arrays, result_array
+from fba.mesh._meshes import Meshes, mesh_arrays, result_array
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from fba.errors import FbaWarning, ModelError
-from fba.face.importers.assembly.polygon_parts import make_piece
-from fba.mesh import obj, text_files
-from fba.mesh.mtl import read_mtl
-from fba.mesh.obj import read_obj
-from fba.mesh.polygons import triangulate
+from fba.face.importers.assembly._polygon_parts import make_piece
+from fba.mesh import _obj as obj
+from fba.mesh import text_files
+from fba.mesh._mtl import read_mtl
+from fba.mesh._obj import read_obj
+from fba.mesh._polygons import triangulate
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 

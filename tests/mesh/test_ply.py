@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fba.errors import ModelError
-from fba.mesh.ply import read_ply
+from fba.mesh._ply import read_ply
 from mesh_files import ply
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 2, 0.25]])

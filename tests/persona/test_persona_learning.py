@@ -10,12 +10,12 @@ import pytest
 
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.persona import LivePersona, Persona, Recogniser, learn, perform, play
-from fba.persona.learning import prune
-from fba.persona.performance import bridge, find_keys
-from fba.persona.persona import part_width
-from fba.persona.points.distances import mask_distance
+from fba.persona._learning import prune
+from fba.persona._performance import bridge, find_keys
+from fba.persona._persona import part_width
+from fba.persona.points._distances import mask_distance
 from fba.persona.points.layout import PARTS, part_points
-from fba.persona.recognition.faps import measure_fapu, told_numbers
+from fba.persona.recognition._faps import measure_fapu, told_numbers
 from fba.persona.report import make_report
 from tools.persona.actors import Act, Style, act
 from tools.persona.evaluation import evaluate, mean_reduction

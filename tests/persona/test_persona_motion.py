@@ -12,7 +12,7 @@ from fba.persona import LivePersona, Persona, learn, load_persona, perform, play
 from fba.persona import _restyle as restyle
 from fba.persona.motion import Motion, Tally, find_gains, flatten, measure_motion
 from fba.persona.points.layout import PARTS, part_vertices, standard_points
-from fba.persona.recognition.faps import face_scale
+from fba.persona.recognition._faps import face_scale
 from tools.persona import blind_test
 from tools.persona.actors import Act, Style, act, all_contents
 

@@ -14,6 +14,7 @@ from fba.capture.points import PointMotion
 from fba.errors import FbaWarning, ModelError
 from fba.face import FaceModel, FeaturePointFace
 from fba.persona import TrackedFace, from_point_motion
+from fba.persona._rest import find_rest
 from fba.persona.points import fit_similarity, hausdorff_distance, mask_distance, register
 from fba.persona.points.layout import (
     PARTS,
@@ -24,8 +25,7 @@ from fba.persona.points.layout import (
     standard_points,
     triangles,
 )
-from fba.persona.recognition.faps import mask_faps, measure_fapu
-from fba.persona.rest import find_rest
+from fba.persona.recognition._faps import mask_faps, measure_fapu
 from tools.captures.tracked_actor import film
 
 RANDOM = np.random.default_rng(0)

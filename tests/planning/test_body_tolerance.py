@@ -14,8 +14,8 @@ from fba.codec import EncoderOptions, decode
 from fba.errors import RangeError
 from fba.parameters import BAP_COUNT, baps
 from fba.planning import NearLossless, Tolerance, encode_within_tolerance
-from fba.planning.body_rows import BodyRows, BodyTarget, add_error, free_room
-from fba.planning.body_tolerance import reduce_joints
+from fba.planning._body_rows import BodyRows, BodyTarget, add_error, free_room
+from fba.planning._body_tolerance import reduce_joints
 
 VISAGE = EncoderOptions(bap_steps="visage")
 NUMBERS = {bap.name: bap.number - 1 for bap in baps()}

@@ -14,12 +14,12 @@ import fba
 from fba import Animation, EncoderOptions, FaceTrack
 from fba.errors import RangeError
 from fba.face import Deformer, FaceModel
+from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.deform.displacements import DisplacementMeter
 from fba.face.resolve import resolve
-from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.parameters import faps
 from fba.planning import Tolerance, encode_planned, encode_within_tolerance
-from fba.planning.mesh_error import ErrorBasis
+from fba.planning._mesh_error import ErrorBasis
 from small_face import small_face
 
 STEPS = np.array([1, 1, *(one.step for one in faps()[2:])])

@@ -10,9 +10,9 @@ import pytest
 import fba
 from fba import Animation, EncoderOptions, FaceTrack
 from fba.codec import quantise
-from fba.face.expressions import Definitions
+from fba.face._expressions import Definitions
+from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.interpolation.terms import Function, Link, Term
 from fba.face.resolve import FaceSettings, resolve
 from fba.parameters import fap_numbers, faps
 from fba.planning import encode_planned, plan_compact

@@ -10,7 +10,7 @@ import pytest
 import fba
 from fba import Animation, EncoderOptions, FaceTrack
 from fba.codec import level_bits
-from fba.planning.paths import Bounds, find_path
+from fba.planning._paths import Bounds, find_path
 
 
 def made_bounds(seed: int, *, gaps: bool) -> tuple[Bounds, np.ndarray]:

@@ -17,7 +17,7 @@ from fba.errors import FbaWarning, OptionError
 from fba.face.resolve import resolve, shown_faps
 from fba.parameters import faps
 from fba.planning import encode_planned, plan_compact, plan_exact
-from fba.planning.segments import Cuts, cheapest_segments, find_cuts
+from fba.planning._segments import Cuts, cheapest_segments, find_cuts
 from fba.presets import PRESETS
 from made_motion import LENGTH, MATES, made_animation, made_face, made_options
 

@@ -17,7 +17,7 @@ from fba.errors import OptionError, RangeError
 from fba.face.resolve import resolve
 from fba.parameters import bap_steps, fap_steps
 from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate, measure_errors
-from fba.planning.rate.visibility import slot_weights
+from fba.planning.rate._visibility import slot_weights
 
 VISAGE = EncoderOptions(bap_steps="visage", clamp=True, mark=False)
 FACE = [3, 4, 5, 6, 7, 12, 13, 14, 19, 20, 23, 24, 31, 32, 48, 49, 50]
@@ -127,8 +127,8 @@ def test_every_plane_fits_the_buffer(kind: str, fps: Fraction | int, rate: float
 
 @pytest.mark.parametrize("kind", ["shock", "noise"])
 def test_planes_fit_however_little_is_given_up(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fba.planning.rate.encoder.COARSEST", 1e-9)
-    monkeypatch.setattr("fba.planning.rate.encoder.FULL", 10.0)
+    monkeypatch.setattr("fba.planning.rate._encoder.COARSEST", 1e-9)
+    monkeypatch.setattr("fba.planning.rate._encoder.FULL", 10.0)
     animation = made(kind)
     encoder = RateEncoder(950, 1.0, VISAGE, finest=0)
     data = encoder.push_animation(animation) + encoder.finish()

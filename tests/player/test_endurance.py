@@ -16,7 +16,7 @@ import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
 from fba.player import Offscreen, Scene
-from fba_player.gl import context
+from fba_player.gl import _context as context
 from fba_player.scene.scene import SWITCHES
 from player_tracks import body_track, face_track
 from small_face import small_face

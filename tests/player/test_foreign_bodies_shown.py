@@ -9,7 +9,7 @@ from fba import Animation
 from fba.body.model import BodyModel
 from fba.formats.gltf.bodies import read_body
 from fba.parameters import fap_numbers
-from fba_player.figure.person import head_rows
+from fba_player._figure.person import head_rows
 from fba_player.scene.scene import Scene
 from player_tracks import body_track, face_track
 from small_people import BONES, write_person

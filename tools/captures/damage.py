@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture import MarkerMotion
 
 LONGEST = 0.15
 """Seconds of the longest gap of a marker."""

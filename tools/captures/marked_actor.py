@@ -13,10 +13,10 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture.markers.faces import PATH
+from fba.capture import MarkerMotion
+from fba.capture.markers._faces import PATH
+from fba.capture.markers._targets import TRAGIONS
 from fba.capture.markers.marker_maps import marker_sets
-from fba.capture.markers.motion import MarkerMotion
-from fba.capture.markers.targets import TRAGIONS
 from fba.face import Deformer, FaceModel
 from fba.face.feature_points import row_of
 from fba.parameters import BAP_COUNT

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture import MarkerMotion
 
 BLOCK = 512
 TRC_HEADER = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate",

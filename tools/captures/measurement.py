@@ -14,10 +14,9 @@ import numpy as np
 import fba
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture import from_action_units, from_blendshapes, to_blendshapes
-from fba.capture.markers.faces import find_face
-from fba.capture.markers.motion import MarkerMotion
-from fba.capture.points.conversion import find_point_face
+from fba.capture import MarkerMotion, from_action_units, from_blendshapes, to_blendshapes
+from fba.capture.markers import find_face
+from fba.capture.points import find_point_face
 from fba.errors import FbaWarning
 from fba.face import FaceModel
 from fba.parameters import faps

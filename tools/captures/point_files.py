@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.points import PointMotion
+from fba.capture import PointMotion
 
 
 def _row(values: Float64) -> str:

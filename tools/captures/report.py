@@ -13,7 +13,8 @@ from fba.capture import ShapeMotion, from_blendshapes, to_blendshapes
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.face import FaceModel
 from fba.formats import format_of
-from fba.formats.face_tables import livelink_csv, livelink_udp
+from fba.formats.face_tables import _livelink_csv as livelink_csv
+from fba.formats.face_tables import livelink_udp
 from fba.parameters import faps
 from tools.captures.marked_actor import as_face, record
 from tools.captures.marker_files import MAKERS

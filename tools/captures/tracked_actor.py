@@ -15,7 +15,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.points import PointMotion
+from fba.capture import PointMotion
 from fba.face import Deformer, FaceModel
 from fba.face.feature_points import row_of
 from tools.captures.performances import head_motion, speech

@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from fba.arrays import Bool, Float64, Int64
 from fba.body import Skeleton
 from fba.easing import smoothstep
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 
 EdgeDistance = Callable[[Float64, Float64], Float64]
 

@@ -11,7 +11,8 @@ import sculpt
 from subdivide import Refined
 
 from fba.arrays import Bool, Float64, Int32
-from fba.face.feature_points import MIRRORED, names, row_of
+from fba.face import feature_point_names as names
+from fba.face.feature_points import MIRRORED, row_of
 
 HERE = Path(__file__).parent
 

@@ -22,14 +22,15 @@ from sculpt import ORIGIN
 
 import figure
 from fba.arrays import Bool, Float64, Int64
-from fba.body import Skeleton
-from fba.body.model import BodyModel, BodyPart, Material
+from fba.body import BodyModel, Skeleton
+from fba.body.model import BodyPart, Material
 from fba.body.skin.skin_weights import strongest_weights
-from fba.body.solve.bind_pose import FINGERS
+from fba.body.solve._bind_pose import FINGERS
 from fba.easing import smoothstep
-from fba.face.model import FaceModel, point_row
-from fba.mesh.meshes import vertex_normals
-from fba_player.figure.occlusion import bake
+from fba.face import FaceModel
+from fba.face.model import point_row
+from fba.mesh import vertex_normals
+from fba_player._figure.occlusion import bake
 
 TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
 GLOSS = 0.38

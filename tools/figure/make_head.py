@@ -26,10 +26,9 @@ from subdivide import Refined, refine
 import figure
 from fba.arrays import Float64, Int32
 from fba.easing import smoothstep
+from fba.face import FaceModel, Material, Part, compact
 from fba.face.authoring import author
-from fba.face.compact import compact
-from fba.face.model import FaceModel, Material, Part
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
@@ -178,7 +177,7 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
 
 def _nostrils(surface: Refined) -> Float64:
     """Return (V,) 1 outside, dark within the nostrils, where little light falls."""
-    from fba_player.figure.occlusion import bake
+    from fba_player._figure.occlusion import bake
 
     v = surface.vertices
     normals = vertex_normals(v, surface.triangles)

@@ -17,7 +17,7 @@ from person import Person, make_person, reproportion
 import figure
 from fba.arrays import Float64, Int64
 from fba.body import Skeleton
-from fba.body.solve.bind_pose import (
+from fba.body.solve._bind_pose import (
     FINGERS,
     bind_matrices,
     chain_weights,

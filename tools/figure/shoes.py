@@ -8,7 +8,7 @@ from meshes import tube
 
 from fba.arrays import Float64, Int64
 from fba.easing import smoothstep
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 
 LEATHER = np.array([0.030, 0.026, 0.024])
 SOLE = np.array([0.42, 0.41, 0.39])

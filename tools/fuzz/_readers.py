@@ -18,27 +18,23 @@ from zlib import crc32
 import numpy as np
 
 import fba
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from fba.cache import load_or_make
 from fba.capture.virtual_markers import read_mapping, write_mapping
 from fba.errors import FbaError, FbaWarning
+from fba.face import FaceModel
 from fba.face.importers import import_model
 from fba.face.importers.points.points_file import read_points
-from fba.face.model import FaceModel
-from fba.formats.bvh import reader as bvh
+from fba.formats.bvh import _reader as bvh
 from fba.formats.epf.epf import read_epf, write_epf
-from fba.formats.gltf import reader as gltf
-from fba.formats.smpl import reader as smpl
+from fba.formats.gltf import _reader as gltf
+from fba.formats.smpl import _reader as smpl
 from fba.formats.text.bap import read_bap, write_bap
 from fba.formats.text.fap import read_fap, write_fap
-from fba.gltf.reader import read_gltf
+from fba.gltf import read_gltf
 from fba.live import KINDS, Capture, StreamFile, StreamRecorder
-from fba.mesh.mtl import read_mtl
-from fba.mesh.obj import read_obj
-from fba.mesh.ply import read_ply
-from fba.mesh.vrml import read_vrml
-from fba.mesh.wfm import read_wfm
-from fba.persona.storage import load_persona
+from fba.mesh import read_mtl, read_obj, read_ply, read_vrml, read_wfm
+from fba.persona import load_persona
 from tools.fuzz._outcome import ContractError, Outcome
 from tools.fuzz._small_head import small_head_obj, small_head_points, small_head_vrml
 

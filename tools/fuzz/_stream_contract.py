@@ -21,9 +21,9 @@ import numpy as np
 from fba.animation import Animation, Frame
 from fba.codec import Block, Decoder, probe_stream
 from fba.errors import FbaError, FbaWarning
+from fba_conformance._values import plane_records
 from fba_conformance.trace import BAP_BIT, FAP_BIT
 from fba_conformance.trace import planes as independent_planes
-from fba_conformance.values import plane_records
 from tools.fuzz._outcome import ContractError, Outcome
 
 COMPARED_BYTES = 600

@@ -12,7 +12,7 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.face import VISEME_NAMES, Definitions
 from fba.parameters import FAP_COUNT, faps
-from fba.persona.points import TrackedFace
+from fba.persona import TrackedFace
 from tools.persona.training.camera import photograph
 from tools.persona.training.classes import class_faps, face_classes
 from tools.persona.training.people import People, make_people, move_face

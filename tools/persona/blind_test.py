@@ -24,13 +24,12 @@ import numpy as np
 import fba
 from fba.arrays import Float64
 from fba.parameters import FAP_COUNT
-from fba.persona import Persona, TrackedFace, learn, play
+from fba.persona import Persona, Recogniser, TrackedFace, learn, play
+from fba.persona._observation import Observation, observe
 from fba.persona.motion import Motion, flatten, measure_motion
-from fba.persona.observation import Observation, observe
-from fba.persona.points.distances import mask_distance
+from fba.persona.points import mask_distance
 from fba.persona.points.layout import PARTS, part_points, part_vertices, standard_mask
-from fba.persona.recognition import Recogniser
-from fba.persona.recognition.faps import face_scale, measure_fapu
+from fba.persona.recognition._faps import face_scale, measure_fapu
 from tools.persona.actors import INTENSITIES, Style, act, contents, film_faps
 
 MOODS = {

@@ -18,14 +18,13 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.cli.printing import print_table
-from fba.persona.learning import learn
-from fba.persona.observation import observe
-from fba.persona.performance import perform
-from fba.persona.persona import MEANS, Persona
-from fba.persona.points.distances import mask_distance
+from fba.persona import Persona, Recogniser, learn, perform
+from fba.persona._observation import observe
+from fba.persona._persona import MEANS
+from fba.persona.points import mask_distance
 from fba.persona.points.layout import PARTS, SAME, flat_mask, standard_mask
-from fba.persona.recognition import Recogniser, decide
-from fba.persona.recognition.displacements import displacements
+from fba.persona.recognition import decide
+from fba.persona.recognition._displacements import displacements
 from tools.persona.actors import Act, Style, act, all_contents, contents, named_styles
 
 TAUGHT = 2

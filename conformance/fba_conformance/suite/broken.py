@@ -16,11 +16,11 @@ from types import CodeType, ModuleType
 
 from fba.errors import FbaError, FbaWarning
 from fba_conformance import trace
+from fba_conformance._values import Listing, PlaneValues, trace_values
+from fba_conformance.suite._judgement import find_fault
 from fba_conformance.suite._mistakes import Mistake, mistakes
 from fba_conformance.suite.index import Vector, read_vectors
-from fba_conformance.suite.judgement import find_fault
 from fba_conformance.suite.runner import expected_listing
-from fba_conformance.values import Listing, PlaneValues, trace_values
 
 SHOWN = 4
 """Vectors that the list names for each mistake; the others are counted."""

@@ -24,10 +24,10 @@ from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.codec import Damage, Decoder, EncoderOptions, encode
 from fba.errors import FbaError, FbaWarning
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
+from fba_conformance._values import HEADER, Listing, PlaneValues, block_values, read_values, trace_values
 from fba_conformance.suite._mistakes import Mistake, mistakes
 from fba_conformance.suite.broken import broken_decoder
 from fba_conformance.trace import planes
-from fba_conformance.values import HEADER, Listing, PlaneValues, block_values, read_values, trace_values
 
 
 def decode_textbook(data: bytes, bap_steps: str) -> Iterator[str]:

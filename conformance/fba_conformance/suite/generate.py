@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
-from fba_conformance.suite.definitions.case import Case, Fault
-from fba_conformance.suite.definitions.cases import cases
-from fba_conformance.suite.definitions.faults import faults
+from fba_conformance._values import Listing, PlaneValues, trace_values
+from fba_conformance.suite._definitions.case import Case, Fault
+from fba_conformance.suite._definitions.cases import cases
+from fba_conformance.suite._definitions.faults import faults
 from fba_conformance.suite.index import OWN
 from fba_conformance.trace import Walker, planes
-from fba_conformance.values import Listing, PlaneValues, trace_values
 
 Made = tuple[dict[str, Any], bytes, Listing]
 """The entry of a vector in the index, the stream, and the values that a decoder must find."""

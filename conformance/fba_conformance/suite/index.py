@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fba.errors import FormatError
-from fba_conformance.values import Listing, read_values
+from fba_conformance._values import Listing, read_values
 
 OWN = Path(__file__).parents[1] / "vectors"
 OTHER_GROUP = "vectors"

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fba.errors import FbaError, FbaWarning, FormatError
+from fba_conformance._values import Listing, read_values, trace_values
+from fba_conformance.suite._judgement import find_fault
+from fba_conformance.suite._process import OUTPUT_LIMIT, Run, fill_in, run_program, split_command
 from fba_conformance.suite.index import Vector
-from fba_conformance.suite.judgement import find_fault
-from fba_conformance.suite.process import OUTPUT_LIMIT, Run, fill_in, run_program, split_command
 from fba_conformance.suite.result import Result
 from fba_conformance.suite.runner import expected_listing
 from fba_conformance.trace import decode_values, planes
-from fba_conformance.values import Listing, read_values, trace_values
 
 SECONDS = 20.0
 """How long a program may take for a vector, if nobody says otherwise."""

@@ -9,10 +9,10 @@ from dataclasses import replace
 from fba.animation import Animation, Frame
 from fba.codec import Block, Decoder, PlaneSettings, encode_planes
 from fba.errors import BitstreamError, FbaError, FbaWarning, FormatError, UnsupportedError
+from fba_conformance._values import Listing, block_values, trace_values
 from fba_conformance.suite.index import Vector
 from fba_conformance.suite.result import Result
 from fba_conformance.trace import planes
-from fba_conformance.values import Listing, block_values, trace_values
 
 
 def check(vector: Vector) -> Result:

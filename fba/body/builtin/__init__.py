@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 @cache
 def default() -> BodyModel:
     """Return the built-in person; read on first use."""
-    from fba.body.storage import load
+    from fba.body._storage import load
 
     with as_file(files(__package__) / "body.glb") as path:
         return load(path)

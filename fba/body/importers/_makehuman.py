@@ -21,7 +21,7 @@ from fba.arrays import Bool, Float64, Int64
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import strongest_weights
-from fba.body.solve.bind_pose import (
+from fba.body.solve._bind_pose import (
     bind_matrices,
     chain_weights,
     place_vertebrae,
@@ -30,12 +30,9 @@ from fba.body.solve.bind_pose import (
 )
 from fba.easing import smoothstep
 from fba.errors import FormatError, ModelError
-from fba.gltf.document import MAX_ITEMS, parse_json
-from fba.gltf.values import Value
-from fba.mesh.meshes import vertex_normals
-from fba.mesh.obj import read_obj
-from fba.mesh.polygons import Polygons, triangulate
-from fba.mesh.text_files import read_bytes
+from fba.gltf import MAX_ITEMS, Value, parse_json
+from fba.mesh import Polygons, read_obj, triangulate, vertex_normals
+from fba.text_files import read_bytes
 
 METRES = 0.1
 """Metres per unit of the base mesh."""

@@ -1,7 +1,7 @@
 """The compiled loops of `fba.body.skin._girdle`: plain functions over NumPy arrays.
 
 Bounds: joints and rows of a `Girdle` are numbers in the skeleton and mesh that `find_girdle` made it of; the
-rest as in `fba.body.skin.loops`.
+rest as in `fba.body.skin._loops`.
 """
 
 from __future__ import annotations

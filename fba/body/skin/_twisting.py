@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
-from fba.body.skin.loops import Twisting
+from fba.body.skin._loops import Twisting
 from fba.easing import smoothstep
 
 LIMB = ("shoulder", "elbow", "wrist")

@@ -8,7 +8,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float32, Float64
-from fba.body.solve.pose_loops import MILLIMETRE, UNIT
+from fba.body.solve._pose_loops import MILLIMETRE, UNIT
 from fba.body.solve.solver import BapSolver
 
 

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from fba.arrays import Float64, Int32, Int64
 from fba.body.skeleton import Skeleton
-from fba.body.solve import pose_loops, solver_loops
+from fba.body.solve import _pose_loops as pose_loops
+from fba.body.solve import solver_loops
 from fba.body.solve.conventions import NO_BAP, Convention, convention
 from fba.body.solve.limits import widest_limits
 from fba.errors import ModelError

@@ -18,7 +18,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Int32, Int64
 from fba.body.solve._fast_trig import arc_tangent, sine_cosine
-from fba.body.solve.pose_loops import UNIT
+from fba.body.solve._pose_loops import UNIT
 from fba.compiled import compiled, inlined
 
 NEAR_LOCK = 1e-5

@@ -3,7 +3,7 @@
 May use: parameters, the face, and blendshapes.
 """
 
+from fba.capture.action_units._motion import ActionUnitMotion
 from fba.capture.action_units.conversion import from_action_units
-from fba.capture.action_units.motion import ActionUnitMotion
 
 __all__ = ["ActionUnitMotion", "from_action_units"]

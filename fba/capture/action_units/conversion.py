@@ -11,9 +11,9 @@ from importlib.resources import files
 import numpy as np
 
 from fba.animation import Animation
-from fba.capture.action_units.motion import ActionUnitMotion
+from fba.capture.action_units._motion import ActionUnitMotion
+from fba.capture.blendshapes._motion import ShapeMotion
 from fba.capture.blendshapes.conversion import from_blendshapes
-from fba.capture.blendshapes.motion import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits

@@ -3,8 +3,8 @@
 May use: parameters, the face, and what `fba.capture` says of times.
 """
 
+from fba.capture.blendshapes._inversion import to_blendshapes
+from fba.capture.blendshapes._motion import ShapeMotion
 from fba.capture.blendshapes.conversion import from_blendshapes
-from fba.capture.blendshapes.inversion import to_blendshapes
-from fba.capture.blendshapes.motion import ShapeMotion
 
 __all__ = ["ShapeMotion", "from_blendshapes", "to_blendshapes"]

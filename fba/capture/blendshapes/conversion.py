@@ -9,8 +9,8 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
+from fba.capture.blendshapes._motion import ShapeMotion
 from fba.capture.blendshapes.combination import RADIAN, combine, to_face_track
-from fba.capture.blendshapes.motion import ShapeMotion
 from fba.capture.sampling import frame_numbers, interpolate
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits

@@ -16,7 +16,7 @@ from importlib.resources import files
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.face.expressions import Definitions
+from fba.face import Definitions
 from fba.face.gltf.morphs import morph_values
 from fba.face.shape_names import arkit_of, fap_of
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps

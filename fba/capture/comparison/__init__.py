@@ -6,10 +6,10 @@ assumes of rest poses has no part in it, so that a wrong rest pose is seen and n
 May use: parameters, the body, and captured motion.
 """
 
-from fba.capture.comparison.figure import Figure, find_up, source_figure
+from fba.capture.comparison._figure import Figure, find_up, source_figure
+from fba.capture.comparison._stick import Stick, find_sticks
+from fba.capture.comparison._verdict import GRADES, Bounds, Comparison, Difference, bounds
 from fba.capture.comparison.measurement import compare, source_scale
-from fba.capture.comparison.stick import Stick, find_sticks
-from fba.capture.comparison.verdict import GRADES, Bounds, Comparison, Difference, bounds
 
 __all__ = [
     "GRADES",

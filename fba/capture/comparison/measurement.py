@@ -11,14 +11,16 @@ from scipy.ndimage import minimum_filter1d
 
 from fba.animation import Animation
 from fba.arrays import Array, Float64
-from fba.body import SIDES, BapSolver, Skeleton
+from fba.body import SIDES, BapSolver, BodyModel, Skeleton
 from fba.body.footing import GroundedPoser
-from fba.body.model import BodyModel, BodyPart
-from fba.capture.comparison import figure, path_measures, pose_measures
-from fba.capture.comparison.figure import Figure
-from fba.capture.comparison.pose_measures import Row
-from fba.capture.comparison.standing import Floor, find_floor, find_standing
-from fba.capture.comparison.verdict import Comparison, Difference, bounds, in_order
+from fba.body.model import BodyPart
+from fba.capture.comparison import _figure as figure
+from fba.capture.comparison import _path_measures as path_measures
+from fba.capture.comparison import _pose_measures as pose_measures
+from fba.capture.comparison._figure import Figure
+from fba.capture.comparison._pose_measures import Row
+from fba.capture.comparison._standing import Floor, find_floor, find_standing
+from fba.capture.comparison._verdict import Comparison, Difference, bounds, in_order
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 from fba.parameters import BAP_COUNT

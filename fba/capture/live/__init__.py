@@ -3,7 +3,7 @@
 May use: all of `fba.capture`.
 """
 
-from fba.capture.live.blendshapes import LiveBlendshapes, widest_faces
-from fba.capture.live.skeleton import LiveSkeleton
+from fba.capture.live._blendshapes import LiveBlendshapes, widest_faces
+from fba.capture.live._skeleton import LiveSkeleton
 
 __all__ = ["LiveBlendshapes", "LiveSkeleton", "widest_faces"]

@@ -2,3 +2,8 @@
 
 May use: parameters, the face, and the modules of `fba` itself.
 """
+
+from fba.capture.markers._faces import find_face, from_markers
+from fba.capture.markers.motion import MarkerMotion
+
+__all__ = ["MarkerMotion", "find_face", "from_markers"]

@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers.targets import PUPILS
+from fba.capture.markers._targets import PUPILS
 from fba.face.feature_points import row_of
 from fba.face.gaze import LARGEST_GAZE
 

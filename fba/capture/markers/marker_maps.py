@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 
+from fba.capture.markers._targets import HEAD, RIGID, TARGETS
 from fba.capture.markers.motion import MarkerMotion
-from fba.capture.markers.targets import HEAD, RIGID, TARGETS
 from fba.errors import FormatError, OptionError, did_you_mean
 from fba.face.feature_points import row_of
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -74,7 +74,7 @@ def find_map(motion: MarkerMotion) -> tuple[dict[str, str], str]:
     family, found = match_names(motion.names)
     if found:
         return found, family
-    from fba.capture.markers.proposal import propose_map
+    from fba.capture.markers._proposal import propose_map
 
     return propose_map(motion), "shape"
 

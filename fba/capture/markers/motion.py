@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.markers.gaps import find_gaps
+from fba.capture.markers._gaps import find_gaps
 from fba.errors import ModelError
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "dm": 0.1, "in": 0.0254, "ft": 0.3048}

@@ -3,7 +3,7 @@
 May use: parameters, the face, markers, and the modules of `fba` itself.
 """
 
-from fba.capture.points.conversion import from_points
+from fba.capture.points._conversion import find_point_face, from_points
 from fba.capture.points.motion import PointMotion
 
-__all__ = ["PointMotion", "from_points"]
+__all__ = ["PointMotion", "find_point_face", "from_points"]

@@ -14,8 +14,8 @@ from importlib.resources import files
 import numpy as np
 
 from fba.arrays import Float64
+from fba.capture.markers._targets import HEAD, RIGID
 from fba.capture.markers.marker_maps import check_map, check_target
-from fba.capture.markers.targets import HEAD, RIGID
 from fba.errors import OptionError
 from fba.name_maps import change_names, write_names
 from fba.source import Path

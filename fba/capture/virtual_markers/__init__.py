@@ -3,10 +3,10 @@
 A deformer beside FaceDefTables, for heads that know nothing of FAPs. May use: faces, captured markers.
 """
 
-from fba.capture.virtual_markers.heads import MarkedHead, head_of_model, read_head
+from fba.capture.virtual_markers._heads import MarkedHead, head_of_model, read_head
+from fba.capture.virtual_markers._mapping_files import read_mapping, write_mapping
 from fba.capture.virtual_markers.influence import Influence, find_influence
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
-from fba.capture.virtual_markers.mapping_files import read_mapping, write_mapping
 from fba.capture.virtual_markers.performance import MarkerPerformance, perform
 from fba.capture.virtual_markers.proposal import propose_mapping
 

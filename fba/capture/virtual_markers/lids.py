@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.capture.virtual_markers.heads import MarkedHead
+from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.influence import Influence
 from fba.errors import ModelError
 from fba.face.feature_points import row_of

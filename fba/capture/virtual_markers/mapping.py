@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from fba.capture.virtual_markers.heads import MarkedHead
+from fba.capture.virtual_markers._heads import MarkedHead
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.name_maps import list_names
 

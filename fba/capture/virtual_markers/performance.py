@@ -10,12 +10,12 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64
-from fba.capture.markers.gaps import RARELY, fill_gaps, warn_of_gaps
+from fba.capture.markers._gaps import RARELY, fill_gaps, warn_of_gaps
+from fba.capture.markers._neutral import neutral_frames
+from fba.capture.markers._stabilisation import follow_head, relate_poses, remove_poses
 from fba.capture.markers.motion import MarkerMotion
-from fba.capture.markers.neutral import neutral_frames
-from fba.capture.markers.stabilisation import follow_head, relate_poses, remove_poses
-from fba.capture.virtual_markers.alignment import align
-from fba.capture.virtual_markers.heads import MarkedHead
+from fba.capture.virtual_markers._alignment import align
+from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import Eye, find_eyes, narrow, turn_to_camera
 from fba.capture.virtual_markers.mapping import MarkerMapping
 from fba.capture.virtual_markers.weights import MarkerWeights, find_weights

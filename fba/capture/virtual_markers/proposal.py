@@ -7,11 +7,11 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from fba.arrays import Float64
+from fba.capture.markers._targets import HEAD, RIGID, target_points
 from fba.capture.markers.marker_maps import find_map
 from fba.capture.markers.motion import MarkerMotion
-from fba.capture.markers.targets import HEAD, RIGID, target_points
-from fba.capture.virtual_markers.alignment import align
-from fba.capture.virtual_markers.heads import MarkedHead
+from fba.capture.virtual_markers._alignment import align
+from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import lid_at, lid_height
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
 from fba.errors import ModelError

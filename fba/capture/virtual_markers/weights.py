@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.virtual_markers.heads import MarkedHead
+from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.influence import Influence, give_to_nearest
 from fba.capture.virtual_markers.lids import find_rows
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker

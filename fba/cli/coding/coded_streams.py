@@ -24,7 +24,7 @@ from fba.presets import PRESETS
 if TYPE_CHECKING:
     from fba.cli.recordings.inputs import Inputs
     from fba.codec import ClampedParameter, EncoderOptions
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
     from fba.planning import Encoded, Goal
     from fba.planning.rate import RateStatistics
 

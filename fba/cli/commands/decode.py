@@ -29,7 +29,7 @@ from fba.parameters import BAP_STEPS_AUTO
 if TYPE_CHECKING:
     from fba.animation import FaceTrack
     from fba.codec import PlaneSettings
-    from fba.formats.registry import Format
+    from fba.formats import Format
 
 _CHUNK = 1 << 16
 """Bytes decoded at once."""

@@ -24,7 +24,7 @@ from fba.limits import Limits
 if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.emotion import Mood, MoodCurve
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
 
 DEFAULT_EASE = 0.5
 MOST_KEYS = 1_000_000

@@ -24,7 +24,7 @@ from fba.cli.inputs import (
     read_face,
 )
 from fba.cli.printing import clock_text, print_json, rate_text, seconds_text
-from fba.codec.stream_info import PartInfo, StreamInfo
+from fba.codec import PartInfo, StreamInfo
 from fba.errors import FbaWarning, ModelError
 from fba.parameters import BAP_STEPS_AUTO
 
@@ -159,7 +159,7 @@ def _print_person(path: Path, size: int, person: PersonInfo) -> None:
 
 def _summarise_markers(face: FaceCapture) -> dict[str, Any] | None:
     """Return what a capture of markers holds, which may be no face; None for other captures."""
-    from fba.capture.markers.motion import MarkerMotion
+    from fba.capture import MarkerMotion
     from fba.capture.markers.summary import summarise
 
     return summarise(face) if isinstance(face, MarkerMotion) else None

@@ -20,7 +20,7 @@ from fba.cli.printing import Progress
 from fba.errors import FbaWarning, ModelError, OptionError
 
 if TYPE_CHECKING:
-    from fba.capture.markers.motion import MarkerMotion
+    from fba.capture import MarkerMotion
     from fba.capture.virtual_markers import MarkedHead, MarkerMapping
     from fba_player.scene.marker_editing import MarkerEditing
     from fba_player.scene.markers_scene import MarkersScene
@@ -294,7 +294,7 @@ def _outputs(request: _Request) -> Outputs:
 
 def _read_capture(path: Path, reading: Reading) -> MarkerMotion:
     """Return the markers of a capture; click.UsageError for a file of another kind."""
-    from fba.capture.markers.motion import MarkerMotion
+    from fba.capture import MarkerMotion
     from fba.formats import format_of, formats
 
     reader = format_of(path, reading.format)

@@ -20,8 +20,8 @@ from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
     from fba.arrays import Float64
+    from fba.face import FaceModel
     from fba.face.checks import Finding
-    from fba.face.model import FaceModel
 
 SOURCE = ExistingPath()
 KINDS = ("makehuman", "gltf", "obj", "ply", "wfm", "fdp")
@@ -113,7 +113,7 @@ def _read_or_default(file: Path | None, default: bool) -> FaceModel:
 
 
 def _read(file: Path | None) -> FaceModel:
-    from fba.face.model import FaceModel
+    from fba.face import FaceModel
 
     if file is None:
         return FaceModel.default()
@@ -391,7 +391,7 @@ def _read_points(path: Path, model: FaceModel) -> Float64:
     from fba.face.importers.points.fdp import load_fdp
     from fba.face.importers.points.points_file import read_points
     from fba.face.importers.points.xface import xface_points
-    from fba.mesh.text_files import find_beside
+    from fba.text_files import find_beside
 
     if path.suffix.lower() in (".json", ".csv"):
         return read_points(path).points

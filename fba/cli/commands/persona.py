@@ -70,7 +70,7 @@ class _Tracking:
 
     def read(self, path: Path) -> TrackedFace:
         """Return the face in a recording."""
-        from fba.persona.recordings import read_recording
+        from fba.persona import read_recording
 
         with input_file(path) as file:
             return read_recording(file, fps=self.fps, face=self.face, aspect=self.aspect, limits=self.limit)
@@ -87,7 +87,7 @@ class _Performer:
 
     def play(self, file: Path, tracking: _Tracking) -> tuple[Persona | None, Animation]:
         """Return the actor's Persona, if any, and a user's recording played by it."""
-        from fba.persona.performance import play
+        from fba.persona import play
 
         persona = None if self.persona_file is None else _load(self.persona_file, tracking.limit)
         user = None if self.user_file is None else _load(self.user_file, tracking.limit)
@@ -165,8 +165,7 @@ def learn_command(
     if report is not None:
         written.append(Output("--report", report, text=True))
     outputs = Outputs(written, actors, no_clobber=no_clobber)
-    from fba.persona.learning import learn
-    from fba.persona.storage import save_persona
+    from fba.persona import learn, save_persona
 
     neutral = tracking.neutral
     faces = [tracking.read(path) for path in actors]
@@ -262,7 +261,7 @@ def play_command(
 
 
 def _load(path: Path, limits: Limits) -> Persona:
-    from fba.persona.storage import load_persona
+    from fba.persona import load_persona
 
     with input_file(path) as file:
         return load_persona(file, limits=limits)
@@ -289,7 +288,7 @@ def _describe(persona: Persona) -> dict[str, Any]:
 
 
 def _missing(persona: Persona) -> dict[str, list[str]]:
-    from fba.persona.recognition import Recogniser
+    from fba.persona import Recogniser
 
     known = Recogniser.default().components
     return persona.missing({part: component.classes for part, component in known.items()})

@@ -12,7 +12,7 @@ from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, input_file
 from fba.cli.printing import print_json, print_table
-from fba.codec.stream_info import StreamInfo
+from fba.codec import StreamInfo
 from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO
 

@@ -45,7 +45,7 @@ def command(
     The digest depends on frame rate, times and values alone, not on how they are coded. It also finds
     changes that leave the syntax of a stream intact. Exits with 1 if a stream is damaged, cut off or changed.
     """
-    from fba.codec.verification import verify_stream
+    from fba.codec import verify_stream
 
     known = _known_digests(against) if against is not None else {}
     reports: list[dict[str, Any]] = []

@@ -22,7 +22,7 @@ from fba.formats.time_codes import parse_time_code, parse_time_of_day
 
 if TYPE_CHECKING:
     from fba.capture import FaceCapture
-    from fba.formats.registry import Format
+    from fba.formats import Format
 
 
 SLOWEST = 60

@@ -100,10 +100,10 @@ def command(
     if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
         name = output.with_suffix(".glb").name
         raise click.UsageError(f"--output {output}: face models are written as glTF; name it {name}")
+    from fba.face import FaceModel
     from fba.face.importers import import_model
     from fba.face.learning import learn_fit
     from fba.face.learning.learn import FAPS
-    from fba.face.model import FaceModel
 
     head = FaceModel.default() if model is None else import_model(model)
     animations = []

@@ -15,8 +15,8 @@ def default() -> FaceModel:
     """The built-in head; read on first use."""
     from dataclasses import replace
 
-    from fba.face.expressions import Definitions
-    from fba.face.gltf.storage import load
+    from fba.face._expressions import Definitions
+    from fba.face.gltf._storage import load
 
     with as_file(files(__package__) / "head.glb") as path:
         # The current definitions, so that visemes can be tuned without a new head.glb.

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fba.arrays import Float64, Floating, Integer
+from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.calibration._align import known_rows
 from fba.face.calibration._eyes import FittedEye, eyeball_weight
 from fba.face.calibration._shape import Shape, fit_size
 from fba.face.feature_points import row_of
-from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
 from fba.rotations import between
 
@@ -166,7 +166,7 @@ def surface_stretches(part: Part, after: Floating) -> Float64:
 
     Least squares over the edges at the vertex; its normal goes to the new normal, scaled as the surface is.
     """
-    from fba.mesh.meshes import vertex_normals
+    from fba.mesh import vertex_normals
 
     before = part.vertices.astype(np.float64)
     now = np.asarray(after, dtype=np.float64)

@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float64, Floating, Integer, Intp
 from fba.face.feature_points import names
 from fba.geometry import nearest_orthonormal
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 
 WELL_KNOWN = 0.02
 """Metres: the affine part covers directions in which the points spread by more than this."""

@@ -29,7 +29,7 @@ from fba.face.model import FaceModel, Part
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 if TYPE_CHECKING:
-    from fba.face.checks.posing import Poser
+    from fba.face.checks._posing import Poser
 
 
 TURNED_OVER = 0.002
@@ -145,7 +145,7 @@ def _check_points(points: npt.ArrayLike) -> Float64:
 
 
 def _swap_to_own_sides(points: Float64) -> Float64:
-    from fba.face.importers.points.fdp_data import repair_sides
+    from fba.face.importers.points._fdp_data import repair_sides
 
     repaired, swaps, wrong = repair_sides(points)
     changes = [f"{a} and {b} have changed places" for a, b in swaps]
@@ -228,7 +228,7 @@ def _check_folds(model: FaceModel, parts: tuple[Part, ...], targets: Float64, kn
 
 def _with_tables(model: FaceModel, fitted: FaceModel, shape: Shape, how: str) -> FaceModel:
     from fba.face.calibration._carry import carry_tables
-    from fba.face.checks.posing import Poser
+    from fba.face.checks._posing import Poser
 
     if not model.tables:
         return fitted
@@ -275,7 +275,7 @@ def _author_anew(model: FaceModel, fitted: FaceModel) -> FaceModel:
 
 
 def _count_errors(poser: Poser, fap: int | None = None) -> int:
-    from fba.face.checks.fap_checks import check_posed
+    from fba.face.checks._fap_checks import check_posed
 
     findings = check_posed(poser, range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1) if fap is None else [fap])
     return sum(finding.severity == "error" for finding in findings)

@@ -15,7 +15,7 @@ from fba.face.calibration._field import Field, bump_field
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, eyeballs
 from fba.face.feature_points import names, row_of
 from fba.geometry import Similarity, fit_similarity
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 from fba.rotations import apply, between_all
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Integer
 from fba.face.checks._findings import Finding
-from fba.face.checks.posing import Poser
+from fba.face.checks._posing import Poser
 from fba.face.model import Part
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, OPEN_JAW, TONGUE_ROLL
 from fba.geometry import nearest_rotation

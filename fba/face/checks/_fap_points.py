@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.face._tables import HEAD
 from fba.face.checks._findings import Finding
-from fba.face.checks.posing import Poser
+from fba.face.checks._posing import Poser
 from fba.face.eyeball import distances_from_axis
 from fba.face.points import (
     DILATE_PUPIL,
@@ -22,7 +23,6 @@ from fba.face.points import (
     TONGUE_ROLL,
     YAW_EYE,
 )
-from fba.face.tables import HEAD
 from fba.parameters import faps
 
 SMALL_VALUE = 10.0

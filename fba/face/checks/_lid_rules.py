@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64
-from fba.face.authoring.regions.eyes import Eye
+from fba.face.authoring.regions._eyes import Eye
 from fba.face.checks._findings import Finding
-from fba.face.checks.posing import Poser
+from fba.face.checks._posing import Poser
 
 SIDES = {"left": (19, 21), "right": (20, 22)}
 """FAPs of the upper and the lower lid."""

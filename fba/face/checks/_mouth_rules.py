@@ -8,7 +8,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.face.checks._findings import Finding
-from fba.face.checks.posing import Poser
+from fba.face.checks._posing import Poser
 from fba.face.points import OPEN_JAW
 
 PAIRS = ((4, 5), (8, 10), (9, 11))

@@ -17,8 +17,8 @@ import numpy as np
 
 from fba.arrays import Array, Float32, Float64, Int64
 from fba.compiled import compiled
+from fba.face.deform._normals import Surface
 from fba.face.deform.flat_tables import Shifts, Transforms
-from fba.face.deform.normals import Surface
 
 MIN_SQUARE = np.float32(1e-30)
 """Squared length of a sum of normals below which it has no direction."""

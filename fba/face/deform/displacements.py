@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64, Int64
-from fba.face.deform.deformer import Deformer, frame_values
+from fba.face.deform._deformer import Deformer, frame_values
 from fba.face.deform.flat_tables import KIND_ORDER, Shifts, Transforms
 from fba.face.model import FaceModel
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 
 BLOCK = 16
 """Frames whose vertices are held at once."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from fba.arrays import Array, Bool, Float64, Int64, Intp, UInt32
 from fba.errors import ModelError
+from fba.face._tables import HEAD, FaceDefMesh
 from fba.face.model import FaceModel
-from fba.face.tables import HEAD, FaceDefMesh
 from fba.parameters import faps
 
 VALUE_MAX = 2**31 - 1

@@ -11,13 +11,12 @@ import numpy as np
 
 from fba.arrays import Float32
 from fba.errors import ModelError
-from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES
+from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES
+from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names
 from fba.face.gltf.morphs import morph_values
 from fba.face.model import FaceModel
-from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
-from fba.gltf.values import MAX_TEXT
-from fba.gltf.writer import Builder
+from fba.gltf import MAX_TEXT, Builder
 from fba.parameters import faps
 
 NAME = "FBA_face"

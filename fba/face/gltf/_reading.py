@@ -9,18 +9,23 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
-from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
+from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
+from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names, row_of
 from fba.face.gltf._extension import NAME, VERSION
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Part
-from fba.face.tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
-from fba.gltf.document import Document
-from fba.gltf.packed import unpack
-from fba.gltf.part_materials import read_material
-from fba.gltf.reader import read_document
-from fba.gltf.scene import Gltf
-from fba.gltf.values import Budget, Value, locating_errors, optional_member
+from fba.gltf import (
+    Budget,
+    Document,
+    Gltf,
+    Value,
+    locating_errors,
+    optional_member,
+    read_document,
+    read_material,
+    unpack,
+)
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
 
 MAX_PARTS = 1000

@@ -16,7 +16,7 @@ import numpy as np
 
 from fba.arrays import Float32
 from fba.errors import ModelError
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel
 from fba.parameters import FAP_COUNT, fap_numbers, faps
 

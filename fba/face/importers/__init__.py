@@ -81,7 +81,7 @@ def _import(
         from fba.face.importers._gltf import import_gltf
 
         return import_gltf(options, points)
-    from fba.face.importers.mesh import import_mesh
+    from fba.face.importers._mesh import import_mesh
 
     return import_mesh(options, form, points)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.arrays import Float32
 from fba.easing import smoothstep
-from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.shape_names import canonical_names
 
 BOTH = {

@@ -9,15 +9,15 @@ import numpy as np
 
 from fba.errors import ModelError
 from fba.face.feature_points import row_of
+from fba.face.importers._mesh import import_mesh
+from fba.face.importers.assembly._polygon_parts import make_piece
 from fba.face.importers.assembly.model import ImportOptions, finish_import
-from fba.face.importers.assembly.polygon_parts import make_piece
-from fba.face.importers.mesh import import_mesh
+from fba.face.importers.points._fdp_data import Fdp
 from fba.face.importers.points.fdp import load_fdp
-from fba.face.importers.points.fdp_data import Fdp
 from fba.face.importers.points.points_file import GivenPoints
 from fba.face.importers.points.xface import NEUTRAL, xface_points
 from fba.face.model import FaceModel
-from fba.mesh.vrml import read_vrml
+from fba.mesh import read_vrml
 
 BINDS = {
     "LeftEye": "eye",

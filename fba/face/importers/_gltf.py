@@ -17,11 +17,10 @@ from fba.arrays import Float32, Float64
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers._both_sides import split_sides
-from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
-from fba.face.importers.assembly.pieces import assemble, guess_kind, part_names
-from fba.face.importers.assembly.polygon_parts import Piece
-from fba.face.importers.assembly.repair import repair_tables
-from fba.face.importers.assembly.symmetry import (
+from fba.face.importers.assembly._pieces import assemble, guess_kind, part_names
+from fba.face.importers.assembly._polygon_parts import Piece
+from fba.face.importers.assembly._repair import repair_tables
+from fba.face.importers.assembly._symmetry import (
     MIRRORED_LIDS,
     MIRRORED_POINTS,
     MIRRORED_TABLES,
@@ -30,14 +29,13 @@ from fba.face.importers.assembly.symmetry import (
     mirror_tables,
     stand_upright,
 )
+from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
 from fba.face.importers.points.points_file import given_points, points_beside
 from fba.face.model import FaceModel, Material, Part
 from fba.face.shape_names import canonical_names
-from fba.gltf.part_materials import convert_material
-from fba.gltf.scene import Gltf
-from fba.gltf.values import Value
+from fba.gltf import Gltf, Value, convert_material
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.mesh.text_files import MAX_VERTICES
+from fba.text_files import MAX_VERTICES
 
 EXTENSION = "FBA_face"
 POINT_FILES = (".points.csv", ".points.json", ".fdp")
@@ -105,7 +103,7 @@ def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Fl
 
     Raises ModelError as `find_points`.
     """
-    from fba.face.importers.assembly.landmarks import find_eyes, find_points
+    from fba.face.importers.assembly._landmarks import find_eyes, find_points
 
     path = os.fspath(options.path)
     upright, _ = turn_upright(pieces, np.full((len(names()), 3), np.nan), options.up)

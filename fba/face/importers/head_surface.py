@@ -19,12 +19,12 @@ from fba.face.authoring.surface.landmarks import weld_skin
 from fba.face.feature_points import names
 from fba.face.importers._gltf import POINT_FILES as GLTF_POINT_FILES
 from fba.face.importers._gltf import gltf_pieces, locate
+from fba.face.importers._mesh import POINT_FILES, READERS, polygon_pieces, read_materials
 from fba.face.importers._sniffing import sniff
-from fba.face.importers.assembly.landmarks import find_eye_points
+from fba.face.importers.assembly._landmarks import find_eye_points
+from fba.face.importers.assembly._pieces import DROPPED, assemble, check_kinds, kind_of
+from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.importers.assembly.model import AXES, ImportOptions, turn_upright
-from fba.face.importers.assembly.pieces import DROPPED, assemble, check_kinds, kind_of
-from fba.face.importers.assembly.polygon_parts import Piece
-from fba.face.importers.mesh import POINT_FILES, READERS, polygon_pieces, read_materials
 from fba.face.importers.points.points_file import GivenPoints, given_points, points_beside
 from fba.face.model import FaceModel, Part
 from fba.limits import DEFAULT_LIMITS, Limits

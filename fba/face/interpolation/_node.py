@@ -22,7 +22,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from fba.errors import ModelError
-from fba.face.interpolation.terms import (
+from fba.face.interpolation._terms import (
     EXPONENT_MAX,
     HIGH_LEVEL_NUMBERS,
     TERMS_MAX,

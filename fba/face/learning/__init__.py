@@ -3,7 +3,7 @@
 May use: models, their deformation, and the rules by which a face fills in what was not sent.
 """
 
-from fba.face.learning.errors import FapError, FitError, Spread
+from fba.face.learning._errors import FapError, FitError, Spread
 from fba.face.learning.learn import LearntFit, learn_fit
 from fba.face.learning.reduction import send_sources
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float64
+from fba.face.interpolation._terms import TERMS_MAX, Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.interpolation.terms import TERMS_MAX, Function, Link, Term
 from fba.face.learning._moments import EYES, FACE, HEAD, Moments
 from fba.parameters import faps
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Int32
 from fba.errors import FbaError, FbaWarning, ModelError
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.interpolation.table import InterpolationTable
+from fba.face.learning._errors import ErrorSum, FitError
 from fba.face.learning._moments import HEAD, add_up, measure
 from fba.face.learning._regression import choose_order, fewest, fit_coefficients, make_table
-from fba.face.learning.errors import ErrorSum, FitError
 from fba.face.learning.reduction import linked_columns, send_sources
 from fba.face.learning.sensitivity import displacements
 from fba.face.model import FaceModel

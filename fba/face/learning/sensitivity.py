@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float64
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 REACH = 100

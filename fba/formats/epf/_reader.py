@@ -14,20 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fba.arrays import Bool, UInt8
-from fba.codec.settings import (
-    QUANT_MAX,
-    RANGE_CODE_MAX,
-    RANGE_UNIT,
-    FrameRate,
-    PartSettings,
-    PlaneSettings,
-    RangeLists,
-    TimeCode,
-)
+from fba.codec import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
+from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT
 from fba.errors import FbaWarning
 from fba.formats.epf._tags import BODY, FACE, PARTS, TAGS, Part
-from fba.formats.text.lines import Lines, content, decoded
-from fba.formats.text.values import FRAME_NUMBER_MAX
+from fba.formats.text._lines import Lines, content, decoded
+from fba.formats.text._values import FRAME_NUMBER_MAX
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import recognition_hint
 from fba.source import Path, open_source

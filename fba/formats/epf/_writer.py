@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from fba.atomic import atomic
-from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT, PartSettings, PlaneSettings
+from fba.codec import PartSettings, PlaneSettings
+from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
 from fba.errors import FbaWarning, FormatError, UnsupportedError
 from fba.formats.epf._tags import BODY, PARTS, Part
 from fba.source import Path

@@ -11,7 +11,7 @@ from fba.errors import UnsupportedError
 from fba.formats.epf._reader import read_epf
 from fba.formats.epf._tags import TAGS
 from fba.formats.epf._writer import write_epf
-from fba.formats.text.lines import UTF8_MARK, content, decoded
+from fba.formats.text._lines import UTF8_MARK, content, decoded
 from fba.source import Path, read_head
 
 __all__ = ["read_animation", "read_epf", "sniff_epf", "write_epf"]

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.points import PointMotion
+from fba.capture import PointMotion
 from fba.errors import FormatError, ModelError
 from fba.source import Path
 

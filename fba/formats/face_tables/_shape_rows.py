@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.blendshapes import ShapeMotion
+from fba.capture import ShapeMotion
 from fba.capture.sampling import find_gaps
 from fba.errors import OptionError
 from fba.face.shape_names import arkit_names

@@ -14,7 +14,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.blendshapes import ShapeMotion
+from fba.capture import ShapeMotion
 from fba.errors import FormatError
 from fba.formats.face_tables._shape_rows import find_lacks, shape_of
 from fba.formats.face_tables._tables import named

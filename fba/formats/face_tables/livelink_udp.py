@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float64, Int64, to_float64
-from fba.capture.blendshapes import ShapeMotion
+from fba.capture import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import FormatError, Remedy, UnsupportedError
 from fba.formats.face_tables._shape_rows import check_weights, find_lacks, find_swap

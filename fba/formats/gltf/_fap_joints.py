@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64
+from fba.face import HEAD, FaceModel
 from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
-from fba.face.model import FaceModel
-from fba.face.tables import HEAD
-from fba.gltf.values import Value
+from fba.gltf import Value
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 Steps = tuple[tuple[int, Float64], ...]

@@ -16,15 +16,12 @@ import numpy as np
 from fba.animation import FaceTrack
 from fba.arrays import Bool, Float32, Float64
 from fba.errors import FbaWarning
-from fba.face.model import FaceModel
-from fba.face.resolve import resolve
+from fba.face import FaceModel, resolve
 from fba.formats.gltf._fap_joints import FapJoint
 from fba.formats.gltf._morph_targets import Targets
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
 from fba.gltf import Animation as Clip
-from fba.gltf import Gltf
-from fba.gltf.values import Value
-from fba.gltf.writer import Builder
+from fba.gltf import Builder, Gltf, Value
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 MAX_ERROR = 0.25

@@ -8,17 +8,15 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Array, Float32, Float64
+from fba.body import BodyModel
 from fba.body.head_attachment import AttachedHead, attach_head
-from fba.body.model import BodyModel
-from fba.face.deform.deformer import Deformer
-from fba.face.model import FaceModel, Part, point_row
-from fba.face.tables import HEAD
+from fba.face import HEAD, Deformer, FaceModel, Part
+from fba.face.model import point_row
 from fba.formats.gltf._fap_joints import FapJoint
 from fba.formats.gltf._joints import Clip, adopt, move
 from fba.formats.gltf._morph_targets import Targets, make_targets
 from fba.formats.gltf._pose import nearest_rotation
-from fba.gltf.part_materials import PartWriter
-from fba.gltf.writer import Builder
+from fba.gltf import Builder, PartWriter
 
 HEAD_NODE = "head"
 """The joint that FAPs 48 to 50 turn; BAPs turn its parent, the skull base."""

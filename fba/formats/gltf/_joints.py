@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
 from fba.errors import FormatError
-from fba.gltf.writer import Builder
+from fba.gltf import Builder
 from fba.rotations import quaternions
 from fba.source import Path
 

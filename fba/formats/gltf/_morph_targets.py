@@ -9,10 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from fba.arrays import Float32, Float64
-from fba.face.deform.deformer import Deformer
+from fba.face import Deformer, FaceDefTables, FaceModel
 from fba.face.gltf.morphs import morph_values
-from fba.face.model import FaceModel
-from fba.face.tables import FaceDefTables
 from fba.parameters import FAP_COUNT, faps
 
 TOLERANCE = 1e-4

@@ -12,18 +12,16 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Float64
-from fba.body import BapSolver, Skeleton
-from fba.body.solve.conventions import convention_names
+from fba.body import BapSolver, Skeleton, convention_names
 from fba.body.solve.solver import solve_track
 from fba.errors import FormatError
 from fba.formats.gltf._fap_joints import MAX_COORDINATE
 from fba.formats.gltf._fap_tracks import read_face
 from fba.formats.gltf._pose import Sampler, key_times, nearest_rotation
-from fba.formats.gltf.writer import MARK, MOST_FRAMES
+from fba.formats.gltf._writer import MARK, MOST_FRAMES
 from fba.formats.text.frame_rates import parse_rate
 from fba.gltf import Animation as Clip
-from fba.gltf import Channel, Gltf
-from fba.gltf.values import Value, optional_member
+from fba.gltf import Channel, Gltf, Value, optional_member
 
 VERSION = 1
 MAX_INDEX = 1 << 62

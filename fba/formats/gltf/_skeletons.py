@@ -10,14 +10,15 @@ from fractions import Fraction
 import numpy as np
 
 from fba import rotations
-from fba.body.skeleton import ROOT, Skeleton
+from fba.body import Skeleton
+from fba.body.skeleton import ROOT
 from fba.capture import SkeletonMotion, matching
 from fba.capture.bones import find_bones
 from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._pose import BindPose, find_bind_pose
 from fba.formats.gltf.humanoid import Humanoid, find_humanoid
 from fba.gltf import Gltf
-from fba.mesh.names import UniqueNames
+from fba.mesh import UniqueNames
 
 MAX_JOINTS = 4096
 TURNED = 1e-3

@@ -19,23 +19,22 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float32, Float64, Int32
-from fba.body.model import BodyModel, BodyPart
+from fba.body import BodyModel, Skeleton
+from fba.body.model import BodyPart
 from fba.body.own_head import OwnHead
-from fba.body.skeleton import ROOT, Skeleton
+from fba.body.skeleton import ROOT
 from fba.body.skin.skin_weights import strongest_weights
+from fba.capture import SkeletonMotion
 from fba.capture.blendshapes.shape_table import amounts_of
-from fba.capture.motion import SkeletonMotion
 from fba.capture.rest import Rest, find_rest
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
 from fba.formats.gltf._pose import bind_matrices
 from fba.formats.gltf._skeletons import Joints, find_joints
-from fba.gltf import Gltf, Node, Primitive, read_gltf
+from fba.gltf import Gltf, Node, Primitive, convert_material, read_gltf
 from fba.gltf import Material as GltfMaterial
-from fba.gltf.part_materials import convert_material
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.mesh.meshes import Material
-from fba.mesh.names import UniqueNames
+from fba.mesh import Material, UniqueNames
 from fba.source import Path
 
 CHUNK = 20_000

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from fba.gltf import Gltf
-from fba.gltf.values import Value, optional_member
+from fba.gltf import Gltf, Value, optional_member
 
 EXTENSIONS = {"VRM": "VRM 0", "VRMC_vrm": "VRM 1", "VRMC_vrm_animation": "VRMA"}
 MOST_BONES = 200

@@ -11,9 +11,8 @@ from fba.arrays import Float64
 from fba.capture.virtual_markers import MarkerPerformance
 from fba.errors import FormatError
 from fba.formats.gltf._joints import Clip, adopt, move, start_clip
-from fba.formats.gltf.writer import MOST_FRAMES
-from fba.gltf.part_materials import PartWriter
-from fba.gltf.writer import Builder
+from fba.formats.gltf._writer import MOST_FRAMES
+from fba.gltf import Builder, PartWriter
 from fba.source import Path
 
 STEP = 0.01

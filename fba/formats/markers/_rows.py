@@ -8,9 +8,10 @@ from fractions import Fraction
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers.motion import MAX_MARKERS, MarkerMotion, regular_times
+from fba.capture import MarkerMotion
+from fba.capture.markers.motion import MAX_MARKERS, regular_times
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.formats.markers.names import unique_names
+from fba.formats.markers._names import unique_names
 from fba.limits import Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
 from fba.source import Path, read_whole

@@ -15,9 +15,9 @@ import numpy as np
 from fba.arrays import Bool, Int32, Int64
 from fba.errors import FbaWarning, FormatError, Remedy
 from fba.formats.text._layout import Layout
+from fba.formats.text._lines import GIVE_RATE, Header, Lines, content, is_header, is_mask, parse_header
+from fba.formats.text._values import Row, ValueParser
 from fba.formats.text.frame_rates import parse_rate
-from fba.formats.text.lines import GIVE_RATE, Header, Lines, content, is_header, is_mask, parse_header
-from fba.formats.text.values import Row, ValueParser
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, open_source
 

@@ -13,8 +13,8 @@ from fba.arrays import Int32
 from fba.atomic import atomic
 from fba.errors import FormatError
 from fba.formats.text._layout import Layout
+from fba.formats.text._values import FRAME_NUMBER_MAX
 from fba.formats.text.frame_rates import format_rate, parse_rate
-from fba.formats.text.values import FRAME_NUMBER_MAX
 from fba.source import Path
 from fba.tracks import Track
 

@@ -9,7 +9,7 @@ from fba.errors import FormatError
 from fba.formats.text._frame_reader import read_frames
 from fba.formats.text._frame_writer import write_frames
 from fba.formats.text._layout import bap_layout
-from fba.formats.text.lines import sniff_layout
+from fba.formats.text._lines import sniff_layout
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 

@@ -3,11 +3,11 @@
 May use: the face, and what `fba.capture.points` says of trackers.
 """
 
-from fba.persona.points.adaptation import from_point_motion
-from fba.persona.points.distances import hausdorff_distance, mask_distance
-from fba.persona.points.procrustes import fit_similarity
-from fba.persona.points.registration import Registered, register
-from fba.persona.points.tracked import TrackedFace
+from fba.persona.points._adaptation import from_point_motion
+from fba.persona.points._distances import hausdorff_distance, mask_distance
+from fba.persona.points._procrustes import fit_similarity
+from fba.persona.points._registration import Registered, register
+from fba.persona.points._tracked import TrackedFace
 
 __all__ = [
     "Registered",

@@ -22,7 +22,9 @@ from importlib.resources import files
 import numpy as np
 
 from fba.arrays import Float64, Int64, Intp
-from fba.face.feature_points import names, neutral_points, row_of
+from fba.face import feature_point_names as names
+from fba.face import neutral_points
+from fba.face.feature_points import row_of
 
 TRACKED = 64
 """Number of points of a tracker."""

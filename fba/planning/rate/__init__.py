@@ -3,10 +3,10 @@
 May use: all of `fba.planning`, the models of faces and bodies.
 """
 
-from fba.planning.rate.bucket import LeakyBucket
-from fba.planning.rate.encoder import RateEncoder, RateStatistics
-from fba.planning.rate.errors import DistanceErrors, ParameterErrors, ShownErrors, measure_errors
-from fba.planning.rate.search import RatedStream, encode_at_rate
+from fba.planning.rate._bucket import LeakyBucket
+from fba.planning.rate._encoder import RateEncoder, RateStatistics
+from fba.planning.rate._errors import DistanceErrors, ParameterErrors, ShownErrors, measure_errors
+from fba.planning.rate._search import RatedStream, encode_at_rate
 
 __all__ = [
     "DistanceErrors",

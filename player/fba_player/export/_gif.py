@@ -13,7 +13,7 @@ import numpy as np
 
 from fba.arrays import UInt8
 from fba.atomic import PathLike, atomic_path, write_error
-from fba_player.sound.pyav import import_av
+from fba_player.sound._pyav import import_av
 
 SMOOTH = Fraction(25)
 """Most frames per second where none are asked for; some browsers slow down above 50."""

@@ -15,10 +15,10 @@ from PIL import Image, ImageDraw, ImageFont
 from fba.animation import Animation
 from fba.arrays import Float64, UInt8
 from fba.capture.comparison import Stick
-from fba_player.export.sheet_layout import lay_out
+from fba_player.export._sheet_layout import lay_out
 from fba_player.scene.scene import Scene
+from fba_player.view._view import View
 from fba_player.view.camera import Camera, Subject
-from fba_player.view.view import View
 
 TILE = (400, 480)
 """Width and height of one of the two pictures of a frame, in pixels."""

@@ -12,14 +12,15 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, UInt8
-from fba.face.model import FaceModel, point_row
+from fba.face import FaceModel
+from fba.face.model import point_row
 from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
 from fba.tracks import FaceTrack
+from fba_player.export._sheet_layout import FAINT, PAPER, TEXT, check_tile, lay_out
 from fba_player.export.offscreen import Offscreen
-from fba_player.export.sheet_layout import FAINT, PAPER, TEXT, check_tile, lay_out
 from fba_player.scene.scene import Scene
+from fba_player.view._font import label_font, shortened
 from fba_player.view.camera import Camera, Subject
-from fba_player.view.font import label_font, shortened
 
 SHEETS = ("faps", "visemes", "expressions", "all", "review")
 """Names of the sheets."""

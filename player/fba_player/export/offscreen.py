@@ -11,13 +11,13 @@ import numpy.typing as npt
 from fba.animation import Animation
 from fba.arrays import UInt8
 from fba.parameters import FAP_COUNT
-from fba_player.gl.context import offscreen_context
-from fba_player.gl.framebuffer import Target
+from fba_player.gl._context import offscreen_context
+from fba_player.gl._framebuffer import Target
 from fba_player.gl.renderer import Renderer
 from fba_player.scene.scene import Scene
+from fba_player.view._view import View
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
-from fba_player.view.view import View
 
 SAMPLES = 0
 """Samples per pixel; 0 is one, with edges smoothed afterwards."""

@@ -19,17 +19,17 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import DisplayError
+from fba_player._mesh.primitives import sphere_mesh
 from fba_player.export.offscreen import follow_camera, looks_at_head
-from fba_player.gl.context import missing_libraries, missing_text
-from fba_player.mesh.primitives import sphere_mesh
+from fba_player.gl._context import missing_libraries, missing_text
 from fba_player.scene.scene import Scene
+from fba_player.view._geometry import turn_partly, unit_rows
+from fba_player.view._view import Eye, FaceMesh, Mesh
 from fba_player.view.camera import Camera
-from fba_player.view.geometry import turn_partly, unit_rows
-from fba_player.view.view import Eye, FaceMesh, Mesh
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyModel
-    from fba.face.model import FaceModel
+    from fba.body import BodyModel
+    from fba.face import FaceModel
 
 
 NUMPY_1 = {"infty": np.inf, "Inf": np.inf, "NaN": np.nan, "float_": np.float64}

@@ -278,7 +278,7 @@ def _open_sink(
 ) -> Sink:
     suffix = path.suffix.lower()
     if suffix == ".mp4":
-        from fba_player.export.mp4 import Mp4
+        from fba_player.export._mp4 import Mp4
 
         return Mp4(path, size, rate, audio, audio_start)
     if suffix == ".gif":

@@ -18,7 +18,7 @@ from fba_player.gl._labels import (
     names_picture,
     place_names,
 )
-from fba_player.gl.resources import (
+from fba_player.gl._resources import (
     RecentlyUsed,
     load_program,
     make_texture,
@@ -26,9 +26,9 @@ from fba_player.gl.resources import (
     set_uniform,
     write_buffer,
 )
+from fba_player.view._geometry import world_normals, world_positions
+from fba_player.view._view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend, Lines
 from fba_player.view.camera import Camera
-from fba_player.view.geometry import world_normals, world_positions
-from fba_player.view.view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend, Lines
 
 REFERENCE_HEIGHT, MIN_SCALE = 720, 0.35
 CROWDED = 7.0

@@ -10,8 +10,8 @@ import numpy as np
 from fba.arrays import Float32, Float64, Floating
 from fba.compiled import is_compiled
 from fba_player.gl._silhouette import Outliner
-from fba_player.view.geometry import turn_partly
-from fba_player.view.view import FaceMesh, View
+from fba_player.view._geometry import turn_partly
+from fba_player.view._view import FaceMesh, View
 
 MARGIN = 0.03
 """Margin on every side, as a share of a rectangle's size."""

@@ -15,8 +15,8 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, UInt8
 from fba.compiled import compiled, is_compiled
-from fba_player.figure.face_light import KEY_DIRECTION
-from fba_player.view.view import FaceMesh, FaceShape
+from fba_player._figure.face_light import KEY_DIRECTION
+from fba_player.view._view import FaceMesh, FaceShape
 
 CELLS, CELL = 96, 0.05
 """The grid: number of cells each way, and their size (m)."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float64, Int64, Intp, UInt8
-from fba_player.view.font import label_font
-from fba_player.view.view import Legend
+from fba_player.view._font import label_font
+from fba_player.view._view import Legend
 
 TEXT = (240, 242, 245, 255)
 FAINT = (186, 192, 200, 255)

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, UInt8
-from fba_player.gl._textures import Pictures, count_halvings
-from fba_player.gl.lod import distance, share_memory
-from fba_player.gl.resources import (
+from fba_player._mesh.textures import RELIEF, skin_relief, texture_breadth
+from fba_player._mesh.wrinkle_map import BOTTOM, TEXELS, TOP, WIDTH, wrinkle_map
+from fba_player._mesh.wrinkle_map import SHAPE as WRINKLE_SHAPE
+from fba_player.gl._lod import distance, share_memory
+from fba_player.gl._resources import (
     RecentlyUsed,
     load_program,
     make_texture,
@@ -17,10 +19,8 @@ from fba_player.gl.resources import (
     set_uniform,
     write_buffer,
 )
-from fba_player.mesh.textures import RELIEF, skin_relief, texture_breadth
-from fba_player.mesh.wrinkle_map import BOTTOM, TEXELS, TOP, WIDTH, wrinkle_map
-from fba_player.mesh.wrinkle_map import SHAPE as WRINKLE_SHAPE
-from fba_player.view.view import FaceMesh, FaceShape
+from fba_player.gl._textures import Pictures, count_halvings
+from fba_player.view._view import FaceMesh, FaceShape
 
 CACHED_SHAPES = 64
 """Number of parts whose buffers are cached; the least recently used goes first."""

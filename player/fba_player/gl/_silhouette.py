@@ -11,8 +11,8 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int8, Int32, UInt8
 from fba.compiled import compiled
-from fba_player.gl.resources import RecentlyUsed
-from fba_player.view.view import FaceMesh
+from fba_player.gl._resources import RecentlyUsed
+from fba_player.view._view import FaceMesh
 
 TILE = 8
 """Size (pixels) of the tiles that are smoothed if an outline runs through them."""

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float32, UInt8
-from fba_player.gl.resources import make_texture
-from fba_player.mesh.textures import texture_breadth
-from fba_player.view.view import FaceShape
+from fba_player._mesh.textures import texture_breadth
+from fba_player.gl._resources import make_texture
+from fba_player.view._view import FaceShape
 
 MIN_TEXEL = 0.8
 """Least width of a texel, in pixels of the screen."""

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
+from fba_player._mesh.primitives import capsule_mesh, sphere_mesh
 from fba_player.gl._annotation_renderer import ExtrasRenderer
 from fba_player.gl._antialias_region import Steps, find_steps
 from fba_player.gl._ground_shadow import ShadowCaster
+from fba_player.gl._lod import Details
 from fba_player.gl._mesh_renderer import FaceRenderer
+from fba_player.gl._resources import RecentlyUsed, load_program, matrix_bytes, set_uniform, write_buffer
 from fba_player.gl._silhouette import Outliner
-from fba_player.gl.lod import Details
-from fba_player.gl.resources import RecentlyUsed, load_program, matrix_bytes, set_uniform, write_buffer
-from fba_player.mesh.primitives import capsule_mesh, sphere_mesh
+from fba_player.view._view import CAPSULE_FLOATS, Eye, Mesh, View
 from fba_player.view.camera import Camera
-from fba_player.view.view import CAPSULE_FLOATS, Eye, Mesh, View
 
 MAX_BLOBS = 8
 """Largest number of soft shadows on the ground."""

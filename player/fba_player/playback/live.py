@@ -15,8 +15,7 @@ from typing import Any, Protocol
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Int64
-from fba.codec import Decoder, FrameBuffer, StreamInfo, marked_table
-from fba.codec.block import Block
+from fba.codec import Block, Decoder, FrameBuffer, StreamInfo, marked_table
 from fba.errors import BitstreamError, FbaError, FbaWarning
 from fba.formats.step_choice import choose_steps
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT

@@ -10,7 +10,7 @@ import math
 import time as wall
 from collections.abc import Callable
 
-from fba_player.playback.playhead import Motion
+from fba_player.playback._playhead import Motion
 from fba_player.playback.timeline import clock_text, timecode
 from fba_player.view.protocols import Times
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
 from fba.body import Skeleton
-from fba.face.model import FaceModel
-from fba.face.tables import HEAD
-from fba_player.view.view import CAPSULE_FLOATS, spheres, srgb
+from fba.face import HEAD, FaceModel
+from fba_player.view._view import CAPSULE_FLOATS, spheres, srgb
 
 BONE = (*srgb("#c3c8cf"), 0.12)
 JOINT = (*srgb("#e08a3c"), 0.25)

@@ -9,13 +9,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
-from fba.face.feature_points import names
-from fba_player.figure.face import FaceFigure
+from fba.face import feature_point_names as names
+from fba_player._figure.face import FaceFigure
 from fba_player.scene._bones import Bones, Pivots, find_pivots
 from fba_player.scene._fap_heatmap import FapHeatmap
 from fba_player.scene._wireframe import Wireframe
+from fba_player.view._view import Colour, Dots, Extras, FaceMesh, FaceShape, Grid, View
 from fba_player.view.switches import Switches
-from fba_player.view.view import Colour, Dots, Extras, FaceMesh, FaceShape, Grid, View
 
 HIDDEN_KINDS = {"eyes": ("eye",), "teeth": ("teeth", "tongue"), "hair": ("hair", "brow", "lash")}
 """Kinds of parts that a switch hides."""

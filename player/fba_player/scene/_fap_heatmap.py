@@ -12,11 +12,11 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Floating
 from fba.parameters import FAP_COUNT, faps
-from fba_player.figure.face import FaceFigure
-from fba_player.mesh.primitives import sphere_mesh
-from fba_player.mesh.textures import linear_light
-from fba_player.view.geometry import rotation_vector, turn_partly
-from fba_player.view.view import Eye, FaceMesh, FaceShape, Legend, Mesh, MeshShape
+from fba_player._figure.face import FaceFigure
+from fba_player._mesh.primitives import sphere_mesh
+from fba_player._mesh.textures import linear_light
+from fba_player.view._geometry import rotation_vector, turn_partly
+from fba_player.view._view import Eye, FaceMesh, FaceShape, Legend, Mesh, MeshShape
 
 STEPS, ANGLE = 100, 10_000
 """The FAP's value: about a tenth of the unit for distances, 0.1 rad for angles."""

@@ -12,11 +12,11 @@ import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
 from fba.face.feature_points import row_of
-from fba_player.figure.face import FaceFigure
-from fba_player.mesh.primitives import tube_mesh
+from fba_player._figure.face import FaceFigure
+from fba_player._mesh.primitives import tube_mesh
 from fba_player.scene._skin_lines import SkinLine, skin_lines
-from fba_player.view.geometry import unit_rows
-from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, spheres, srgb
+from fba_player.view._geometry import unit_rows
+from fba_player.view._view import FaceMesh, FaceShape, Mesh, MeshShape, spheres, srgb
 
 POINT = (*srgb("#f0a04b"), 0.3)
 POINT_RADIUS = 0.00125

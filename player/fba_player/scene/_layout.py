@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from fba.arrays import Float32, Float64
-from fba_player.view.geometry import translation
-from fba_player.view.view import Dots, Extras, Lines, MeshShape, View
+from fba_player.view._geometry import translation
+from fba_player.view._view import Dots, Extras, Lines, MeshShape, View
 
 Colour = tuple[float, float, float]
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
-from fba.face.model import FaceModel, point_row
+from fba.face import FaceModel
+from fba.face.model import point_row
 
 Indices = Intp
 

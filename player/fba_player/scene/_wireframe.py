@@ -8,9 +8,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Intp
-from fba_player.mesh.primitives import sphere_mesh
-from fba_player.view.geometry import world_normals, world_positions
-from fba_player.view.view import Colour, Eye, FaceMesh, FaceShape, Lines, Mesh, MeshShape
+from fba_player._mesh.primitives import sphere_mesh
+from fba_player.view._geometry import world_normals, world_positions
+from fba_player.view._view import Colour, Eye, FaceMesh, FaceShape, Lines, Mesh, MeshShape
 
 WIRE: Colour = (0.03, 0.05, 0.08, 0.8)
 WIRE_LIFT = 0.0012

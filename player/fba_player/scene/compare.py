@@ -11,18 +11,18 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba_player.scene._compare_timeline import CompareTimeline
+from fba_player.scene._differences import Differences, differences
 from fba_player.scene._layout import Drawing, join_views, make_caption, move_view
-from fba_player.scene.differences import Differences, differences
 from fba_player.scene.scene import Scene
+from fba_player.view._view import Extras, View, srgb
 from fba_player.view.camera import PRESETS, Camera, Subject
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
-from fba_player.view.view import Extras, View, srgb
 
 if TYPE_CHECKING:
     from fba.animation import Animation
-    from fba.face.model import FaceModel
-    from fba_player.figure.face import FaceFigure
+    from fba.face import FaceModel
+    from fba_player._figure.face import FaceFigure
 
 
 ARRANGEMENTS = ("side", "over")

@@ -14,16 +14,22 @@ from pathlib import Path
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.markers.motion import MarkerMotion
-from fba.capture.virtual_markers import MarkedHead, MarkerMapping, MarkerPerformance, VirtualMarker
-from fba.capture.virtual_markers.influence import Influence, give_to_nearest
+from fba.capture import MarkerMotion
+from fba.capture.virtual_markers import (
+    Influence,
+    MarkedHead,
+    MarkerMapping,
+    MarkerPerformance,
+    VirtualMarker,
+    write_mapping,
+)
+from fba.capture.virtual_markers.influence import give_to_nearest
 from fba.capture.virtual_markers.lids import lid_at
-from fba.capture.virtual_markers.mapping_files import write_mapping
 from fba.capture.virtual_markers.performance import Neutral, SteadyMarkers, perform_steady, steady
 from fba.capture.virtual_markers.proposal import usual_radius
 from fba.capture.virtual_markers.weights import find_influences
 from fba.errors import FbaError, FbaWarning
-from fba_player.scene.hand_editing import HandEditing
+from fba_player.scene._hand_editing import HandEditing
 
 
 class MarkerEditing(HandEditing[MarkerMapping]):

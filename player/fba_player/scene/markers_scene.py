@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
-from fba.mesh.meshes import vertex_normals
-from fba_player.figure.face import FaceFigure, build_figure
-from fba_player.mesh.textures import linear_light
+from fba.mesh import vertex_normals
+from fba_player._figure.face import FaceFigure, build_figure
+from fba_player._mesh.textures import linear_light
 from fba_player.playback.timeline import CaptureTimes
 from fba_player.scene._fap_heatmap import GLOSS, SHADES, heat_colours
+from fba_player.scene._placement_scene import fit_box, make_dots, plain_mesh, plain_shape
 from fba_player.scene.marker_editing import MarkerEditing
-from fba_player.scene.placement_scene import fit_box, make_dots, plain_mesh, plain_shape
+from fba_player.view._geometry import first_hit, ray_through, rotation_vector, translation, unit_rows
+from fba_player.view._view import Colour, Dots, Extras, Eye, FaceMesh, FaceShape, Legend, Lines, View
 from fba_player.view.camera import Camera, Subject
-from fba_player.view.geometry import first_hit, ray_through, rotation_vector, translation, unit_rows
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
-from fba_player.view.view import Colour, Dots, Extras, Eye, FaceMesh, FaceShape, Legend, Lines, View
 
 MOVING: Colour = (0.95, 0.62, 0.25, 1.0)
 FIXED: Colour = (0.62, 0.70, 0.80, 1.0)

@@ -11,16 +11,16 @@ from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba_player.playback.timeline import Timeline
 from fba_player.scene._framing import Extent, body_extent
+from fba_player.view._view import View
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import SWITCHES, Switches
-from fba_player.view.view import View
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyModel
-    from fba.face.model import FaceModel
-    from fba_player.figure.face import FaceFigure
-    from fba_player.figure.person import Person
+    from fba.body import BodyModel
+    from fba.face import FaceModel
+    from fba_player._figure.face import FaceFigure
+    from fba_player._figure.person import Person
     from fba_player.scene._display_options import DisplayOptions
     from fba_player.scene._feature_points_view import PointView
 
@@ -59,8 +59,8 @@ class Scene(Timed[Timeline]):
     ) -> None:
         if not len(animation):
             raise ValueError("nothing to show: the animation has no frames")
-        from fba.face.model import FaceModel
-        from fba_player.figure.model_units import prepare_model
+        from fba.face import FaceModel
+        from fba_player._figure.model_units import prepare_model
 
         self.animation = animation
         self.model = FaceModel.default() if model is None else prepare_model(model)
@@ -74,8 +74,8 @@ class Scene(Timed[Timeline]):
         self._extent: Extent | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
+            from fba.body import BodyModel
             from fba.body.footing import GroundedPoser
-            from fba.body.model import BodyModel
             from fba_player.scene._bones import Bones
 
             self._body = body or BodyModel.default()
@@ -110,7 +110,7 @@ class Scene(Timed[Timeline]):
     def figure(self) -> FaceFigure:
         """The face that is shown; built on first use."""
         if self._figure is None:
-            from fba_player.figure.face import build_figure
+            from fba_player._figure.face import build_figure
 
             self._figure = build_figure(self.model)
         return self._figure
@@ -119,7 +119,7 @@ class Scene(Timed[Timeline]):
     def person(self) -> Person:
         """The body that is shown, with the face on it; built on first use; only if there is a body."""
         if self._person is None:
-            from fba_player.figure.person import build_person
+            from fba_player._figure.person import build_person
 
             self._person = build_person(self._body, self.figure)
         return self._person

@@ -20,7 +20,7 @@ from fba_player.session.takes import TakeRecorder, Takes, take_rate
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from fba_player.session.session import Session
+    from fba_player.session._session import Session
 
 NEUTRAL_SECONDS = 10
 UNSAVED_TAKE = "the last take"

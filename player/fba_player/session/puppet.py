@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float32, Float64
-from fba.face.expressions import Definitions
+from fba.face import Definitions
 from fba.parameters import (
     BAP_COUNT,
     EXPRESSION_SELECT_MAX,
@@ -16,7 +16,7 @@ from fba.parameters import (
     INTENSITY_MAX,
     VISEME_SELECT_MAX,
 )
-from fba_player.session.mood import PuppetMood
+from fba_player.session._mood import PuppetMood
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.arrays import Int16
 from fba.errors import FbaError
-from fba_player.playback.playhead import Motion
+from fba_player.playback._playhead import Motion
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 
 SECONDS = 0.5

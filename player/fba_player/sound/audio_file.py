@@ -12,7 +12,7 @@ import numpy as np
 from fba.arrays import Int16
 from fba.atomic import PathLike
 from fba.errors import FbaWarning, FormatError
-from fba_player.sound.pyav import av_version, import_av
+from fba_player.sound._pyav import av_version, import_av
 
 CHANNELS = 2
 RATES = (8000, 192_000)

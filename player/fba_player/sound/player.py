@@ -19,7 +19,7 @@ from typing import Any
 
 from fba.atomic import PathLike
 from fba.errors import FbaWarning
-from fba_player.gl.context import cure
+from fba_player.gl._context import cure
 from fba_player.playback.transport import Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound._read_ahead import SoundBlocks, samples_ahead

@@ -12,8 +12,8 @@ import numpy as np
 from fba.arrays import Int16
 from fba.atomic import PathLike
 from fba.formats.time_codes import parse_time_code
+from fba_player.sound._pyav import import_av
 from fba_player.sound.audio_file import open_sound
-from fba_player.sound.pyav import import_av
 from fba_player.sound.soundtrack import BLOCK, Soundtrack
 
 FULL = 32767

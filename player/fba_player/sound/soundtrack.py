@@ -12,8 +12,8 @@ import numpy as np
 from fba.arrays import Float32
 from fba.atomic import PathLike
 from fba.errors import FormatError
+from fba_player.sound._pyav import import_av
 from fba_player.sound.audio_file import open_sound
-from fba_player.sound.pyav import import_av
 
 AAC_RATES = (96000, 88200, 64000, 48000, 44100, 32000, 24000, 22050, 16000, 12000, 11025, 8000)
 BLOCK = 1024

@@ -8,9 +8,9 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Generic, Protocol, TypeVar
 
+from fba_player.view._view import View
 from fba_player.view.camera import Camera
 from fba_player.view.switches import Switches
-from fba_player.view.view import View
 
 
 class Times(Protocol):

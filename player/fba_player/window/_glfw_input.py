@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fba_player.session.controls import Controls
-from fba_player.session.keys import by_name
-from fba_player.session.session import Session
+from fba_player.session._controls import Controls
+from fba_player.session._keys import by_name
+from fba_player.session._session import Session
 from fba_player.window.display import decode
 
 CURSORS = {
@@ -38,7 +38,7 @@ US_LAYOUT = {
 class GlfwInput:
     """Hands the events of a glfw window to the panels and the controls.
 
-    gui: a `fba_player.ui.gui.Gui`, or None where there are no panels. on_input: called after each event that
+    gui: a `fba_player._ui.gui.Gui`, or None where there are no panels. on_input: called after each event that
     may change the picture.
     """
 

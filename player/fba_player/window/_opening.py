@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fba_player.view.font import label_font, shortened
+from fba_player.view._font import label_font, shortened
 
 GREY, LETTERS = (118, 122, 127), (236, 238, 240)
 """sRGB."""

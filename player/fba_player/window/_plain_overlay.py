@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fba_player.gl.resources import load_program
-from fba_player.session.controls import BAR_HEIGHT, Controls
-from fba_player.session.keys import keys
-from fba_player.view.font import label_font
+from fba_player.gl._resources import load_program
+from fba_player.session._controls import BAR_HEIGHT, Controls
+from fba_player.session._keys import keys
+from fba_player.view._font import label_font
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fba.arrays import UInt8
 from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaWarning
-from fba_player.gl.context import (
+from fba_player.gl._context import (
     OPENGL,
     cure,
     how_to_install,
@@ -18,16 +18,16 @@ from fba_player.gl.context import (
     missing_libraries,
     missing_text,
 )
-from fba_player.gl.framebuffer import Target
-from fba_player.gl.readback import Readback
+from fba_player.gl._framebuffer import Target
+from fba_player.gl._readback import Readback
 from fba_player.gl.renderer import Renderer
 from fba_player.playback.live import LiveTimeline
 from fba_player.playback.transport import Transport
-from fba_player.session.captures import Captures, draw_screenshot
-from fba_player.session.controls import Controls
-from fba_player.session.pages import page_of
-from fba_player.session.session import Session
-from fba_player.session.source import Source
+from fba_player.session._captures import Captures, draw_screenshot
+from fba_player.session._controls import Controls
+from fba_player.session._pages import page_of
+from fba_player.session._session import Session
+from fba_player.session._source import Source
 from fba_player.view.camera import Camera
 from fba_player.window._glfw_input import GlfwInput
 from fba_player.window._opening import draw_opening
@@ -222,7 +222,7 @@ class Window:
         session.size, session.scale = self._framebuffer(), self._scale()
         if panels:
             try:
-                from fba_player.ui.gui import Gui
+                from fba_player._ui.gui import Gui
 
                 self._gui = Gui(self._gl, session)
             except (ImportError, RuntimeError) as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fba.errors import DisplayError
-from fba_player.gl.context import cure
+from fba_player.gl._context import cure
 
 HOW_WITHOUT = (
     "On a machine without a display, `fba render FILE -o OUT.mp4` makes a film instead; "

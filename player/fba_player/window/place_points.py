@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fba.atomic import PathLike
 from fba.face.importers.head_surface import HeadSurface
-from fba_player.scene.placement_scene import PlacementScene
-from fba_player.scene.point_placement import PointPlacement
+from fba_player.scene._placement_scene import PlacementScene
+from fba_player.scene._point_placement import PointPlacement
 from fba_player.window._window import Window
 from fba_player.window.display import check_page
 

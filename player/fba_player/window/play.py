@@ -14,13 +14,13 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba.atomic import PathLike
-from fba.face.resolve import Resolver
+from fba.face import Resolver
 from fba.tracks import BodyTrack, FaceTrack
 from fba_player.export.render import as_scene
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.scene import Scene
-from fba_player.session.session import Session
-from fba_player.session.source import Source
+from fba_player.session._session import Session
+from fba_player.session._source import Source
 from fba_player.view.camera import Camera
 from fba_player.window._window import WARNING_SECONDS, Window
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from fba.body import BapSolver
 from fba.body.model import BodyModel, BodyPart
 from fba.compiled import is_compiled
-from fba.mesh.meshes import vertex_normals
+from fba.mesh._meshes import vertex_normals
 from fba.parameters import baps
 from small_bodies import Float64, random_pose, rod, tube
 

@@ -12,11 +12,11 @@ from scipy.optimize import lsq_linear
 import fba
 from fba.animation import Animation, FaceTrack
 from fba.capture import ShapeMotion, from_blendshapes, to_blendshapes
-from fba.capture.blendshapes.inversion import find_weights
+from fba.capture.blendshapes._inversion import find_weights
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.face.shape_names import arkit_names
-from fba.formats.face_tables.livelink_csv import read_face
+from fba.formats.face_tables._livelink_csv import read_face
 from fba.parameters import fap_numbers
 
 COUNT = 40

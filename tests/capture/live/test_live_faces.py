@@ -250,7 +250,7 @@ def test_records_of_ifacialmocap(version: int, tmp_path: Path) -> None:
 
 def test_records_that_arrive_in_bursts_count_at_a_steady_rate() -> None:
     clock = ifacial_clock = None
-    from fba.live.protocols.ifacialmocap import SteadyClock
+    from fba.live._protocols.ifacialmocap import SteadyClock
 
     clock, ifacial_clock = SteadyClock(1 / 60), SteadyClock(1 / 60)
     random = np.random.default_rng(3)

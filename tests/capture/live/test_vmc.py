@@ -12,10 +12,10 @@ import fba
 from fba.arrays import Float64
 from fba.body import BapSolver
 from fba.capture import SkeletonMotion, from_skeleton
-from fba.live.protocols._osc import read_messages
-from fba.live.protocols.sample import DatagramError
-from fba.live.protocols.unity_bones import joint_of, parents
-from fba.live.protocols.vmc import VmcReader
+from fba.live._protocols._osc import read_messages
+from fba.live._protocols.sample import DatagramError
+from fba.live._protocols.unity_bones import joint_of, parents
+from fba.live._protocols.vmc import VmcReader
 from fba.parameters import fap_numbers
 from live_senders import UNITY_BONES, Sent, bundle, captured, osc, vmc_frames
 

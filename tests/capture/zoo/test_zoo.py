@@ -11,7 +11,7 @@ from fba.body import BapSolver, Skeleton
 from fba.capture import from_skeleton
 from fba.capture.bones import find_bones
 from fba.errors import ModelError
-from fba.formats.bvh.reader import parse
+from fba.formats.bvh._reader import parse
 from zoo_bodies import Maker, truth, write
 
 MIXAMO = (

@@ -18,7 +18,7 @@ from fba.body import Limits
 from fba.capture import preparation
 from fba.capture.comparison import Comparison, Difference
 from fba.cli.capture_report import CaptureReport, poor_line
-from fba.formats.bvh import reader
+from fba.formats.bvh import _reader as reader
 from fba.parameters import baps
 
 BVH = """HIERARCHY

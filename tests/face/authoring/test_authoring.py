@@ -10,7 +10,7 @@ import pytest
 from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.face.checks import check_faps
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.feature_points import row_of
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps

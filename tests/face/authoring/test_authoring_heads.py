@@ -13,7 +13,7 @@ from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.face.checks import check_faps
 from fba.face.checks._lid_rules import GAP, SPLITS, lid_cut, lid_gap
-from fba.face.checks.posing import Poser
+from fba.face.checks._posing import Poser
 from fba.face.importers import import_model
 
 

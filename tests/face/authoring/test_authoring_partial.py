@@ -11,7 +11,7 @@ import pytest
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.face.authoring import author
-from fba.face.authoring.author import author_lids
+from fba.face.authoring._author import author_lids
 from fba.face.checks import check_faps
 from fba.face.feature_points import row_of
 from fba.face.model import Part
@@ -201,7 +201,7 @@ def test_no_skin_no_face(parts: list[Part], points: np.ndarray) -> None:
 def test_a_mesh_beyond_the_limit_is_refused_at_once(
     parts: list[Part], points: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sys.modules["fba.face.authoring.author"], "MOST_VERTICES", 5000)
+    monkeypatch.setattr(sys.modules["fba.face.authoring._author"], "MOST_VERTICES", 5000)
     with pytest.raises(ModelError, match=r"has \d+ vertices, but at most 5000 .* decimate"):
         author(parts, points)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fba.face.authoring.surface.fold_limits import LEAST_AREA, MOST_STRETCH, Limiter, Patch
+from fba.face.authoring.surface._fold_limits import LEAST_AREA, MOST_STRETCH, Limiter, Patch
+from fba.face.authoring.surface._unfold import _solve_harmonic
 from fba.face.authoring.surface.surface import Surface, weld_parts
-from fba.face.authoring.surface.unfold import _solve_harmonic
 from fba.face.model import Part
 
 SIDE = 12

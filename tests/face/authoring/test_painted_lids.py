@@ -13,11 +13,11 @@ from PIL import Image
 from fba.face.authoring import author
 from fba.face.authoring.surface.landmarks import find_landmarks, weld_skin
 from fba.face.checks import check_faps
-from fba.face.checks.posing import Poser
+from fba.face.checks._posing import Poser
 from fba.face.feature_points import row_of
 from fba.face.importers import import_model
 from fba.face.model import FaceModel
-from fba.mesh.pictures import read_pixels
+from fba.mesh._pictures import read_pixels
 from small_head import small_head
 
 BAND = 0.0045

@@ -21,7 +21,7 @@ from fba.face.eyeball import eyeballs
 from fba.face.fapu import Fapu
 from fba.face.feature_points import MIRRORED, names, row_of
 from fba.face.model import FaceModel, Part
-from fba.mesh.meshes import vertex_normals
+from fba.mesh._meshes import vertex_normals
 from small_head import EYE_RADIUS, small_head
 
 ROW = row_of()

@@ -10,12 +10,12 @@ import pytest
 
 from fba.errors import OptionError
 from fba.face import FaceModel
+from fba.face._tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.authoring import author
 from fba.face.checks import Finding, check_faps
-from fba.face.checks.fap_checks import check_posed
-from fba.face.checks.posing import Poser
+from fba.face.checks._fap_checks import check_posed
+from fba.face.checks._posing import Poser
 from fba.face.feature_points import row_of
-from fba.face.tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from grid_head import grid_head
 
 

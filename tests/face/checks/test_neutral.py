@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fba.face._tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.checks._findings import Finding
 from fba.face.checks._locations import check_locations
 from fba.face.checks._neutral import check_neutral
 from fba.face.eyeball import eyeballs, pupil_diameter, sphere
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.model import FaceModel, Part
-from fba.face.tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from small_head import EYE_RADIUS, adult_points, ball, small_head
 
 ROW = row_of()

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fba.face import FeaturePointFace, feature_point_names, neutral_points
-from fba.face.deform.deformer import Deformer
+from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
+from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel, Part
 from fba.face.points import shift_table
-from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
-from fba.mesh.meshes import vertex_normals
+from fba.mesh._meshes import vertex_normals
 from fba.parameters import faps
 
 ROW = {name: row for row, name in enumerate(feature_point_names())}

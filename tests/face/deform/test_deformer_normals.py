@@ -17,9 +17,9 @@ import pytest
 
 from fba.errors import ModelError, RangeError
 from fba.face import neutral_points
-from fba.face.deform.deformer import Deformer
+from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
+from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel, Part
-from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 
 FREE = np.full(84, -1)
 CENTRE = np.array([0.01, 0.02, -0.03])

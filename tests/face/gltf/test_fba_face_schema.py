@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from test_storage_hostile import CASES
 
-from fba.face.gltf.storage import build
+from fba.face.gltf._storage import build
 from fba.face.model import PART_KINDS, FaceModel
 from fba.parameters import faps, feature_points
 from json_places import put

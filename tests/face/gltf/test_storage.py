@@ -11,10 +11,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from fba.errors import FormatError, ModelError
+from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import neutral_points, row_of
-from fba.face.gltf.storage import load, save
+from fba.face.gltf._storage import load, save
 from fba.face.model import FaceModel, Material
-from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.gltf import Gltf, Surface, read_gltf, surfaces
 from fba.parameters import fap_numbers, faps
 from stored_models import assert_same, ball, face, models, picture

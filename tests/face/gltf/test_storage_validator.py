@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fba.face.gltf.storage import save
+from fba.face.gltf._storage import save
 from fba.face.model import FaceModel, Material
 from stored_models import face
 

@@ -11,22 +11,22 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from fba.errors import ModelError
+from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.authoring import author
-from fba.face.authoring.shapes.morphs import add_shapes
+from fba.face.authoring._shapes.morphs import add_shapes
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.checks import check_faps
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import eyeballs
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers.assembly._joining import join_pieces
 from fba.face.importers.assembly._openings import find_eye_loop, lid_points_of_loop
-from fba.face.importers.assembly.model import turn_outward
-from fba.face.importers.assembly.pieces import assemble
-from fba.face.importers.assembly.polygon_parts import Piece
-from fba.face.importers.assembly.repair import _stopped, repair_tables
-from fba.face.importers.assembly.symmetry import (
+from fba.face.importers.assembly._pieces import assemble
+from fba.face.importers.assembly._polygon_parts import Piece
+from fba.face.importers.assembly._repair import _stopped, repair_tables
+from fba.face.importers.assembly._symmetry import (
     asymmetry,
     mirror_faulty_lids,
     mirror_points,
@@ -34,8 +34,8 @@ from fba.face.importers.assembly.symmetry import (
     stand_upright,
     stand_upright_by_points,
 )
+from fba.face.importers.assembly.model import turn_outward
 from fba.face.model import FaceModel, Part
-from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.gltf import read_gltf, surfaces
 from gltf_documents import Sheet
 from mesh_files import write_glb

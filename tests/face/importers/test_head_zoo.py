@@ -14,13 +14,13 @@ import pytest
 
 from fba.errors import ModelError
 from fba.face.checks import check_faps
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
 from fba.face.feature_points import MIRRORED, names, row_of
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces, locate
+from fba.face.importers.assembly._symmetry import MIRRORED_LIDS
 from fba.face.importers.assembly.model import ImportOptions
-from fba.face.importers.assembly.symmetry import MIRRORED_LIDS
 from fba.face.model import FaceModel
 from fba.parameters import faps
 from mesh_files import write_points

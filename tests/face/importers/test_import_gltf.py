@@ -9,13 +9,13 @@ import pytest
 
 from fba.errors import FbaWarning, ModelError
 from fba.face.authoring import author, from_morphs
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
 from fba.face.feature_points import row_of
 from fba.face.gltf.morphs import displacements
 from fba.face.importers import import_model
-from fba.face.importers.assembly.landmarks import find_points
-from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly._landmarks import find_points
+from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers, faps
 from mesh_files import write_glb, write_points

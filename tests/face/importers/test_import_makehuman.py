@@ -10,7 +10,7 @@ import pytest
 
 from fba.errors import ModelError, OptionError
 from fba.face.checks import check_neutral
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
 from fba.face.importers.makehuman.makehuman import read_makehuman

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fba.errors import FbaWarning, ModelError, OptionError
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.feature_points import row_of
 from fba.face.importers import import_model
+from fba.face.importers.assembly._pieces import guess_kind
 from fba.face.importers.assembly.model import metres_per_unit
-from fba.face.importers.assembly.pieces import guess_kind
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers
 from mesh_files import ply, write_obj, write_points

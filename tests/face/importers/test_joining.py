@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from fba.face.importers.assembly._joining import MAX_PIXELS, join_pieces, make_atlas
-from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.model import Material, Part
 
 

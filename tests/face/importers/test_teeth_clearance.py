@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fba.face.authoring import author
-from fba.face.checks.fap_checks import check_posed
-from fba.face.checks.posing import Poser
+from fba.face.checks._fap_checks import check_posed
+from fba.face.checks._posing import Poser
 from fba.face.importers.assembly._teeth_clearance import STRETCH, clear_teeth
 from fba.face.model import FaceModel, Part
 from small_head import small_head

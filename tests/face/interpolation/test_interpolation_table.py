@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fba.errors import ModelError
-from fba.face.interpolation.evaluate import evaluate
+from fba.face.interpolation._evaluate import evaluate
+from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.interpolation.terms import Function, Link, Term
 from fba.parameters import fap_numbers, faps
 
 SURPRISE = 6

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 import hand_tracks
 from fba.animation import FaceTrack
 from fba.face import Definitions, Resolver, resolve
+from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.interpolation.terms import Function, Link, Term
 from fba.parameters import fap_numbers
 
 JOY = 1

@@ -8,8 +8,8 @@ import pytest
 import fba
 from fba.animation import Animation, FaceTrack
 from fba.face import Definitions, Resolver, resolve
+from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.interpolation.terms import Function, Link, Term
 from fba.parameters import faps
 
 OPEN_JAW, CORNER_L, CORNER_R, CORNER_L_O, HEAD_PITCH = (n - 1 for n in (3, 6, 7, 53, 48))

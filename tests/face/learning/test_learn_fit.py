@@ -11,9 +11,9 @@ import pytest
 
 from fba.errors import FbaError, ModelError
 from fba.face import FaceModel, InterpolationTable
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.deform.distances import vertex_distances
-from fba.face.interpolation.terms import TERMS_MAX, Function, Link, Term
+from fba.face.interpolation._terms import TERMS_MAX, Function, Link, Term
 from fba.face.learning import learn_fit, send_sources
 from fba.face.learning._moments import measure
 from fba.face.learning._regression import fit_coefficients, make_table

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import fba
 from fba.errors import FbaError, FbaWarning, FormatError
-from fba.formats.bvh import reader
+from fba.formats.bvh import _reader as reader
 
 HEAD = """HIERARCHY
 ROOT Hips

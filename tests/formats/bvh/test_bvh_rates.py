@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from fba.formats.bvh import reader
+from fba.formats.bvh import _reader as reader
 
 
 @pytest.mark.parametrize(

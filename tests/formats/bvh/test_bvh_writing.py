@@ -13,7 +13,7 @@ import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.body import BapSolver, Skeleton
 from fba.errors import FormatError, OptionError
-from fba.formats.bvh import reader
+from fba.formats.bvh import _reader as reader
 from fba.parameters import BAP_COUNT, bap_numbers, baps
 
 

@@ -15,7 +15,8 @@ from fba.capture.action_units.conversion import unit_shapes
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats import format_of
-from fba.formats.face_tables import openface, pyfeat
+from fba.formats.face_tables import _openface as openface
+from fba.formats.face_tables import _pyfeat as pyfeat
 from fba.parameters import fap_numbers
 from tools.captures.face_files import openface_csv, pyfeat_csv
 

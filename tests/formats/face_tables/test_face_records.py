@@ -13,8 +13,9 @@ import fba
 from fba.capture import ShapeMotion
 from fba.errors import FbaWarning, FormatError, UnsupportedError
 from fba.formats import format_of
-from fba.formats.face_tables import ifacialmocap, shapes_json
-from fba.formats.face_tables import livelink_csv as tables
+from fba.formats.face_tables import _livelink_csv as tables
+from fba.formats.face_tables import _shapes_json as shapes_json
+from fba.formats.face_tables import ifacialmocap
 from fba.formats.face_tables import livelink_udp as packets
 from tools.captures.face_files import (
     STEP,

@@ -10,7 +10,7 @@ import pytest
 import fba
 from fba.arrays import Float64
 from fba.errors import FbaWarning, FormatError, LimitError, OptionError
-from fba.formats.face_tables.livelink_csv import read_face
+from fba.formats.face_tables._livelink_csv import read_face
 from fba.parameters import fap_numbers
 from tools.captures.face_files import (
     ANGLES,

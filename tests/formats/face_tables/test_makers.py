@@ -17,8 +17,10 @@ from fba.capture import ActionUnitMotion, ShapeMotion
 from fba.errors import FormatError
 from fba.face import FaceModel
 from fba.formats import format_of
-from fba.formats.face_tables import openface, pyfeat, shapes_json
-from fba.formats.face_tables.livelink_csv import read_face
+from fba.formats.face_tables import _openface as openface
+from fba.formats.face_tables import _pyfeat as pyfeat
+from fba.formats.face_tables import _shapes_json as shapes_json
+from fba.formats.face_tables._livelink_csv import read_face
 from fba.parameters import fap_numbers
 from tools.captures.face_files import ANGLES, camel, face_angles, face_weights, livelink_csv
 from tools.captures.tracked_actor import film

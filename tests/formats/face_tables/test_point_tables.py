@@ -18,8 +18,8 @@ from fba.capture.points import PointMotion
 from fba.errors import FbaWarning, FormatError
 from fba.face import FaceModel
 from fba.formats import format_of
-from fba.formats.face_tables import pyfeat
-from fba.formats.face_tables.points import read_points
+from fba.formats.face_tables import _pyfeat as pyfeat
+from fba.formats.face_tables._tracked_points import read_points
 from tools.captures.face_files import openface_csv, pyfeat_csv
 from tools.captures.point_files import (
     LAYOUTS,

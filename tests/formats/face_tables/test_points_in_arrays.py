@@ -15,7 +15,7 @@ from fba.arrays import Float64
 from fba.capture.points import PointMotion
 from fba.errors import FormatError
 from fba.face import FaceModel
-from fba.formats.face_tables.points import read_points
+from fba.formats.face_tables._tracked_points import read_points
 from tools.captures.tracked_actor import film
 
 FRAMES = 6

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 import fba
 from fba.body import BapSolver
 from fba.errors import FormatError
+from fba.formats.gltf._reader import read_motion
 from fba.formats.gltf.humanoid import find_humanoid
-from fba.formats.gltf.reader import read_motion
 from fba.gltf import read_gltf
 from gltf_edits import edit
 from small_people import BONES, write_person

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 import fba
 from fba.capture.blendshapes.shape_table import amounts_of
 from fba.errors import FbaWarning, FormatError
-from fba.face.expressions import Definitions
+from fba.face._expressions import Definitions
 from fba.gltf import read_gltf
-from fba.gltf.writer import Builder
+from fba.gltf._writer import Builder
 from fba.parameters import fap_numbers
 from gltf_edits import edit
 from small_people import BONES, write_person

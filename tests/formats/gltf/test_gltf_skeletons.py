@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 import fba
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.formats.gltf import reader
-from fba.formats.gltf.reader import read_motion
-from fba.gltf.writer import Builder
+from fba.formats.gltf import _reader as reader
+from fba.formats.gltf._reader import read_motion
+from fba.gltf._writer import Builder
 from gltf_edits import edited
 
 OFFSETS = {

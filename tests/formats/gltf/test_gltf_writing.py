@@ -21,7 +21,7 @@ from fba.body.footing import GroundedPoser
 from fba.body.head_attachment import attach_head
 from fba.body.model import BodyModel
 from fba.errors import FormatError, ModelError
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba.gltf import Gltf, read_gltf
 from fba.parameters import BAP_COUNT, FAP_COUNT, bap_numbers, baps, fap_numbers

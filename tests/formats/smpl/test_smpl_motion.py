@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import fba
 from fba.errors import FormatError
 from fba.formats import format_of
-from fba.formats.smpl.reader import read_motion
+from fba.formats.smpl._reader import read_motion
 from fba.parameters import bap_numbers, fap_numbers
 
 FRAMES = 9

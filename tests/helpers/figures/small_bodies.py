@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from fba.body import Skeleton
 from fba.body.model import BodyModel, BodyPart
-from fba.mesh.meshes import Material
+from fba.mesh._meshes import Material
 
 Float64 = npt.NDArray[np.float64]
 

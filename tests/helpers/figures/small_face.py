@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.model import FaceModel, Part, point_row
-from fba.face.tables import FaceDefMesh, FaceDefTables
-from fba_player.mesh.primitives import sphere_mesh
+from fba_player._mesh.primitives import sphere_mesh
 
 
 def small_face(*kinds: str, scale: float = 1.0) -> FaceModel:

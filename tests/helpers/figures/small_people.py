@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fba.gltf.writer import Builder
+from fba.gltf._writer import Builder
 
 BONES: dict[str, tuple[str | None, tuple[float, float, float]]] = {
     "hips": (None, (0.0, 0.9, 0.0)),

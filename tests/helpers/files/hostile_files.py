@@ -297,36 +297,36 @@ def encode_with_epf(path: Path) -> object:
 
 def read_obj(path: Path) -> object:
     """Read an OBJ mesh."""
-    from fba.mesh.obj import read_obj as read
+    from fba.mesh._obj import read_obj as read
 
     return read(path)
 
 
 def read_pieces(path: Path) -> object:
     """Read an OBJ mesh with its materials, as an import does."""
-    from fba.face.importers.mesh import polygon_pieces, read_materials
-    from fba.mesh.obj import read_obj as read
+    from fba.face.importers._mesh import polygon_pieces, read_materials
+    from fba.mesh._obj import read_obj as read
 
     return polygon_pieces(read(path), read_materials(path))
 
 
 def read_ply(path: Path) -> object:
     """Read a PLY mesh."""
-    from fba.mesh.ply import read_ply as read
+    from fba.mesh._ply import read_ply as read
 
     return read(path)
 
 
 def read_vrml(path: Path) -> object:
     """Read a VRML mesh."""
-    from fba.mesh.vrml import read_vrml as read
+    from fba.mesh._vrml import read_vrml as read
 
     return read(path)
 
 
 def read_wfm(path: Path) -> object:
     """Read a wire frame."""
-    from fba.mesh.wfm import read_wfm as read
+    from fba.mesh._wfm import read_wfm as read
 
     return read(path)
 
@@ -348,7 +348,7 @@ def read_head(path: Path) -> object:
 def read_picture(path: Path) -> object:
     """Decode the picture of a glTF head."""
     from fba.face.importers._gltf import gltf_pieces
-    from fba_player.mesh.textures import load_picture
+    from fba_player._mesh.textures import load_picture
 
     (piece,), _ = gltf_pieces(path)
     assert piece.part.material.texture is not None

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from fba.face.expressions import Definitions
+from fba.face._expressions import Definitions
+from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names, neutral_points, row_of
+from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.interpolation.terms import Function, Link, Term
 from fba.face.model import PART_KINDS, FaceModel, Material, Part
-from fba.face.tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
 
 UNITS_NEED = ("3.1", "3.2", "3.3", "3.4", "3.5", "3.6", "9.15", "2.2", "8.3", "8.4")

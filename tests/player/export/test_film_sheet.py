@@ -10,8 +10,8 @@ import pytest
 from fba.animation import Animation
 from fba.errors import RangeError
 from fba.player import Offscreen, Scene
+from fba_player.export._sheet_layout import choose_columns
 from fba_player.export.film_sheet import choose_frames, film_sheet
-from fba_player.export.sheet_layout import choose_columns
 from player_tracks import face_track
 
 

@@ -15,7 +15,7 @@ from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.face.model import point_row
 from fba.player import Camera, Offscreen, Scene
-from fba_player.gl import context
+from fba_player.gl import _context as context
 from player_tracks import body_track, face_track
 
 UInt8 = npt.NDArray[np.uint8]

@@ -9,7 +9,7 @@ import pytest
 from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.compiled import is_compiled
-from fba_player.figure.body_light import REACH, build_body_light
+from fba_player._figure.body_light import REACH, build_body_light
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
 

@@ -7,9 +7,9 @@ import numpy.typing as npt
 import pytest
 
 from fba.compiled import is_compiled
-from fba.mesh.meshes import vertex_normals
-from fba_player.figure.occlusion import Visibility, bake, harmonics, weights
-from fba_player.mesh.primitives import sphere_mesh
+from fba.mesh._meshes import vertex_normals
+from fba_player._figure.occlusion import Visibility, bake, harmonics, weights
+from fba_player._mesh.primitives import sphere_mesh
 
 compiled = pytest.mark.skipif(not is_compiled(), reason="without numba everything counts as free")
 Float32 = npt.NDArray[np.float32]

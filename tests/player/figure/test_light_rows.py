@@ -9,9 +9,9 @@ from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel
-from fba_player.figure.face import build_figure
-from fba_player.figure.person import Person, build_person
-from fba_player.gl.lod import Details, share_memory
+from fba_player._figure.face import build_figure
+from fba_player._figure.person import Person, build_person
+from fba_player.gl._lod import Details, share_memory
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
 

@@ -11,11 +11,11 @@ import pytest
 
 from fba.animation import Animation
 from fba.errors import FbaWarning
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.feature_points import names
 from fba.face.model import FaceModel, Part, point_row
 from fba.player import Offscreen, Scene
-from fba_player.figure.model_units import prepare_model, resize
+from fba_player._figure.model_units import prepare_model, resize
 from fba_player.scene.scene import SWITCHES
 from player_tracks import body_track, face_track
 from small_face import small_face

@@ -14,8 +14,8 @@ from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.face.model import FaceModel
 from fba.player import Scene
-from fba_player.figure.face import build_figure
-from fba_player.figure.person import Person, build_person
+from fba_player._figure.face import build_figure
+from fba_player._figure.person import Person, build_person
 from player_tracks import body_track, face_track
 
 STILL = np.zeros(68, dtype=np.float32)

@@ -15,9 +15,9 @@ from fba.arrays import Float32
 from fba.errors import ModelError
 from fba.face.model import FaceModel, point_row
 from fba.player import Offscreen, Scene
-from fba_player.figure.face import build_figure
-from fba_player.figure.wrinkles import MAP_POINTS, MIRRORED, place_wrinkles, wrinkle_strengths
-from fba_player.mesh.wrinkle_map import BOTTOM, PLAIN, SHAPE, TEXELS, TOP, WIDTH, WRINKLES, wrinkle_map
+from fba_player._figure.face import build_figure
+from fba_player._figure.wrinkles import MAP_POINTS, MIRRORED, place_wrinkles, wrinkle_strengths
+from fba_player._mesh.wrinkle_map import BOTTOM, PLAIN, SHAPE, TEXELS, TOP, WIDTH, WRINKLES, wrinkle_map
 from player_tracks import face_track
 
 JOY, ANGER, FEAR, SURPRISE = 1, 3, 4, 6

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import graphics
-from fba_player.gl.context import offscreen_context
+from fba_player.gl._context import offscreen_context
 
 
 @pytest.fixture(scope="module")

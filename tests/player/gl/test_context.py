@@ -12,7 +12,7 @@ import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.player import Offscreen
-from fba_player.gl.context import PACKAGES, cure, missing_libraries
+from fba_player.gl._context import PACKAGES, cure, missing_libraries
 
 
 def take_away(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:

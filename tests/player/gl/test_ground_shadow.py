@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fba.compiled import is_compiled
+from fba_player._mesh.primitives import sphere_mesh
+from fba_player._mesh.simplify import DetailLevels
 from fba_player.gl._ground_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
-from fba_player.mesh.primitives import sphere_mesh
-from fba_player.mesh.simplify import DetailLevels
-from fba_player.view.view import FaceMesh, FaceShape
+from fba_player.view._view import FaceMesh, FaceShape
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba there are blobs instead")
 LIGHT = np.array([0.70, 0.68, 0.80]) / np.linalg.norm([0.70, 0.68, 0.80])

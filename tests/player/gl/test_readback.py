@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fba_player.gl.readback import Readback
-from fba_player.session.captures import read_pixels
+from fba_player.gl._readback import Readback
+from fba_player.session._captures import read_pixels
 
 
 def test_what_is_fetched_is_what_was_there_when_reading_began(context: Any) -> None:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fba.mesh.meshes import Alpha
+from fba.mesh._meshes import Alpha
+from fba_player._mesh.textures import load_picture
 from fba_player.gl._mesh_renderer import FaceRenderer
-from fba_player.mesh.textures import load_picture
-from fba_player.view.view import FaceMesh, FaceShape
+from fba_player.view._view import FaceMesh, FaceShape
 
 Image = pytest.importorskip("PIL.Image")
 SIZE = 16

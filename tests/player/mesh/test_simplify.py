@@ -10,10 +10,10 @@ import pytest
 
 from fba.cache import load_or_make
 from fba.compiled import is_compiled
-from fba_player.gl.lod import Details, distance, share_memory
-from fba_player.mesh.primitives import sphere_mesh
-from fba_player.mesh.simplify import TOLERANCES, DetailLevels, simplify
-from fba_player.view.view import FaceMesh, FaceShape
+from fba_player._mesh.primitives import sphere_mesh
+from fba_player._mesh.simplify import TOLERANCES, DetailLevels, simplify
+from fba_player.gl._lod import Details, distance, share_memory
+from fba_player.view._view import FaceMesh, FaceShape
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba meshes are drawn as they are")
 Int32 = npt.NDArray[np.int32]

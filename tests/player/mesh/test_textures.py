@@ -10,7 +10,7 @@ import pytest
 
 Image = pytest.importorskip("PIL.Image")
 
-from fba_player.mesh.textures import MIN_CACHED_BYTES, load_picture  # noqa: E402 - needs Pillow
+from fba_player._mesh.textures import MIN_CACHED_BYTES, load_picture  # noqa: E402 - needs Pillow
 
 
 def encoded(pixels: np.ndarray) -> bytes:
@@ -46,7 +46,7 @@ def test_a_large_one_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
     def fails(data: bytes) -> None:
         raise AssertionError("decoded again")
 
-    monkeypatch.setattr("fba_player.mesh.textures._decode", fails)
+    monkeypatch.setattr("fba_player._mesh.textures._decode", fails)
     again = load_picture(data)
     assert (again.size, again.opaque) == (first.size, first.opaque) == ((200, 300), True)
     np.testing.assert_array_equal(again.reduced(4), seen)

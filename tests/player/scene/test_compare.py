@@ -12,8 +12,8 @@ from fba_player.export.offscreen import Offscreen
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import Transport
 from fba_player.scene._compare_timeline import CompareTimeline
+from fba_player.scene._differences import differences
 from fba_player.scene.compare import CompareScene
-from fba_player.scene.differences import differences
 from fba_player.scene.scene import Scene
 from player_tracks import body_track, face_track
 

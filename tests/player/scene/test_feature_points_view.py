@@ -13,10 +13,10 @@ from fba.body import BapSolver
 from fba.body.footing import GroundedPoser
 from fba.body.model import BodyModel
 from fba.face import feature_point_names, resolve
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel
 from fba.player import Offscreen, Scene
-from fba_player.figure.face import build_figure
+from fba_player._figure.face import build_figure
 from fba_player.scene._feature_points_view import PointView
 from fba_player.scene._skin_lines import skin_lines
 from player_tracks import body_track, face_track

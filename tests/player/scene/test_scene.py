@@ -12,8 +12,8 @@ from fba.animation import Animation
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, point_row
 from fba.player import Scene, default_camera
-from fba_player.figure._face_parts import compute_sway
-from fba_player.figure.face import FaceFigure, build_figure
+from fba_player._figure._face_parts import compute_sway
+from fba_player._figure.face import FaceFigure, build_figure
 from player_tracks import body_track, face_track
 
 STILL = np.zeros(68, dtype=np.float32)

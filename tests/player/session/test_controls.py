@@ -10,9 +10,9 @@ import pytest
 from fba.animation import Animation
 from fba_player.scene.scene import SWITCHES, Scene
 from fba_player.session._camera_controller import GLIDE
-from fba_player.session.controls import Controls
-from fba_player.session.keys import by_name
-from fba_player.session.session import Session
+from fba_player.session._controls import Controls
+from fba_player.session._keys import by_name
+from fba_player.session._session import Session
 from fba_player.view.camera import Camera, Subject
 
 

@@ -11,9 +11,9 @@ from fba.emotion import Mood, emote
 from fba.emotion.recogniser import labels
 from fba.tracks import BodyTrack, FaceTrack
 from fba_player.scene.scene import Scene
-from fba_player.session import emotion_trace
-from fba_player.session.emotion_trace import read_stretches, stretch_at
-from fba_player.session.source import Source
+from fba_player.session import _emotion_trace as emotion_trace
+from fba_player.session._emotion_trace import read_stretches, stretch_at
+from fba_player.session._source import Source
 
 
 def angry_for_a_while(first: int = 0) -> Animation:
@@ -57,6 +57,6 @@ def test_every_label_has_a_colour() -> None:
     import graphics
 
     graphics.imported("imgui_bundle")
-    from fba_player.ui import theme
+    from fba_player._ui import theme
 
     assert set(theme.FEELINGS) == set(labels()) - {"neutral", "unknown"}

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import graphics
-from fba_player.session.keys import by_name, key_of, keys, mouse
+from fba_player.session._keys import by_name, key_of, keys, mouse
 from fba_player.view.switches import SWITCHES
 
 ROOT = Path(__file__).parents[3]
@@ -42,7 +42,7 @@ def test_keys_are_shown_as_people_write_them() -> None:
 
 def test_every_panel_has_a_key_and_every_key_its_panel() -> None:
     graphics.imported("imgui_bundle")
-    from fba_player.ui.panels.registry import make_panels
+    from fba_player._ui.panels.registry import make_panels
 
     panels = [panel.name for panel in make_panels()]
     opened = [row.action.removeprefix("panel ") for row in keys() if row.action.startswith("panel ")]

@@ -6,7 +6,7 @@ import pytest
 
 from fba.animation import Animation
 from fba.player import Scene
-from fba_player.session.session import Session
+from fba_player.session._session import Session
 from set_clock import Clock
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError
-from fba_player.playback.playhead import Motion
+from fba_player.playback._playhead import Motion
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import Transport
 from fba_player.sound._read_ahead import SoundBlocks, samples_ahead

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
-from fba_player.playback.playhead import Motion
+from fba_player.playback._playhead import Motion
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import Transport
 from fba_player.sound._mixer import FADE, SoundMixer

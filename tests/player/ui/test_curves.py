@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from fba.animation import Animation, FaceTrack
 from fba.parameters import faps
+from fba_player._ui.panels._curve_data import BLOCK, MIN_SHOWN_SECONDS, Courses, TimeZoom, amount, envelope
+from fba_player._ui.panels._curves_panel import search_parameters
 from fba_player.playback.timeline import Timeline
-from fba_player.ui.panels._curve_data import BLOCK, MIN_SHOWN_SECONDS, Courses, TimeZoom, amount, envelope
-from fba_player.ui.panels._curves_panel import search_parameters
 from player_tracks import body_track, face_track
 
 

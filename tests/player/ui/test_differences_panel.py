@@ -13,13 +13,13 @@ from fba.animation import Animation
 from fba_player.playback.transport import Transport
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
-from fba_player.session.session import Session
+from fba_player.session._session import Session
 from player_tracks import body_track, face_track
 from studio_hand import panel_of
 
 graphics.imported("imgui_bundle")
 
-from fba_player.ui.panels._differences_panel import DifferencesPanel, thin_curve  # noqa: E402 - needs imgui
+from fba_player._ui.panels._differences_panel import DifferencesPanel, thin_curve  # noqa: E402 - needs imgui
 from tools.window_picture import Studio  # noqa: E402
 
 SIZE = (900, 640)
@@ -89,7 +89,7 @@ def test_the_second_ones_curves_are_shown_on_demand(studio: Studio) -> None:
 
 
 def test_each_file_is_told_of(studio: Studio) -> None:
-    from fba_player.ui.panels._file_panel import _sections
+    from fba_player._ui.panels._file_panel import _sections
 
     told = _sections(studio.session, studio.session.source.info)
     assert [title for title, _ in told] == ["1  a.fba", "2  b.fba"]
@@ -101,7 +101,7 @@ def test_each_file_is_told_of(studio: Studio) -> None:
 
 
 def test_why_nothing_differs() -> None:
-    from fba_player.ui.panels._differences_panel import _why_nothing_differs
+    from fba_player._ui.panels._differences_panel import _why_nothing_differs
 
     rest = body_track([{32: 0}] * 4)
     face, body = Scene(talk([0] * 4)), Scene(Animation(Fraction(10), np.arange(4), body=rest))

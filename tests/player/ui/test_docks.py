@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fba_player.ui._docks import (
+from fba_player._ui._docks import (
     EDGE,
     GAP,
     MIDDLE,

@@ -13,8 +13,8 @@ import graphics
 from fba.animation import Animation
 from fba_player.playback.transport import Transport
 from fba_player.scene.scene import Scene
-from fba_player.session.session import Session
-from fba_player.session.source import Source
+from fba_player.session._session import Session
+from fba_player.session._source import Source
 from set_clock import Clock
 
 imgui = graphics.imported("imgui_bundle").imgui

@@ -15,15 +15,15 @@ from fba.errors import OptionError
 from fba.tracks import FaceTrack
 from fba_player.playback.transport import Transport
 from fba_player.scene.scene import Scene
-from fba_player.session.mood import COMMON, PuppetMood
+from fba_player.session._mood import COMMON, PuppetMood
+from fba_player.session._session import Session
 from fba_player.session.puppet import Puppet
-from fba_player.session.session import Session
 from set_clock import Clock
 from studio_hand import StudioHand, panel_of
 
 graphics.imported("imgui_bundle")
 
-from fba_player.ui.panels._puppet_emotion import DOT, LABEL, place_labels  # noqa: E402 - needs imgui
+from fba_player._ui.panels._puppet_emotion import DOT, LABEL, place_labels  # noqa: E402 - needs imgui
 from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 BROW = 30

@@ -9,7 +9,7 @@ import fba
 from fba.animation import Animation, BodyTrack
 from fba.body import BapSolver, Skeleton
 from fba.body.solve.limits import Limits
-from fba_player.ui.panels._puppet_rows import Group, Row, groups
+from fba_player._ui.panels._puppet_rows import Group, Row, groups
 
 
 def test_every_fap_has_one_slider() -> None:

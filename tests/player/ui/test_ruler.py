@@ -7,8 +7,8 @@ import pytest
 
 import graphics
 from fba.animation import Animation, FaceTrack
-from fba_player.session.timeline_trace import INTRA, Trace, trace_of_motion, trace_picture
-from fba_player.ui.ruler import Ruler, label
+from fba_player._ui.ruler import Ruler, label
+from fba_player.session._timeline_trace import INTRA, Trace, trace_of_motion, trace_picture
 from player_tracks import face_track
 
 
@@ -88,6 +88,6 @@ def test_motion_is_added_up_over_parameters() -> None:
 )
 def test_the_slider_of_speed_holds_on_to_its_steps(slid: float, speed: float) -> None:
     graphics.imported("imgui_bundle")
-    from fba_player.ui._transport_buttons import snap_speed
+    from fba_player._ui._transport_buttons import snap_speed
 
     assert snap_speed(slid) == speed

@@ -14,8 +14,8 @@ import graphics
 from fba.animation import Animation
 from fba_player.playback.transport import Transport
 from fba_player.scene.scene import Scene
-from fba_player.session.session import Session
-from fba_player.session.source import Source
+from fba_player.session._session import Session
+from fba_player.session._source import Source
 from set_clock import Clock
 from studio_hand import StudioHand, panel_of
 
@@ -72,7 +72,7 @@ def test_curves_that_move_most_are_there_at_once(opened: Opened, talking: Animat
     studio = opened(talking, "curves")
     assert studio.session.selection.faps == [5, 3, 31]  # 540 of 600, 630 of 800, 180 of 240
     panel = panel_of(studio, "curves")
-    from fba_player.ui.panels._curve_plot import COLOURS
+    from fba_player._ui.panels._curve_plot import COLOURS
 
     line = coloured(studio.draw(1), panel.lanes.area, COLOURS[0])
     rows = [np.flatnonzero(line[:, x]).mean() for x in (20, line.shape[1] // 2, line.shape[1] - 20)]
@@ -116,7 +116,7 @@ def test_choosing_from_the_list(opened: Opened, walking: Animation) -> None:
 
 
 def test_stretches_that_were_not_sent_are_thin(opened: Opened, talking: Animation) -> None:
-    from fba_player.ui.panels._curve_plot import COLOURS
+    from fba_player._ui.panels._curve_plot import COLOURS
 
     assert talking.face is not None
     mask = talking.face.mask.copy()
@@ -135,7 +135,7 @@ def test_the_bit_rate_of_a_stream(opened: Opened, talking: Animation, tmp_path: 
     fba.write(path, talking, intra_period=0.2)
     studio = opened(talking, "rate", path=path)
     panel, hand = panel_of(studio, "rate"), StudioHand(studio)
-    from fba_player.ui import theme
+    from fba_player._ui import theme
 
     left, _, right, bottom = panel.bars
     warm = coloured(studio.draw(1), panel.bars, theme.WARM).any(axis=0)
@@ -192,7 +192,7 @@ def test_the_bit_rate_of_what_is_no_stream_yet(opened: Opened, talking: Animatio
 def test_pictures_go_on_until_all_curves_are_known(
     opened: Opened, talking: Animation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fba_player.ui.panels._curve_data.BLOCK", 1)
+    monkeypatch.setattr("fba_player._ui.panels._curve_data.BLOCK", 1)
     studio = opened(talking, "curves")
     session = studio.session
     assert session.restless
@@ -237,7 +237,7 @@ def test_a_slider_moves_the_face_until_it_is_released(opened: Opened, talking: A
 
 
 def test_left_and_right_move_together_or_alone(opened: Opened, walking: Animation) -> None:
-    from fba_player.ui.panels._puppet_rows import groups
+    from fba_player._ui.panels._puppet_rows import groups
 
     studio = opened(walking, "puppet")
     panel = panel_of(studio, "puppet")

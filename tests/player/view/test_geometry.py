@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel, Part
-from fba_player.figure._eyeball import find_eyeball
-from fba_player.figure._face_parts import find_hairs
+from fba_player._figure._eyeball import find_eyeball
+from fba_player._figure._face_parts import find_hairs
+from fba_player._mesh.primitives import sphere_mesh
 from fba_player.gl._antialias_region import bounding_rectangles
 from fba_player.gl._silhouette import TILE, Outliner
-from fba_player.mesh.primitives import sphere_mesh
+from fba_player.view._geometry import rotation_vector, turn_partly
+from fba_player.view._view import FaceMesh, FaceShape, Mesh, MeshShape, View
 from fba_player.view.camera import Camera
-from fba_player.view.geometry import rotation_vector, turn_partly
-from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, View
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.5, 2.0, 3.1, np.pi])

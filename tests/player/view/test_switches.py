@@ -12,10 +12,10 @@ import pytest
 
 from fba.animation import Animation
 from fba.body.model import BodyModel
-from fba.face.deform.deformer import Deformer
+from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba.player import Camera, Offscreen, Scene
-from fba_player.figure.face import FaceFigure, build_figure
+from fba_player._figure.face import FaceFigure, build_figure
 from fba_player.gl._labels import place_names
 from fba_player.scene._fap_heatmap import FapHeatmap
 from fba_player.scene._wireframe import unique_edges

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 import graphics
+from fba.capture.markers._targets import target_points
 from fba.capture.markers.motion import MarkerMotion
-from fba.capture.markers.targets import target_points
 from fba.capture.virtual_markers import MarkedHead, MarkerMapping, propose_mapping, read_head, read_mapping
 from fba.errors import DisplayError, OptionError
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.scene.markers_scene import CURRENT, MarkersScene
-from fba_player.session.session import Session
+from fba_player.session._session import Session
 from mesh_files import write_obj
 from open_windows import settle
 from small_head import small_head

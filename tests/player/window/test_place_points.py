@@ -14,9 +14,9 @@ from fba.errors import DisplayError
 from fba.face.feature_points import row_of
 from fba.face.importers.head_surface import HeadSurface, read_head_surface
 from fba.face.importers.points.points_file import read_points
-from fba_player.scene.placement_scene import CURRENT, PlacementScene
-from fba_player.scene.point_placement import PointPlacement
-from fba_player.session.session import Session
+from fba_player.scene._placement_scene import CURRENT, PlacementScene
+from fba_player.scene._point_placement import PointPlacement
+from fba_player.session._session import Session
 from mesh_files import write_obj
 from open_windows import settle
 from small_head import small_head
@@ -158,7 +158,7 @@ def test_keys_work_through_the_points(on_display: str, surface: HeadSurface, tmp
 
 
 def test_an_unwritable_file_is_said_in_the_window(surface: HeadSurface, tmp_path: Path) -> None:
-    from fba_player.session.placing import PLACING
+    from fba_player.session._placing import PLACING
 
     placement = PointPlacement(surface, tmp_path / "nowhere" / "points.csv")
     session = Session(PlacementScene(placement), size=SIZE)

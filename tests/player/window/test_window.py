@@ -13,7 +13,7 @@ import pytest
 import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
-from fba_player.gl.context import import_moderngl
+from fba_player.gl._context import import_moderngl
 from fba_player.gl.renderer import Renderer
 from fba_player.scene.scene import Scene
 from fba_player.window._window import Window
@@ -209,7 +209,7 @@ def test_without_imgui_it_plays_and_says_so(
 ) -> None:
     (tmp_path / "imgui_bundle.py").write_text(f"raise ImportError({failure!r})", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    for name in [name for name in sys.modules if name.startswith(("imgui_bundle", "fba_player.ui.gui"))]:
+    for name in [name for name in sys.modules if name.startswith(("imgui_bundle", "fba_player._ui.gui"))]:
         monkeypatch.delitem(sys.modules, name)
     try:
         with pytest.warns(FbaWarning, match=said):

@@ -12,7 +12,7 @@ from fba.animation import Animation
 from fba.tracks import BodyTrack, FaceTrack
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.scene import Scene
-from fba_player.session.session import Session
+from fba_player.session._session import Session
 from fba_player.window.play import follow_newest
 from player_tracks import face_track
 

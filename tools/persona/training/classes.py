@@ -17,9 +17,8 @@ from importlib.resources import files
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.action_units import ActionUnitMotion
+from fba.capture import ActionUnitMotion, ShapeMotion, from_blendshapes
 from fba.capture.action_units.conversion import to_shapes
-from fba.capture.blendshapes import ShapeMotion, from_blendshapes
 from fba.face import Definitions, resolve
 from fba.parameters import FAP_COUNT
 from fba.persona.points.layout import PARTS

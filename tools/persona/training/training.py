@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
+from fba.persona import Recogniser
 from fba.persona.points.layout import PARTS, VERTICES, flat_mask, part_vertices
-from fba.persona.recognition.component import Component, train_component
-from fba.persona.recognition.displacements import displacements
-from fba.persona.recognition.faps import face_scale, mask_faps, measure_fapu
-from fba.persona.recognition.recogniser import JAW_FAPS, Recogniser
+from fba.persona.recognition import Component
+from fba.persona.recognition._component import train_component
+from fba.persona.recognition._displacements import displacements
+from fba.persona.recognition._faps import face_scale, mask_faps, measure_fapu
+from fba.persona.recognition._recogniser import JAW_FAPS
 from tools.persona.training.classes import class_labels, face_classes, part_classes
 from tools.persona.training.examples import Examples
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
 from fba.easing import smoothstep
-from fba.face.authoring.regions.eye_opening import CLOSED
-from fba.face.authoring.regions.eyes import Eye
+from fba.face.authoring.regions._eye_opening import CLOSED
+from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.surface import Surface, positions_in
 from fba.face.model import Part

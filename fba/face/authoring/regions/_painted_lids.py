@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from fba.arrays import Float64, Integer
-from fba.face.authoring.regions.eye_opening import Opening
-from fba.face.authoring.regions.eyes import Eye
+from fba.face.authoring.regions._eye_opening import Opening
+from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.model import Part
-from fba.mesh.pictures import read_pixels
+from fba.mesh import read_pixels
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Shares of red, green and blue (ITU-R BT.709)."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
+from fba.face.authoring.surface._motion import fap_limits
+from fba.face.authoring.surface._weights import reachable_region, solve_smooth_field, trim_small
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
-from fba.face.authoring.surface.motion import fap_limits
 from fba.face.authoring.surface.surface import weld_parts
-from fba.face.authoring.surface.weights import reachable_region, solve_smooth_field, trim_small
 from fba.face.model import Part
 from fba.face.points import OPEN_JAW
 

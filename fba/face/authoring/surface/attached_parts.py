@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.face.authoring.surface.motion import Motion
+from fba.face.authoring.surface._motion import Motion
 from fba.face.authoring.surface.surface import Surface, weld_parts
 from fba.face.model import Part
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fba.arrays import Bool, Float64, Integer, Intp
 from fba.face.model import PART_KINDS, Part
-from fba.mesh.meshes import vertex_normals
+from fba.mesh import vertex_normals
 
 WELD = 1e-6
 """Vertices on open edges this close together, as a share of the surface's extent, are one: a seam."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fba.arrays import Float32, Float64, UInt8
-from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.model import Material, Part
-from fba.mesh.pictures import read_pixels
+from fba.mesh import read_pixels
 
 MAX_PIXELS = 4096
 """Pixels, each way, of the largest picture that is made."""

@@ -13,13 +13,13 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.easing import smoothstep
+from fba.face._tables import FaceDefMesh, FaceDefTables
+from fba.face.authoring.surface._motion import UNMOVED_DISTANCE
 from fba.face.authoring.surface.landmarks import weld_skin
-from fba.face.authoring.surface.motion import UNMOVED_DISTANCE
 from fba.face.authoring.surface.surface import Surface
-from fba.face.checks.fap_checks import check_posed
-from fba.face.checks.posing import Poser
+from fba.face.checks._fap_checks import check_posed
+from fba.face.checks._posing import Poser
 from fba.face.model import FaceModel
-from fba.face.tables import FaceDefMesh, FaceDefTables
 from fba.parameters import faps
 
 STRETCH = (6, 7, 53, 54)

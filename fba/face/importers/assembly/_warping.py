@@ -8,8 +8,8 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
-from fba.face.importers.assembly.pieces import FREE
-from fba.face.importers.assembly.polygon_parts import Piece
+from fba.face.importers.assembly._pieces import FREE
+from fba.face.importers.assembly._polygon_parts import Piece
 
 ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
 """Parts that points of the teeth stand on."""

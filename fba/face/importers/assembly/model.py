@@ -12,13 +12,13 @@ import numpy as np
 from fba.arrays import Bool, Float64, Int32
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
+from fba.face.importers.assembly._default_materials import apply_default_materials
+from fba.face.importers.assembly._definitions import define_by_shapes
+from fba.face.importers.assembly._pieces import FREE, assemble, shift_piece
+from fba.face.importers.assembly._polygon_parts import Piece
+from fba.face.importers.assembly._repair import drop_false_pupils, repair_tables
+from fba.face.importers.assembly._symmetry import stand_upright_by_points
 from fba.face.importers.assembly._teeth_clearance import clear_teeth
-from fba.face.importers.assembly.default_materials import apply_default_materials
-from fba.face.importers.assembly.definitions import define_by_shapes
-from fba.face.importers.assembly.pieces import FREE, assemble, shift_piece
-from fba.face.importers.assembly.polygon_parts import Piece
-from fba.face.importers.assembly.repair import drop_false_pupils, repair_tables
-from fba.face.importers.assembly.symmetry import stand_upright_by_points
 from fba.face.model import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
 
@@ -121,7 +121,7 @@ def author_pieces(
     shapes = sorted({shape for piece in pieces for shape in piece.morphs})
     if not shapes:
         return clear_teeth(drop_false_pupils(face))
-    from fba.face.authoring.shapes.morphs import add_shapes
+    from fba.face.authoring._shapes.morphs import add_shapes
 
     morphs = {
         shape: {piece.part.name: piece.morphs[shape] for piece in pieces if shape in piece.morphs}

@@ -20,14 +20,13 @@ import numpy as np
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError, Remedy
 from fba.face.feature_points import row_of
-from fba.face.importers.assembly.default_materials import LOOKS
+from fba.face.importers.assembly._default_materials import LOOKS
+from fba.face.importers.assembly._pieces import shift_piece
+from fba.face.importers.assembly._polygon_parts import Piece, make_piece, polygon_components
 from fba.face.importers.assembly.model import bind_by_number
-from fba.face.importers.assembly.pieces import shift_piece
-from fba.face.importers.assembly.polygon_parts import Piece, make_piece, polygon_components
 from fba.face.model import FaceModel, Material, Part
-from fba.mesh.obj import read_obj
-from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import find_beside, parse_integer, parse_number, read_bytes, read_words
+from fba.mesh import Polygons, read_obj
+from fba.text_files import find_beside, parse_integer, parse_number, read_bytes, read_words
 
 METRES = 0.1
 """Metres per unit of the base mesh."""

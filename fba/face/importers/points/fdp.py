@@ -14,9 +14,9 @@ import numpy as np
 from fba.arrays import Float64
 from fba.errors import FbaWarning, ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.points.fdp_data import Fdp, repair_sides_with_warning
+from fba.face.importers.points._fdp_data import Fdp, repair_sides_with_warning
 from fba.face.importers.points.xface import load_xface, xface_points
-from fba.mesh.text_files import parse_integer, parse_number, read_bytes, read_words
+from fba.text_files import parse_integer, parse_number, read_bytes, read_words
 
 
 def read_fdp(path: str | os.PathLike[str]) -> Float64:

@@ -18,7 +18,7 @@ from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.points.fdp import load_fdp
 from fba.face.importers.points.xface import xface_points
-from fba.mesh.text_files import parse_integer, parse_number, read_bytes, read_lines
+from fba.text_files import parse_integer, parse_number, read_bytes, read_lines
 
 MAX_JSON = 1 << 24
 """Largest JSON file of 84 points, in bytes."""

@@ -10,10 +10,10 @@ import numpy as np
 from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.points.fdp_data import Fdp, Influence, XfaceMesh, repair_sides_with_warning
-from fba.mesh.text_files import find_beside, parse_integer, parse_number, read_bytes
-from fba.mesh.vrml import read_vrml
+from fba.face.importers.points._fdp_data import Fdp, Influence, XfaceMesh, repair_sides_with_warning
+from fba.mesh import read_vrml
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
+from fba.text_files import find_beside, parse_integer, parse_number, read_bytes
 
 DISTANCES = ("ENS0", "ES0", "IRISD0", "MNS0", "MW0")
 NEUTRAL = "Rest"

@@ -1,0 +1,203 @@
+"""Skinning: vertices moved by the joints of a skeleton."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.arrays import Float32, Float64, Int32, Int64
+from fba.body.skeleton import Skeleton
+from fba.body.skin import _loops as loops
+from fba.body.skin._girdle import find_girdle
+from fba.body.skin._girdle_loops import Girdle
+from fba.body.skin._loops import Twisting
+from fba.body.skin._moving_normals import normal_rings
+from fba.body.skin._twisting import find_twists
+from fba.mesh import result_array
+
+METHODS = ("dual", "linear")
+"""Ways to blend the motion of several joints."""
+BLOCK = 64
+"""Frames per call of the compiled loop: Ctrl+C takes effect between calls only."""
+
+
+@dataclass(eq=False)
+class Skinner:
+    """Moves vertices with joints; `build_skinner` makes it.
+
+    vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), largest
+    first, rows sum to 1. counts: int32 (V,), number of weights above 0. inverse: float64 (J, 4, 4), inverses
+    of the joints as modelled. parents: int64 (J,). neighbours: int32 (V, 4), and coefficients: float32
+    (V, 3), see `fba.body.skin._moving_normals`.
+
+    Calls allocate nothing but their result. Threads that share a Skinner wait for each other.
+    """
+
+    vertices: Float32
+    normals: Float32
+    joints: Int32
+    weights: Float32
+    counts: Int32
+    inverse: Float64
+    parents: Int64
+    twists: Twisting
+    girdle: Girdle
+    neighbours: Int32
+    coefficients: Float32
+
+    def __post_init__(self) -> None:
+        self._vertices, self._normals = self.vertices.copy(), self.normals.copy()
+        self._twisted, self._twisted_is_modelled = self.vertices.copy(), True
+        self._scratch = np.empty((len(self.inverse), 12), dtype=np.float32)
+        self._lock = threading.Lock()
+
+    def skin(
+        self,
+        matrices: npt.ArrayLike,
+        out: Float32 | None = None,
+        normals: Float32 | None = None,
+        method: str = "dual",
+    ) -> Float32:
+        """Return vertices for joint matrices: see `BodyModel.skin`."""
+        return self._run(self.vertices, self.normals, matrices, out, normals, method)
+
+    def skin_vertices(
+        self,
+        vertices: Float32,
+        rest_normals: Float32 | None,
+        matrices: npt.ArrayLike,
+        out: Float32 | None = None,
+        normals: Float32 | None = None,
+        method: str = "dual",
+    ) -> Float32:
+        """Return what `skin` does for other rest positions (V, 3), and their normals (V, 3) or None."""
+        if normals is not None and rest_normals is None:
+            raise ValueError("normals need rest_normals, those of the vertices before skinning")
+        for array in (vertices, rest_normals):
+            if array is not None and array.shape != self.vertices.shape:
+                raise ValueError(
+                    f"vertices and normals must have shape {self.vertices.shape}, not {array.shape}"
+                )
+        return self._run(vertices, rest_normals, matrices, out, normals, method)
+
+    def _run(
+        self,
+        vertices: Float32,
+        rest_normals: Float32 | None,
+        matrices: npt.ArrayLike,
+        out: Float32 | None,
+        normals: Float32 | None,
+        method: str,
+    ) -> Float32:
+        if method not in METHODS:
+            raise ValueError(f"no skinning method {method!r}; there are {', '.join(METHODS)}")
+        frames, single = self._frames(matrices)
+        shape = (*(() if single else (len(frames),)), len(vertices), 3)
+        out = result_array(shape, out, normals)
+        out_frames = out[None] if single else out
+        normal_frames = out_frames[:0] if normals is None else normals[None] if single else normals
+        with self._lock, np.errstate(all="ignore"):
+            vertices = _as_writable(vertices, self._vertices)
+            rest_normals = (
+                self._normals if rest_normals is None else _as_writable(rest_normals, self._normals)
+            )
+            mesh = (
+                vertices, rest_normals, self.joints, self.weights, self.counts, self.neighbours,
+                self.coefficients,
+            )  # fmt: skip
+            twisted = vertices
+            if method == "dual" and len(self.twists.rows):
+                twisted = self._twisted
+                # if it holds the vertices as modelled, it can stay: all twisted ones are overwritten below
+                if not (self._twisted_is_modelled and vertices is self.vertices):
+                    np.copyto(twisted, vertices)
+                self._twisted_is_modelled = vertices is self.vertices
+            for start in range(0, len(frames), BLOCK):
+                part = slice(start, start + BLOCK)
+                if method == "dual":
+                    loops.dual_frames(
+                        frames[part],
+                        self.inverse,
+                        self.parents,
+                        *mesh,
+                        self._scratch,
+                        self.twists,
+                        self.girdle,
+                        twisted,
+                        out_frames[part],
+                        normal_frames[part],
+                    )
+                else:
+                    loops.linear_frames(
+                        frames[part],
+                        self.inverse,
+                        *mesh,
+                        self._scratch,
+                        out_frames[part],
+                        normal_frames[part],
+                    )
+        return out
+
+    def _frames(self, matrices: npt.ArrayLike) -> tuple[Float64, bool]:
+        array = np.asarray(matrices)
+        count = len(self.inverse)
+        if array.ndim not in (3, 4) or array.shape[-3:] != (count, 4, 4):
+            raise ValueError(
+                f"joint matrices must have shape ({count}, 4, 4) or (T, {count}, 4, 4), not {array.shape}"
+            )
+        if array.dtype.kind not in "iuf":
+            raise ValueError(f"joint matrices must be real numbers, not {array.dtype}")
+        frames = np.ascontiguousarray(array, dtype=np.float64).reshape(-1, count, 4, 4)
+        if not frames.flags.writeable:
+            frames = frames.copy()  # read-only arrays would make numba compile another version
+        if not np.isfinite(frames).all():
+            frame, joint = (int(index) for index in np.argwhere(~np.isfinite(frames))[0, :2])
+            raise ValueError(f"joint matrix {joint} of frame {frame} is not finite")
+        return frames, array.ndim == 3
+
+
+def _as_writable(array: Float32, buffer: Float32) -> Float32:
+    """Return the array itself if compiled code can take it, else a copy in a buffer."""
+    if array.dtype == np.float32 and array.flags.c_contiguous and array.flags.writeable:
+        return array
+    np.copyto(buffer, array)
+    return buffer
+
+
+def build_skinner(
+    vertices: Float32,
+    normals: Float32,
+    joints: Int32,
+    weights: Float32,
+    bind: Float64,
+    skeleton: Skeleton,
+    triangles: Int32 | None = None,
+) -> Skinner:
+    """Return a skinner for arrays that are checked as those of `BodyModel`.
+
+    vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows sum
+    to 1. bind: float64 (J, 4, 4), the joints as modelled. skeleton: its joints. triangles: int32 (F, 3), by
+    which normals follow the surface (`fba.body.skin._moving_normals`); without them normals only rotate with
+    their vertices.
+    """
+    order = np.argsort(-weights, axis=1, kind="stable")
+    joints = np.ascontiguousarray(np.take_along_axis(joints, order, axis=1), dtype=np.int32)
+    weights = np.ascontiguousarray(np.take_along_axis(weights, order, axis=1), dtype=np.float32)
+    # copies: read-only arrays would make numba compile another version
+    vertices = np.array(vertices, dtype=np.float32, order="C")
+    normals = np.array(normals, dtype=np.float32, order="C")
+    faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
+    neighbours, coefficients = normal_rings(vertices, normals, faces)
+    return Skinner(
+        vertices, normals, joints, weights,
+        counts=(weights > 0).sum(axis=1).astype(np.int32),
+        inverse=np.linalg.inv(bind).astype(np.float64),
+        parents=np.ascontiguousarray(skeleton.parents, dtype=np.int64),
+        twists=find_twists(skeleton, bind, vertices, joints, weights),
+        girdle=find_girdle(skeleton, bind, vertices, joints, weights),
+        neighbours=neighbours,
+        coefficients=coefficients,
+    )  # fmt: skip

@@ -1,0 +1,164 @@
+"""Which marker is where on the face, found from the shape of the cloud alone, for names that tell nothing.
+
+The cloud is laid onto the built-in head from many sides, by its nearest points; the best fit says where each
+marker is, and markers near a feature point get it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fba.arrays import Float64
+from fba.capture.markers._registration import GIVE_MAP, SIZE_RANGE, UNIT_FACTORS
+from fba.capture.markers._targets import HEAD, PUPILS, target_points
+from fba.capture.markers.motion import MarkerMotion
+from fba.errors import ModelError
+from fba.face import FaceModel
+from fba.geometry import fit_similarity
+from fba.rotations import axis_matrices
+
+MIN_MARKERS = 12
+"""Smallest number of markers whose shape identifies a face."""
+DIRECTIONS = 12
+"""Number of directions about the vertical from which the cloud is laid onto the head."""
+ITERATIONS = 25
+"""Number of iterations of each fit."""
+FULL_FITS = 6
+"""Number of best fits that are completed."""
+MAX_POINT_DISTANCE = 0.014
+"""Largest distance of a marker from its feature point, in metres."""
+MIN_PLACED = 0.4
+"""Smallest share of the markers that must be near feature points."""
+MAX_ERROR = 0.006
+"""Largest root mean square distance, in metres, of a cloud that is a face's."""
+SELDOM = (*(f"2.{n}" for n in range(2, 10)), *(f"3.{n}" for n in range(7, 15)), "8.9", "8.10", "9.4", "9.5",
+          "9.6", "9.7", "9.13", "9.14", "11.4", "11.6")  # fmt: skip
+"""Points that hardly anybody marks, beside others that many do: inside the lips, corners of the eyes."""
+FRONT = -0.09
+"""Depth, metres, from which the head's surface carries markers."""
+
+
+def propose_map(motion: MarkerMotion) -> dict[str, str]:
+    """Return marker -> target. ModelError if the cloud is not that of a face, or has too few markers."""
+    from scipy.optimize import linear_sum_assignment
+
+    seen = motion.seen
+    usual = seen.mean(axis=0) > 0.5
+    frame = int(seen[:, usual].sum(axis=1).argmax()) if usual.any() else 0
+    rows = np.flatnonzero(seen[frame])
+    if len(rows) < MIN_MARKERS:
+        raise ModelError(
+            f"no built-in set has the names of these markers, and {len(rows)} are too few to find a face by "
+            "its shape"
+        ).with_remedies(GIVE_MAP)
+    model = FaceModel.default()
+    cloud = motion.positions[frame, rows]
+    laid, error = _lay_onto(cloud, model, motion.up)
+    if error > MAX_ERROR:
+        raise ModelError(
+            "no built-in set has the names of these markers, and their shape is not that of a face "
+            f"(best fit {1000 * error:.0f} mm off)"
+        ).with_remedies(GIVE_MAP)
+    places = _skin_points(model)
+    names = [name for name in places if name not in SELDOM]
+    apart = np.linalg.norm(laid[:, None] - np.array([places[name] for name in names])[None], axis=2)
+    markers, targets = linear_sum_assignment(np.minimum(apart, MAX_POINT_DISTANCE))
+    result = {
+        motion.names[rows[m]]: names[t]
+        for m, t in zip(markers, targets, strict=True)
+        if apart[m, t] < MAX_POINT_DISTANCE
+    }
+    if len(result) < max(MIN_MARKERS, MIN_PLACED * len(rows)):
+        raise ModelError(
+            "no built-in set has the names of these markers, and their shape is not that of a face: only "
+            f"{len(result)} of {len(rows)} would be where a face has feature points"
+        ).with_remedies(GIVE_MAP)
+    top = places["11.1"][1]
+    for m, row in enumerate(rows):
+        if motion.names[row] not in result and laid[m, 1] > top:
+            result[motion.names[row]] = HEAD
+    return {name: result[name] for name in motion.names if name in result}
+
+
+def _skin_points(model: FaceModel) -> dict[str, Float64]:
+    """Return where markers can be on a face: each target that is on its skin."""
+    return {name: point for name, point in target_points(model.points).items() if name not in PUPILS}
+
+
+def _lay_onto(cloud: Float64, model: FaceModel, up: str) -> tuple[Float64, float]:
+    """Return the cloud on the head, float64 (M, 3), and the root mean square distance, metres."""
+    from scipy.spatial import cKDTree
+
+    skin = np.concatenate([part.vertices for part in model.of_kind("skin")]).astype(np.float64)
+    skin = skin[(skin[:, 2] > FRONT) & (skin[:, 1] > model.points[:, 1].min() - 0.02)]
+    tree = cKDTree(skin)
+    key = np.array(list(_skin_points(model).values()))
+    size = float(np.sqrt(((cloud - cloud.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    usual = float(np.sqrt(((key - key.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    if (
+        not SIZE_RANGE[0] * usual < max(UNIT_FACTORS) * size
+        or not min(UNIT_FACTORS) * size < SIZE_RANGE[1] * usual
+    ):
+        raise ModelError(
+            "no built-in set has the names of these markers, and their shape is not that of a face: they "
+            f"spread over {size:.2g} m in no unit of length that a face has"
+        ).with_remedies(GIVE_MAP)
+    factor = min((1.0, *UNIT_FACTORS), key=lambda each: abs(np.log(each * size / usual)))
+    starts = []
+    for axis in _up_axes(up):
+        for turn in range(DIRECTIONS):
+            upright = _turn_up(axis)
+            starts.append(axis_matrices(1, 2 * np.pi * turn / DIRECTIONS) @ upright)
+    fits = sorted(
+        (_fit(cloud * factor, start, tree, skin, key, 6) for start in starts), key=lambda fit: fit[1]
+    )[:FULL_FITS]
+    done = [_fit(laid, np.eye(3), tree, skin, key, ITERATIONS, moved=True) for laid, _ in fits]
+    return min(done, key=lambda fit: fit[1])
+
+
+def _up_axes(up: str) -> list[tuple[int, float]]:
+    """Return axes that may point up, and their signs."""
+    if up:
+        return [("xyz".index(up[1]), 1.0 if up[0] == "+" else -1.0)]
+    return [(1, 1.0), (2, 1.0), (0, 1.0), (1, -1.0), (2, -1.0), (0, -1.0)]
+
+
+def _turn_up(axis: tuple[int, float]) -> Float64:
+    """Return the rotation that turns an axis to +y."""
+    number, sign = axis
+    vector = np.zeros(3)
+    vector[number] = sign
+    other = np.roll(np.abs(vector), 1)
+    return np.stack([other, vector, np.cross(other, vector)])
+
+
+def _fit(
+    cloud: Float64,
+    start: Float64,
+    tree: object,
+    skin: Float64,
+    key: Float64,
+    rounds: int,
+    moved: bool = False,
+) -> tuple[Float64, float]:
+    """Return the cloud turned and moved onto the surface from a start, and its error, metres."""
+    from scipy.spatial import cKDTree
+
+    assert isinstance(tree, cKDTree)
+    laid = cloud @ start.T
+    if not moved:
+        laid = laid - laid.mean(axis=0) + key.mean(axis=0)
+    size = 1.0
+    for _ in range(rounds):
+        distance, nearest = tree.query(laid)
+        weight = 1 / (1 + (distance / (2 * max(float(np.median(distance)), 1e-4))) ** 2)
+        fit = fit_similarity(laid, skin[nearest], weight)
+        scale = np.clip(fit.scale, SIZE_RANGE[0] / size, SIZE_RANGE[1] / size)
+        size *= float(scale)
+        laid = replace(fit, scale=scale).apply(laid)
+    distance, _ = tree.query(laid)
+    back, _ = cKDTree(laid).query(key)
+    # features of the face must have markers near them: a smooth surface alone fits in many places
+    return laid, float(np.sqrt((np.minimum(distance, 0.03) ** 2).mean()) + 0.05 * np.median(back))

@@ -1,0 +1,163 @@
+"""Displacements of markers to FAPs: a least-squares solution within bounds, with the responses of a face.
+
+Each feature point is looked at along the directions of its own FAPs, and of those of the lip contour beside
+it. The jaw moves on an arc whose shape depends on the skull, so its depth is fitted to the take. It
+turns about its joint, in front of the ears, which slides forward as it does. How far the chin goes back for
+each millimetre that it sinks differs by a third between faces, and follows from where chin and ears are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.arrays import Float64, Intp
+from fba.capture.markers._responses import JAW, JAW_VALUES, Responses
+from fba.face import Fapu
+from fba.face.authoring.regions.jaw import CHIN, EARS, Jaw, opening_angles, opening_shifts
+from fba.face.feature_points import row_of
+from fba.face.points import DIRECTIONS
+from fba.parameters import FAP_COUNT, faps
+
+RIDGE_WEIGHT = 1e-4
+"""Weight of small values, relative to that of the displacements."""
+JAW_ROUNDS = 3
+"""Number of solutions, each with the jaw's arc at the values of the previous one."""
+BOUND_ROUNDS = 8
+"""Largest number of rounds in which values are fixed at a bound or released."""
+JAW_STEP = 2
+"""Row of `JAW_VALUES` that is the first guess of how far the jaw moves what."""
+BESIDE_CHIN = ("2.11", "2.12")
+"""Points without a FAP of their own, which go up, down, forward and back with the jaw."""
+INNER_LIP = {"8.1": "2.2", "8.2": "2.3", "8.3": "2.4", "8.4": "2.5", "8.5": "2.6", "8.6": "2.7", "8.7": "2.8",
+         "8.8": "2.9"}  # fmt: skip
+"""The point of the inner lip beside each of the outer lip."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """What is solved for. faps: the number of each; mates: FAPs that have the same value; rows: (point, axis)
+    pairs that are looked at."""
+
+    faps: tuple[int, ...]
+    mates: dict[int, int]
+    rows: tuple[tuple[int, int], ...]
+
+
+def choose_unknowns(points: Sequence[str], depth: bool = True, untold: Collection[int] = ()) -> Unknowns:
+    """Return which FAPs markers on these feature points tell, and along which axes.
+
+    depth: whether it is known how far forward the markers are; without it, FAPs in that direction are not
+    told. untold: FAPs that are not told, either.
+    """
+    given = set(points)
+    solved: list[int] = []
+    mates: dict[int, int] = {}
+    rows: list[tuple[int, int]] = []
+    for fap in faps()[2:]:
+        axis = _axis(fap.positive)
+        owner = next((point for point in fap.feature_points if point in given), None)
+        inner = next((outer for outer, point in INNER_LIP.items() if point in fap.feature_points), None)
+        if axis is None or fap.unit == "AU" or (axis == 2 and not depth) or fap.number in untold:
+            continue
+        if owner is not None:
+            solved.append(fap.number)
+            rows.append((row_of()[owner], axis))
+        elif inner in given:
+            rows.append((row_of()[inner], axis))
+            if fap.lip_mate:
+                mates[fap.number] = fap.lip_mate
+            else:
+                solved.append(fap.number)
+    if JAW in solved:
+        rows += [(row_of()[point], axis) for point in BESIDE_CHIN if point in given for axis in (1, 2)]
+    return Unknowns(tuple(solved), mates, tuple(dict.fromkeys(rows)))
+
+
+def solve(moved: Float64, still: Float64, fapu: Fapu, unknowns: Unknowns, responses: Responses) -> Float64:
+    """Return FAPs, float64 (T, 68), zero where no marker tells.
+
+    moved: float64 (T, 84, 3), displacements of feature points from the neutral face, relative to the head,
+    in metres along the standard's axes. still, fapu: the actor's, float64 (84, 3)
+    and what is measured on these points. responses: those of any face.
+    """
+    points, axes = np.array(unknowns.rows).T
+    seen = moved[:, points, axes]
+    unit = np.array([fapu[fap.unit] if fap.unit else 0.0 for fap in faps()])
+    each = (responses.each * unit[:, None, None])[:, points, axes]  # (68, R), metres for one step
+    columns = np.array(unknowns.faps) - 1
+    matrix = each[columns].copy()
+    for mate, leader in unknowns.mates.items():
+        if leader in unknowns.faps:
+            matrix[unknowns.faps.index(leader)] += each[mate - 1]
+    curve = responses.jaw[:, points, axes] * fapu.MNS
+    for row, shifts in jaw_curves(still, fapu).items():
+        chin = points == row
+        curve[:, chin] = shifts[:, axes[chin]] * fapu.MNS
+    jaw = unknowns.faps.index(JAW) if JAW in unknowns.faps else None
+    if jaw is not None:
+        matrix[jaw] = curve[JAW_STEP] / JAW_VALUES[JAW_STEP]
+    size = float(np.linalg.norm(matrix, axis=1).mean()) or 1.0
+    inverse = np.linalg.inv(matrix @ matrix.T + RIDGE_WEIGHT * size**2 * np.eye(len(columns)))
+    one_way = np.flatnonzero([faps()[c].direction == "U" for c in columns])
+    values = _solve_bounded(inverse, seen @ matrix.T, one_way)
+    if jaw is not None:
+        for _ in range(JAW_ROUNDS):
+            opened = values[:, jaw]
+            arc = np.stack([np.interp(opened, JAW_VALUES, curve[:, r]) for r in range(len(points))], axis=1)
+            bent = seen - arc + np.outer(opened, matrix[jaw])
+            values = _solve_bounded(inverse, bent @ matrix.T, one_way)
+    result = np.zeros((len(seen), FAP_COUNT))
+    result[:, columns] = values
+    for mate, leader in unknowns.mates.items():
+        result[:, mate - 1] = result[:, leader - 1]
+    return result
+
+
+def _solve_bounded(inverse: Float64, right: Float64, one_way: Intp) -> Float64:
+    """Return the minimum of x . normal . x / 2 - right . x for each row: float64 (T, F).
+
+    inverse: of the normal matrix. one_way: columns that must not be negative. A primal-dual active-set
+    method: in each round, frames with the same columns held at 0 are solved at once.
+    """
+    free: Float64 = right @ inverse
+    held = free[:, one_way] < 0
+    values = free
+    for _ in range(BOUND_ROUNDS):
+        values, pull = free.copy(), np.zeros(held.shape)
+        codes = held @ (1 << np.arange(len(one_way)))
+        for code in np.unique(codes[codes > 0]):
+            rows = np.flatnonzero(codes == code)
+            pattern = held[rows[0]]
+            columns = one_way[pattern]
+            # what holds these columns at 0
+            force = free[np.ix_(rows, columns)] @ np.linalg.inv(inverse[np.ix_(columns, columns)])
+            values[rows] -= force @ inverse[columns]
+            pull[np.ix_(rows, pattern)] = force
+        now = np.where(held, pull < 0, values[:, one_way] < 0)
+        if (now == held).all():
+            break
+        held = now
+    values[:, one_way] = np.maximum(values[:, one_way], 0.0)
+    return values
+
+
+def _axis(word: str) -> int | None:
+    """Return the axis of the standard's word for a motion; None for turns and growth."""
+    return int(np.argmax(np.abs(DIRECTIONS[word]))) if word in DIRECTIONS else None
+
+
+def jaw_curves(points: Float64, fapu: Fapu) -> dict[int, Float64]:
+    """Return shifts (J, 3) in MNS at `JAW_VALUES` of each feature point on the chin, by its row.
+
+    points: float64 (84, 3), the actor's neutral feature points, metres, along the standard's axes.
+    """
+    rows = [row_of()[name] for name in CHIN]
+    hinge = points[[row_of()[name] for name in EARS]].mean(axis=0)[1:]
+    none = np.zeros(0)
+    jaw = Jaw(none, none, hinge, points[row_of()["2.1"]], fapu.ES * 1024)
+    values, angles = opening_angles(jaw, fapu.MNS)
+    shifts = opening_shifts(points[rows], jaw, np.interp(JAW_VALUES, values, angles)) / fapu.MNS
+    return {row: shifts[:, n] for n, row in enumerate(rows)}

@@ -1,0 +1,197 @@
+"""The two rules by which expressions mix: of one family, and of two.
+
+Section 8.4 of the thesis in docs/emotion.md, which gives no numbers; those here are named parameters.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cache
+
+import numpy as np
+
+from fba.arrays import Bool, Float32, Float64, Floating
+from fba.easing import smoothstep
+from fba.emotion._profiles import measurements, vocabulary
+from fba.emotion.expression import Expression
+from fba.errors import OptionError
+from fba.face import Definitions
+from fba.parameters import FAP_COUNT, faps
+
+LEAST_ACTIVATION = 2.0
+"""The activation of an expression that has none, nor a family: the smallest in the table."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Parameters of the rules.
+
+    interpolation: share of the second of two expressions of one family in the FAPs that both move, 0 to 1;
+    None: by their intensities. reduction: what remains of a FAP that only one of them moves, 0 to 1.
+    nearness: within one family, how far such a FAP may be from the family's own value, as a share of that, to
+    be kept at all. presence: an expression moves a FAP if Table 8-3 or 8-4 lists it for the family, or if its
+    value is at least this share of the largest among the six. crossover: the rules take hold gradually, so
+    that nothing jumps while intensities change: in one family, until the lesser expression has this share; of
+    two, until their activations differ by this share of their sum. 0: at once.
+
+    Raises OptionError where one is no number of 0 to 1.
+    """
+
+    interpolation: float | None = None
+    reduction: float = 0.6
+    nearness: float = 0.6
+    presence: float = 0.5
+    crossover: float = 0.1
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is None and field.name == "interpolation":
+                continue
+            if not isinstance(value, int | float) or not math.isfinite(value) or not 0 <= value <= 1:
+                raise OptionError(f"{field.name} must be a number from 0 to 1, not {value!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """An expression at an intensity, on its way into a mix.
+
+    faps: float64 (68,), at full intensity. moved: float64 (68,), 1 for the FAPs that it moves, 0 for others;
+    a mix moves some in part. activation: at full intensity. intensity: 0 to 1. family: "" for none.
+    """
+
+    faps: Float64
+    moved: Float64
+    activation: float
+    intensity: float
+    family: str
+
+    @property
+    def shown(self) -> Float64:
+        """The FAPs at the intensity: float64 (68,)."""
+        return self.faps * self.intensity
+
+    @property
+    def shown_activation(self) -> float:
+        """The activation at the intensity, which decides what dominates."""
+        return self.activation * self.intensity
+
+
+def part(expression: Expression, intensity: float, activation: float | None, presence: float) -> Part:
+    """Return an expression at an intensity of 0 to 1.
+
+    activation: of the expression or its family, None without one. presence: see `Rules`.
+    """
+    return Part(
+        expression.faps.astype(np.float64),
+        moved_faps(expression, presence).astype(np.float64),
+        LEAST_ACTIVATION if activation is None else activation,
+        intensity,
+        expression.family,
+    )
+
+
+def moved_faps(expression: Expression, presence: float) -> Bool:
+    """Return which FAPs an expression moves, bool (68,): see `Rules.presence`."""
+    largest = np.abs(Definitions.default().expressions).max(axis=0)
+    size = np.abs(expression.faps)
+    listed = _listed_faps(expression.family) if expression.family else np.zeros(FAP_COUNT, dtype=bool)
+    moved: Bool = (size > 0) & (listed | (size >= presence * largest))
+    return moved
+
+
+@cache
+def _listed_faps(family: str) -> Bool:
+    listed = np.zeros(FAP_COUNT, dtype=bool)
+    listed[[one.fap - 1 for one in vocabulary(family)]] = True
+    listed[[fap - 1 for one in measurements(family) for fap in one.faps]] = True
+    return listed
+
+
+def mix_within_family(first: Part, second: Part, centre: Float64, rules: Rules) -> Part:
+    """Return two expressions of one family as one, with the larger of their intensities.
+
+    A FAP that both move, or neither, is interpolated. One that only one of them moves is kept, reduced, if it
+    is near the family's own value, else dropped.
+
+    centre: float64 (68,), the family's own expression at full intensity.
+    """
+    total = first.intensity + second.intensity
+    share = second.intensity / total if rules.interpolation is None else rules.interpolation
+    interpolated = (1 - share) * first.faps + share * second.faps
+    ruled = interpolated
+    for own, other in ((first, second), (second, first)):
+        near = np.abs(own.faps - centre) <= rules.nearness * np.abs(centre)
+        kept = np.where(near, rules.reduction * own.faps, 0.0)
+        alone = own.moved * (1 - other.moved)
+        ruled = ruled + alone * (kept - interpolated)
+    hold = _grow(min(share, 1 - share), rules.crossover)
+    return Part(
+        hold * ruled + (1 - hold) * interpolated,
+        (1 - share) * first.moved + share * second.moved,
+        (1 - share) * first.activation + share * second.activation,
+        max(first.intensity, second.intensity),
+        first.family,
+    )
+
+
+def mix_families(parts: Sequence[Part], rules: Rules) -> Float64:
+    """Return the FAPs of expressions of different families: float64 (68,).
+
+    The one with the largest activation, as shown, dominates: its FAPs stay, and to those that it does not
+    move the others' are added, reduced. The others are mixed in the same way before.
+    """
+    return _mix(tuple(parts), rules, {})[0]
+
+
+def _mix(
+    parts: tuple[Part, ...], rules: Rules, known: dict[tuple[Part, ...], tuple[Float64, Float64]]
+) -> tuple[Float64, Float64]:
+    """Return FAPs (68,), and how far each is moved, 0 to 1. known: mixtures that were made before."""
+    if len(parts) == 1:
+        return parts[0].shown, parts[0].moved
+    if parts in known:
+        return known[parts]
+    values, moved = np.zeros(FAP_COUNT), np.zeros(FAP_COUNT)
+    for number, weight in enumerate(_dominance([one.shown_activation for one in parts], rules)):
+        if not weight:
+            continue
+        leader, others = parts[number], parts[:number] + parts[number + 1 :]
+        added, added_moved = _mix(others, rules, known)
+        free = added_moved * (1 - leader.moved)
+        activation = max(one.shown_activation for one in others)
+        part_of = _grow(activation / (activation + leader.shown_activation or 1.0), rules.crossover)
+        values += weight * (leader.shown + rules.reduction * free * added)
+        moved += weight * (leader.moved + free * part_of)
+    known[parts] = values, moved
+    return values, moved
+
+
+def _dominance(activations: list[float], rules: Rules) -> list[float]:
+    """Return the share of each in the lead: 1 for the largest activation, less where others are near it."""
+    largest = max(activations) or 1.0
+    near = [1 - _grow((largest - one) / (largest + one), rules.crossover) for one in activations]
+    return [one / sum(near) for one in near]
+
+
+def _grow(value: float, crossover: float) -> float:
+    """Return 0 at 0, rising to 1 at the crossover; if that is 0, 1 for all that is more than 0."""
+    if value <= 0:
+        return 0.0
+    return 1.0 if value >= crossover else float(smoothstep(value / crossover))
+
+
+def limited(values: Floating) -> Float32:
+    """Return FAPs (..., 68) within the limits of the standard: float32."""
+    low, high = fap_limits()
+    return np.clip(values, low, high).astype(np.float32)
+
+
+@cache
+def fap_limits() -> tuple[Float64, Float64]:
+    """Return the smallest and the largest value of each FAP, float64 (68,) each; zeros for FAP 1 and 2."""
+    pairs = [one.i_limits or (0, 0) for one in faps()]
+    scale = np.array([one.step for one in faps()], dtype=np.float64)
+    return np.array([p[0] for p in pairs]) * scale, np.array([p[1] for p in pairs]) * scale

@@ -1,0 +1,252 @@
+"""Moves the vertices of a face model by FAPs, through its FaceDefTables.
+
+ISO/IEC 14496-1, nodes FaceDefTables, FaceDefMesh and FaceDefTransform.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.arrays import Float32, Float64, Int64
+from fba.errors import RangeError
+from fba.face.deform._normals import Surface, build_surface
+from fba.face.deform.flat_tables import (
+    VALUE_MAX,
+    Shifts,
+    Transforms,
+    all_vertices,
+    bound_points,
+    flatten_shifts,
+    flatten_transforms,
+)
+from fba.face.feature_points import names
+from fba.face.model import FaceModel
+from fba.mesh import result_array
+from fba.parameters import FAP_COUNT, faps
+
+BLOCK = 64
+"""Frames per call of the compiled loop: Ctrl-C takes effect between calls only."""
+
+
+class _FlatModel(NamedTuple):
+    """The tables of a model as flat arrays for the compiled loops."""
+
+    part_start: Int64
+    """(P + 1,) first vertex of each part, and the number of all."""
+    shifts: Shifts
+    transforms: Transforms
+    surface: Surface
+    point_shifts: Shifts
+    """The shifts of feature points that are bound to vertices."""
+    owner: Int64
+    """(84,) part whose transforms move each feature point, -1 for the head alone."""
+
+
+_flat_models: WeakKeyDictionary[FaceModel, _FlatModel] = WeakKeyDictionary()
+"""Cache of flat tables, as long as their models live: models do not change."""
+
+
+def _flat_model(model: FaceModel) -> _FlatModel:
+    """Return the flat tables of a model, with scratch arrays of their own, for several threads."""
+    tables = _flat_models.get(model)
+    if tables is None:
+        tables = _flat_models[model] = _flatten(model)
+    shifts, surface, points = tables.shifts, tables.surface, tables.point_shifts
+    return tables._replace(
+        shifts=shifts._replace(amount=np.zeros_like(shifts.amount)),
+        surface=surface._replace(sums=np.zeros_like(surface.sums), units=np.zeros_like(surface.units)),
+        point_shifts=points._replace(amount=np.zeros_like(points.amount)),
+    )
+
+
+def _flatten(model: FaceModel) -> _FlatModel:
+    shifts = flatten_shifts(model, all_vertices(model), np.float32)
+    return _FlatModel(
+        part_start=np.cumsum([0, *(len(part.vertices) for part in model.parts)], dtype=np.int64),
+        shifts=shifts,
+        transforms=flatten_transforms(model),
+        surface=build_surface(model, shifts.rows),
+        point_shifts=flatten_shifts(model, bound_points(model), np.float64),
+        owner=_find_owners(model),
+    )
+
+
+class Deformer:
+    """Moves a face: `Deformer(model)(faps)` gives its vertices.
+
+    1. Every FAP that is not 0 moves the vertices of its FaceDefMesh along their piecewise linear paths,
+       by value x FAPU; the shifts of several FAPs add up.
+    2. Then each part's own transforms are applied, about their fixed centres:
+       translations . rotations . scales, the outermost first, as in a Transform node. Of several
+       rotations (or scales) that of the lower FAP is further out, so an eye's yaw (23, 24) is outside
+       its pitch (25, 26); only the head's pitch is innermost, so that the head turns by
+       yaw . roll . pitch (49 . 50 . 48). Of several of one FAP, the one listed first is further out.
+    3. Then the transforms of `HEAD` are applied to all parts, nested in the same way.
+
+    A rotation turns by value x FAPU x amount (radians about each axis), a translation shifts by that
+    vector, a scale multiplies each axis by 1 + value x FAPU x amount.
+
+    The first one of a model copies its tables into flat arrays, which the next ones share; calls allocate
+    nothing but their result.
+    Threads that share a Deformer wait for each other; for speed, give each its own.
+    Raises ModelError for displacements too large for 32-bit floats.
+    """
+
+    def __init__(self, model: FaceModel) -> None:
+        from fba.face.deform import _loops as loops  # imports numba: not before a face is to move
+
+        self.model = model
+        self._loops = loops
+        self._tables = _flat_model(model)
+        self._scratch = loops.allocate_scratch(len(model.vertices), len(model.parts))
+        self._lock = threading.Lock()
+
+    def __call__(
+        self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None
+    ) -> Float32:
+        """Vertices of all parts in order, the head turned: float32 (V, 3), metres, for FAPs (68,), or
+        (T, V, 3) for (T, 68).
+
+        faps: numbers of any type, as `resolve` gives them, in the units of the standard; columns 0 and 1
+        (viseme, expression) are ignored. out: written to and returned. normals: filled with unit normals,
+        computed from the triangles that the FAPs move, smooth across the seams of a part. Both float32,
+        C-contiguous, of the result's shape.
+
+        Raises ValueError for another shape or type, RangeError for FAPs that are not finite or do not
+        fit 32 bits.
+        """
+        return self._run(faps, out, normals, with_head=True)
+
+    def local(
+        self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None
+    ) -> Float32:
+        """Like calling, but in the frame of the head: without the transforms of `HEAD`."""
+        return self._run(faps, out, normals, with_head=False)
+
+    def head_matrices(self, faps: npt.ArrayLike) -> Float64:
+        """Transforms of the head: float64 (4, 4) for FAPs (68,), (T, 4, 4) for (T, 68).
+
+        For column vectors: `calling = matrix . local`. Errors as when called.
+        """
+        values, single = frame_values(faps)
+        matrices = self._poses(values)[:, -1]
+        return matrices[0] if single else matrices
+
+    def part_matrices(self, faps: npt.ArrayLike) -> Float64:
+        """Transforms of each part within the head: float64 (P, 4, 4) for FAPs (68,), (T, P, 4, 4) for (T,
+        68), in the order of `model.parts`.
+
+        The matrix of an eyeball rotates it from looking straight ahead to its current gaze, in the frame of
+        the head; `head_matrices . part_matrices` is that in the world. The identity for parts without
+        transforms; FaceDefMesh is not included. Errors as when called.
+        """
+        values, single = frame_values(faps)
+        matrices = self._poses(values)[:, :-1]
+        return matrices[0] if single else matrices
+
+    def feature_points(self, faps: npt.ArrayLike, *, local: bool = False) -> Float64:
+        """Moved feature points: float64 (84, 3) for FAPs (68,), (T, 84, 3) for (T, 68), metres.
+
+        A point bound to a vertex moves with it. Others move with the transforms of the part that they
+        belong to: a pupil with the nearest eye, points of tongue and teeth with the nearest part of
+        that kind, the rest with the head alone. Points that the face lacks stay NaN. local: without the
+        head's transforms. Errors as when called.
+        """
+        values, single = frame_values(faps)
+        points: Float64 = np.empty((len(values), len(names()), 3))
+        with np.errstate(all="ignore"):
+            self._loops.points_of_frames(
+                values,
+                self.model.points,
+                self._tables.owner,
+                self._tables.point_shifts,
+                self._tables.transforms,
+                not local,
+                points,
+            )
+        return points[0] if single else points
+
+    def _poses(self, values: Float64) -> Float64:
+        matrices = np.zeros((len(values), len(self.model.parts) + 1, 4, 4))
+        matrices[..., 3, 3] = 1
+        top = np.empty((*matrices.shape[:2], 3, 4))
+        self._loops.poses_of_frames(values, self._tables.transforms, top)
+        matrices[..., :3, :] = top
+        return matrices
+
+    def _run(
+        self, faps: npt.ArrayLike, out: Float32 | None, normals: Float32 | None, *, with_head: bool
+    ) -> Float32:
+        values, single = frame_values(faps)
+        count = len(self.model.vertices)
+        shape = (count, 3) if single else (len(values), count, 3)
+        out = result_array(shape, out, normals)
+        out_frames = out[None] if single else out
+        normal_frames = out_frames[:0] if normals is None else normals[None] if single else normals
+        with self._lock, np.errstate(all="ignore"):
+            for start in range(0, len(values), BLOCK):
+                stop = start + BLOCK
+                self._loops.deform_frames(
+                    values[start:stop],
+                    self.model.vertices,
+                    self._tables.part_start,
+                    self._tables.shifts,
+                    self._tables.transforms,
+                    self._tables.surface,
+                    self._scratch,
+                    with_head,
+                    out_frames[start:stop],
+                    normal_frames[start:stop],
+                )
+        return out
+
+
+def frame_values(values: npt.ArrayLike) -> tuple[Float64, bool]:
+    """FAPs as float64 (T, 68), and whether they were one frame (68,)."""
+    array = np.asarray(values)
+    if array.ndim not in {1, 2} or array.shape[-1] != FAP_COUNT:
+        raise ValueError(f"FAPs must have shape ({FAP_COUNT},) or (T, {FAP_COUNT}), not {array.shape}")
+    if array.dtype.kind not in "iufb":
+        raise ValueError(f"FAPs must be real numbers, not {array.dtype}")
+    frames = np.ascontiguousarray(array, dtype=np.float64).reshape(-1, FAP_COUNT)
+    if frames.size and not (frames.min() >= -VALUE_MAX - 1 and frames.max() <= VALUE_MAX):
+        good = (frames >= -VALUE_MAX - 1) & (frames <= VALUE_MAX)
+        frame, column = (int(index) for index in np.argwhere(~good)[0])
+        value = frames[frame, column]
+        raise RangeError(
+            f"{value:g} cannot be shown; FAPs are finite and fit 32 bits",
+            parameter=f"FAP {column + 1} {faps()[column].name}",
+            value=int(value) if np.isfinite(value) else None,
+            limits=(-VALUE_MAX - 1, VALUE_MAX),
+            frame=frame if array.ndim == 2 else None,
+        )
+    return frames, array.ndim == 1
+
+
+POINT_KINDS = {"3.5": "eye", "3.6": "eye", "6": "tongue", "9.8": "teeth", "9.9": "teeth", "9.10": "teeth",
+               "9.11": "teeth"}  # fmt: skip
+"""Kinds of parts to which feature points, or groups of them, belong if they are bound to no vertex."""
+
+
+def _find_owners(model: FaceModel) -> Int64:
+    """(84,) the part whose transforms move each feature point, -1 for the head alone."""
+    owner = np.full(len(names()), -1, dtype=np.int64)
+    ends = np.cumsum([len(part.vertices) for part in model.parts])
+    for row, name in enumerate(names()):
+        if model.bound[row] >= 0:
+            owner[row] = np.searchsorted(ends, model.bound[row], side="right")
+            continue
+        kind = POINT_KINDS.get(name) or POINT_KINDS.get(name.split(".")[0])
+        away = {
+            number: float(np.linalg.norm(part.vertices - model.points[row], axis=1).min())
+            for number, part in enumerate(model.parts)
+            if part.kind == kind and len(part.vertices)
+        }
+        if away and not np.isnan(model.points[row]).any():
+            owner[row] = min(away, key=lambda number: away[number])
+    return owner

@@ -1,0 +1,137 @@
+"""Read arrays of NumPy (.npy, .npz) with the points that a tracker found on a face.
+
+An array is (frames, points, 2 or 3), or has one more axis for faces, or a row of coordinates for each frame.
+Of several in a file, the one whose number of points a tracker has is read. Times, rate and the size of the
+picture are arrays of their own: `times` or `timestamps`, `fps`, `width` and `height`.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from fba.arrays import Float64
+from fba.capture import PointMotion
+from fba.capture.points.motion import COUNTS, OTHERS, check_count
+from fba.capture.sampling import find_rate
+from fba.errors import FormatError, ModelError, Remedy
+from fba.formats.face_tables._points import build_points
+from fba.formats.face_tables._times import check_order, seconds_of
+from fba.formats.numpy_archives import NPY, ZIP, read_arrays
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import Path
+
+NAMES = (
+    "landmarks", "landmark", "face_landmarks", "landmarks68", "landmarks_68", "landmarks478", "points", "pts",
+    "keypoints", "face", "faces", "lms", "lmks", "lm", "coords", "preds", "positions", "data", "arr_0",
+)  # fmt: skip
+"""Names under which programs save points."""
+TIMES = ("times", "timestamps", "timestamp", "time", "t")
+RATES = ("fps", "rate", "frame_rate", "video_fps")
+SINGLE = "points"
+
+
+def sniff(head: bytes, suffix: str) -> bool:
+    """Whether a file that begins like this is an array, or an archive of arrays, one of them with points."""
+    if head.startswith(NPY):
+        return True
+    if not head.startswith(ZIP):
+        return False
+    return any(b"%s.npy" % name.encode() in head for name in NAMES)
+
+
+def read_points(
+    path: Path,
+    *,
+    fps: Fraction | int | str | None = None,
+    face: str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> PointMotion:
+    """Return the points in an array; options and errors as for `points.read_points`."""
+    arrays = read_arrays(path, limits, single=SINGLE)
+    positions, odd = _choose(arrays, path, face)
+    limits.check_frames(len(positions), f"{path}: the recording")
+    times, rate = _times(arrays, len(positions), fps, path)
+    width, height = (_number(arrays, name) for name in ("width", "height"))
+    return build_points(
+        positions, times, rate, path=path, name=FilePath(path).stem,
+        aspect=width / height if width and height else None, findings=odd,
+    )  # fmt: skip
+
+
+def _choose(arrays: dict[str, Any], path: Path, face: str | None) -> tuple[Float64, list[str]]:
+    """Return the points (T, N, 2 or 3) among arrays, and what was odd about them."""
+    shapes = {}
+    order = [*(name for name in NAMES if name in arrays), *arrays]
+    for name in dict.fromkeys(order):
+        points = _as_points(arrays[name])
+        if points is not None and points.shape[2] in COUNTS:
+            faces = points.shape[1]
+            if faces > 1 and face is None:
+                raise FormatError(f"has {faces} faces", path=path).with_remedies(
+                    Remedy("face", "choose one with {}", "'0'")
+                )
+            number = int(face) if face is not None and face.isdigit() else 0
+            if face is not None and not (face.isdigit() and number < faces):
+                raise FormatError(f"has no face {face!r}; there are 0 to {faces - 1}", path=path)
+            return points[:, number], []
+        shapes[name] = arrays[name].shape
+        if points is not None and points.shape[2] in OTHERS:
+            try:
+                check_count(points.shape[2])
+            except ModelError as error:
+                raise FormatError(error.finding, path=path) from error
+    listed = ", ".join(f"{name} {shape}" for name, shape in list(shapes.items())[:6]) or "none of numbers"
+    raise FormatError(
+        f"no array has points of a face, (frames, {' or '.join(map(str, COUNTS))}, 2 or 3), but {listed}",
+        path=path,
+    )
+
+
+def _as_points(array: Any) -> Float64 | None:
+    """Return an array as points (T, faces, N, 2 or 3); None if it cannot be any."""
+    if array.ndim == 4 and array.shape[3] in (2, 3):
+        return np.asarray(array)
+    if array.ndim == 3 and array.shape[2] in (2, 3):
+        return np.asarray(array[:, None])
+    if array.ndim == 3 and array.shape[1] in (2, 3):
+        return np.asarray(array.swapaxes(1, 2)[:, None])
+    if array.ndim == 2 and array.shape[1] in (2, 3):
+        return np.asarray(array[None, None])
+    if array.ndim == 2:
+        for width in (3, 2):
+            if array.shape[1] % width == 0 and array.shape[1] // width in COUNTS:
+                return np.asarray(array.reshape(len(array), 1, -1, width))
+    return None
+
+
+def _times(
+    arrays: dict[str, Any], count: int, fps: Fraction | int | str | None, path: Path
+) -> tuple[Float64, Fraction]:
+    """Return times (T,) in seconds from the first frame, and the nominal rate."""
+    stored = next(
+        (arrays[name].ravel() for name in TIMES if name in arrays and arrays[name].size == count), None
+    )
+    if stored is not None and count > 1 and np.isfinite(stored).all():
+        seconds = seconds_of(stored)
+        check_order(seconds, list(range(1, count + 1)), path)
+        try:
+            return seconds, find_rate(seconds)
+        except ModelError as error:
+            raise FormatError(error.finding, path=path) from error
+    rate = next((found for name in RATES if (found := _number(arrays, name))), None)
+    if fps is None and rate is None and count > 1:
+        raise FormatError("has no times", path=path).with_remedies(
+            Remedy("fps", "give the frame rate of the film with {}", "30")
+        )
+    chosen = Fraction(fps) if fps is not None else Fraction(rate or 30).limit_denominator(1001)
+    return np.arange(count) / float(chosen), chosen
+
+
+def _number(arrays: dict[str, Any], name: str) -> float:
+    """Return a single number of a file; 0 if it is not there."""
+    array = arrays.get(name)
+    return float(array.ravel()[0]) if array is not None and array.size == 1 and array.ravel()[0] > 0 else 0.0

@@ -1,0 +1,229 @@
+"""Read tables (CSV) of points that a tracker found on a face: MediaPipe's, OpenFace's, dlib's, py-feat's.
+
+There is no standard. Wide tables have a column for each coordinate: `x_0, y_0, z_0, ...`, `landmark_0_x`,
+`0_x`, `x0`; long ones have a row for each point: `frame, landmark, x, y, z`. OpenFace writes pixels as
+`x_0, y_0` and millimetres as `X_0, Y_0, Z_0`: these are read, if they are there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from fba.arrays import Float64, Int64
+from fba.capture import PointMotion
+from fba.capture.points.motion import COUNTS, OTHERS, check_count
+from fba.errors import FormatError, ModelError
+from fba.formats.face_tables._faces import choose_rows, row_times, tracked_rows
+from fba.formats.face_tables._points import build_points
+from fba.formats.face_tables._tables import Table, header_names, named, read_table
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import Path
+
+AXIS_FIRST = re.compile(r"(?:(.*?)[ _.\-]*)??([xyzXYZ])[ _.\-\[(]*(\d{1,4})[\])]?")
+AXIS_LAST = re.compile(r"(.*?)[ _.\-\[(]*(\d{1,4})[\])]?[ _.\-]*([xyzXYZ])")
+MIN_POINTS = 5
+"""Smallest number of points in a table of points; fewer are markers."""
+TIMES = ("timestamp", "time", "seconds", "time_s", "timestamp_s", "t")
+MILLISECONDS = ("timestamp_ms", "time_ms", "timestampms", "milliseconds", "ms")
+FRAMES = ("frame", "frame_id", "frame_number", "frame_idx", "frame_index", "framenum", "image_id")
+FACES = ("face_id", "face", "Identity", "person_id", "face_idx", "face_index")
+POINTS = (
+    "landmark",
+    "landmark_id",
+    "landmark_index",
+    "landmark_idx",
+    "point",
+    "point_id",
+    "index",
+    "idx",
+    "id",
+)
+SIZES = (
+    ("width", "height"),
+    ("framewidth", "frameheight"),
+    ("image_width", "image_height"),
+    ("frame_width", "frame_height"),
+)
+WORDS = ("", "landmark", "landmarks", "lm", "lmk", "face", "facelandmark", "point", "points", "p", "pt", "kp",
+         "keypoint", "facepoint", "mesh", "facemesh")  # fmt: skip
+"""What may stand before the numbers of columns, in small letters."""
+PLAIN = re.compile(r"-?\d{1,9}(?:\.\d{0,20})?(?:[eE][+-]?\d{1,3})?")
+PLAIN_COUNTS = {width * count for count in COUNTS for width in (2, 3)}
+"""Columns of tables that number them, or that have no header."""
+MILLIMETRE = 0.001
+
+
+def sniff(head: bytes, suffix: str) -> bool:
+    """Whether the first line of a file names coordinates of numbered points."""
+    names = header_names(head)
+    if _long_columns(names) is not None or _plain_columns(names) is not None:
+        return True
+    sets = _find_sets(names)
+    return any(len(columns.get("x", columns.get("X", {}))) >= MIN_POINTS for columns in sets.values())
+
+
+def read_points(
+    path: Path,
+    *,
+    fps: Fraction | int | str | None = None,
+    face: str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> PointMotion:
+    """Return the points as they are in a table.
+
+    fps: frames in a second, for tables without times. face: the name or number of the face to read, where
+    there are several. Raises FormatError, LimitError.
+    """
+    table = _with_header(read_table(path, limits))
+    column = {name: number for number, name in reversed(list(enumerate(table.names)))}
+    by_word = {name.lower(): number for name, number in column.items()}
+    long = _long_columns(table.names)
+    ids = next((table.column(column[name]) for name in FACES if name in column), [""] * len(table.rows))
+    rows = choose_rows(table, ids, face)
+    if long is not None:
+        positions, first = _read_long(table, rows, long)
+    else:
+        positions, first = _read_wide(table, rows), rows
+    seconds = next((by_word[name] for name in (*TIMES, *MILLISECONDS) if name in by_word), None)
+    frame = next((by_word[name] for name in FRAMES if name in by_word), None)
+    times, rate, odd = row_times(table, first, seconds, frame, fps)
+    metric = long is None and _is_metric(table.names)
+    positions[~tracked_rows(table, column)[first]] = np.nan
+    return build_points(
+        positions * (MILLIMETRE if metric else 1.0), times, rate, path=path, name=FilePath(path).stem,
+        metric=metric, aspect=_read_aspect(table, by_word), findings=odd,
+    )  # fmt: skip
+
+
+def _find_sets(names: Sequence[str]) -> dict[str, dict[str, dict[int, int]]]:
+    """Return what is before the numbers -> axis -> number of the point -> column."""
+    result: dict[str, dict[str, dict[int, int]]] = {}
+    for column, name in enumerate(names):
+        if match := AXIS_FIRST.fullmatch(name):
+            before, axis, number = match[1] or "", match[2], match[3]
+        elif match := AXIS_LAST.fullmatch(name):
+            before, number, axis = match[1], match[2], match[3]
+        else:
+            continue
+        word = re.sub(r"[ _.\-]", "", before.lower())
+        if word in WORDS:
+            result.setdefault(word, {}).setdefault(axis, {}).setdefault(int(number), column)
+    return result
+
+
+def _plain_columns(names: Sequence[str]) -> list[int] | None:
+    """Return columns of coordinates, one after another, of a table that numbers columns or has no names."""
+    numbers = [column for column, name in enumerate(names) if PLAIN.fullmatch(name)]
+    for columns in (numbers, numbers[1:]):
+        if len(names) - len(columns) <= 3 and len(columns) in PLAIN_COUNTS:
+            return columns
+    return None
+
+
+def _with_header(table: Table) -> Table:
+    """Return a table whose first line may be no header, but numbers, as one with a header."""
+    plain = _plain_columns(table.names)
+    if plain is None or all(name.isdigit() for name in (table.names[column] for column in plain)):
+        return table
+    names = [str(column) for column in range(len(table.names))]
+    if len(plain) < len(names):
+        names[0] = "frame"
+    rows = [list(table.names), *table.rows]
+    return replace(table, names=tuple(names), rows=rows, lines=[table.lines[0] - 1, *table.lines])
+
+
+def _is_metric(names: Sequence[str]) -> bool:
+    """Whether columns are OpenFace's points in millimetres, X_0, Y_0, Z_0."""
+    sets = _find_sets(names)
+    return {"X", "Y", "Z"} <= set(sets.get("", {}))
+
+
+def _read_wide(table: Table, rows: Int64) -> Float64:
+    """Return points (T, N, 2 or 3) of a table with a column for each coordinate."""
+    if (plain := _plain_columns(table.names)) is not None:
+        count = len(plain)
+        width = 3 if count % 3 == 0 and count // 3 in COUNTS else 2
+        return table.numbers(plain)[rows].reshape(len(rows), -1, width)
+    sets = _find_sets(table.names)
+    if not sets:
+        raise FormatError(
+            "no columns of points, such as x_0, y_0, z_0, x_1, ...", path=table.path, line=table.lines[0] - 1
+        )
+    chosen = max(sets.values(), key=lambda axes: max(len(numbers) for numbers in axes.values()))
+    axes = "XYZ" if {"X", "Y", "Z"} <= set(chosen) else "xyz" if {"x", "y"} <= set(chosen) else "XYZ"
+    if not set(axes[:2]) <= set(chosen):
+        raise FormatError("has no columns of both x and y of its points", path=table.path, line=1)
+    numbers = sorted(chosen[axes[0]])
+    axes = axes if axes[2] in chosen else axes[:2]
+    for axis in axes:
+        lacking = [f"{axis}_{number}" for number in _expected(numbers) if number not in chosen[axis]]
+        if lacking:
+            raise FormatError(f"columns are missing: {named(lacking)}", path=table.path, line=1)
+    if len(numbers) in (*OTHERS, 68, 70, 468, 478):
+        _check(len(numbers), table)
+    columns = [[chosen[axis][number] for number in _expected(numbers)] for axis in axes]
+    return np.stack([table.numbers(each)[rows] for each in columns], axis=2)
+
+
+def _expected(numbers: list[int]) -> range:
+    """Return the numbers that points should have: from 0 or 1 to the last."""
+    first = min(numbers[0], 1)
+    return range(first, numbers[-1] + 1)
+
+
+def _check(count: int, table: Table) -> None:
+    try:
+        check_count(count)
+    except ModelError as error:
+        raise FormatError(error.finding, path=table.path, line=1) from error
+
+
+def _long_columns(names: Sequence[str]) -> tuple[int, int, int, int, int | None] | None:
+    """Return columns of frame or time, of the point, of x, y and z of a table with a row for each point."""
+    words = [name.lower() for name in names]
+    point = next((words.index(name) for name in POINTS if name in words), None)
+    frame = next((words.index(name) for name in (*FRAMES, *TIMES, *MILLISECONDS) if name in words), None)
+    if point is None or frame is None or not {"x", "y"} <= set(words):
+        return None
+    return frame, point, words.index("x"), words.index("y"), words.index("z") if "z" in words else None
+
+
+def _read_long(
+    table: Table, rows: Int64, columns: tuple[int, int, int, int, int | None]
+) -> tuple[Float64, Int64]:
+    """Return points (T, N, 2 or 3) of a table with a row for each, and each frame's first row."""
+    frame, point, *axes = (number for number in columns if number is not None)
+    numbers = table.numbers([frame, point])[rows]
+    lost = np.isnan(numbers).any(axis=1)
+    if lost.any():
+        raise FormatError(
+            "the row has no frame, or no number of a point",
+            path=table.path, line=table.lines[rows[int(lost.argmax())]],
+        )  # fmt: skip
+    which = numbers[:, 1].astype(np.int64)
+    which -= min(int(which.min()), 1)
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(numbers[:, 0]) != 0]))
+    count = int(which.max()) + 1
+    _check(count, table)
+    if int(which.min()) < 0 or (which != numbers[:, 1] - (numbers[:, 1] - which)).any():
+        raise FormatError("numbers of points begin with 0 or 1", path=table.path)
+    owner = np.cumsum(np.concatenate([[True], np.diff(numbers[:, 0]) != 0])) - 1
+    positions = np.full((len(starts), count, len(axes)), np.nan)
+    positions[owner, which] = table.numbers(list(axes))[rows]
+    return positions, rows[starts]
+
+
+def _read_aspect(table: Table, by_word: dict[str, int]) -> float | None:
+    """Return width / height of the picture, if columns say it."""
+    for names in SIZES:
+        if set(names) <= set(by_word):
+            width, height = table.numbers([by_word[name] for name in names])[0].tolist()
+            if width > 0 and height > 0:
+                return float(width / height)
+    return None

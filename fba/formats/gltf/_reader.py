@@ -1,0 +1,303 @@
+"""Read glTF 2.0 skeletons: animated joints, such as those that exporters write from FBX, become BAPs.
+
+A glTF skeleton rests in its bind pose, in which joints may be turned; in a `SkeletonMotion` at rest all
+rotations are the identity. So rotations are taken relative to the bind pose, in the scene's frame.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from fba import rotations
+from fba.animation import Animation
+from fba.arrays import Bool, Float64
+from fba.body import Skeleton
+from fba.capture import Captured, SkeletonMotion, SkeletonOptions, retarget_motion
+from fba.capture.bones import find_bones
+from fba.capture.skeleton import MAX_FRAMES, check_memory
+from fba.errors import FbaWarning, ModelError
+from fba.formats.gltf._face_motion import find_face_clip, nodes_of_faces, read_face_motion
+from fba.formats.gltf._own_files import find_note, read_note
+from fba.formats.gltf._pose import BindPose, Sampler, key_times
+from fba.formats.gltf._skeletons import find_joints
+from fba.formats.gltf.clips import choose_clip
+from fba.gltf import Animation as Clip
+from fba.gltf import Gltf, read_gltf
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import Path, naming_file
+
+SAMPLED_JOINTS = 200_000
+"""Number of joints times frames that are sampled at once, which bounds the memory."""
+USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
+DEFAULT_RATE = Fraction(30)
+MAX_HEAD_JOINTS = 10
+"""Largest number of turning joints of a skin that is a head."""
+FACE_BYTES = 2500
+"""Memory that a frame of a face takes."""
+HALF_TURN = (-1, 1, -1)
+"""What half a turn about +y multiplies vectors by, and the last three numbers of quaternions."""
+MAX_KEY_INTERVAL = 1.5
+"""Frames at the lowest usual rate between keys that were sampled, not set by hand."""
+STRETCH = 0.01
+"""Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
+
+
+def sniff(head: bytes, suffix: str) -> bool:
+    """Whether the first bytes of a file look like glTF, binary or JSON."""
+    if head[:4] == b"glTF":
+        return True
+    return head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"{" and (b'"asset"' in head or suffix == ".gltf")
+
+
+def read_person(
+    path: Path,
+    options: SkeletonOptions,
+    *,
+    clip: str | int | None = None,
+    rate: Fraction | int | str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> Captured:
+    """Return the person in a glTF file: a skeleton as BAPs, and a face as FAPs, see `read_face_motion`.
+
+    clip, rate: see `read_motion`. BAPs and FAPs in files of this project are read as they are, with their own
+    frames, unless the options ask for retargeting.
+
+    Raises FormatError for anything that is not glTF, or whose skeleton is not a body, LimitError for more
+    than the limits allow; warns (FbaWarning) of what is left out.
+    """
+    with naming_file(path):
+        gltf = read_gltf(path, limits=limits)
+        if options == SkeletonOptions() and (stored := _read_stored(gltf, clip)) is not None:
+            return Captured(stored if rate is None else stored.resample(Fraction(rate), limits=limits))
+        if (face_clip := _clip_of_face_alone(gltf, clip)) is not None:
+            return Captured(_read_face_alone(gltf, face_clip, rate, limits))
+        motion = None
+        try:
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always", FbaWarning)
+                motion = _sample(gltf, clip, rate, limits)
+                made = retarget_motion(motion, None, options, limits=limits)
+        except ModelError as error:
+            person = motion is not None and _has_limbs(motion)  # whose pose is not clear
+            if person or options.joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
+                raise
+            if _count_turning(face_clip, gltf) >= MAX_HEAD_JOINTS:
+                text = f"{gltf.file}: no body is read, the face alone: {error.finding}"
+                warnings.warn(FbaWarning(text).with_remedies(*error.remedies), stacklevel=2)
+            return Captured(_read_face_alone(gltf, face_clip, rate, limits))
+        for each in said:  # not what concerns a skeleton that turned out to be none
+            warnings.warn(each.message, each.category, stacklevel=2)
+        return made
+
+
+def _read_stored(gltf: Gltf, clip: str | int | None) -> Animation | None:
+    """Return the BAPs and FAPs in a file of this project; None for other files."""
+    if not gltf.animations:
+        return None
+    own = gltf.animations[0] if clip is None else choose_clip(gltf, clip, range(len(gltf.nodes)))
+    note = find_note(gltf, own)
+    return None if note is None else read_note(gltf, own, note)
+
+
+def read_motion(
+    path: Path,
+    *,
+    clip: str | int | None = None,
+    rate: Fraction | int | str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> SkeletonMotion:
+    """Return the joints of a glTF file and one of its animations, sampled.
+
+    clip: name or number (from 0) of the animation; None for the first that moves the skeleton. rate: frames
+    per second; None for that of the keys if they are regular, else 30. Raises FormatError, ModelError, and
+    LimitError for more than the limits allow; warns (FbaWarning) if there are several animations or skeletons
+    to choose from.
+    """
+    return sample_motion(read_gltf(path, limits=limits), clip=clip, rate=rate, limits=limits)
+
+
+def sample_motion(
+    gltf: Gltf,
+    *,
+    clip: str | int | None = None,
+    rate: Fraction | int | str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> SkeletonMotion:
+    """Do the same as `read_motion` for a file that has been read."""
+    try:
+        return _sample(gltf, clip, rate, limits)
+    except ModelError as error:
+        found = error.finding.removeprefix(f"{gltf.file}: ")
+        raise ModelError(f"{gltf.file}: {found}").with_remedies(*error.remedies) from error
+
+
+def _has_limbs(motion: SkeletonMotion) -> bool:
+    """Whether the limbs of a person are found among the joints of a motion."""
+    try:
+        find_bones(motion, None, Skeleton.default())
+    except ModelError:
+        return False
+    return True
+
+
+def _count_turning(clip: Clip, gltf: Gltf) -> int:
+    """Return how many joints of skins a clip turns."""
+    joints = {joint for skin in gltf.skins for joint in skin.joints}
+    return sum(
+        channel.path == "rotation" and channel.node in joints and np.ptp(channel.values, axis=0).max() > 0
+        for channel in clip.channels
+    )
+
+
+def _clip_of_face_alone(gltf: Gltf, clip: str | int | None) -> Clip | None:
+    """Return the clip to read if it moves a face and turns nothing else, else None."""
+    clips = gltf.animations if clip is None else [choose_clip(gltf, clip, range(len(gltf.nodes)))]
+    faces = nodes_of_faces(gltf)
+    if any(c.path != "weights" and c.node not in faces for each in clips for c in each.channels):
+        return None
+    return find_face_clip(gltf, clip)
+
+
+def _read_face_alone(gltf: Gltf, clip: Clip, rate: Fraction | int | str | None, limits: Limits) -> Animation:
+    """Return a clip that moves a face alone."""
+    times = key_times(clip.channels)
+    frames, count = _count_frames(gltf, clip, times, rate, limits)
+    limits.check_frames(count, f"{gltf.file}: animation {clip.name!r}")
+    keys = sum(channel.times.nbytes + channel.values.nbytes for channel in clip.channels)
+    limits.check_bytes(count * FACE_BYTES, f"{gltf.file}: animation {clip.name!r}", source=keys)
+    moments = float(times[0]) + np.arange(count) / float(frames)
+    face = read_face_motion(gltf, clip, moments, head=True)
+    return Animation(frames, np.arange(count), face, None, clip.name)
+
+
+def _count_frames(
+    gltf: Gltf, clip: Clip, times: Float64, rate: Fraction | int | str | None, limits: Limits
+) -> tuple[Fraction, int]:
+    """Return the frame rate and the number of frames of a clip with keys at times (T,)."""
+    frames = Fraction(rate) if rate is not None else _rate(times)
+    if frames <= 0:
+        raise ValueError(f"rate must be positive, not {rate}")
+    seconds = float(times[-1] - times[0])
+    count = int(seconds * float(frames) + 1e-6) + 1
+    what = f"{gltf.file}: animation {clip.name!r}, {seconds:.0f} s at {float(frames):g} frames/s,"
+    limits.check_seconds(seconds, what)
+    if count > MAX_FRAMES:
+        raise ModelError(
+            f"{what} has {count} frames, more than {MAX_FRAMES}; give a lower rate, or cut it into pieces"
+        )
+    return frames, count
+
+
+def _sample(
+    gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None, limits: Limits
+) -> SkeletonMotion:
+    joints = find_joints(gltf)
+    nodes, parents, bind, used = joints.nodes, joints.parents, joints.bind, joints.used
+    place = {node: number for number, node in enumerate(nodes)}
+    chosen = choose_clip(gltf, clip, place)
+    channels = [channel for channel in chosen.channels if channel.node in place]
+    times = key_times(channels)
+    frames, count = _count_frames(gltf, chosen, times, rate, limits)
+    first = float(times[0])
+    seconds = float(times[-1]) - first
+    what = f"{gltf.file}: animation {chosen.name!r}, {seconds:.0f} s at {float(frames):g} frames/s,"
+    keys = sum(channel.times.nbytes + channel.values.nbytes for channel in channels)
+    check_memory(limits, count, len(nodes), what, keys)
+    motion = replace(joints.resting(gltf), rate=frames, name=chosen.name)
+    turns, root = np.empty((count, len(used), 4)), np.empty((count, 3))
+    stretched = np.zeros(len(used), dtype=np.bool_)
+    at_once = min(max(SAMPLED_JOINTS // len(nodes), 1), count)
+    for start in range(0, count, at_once):
+        rows = np.arange(start, min(start + at_once, count))
+        sampler = Sampler(gltf, channels, first + rows / float(frames))
+        turned, positions = _world(gltf, sampler, nodes, parents, bind)
+        local = turned[:, used]
+        for row, number in enumerate(used[1:], 1):
+            inverse = turned[:, parents[number]] * [1, -1, -1, -1]
+            local[:, row] = rotations.multiply(inverse, turned[:, number])
+        turns[rows] = local / np.linalg.norm(local, axis=-1, keepdims=True)
+        root[rows] = positions[:, used[0]]
+        stretched |= _stretched(
+            replace(motion, rotations=turns[rows], positions=root[rows]), positions[:, used]
+        )
+    if stretched.any():
+        _warn_of_stretching(chosen.name, [motion.names[row] for row in np.flatnonzero(stretched)])
+    motion = replace(motion, rotations=turns, positions=root)
+    if joints.humanoid is not None and joints.humanoid.kind == "VRM 0":
+        motion = _turn_round(motion)
+    return replace(motion, face=lambda moments: read_face_motion(gltf, chosen, first + moments))
+
+
+def _turn_round(motion: SkeletonMotion) -> SkeletonMotion:
+    """Return a motion half a turn about +y further: people of VRM 0 face -z."""
+    return replace(
+        motion,
+        offsets=motion.offsets * HALF_TURN,
+        rotations=motion.rotations * [1, *HALF_TURN],
+        positions=motion.positions * HALF_TURN,
+    )
+
+
+def _world(
+    gltf: Gltf, sampler: Sampler, nodes: list[int], parents: list[int], bind: BindPose
+) -> tuple[Float64, Float64]:
+    """Return rotations (T, J, 4) of nodes from the bind pose, and positions (T, J, 3), in the scene's frame.
+
+    nodes: parents first. parents: position of each one's parent in nodes, -1 for the root.
+    """
+    turned = np.zeros((len(sampler), len(nodes), 4))
+    positions = np.zeros((len(sampler), len(nodes), 3))
+    linear: list[Float64] = []
+    for number, node in enumerate(nodes):
+        local = sampler.linear(node)
+        parent = parents[number]
+        shift = sampler.translation(node)
+        if parent < 0:
+            above = gltf.nodes[node].parent
+            base = np.eye(4) if above is None else gltf.nodes[above].world
+            linear.append(base[:3, :3] @ local)
+            positions[:, number] = shift @ base[:3, :3].T + base[:3, 3]
+        else:
+            linear.append(linear[parent] @ local)
+            positions[:, number] = positions[:, parent] + (linear[parent] @ shift[:, :, None])[:, :, 0]
+        turned[:, number] = bind.turned(number, linear[number])
+    return turned, positions
+
+
+def _rate(times: Float64) -> Fraction:
+    """Return frames per second of regular keys: the usual rate that fits most of their intervals, else 30.
+
+    Keys that are set by hand, far apart, fit several rates; 30 is tried first for them.
+    """
+    steps = np.diff(times)
+    steps = steps[steps > 1e-4]
+    if not len(steps):
+        return DEFAULT_RATE
+    shortest = float(np.percentile(steps, 25))
+    by_hand = shortest > MAX_KEY_INTERVAL / USUAL_RATES[0]
+    for rate in (int(DEFAULT_RATE), *USUAL_RATES) if by_hand else USUAL_RATES:
+        frames = steps * rate
+        if rate * shortest > 0.9 and (np.abs(frames - np.rint(frames)) < 0.02).mean() > 0.95:
+            return Fraction(rate)
+    return DEFAULT_RATE
+
+
+def _stretched(motion: SkeletonMotion, positions: Float64) -> Bool:
+    """Return bool (J,): joints that move relative to their parents. positions: (T, J, 3), as in the file."""
+    size = float(np.ptp(motion.rest(), axis=0).max()) or 1.0
+    moved: Bool = np.abs(motion.world()[1] - positions).max(axis=(0, 2)) > STRETCH * size
+    return moved
+
+
+def _warn_of_stretching(name: str, joints: list[str]) -> None:
+    """Warn of joints that move relative to their parents, but are held as in the bind pose."""
+    warnings.warn(
+        f"{name}: joints whose offset from the parent varies, or differs from the bind pose, "
+        f"keep that of the bind pose: {', '.join(joints[:5])}{', ...' if len(joints) > 5 else ''}",
+        FbaWarning,
+        stacklevel=5,
+    )

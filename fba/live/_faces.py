@@ -1,0 +1,121 @@
+"""`FaceConversion`: the samples of one sender, in order, to frames of a face."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Float64
+from fba.capture.live import LiveBlendshapes
+from fba.capture.sampling import GAP
+from fba.live._order import Timed
+from fba.live._protocols.sample import DatagramError, Sample
+from fba.live._summary import Summary
+from fba.tracks import FaceTrack
+
+SWAPPED = {
+    "mouthLeft": "mouthRight", "mouthRight": "mouthLeft", "jawLeft": "jawRight", "jawRight": "jawLeft",
+}  # fmt: skip
+
+Row = tuple[Float64, Float64, Float64]
+"""Weights (N,), angles of the head (3,) and of the eyes (4,); 0 for angles that a source does not have."""
+
+
+class FaceConversion:
+    """Turns samples with weights into frames.
+
+    rate: frames per second; sent_rate: those that the sender counts. swap: mouthLeft and mouthRight, jawLeft
+    and jawRight change places. neutral: seconds from the first face on whose median is the neutral face, and
+    is subtracted; nothing comes out before they are over. None: weights count as they are sent. summary: what
+    happens is counted there.
+    """
+
+    def __init__(
+        self, rate: Fraction, sent_rate: Fraction, *, swap: bool, neutral: float | None, summary: Summary
+    ) -> None:
+        self._rate = rate
+        self._sent_rate = sent_rate
+        self._swap = swap
+        self._neutral_seconds = neutral
+        self._summary = summary
+        self._frames: LiveBlendshapes | None = None
+        self._neutral: Row | None = None
+        self._waiting: list[tuple[float, Row]] = []
+        self._last: float | None = None
+
+    def push(self, timed: Timed) -> Iterator[Animation]:
+        """Add a sample; yield the frames that are complete."""
+        time, sample = timed
+        if sample.weights is None:
+            self._summary.unseen += 1
+            return
+        self._summary.used += 1
+        if self._last is not None and (time - self._last) * float(self._sent_rate) >= GAP:
+            self._summary.gaps += 1
+            self._summary.longest_gap = max(self._summary.longest_gap, time - self._last)
+        self._last = time
+        frames, row = self._begun(sample), self._row(sample)
+        if self._neutral_seconds is None or self._neutral is not None:
+            yield from frames.push(time, *self._without_neutral(row))
+            return
+        self._waiting.append((time, row))
+        if time - self._waiting[0][0] >= self._neutral_seconds:
+            yield from self._find_neutral(frames)
+
+    def settle(self) -> Iterator[Animation]:
+        """Yield nothing: all frames that are complete have come out of `push`."""
+        yield from ()
+
+    def finish(self) -> Iterator[Animation]:
+        """Yield the frames that are left."""
+        if self._frames is not None:
+            if self._waiting:
+                yield from self._find_neutral(self._frames)
+            yield from self._frames.finish()
+
+    def show(self, sample: Sample) -> tuple[FaceTrack | None, None]:
+        """Return the FAPs of a sample as it is, a track of one frame; None without a face."""
+        if sample.weights is None or self._frames is None or self._waiting:
+            return None, None
+        return self._frames.show(*self._without_neutral(self._row(sample))), None
+
+    def _begun(self, sample: Sample) -> LiveBlendshapes:
+        """Return what makes frames, begun with the names of the first sample."""
+        if self._frames is None:
+            names = [SWAPPED.get(name, name) for name in sample.names] if self._swap else list(sample.names)
+            if self._swap:
+                self._summary.notes.append("mouthLeft/mouthRight and jawLeft/jawRight changed places")
+            self._frames = LiveBlendshapes(names, self._rate)
+        return self._frames
+
+    def _row(self, sample: Sample) -> Row:
+        weights = sample.weights
+        if weights is None or len(weights) != len(self._begun(sample).names):
+            raise DatagramError("with other shapes than the first")
+        return (
+            weights,
+            np.zeros(3) if sample.head is None else sample.head,
+            np.zeros(4) if sample.eyes is None else sample.eyes,
+        )
+
+    def _find_neutral(self, frames: LiveBlendshapes) -> Iterator[Animation]:
+        """Take the median of what waited as the neutral face; yield the frames since."""
+        waiting, self._waiting = self._waiting, []
+        weights, head, eyes = (
+            np.median(parts, axis=0) for parts in zip(*(row for _, row in waiting), strict=True)
+        )
+        self._neutral = (weights, head, eyes)
+        self._summary.notes.append(
+            f"the median of the first {waiting[-1][0] - waiting[0][0]:.2f} s is the neutral face, subtracted"
+        )
+        for time, row in waiting:
+            yield from frames.push(time, *self._without_neutral(row))
+
+    def _without_neutral(self, row: Row) -> Row:
+        if self._neutral is None:
+            return row
+        weights, head, eyes = (part - still for part, still in zip(row, self._neutral, strict=True))
+        return np.maximum(weights, 0.0), head, eyes

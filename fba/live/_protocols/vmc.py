@@ -1,0 +1,116 @@
+"""The VMC protocol: bones of an avatar and its expressions, as OSC messages.
+
+A sender divides a frame into datagrams as it likes. What belongs to one frame lies between two messages
+`/VMC/Ext/T`, which give its time; senders without them end frames with `/VMC/Ext/Blend/Apply`, or begin the
+next by sending a bone again. Bones and expressions that a frame leaves out stay as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from fba.live._protocols import unity_bones
+from fba.live._protocols._osc import Argument, Message, read_messages
+from fba.live._protocols.ifacialmocap import SteadyClock
+from fba.live._protocols.sample import BoneTurn, DatagramError, Sample
+
+PREFIX = "/VMC/"
+MAX_NAMES = 400
+"""Largest number of expressions of an avatar; others are ignored."""
+MAX_COORDINATE = 1e4
+"""Largest coordinate of a bone, in metres."""
+MAX_VALUE = 4.0
+"""Largest value of an expression; more is no share of one."""
+USUAL_PERIOD = 1 / 60
+NOTHING = "nothing of VMC"
+WRONG = "wrong messages of VMC"
+
+
+class VmcReader:
+    """Reads datagrams of a VMC performer."""
+
+    def __init__(self) -> None:
+        self._bones: dict[str, BoneTurn] = {}
+        self._expressions: dict[str, float] = {}
+        self._sent: set[str] = set()  # bones and expressions of this frame
+        self._time: float | None = None  # that the sender gave for this frame
+        self._timed = False
+        self._clock = SteadyClock(USUAL_PERIOD)
+        self._now = 0.0
+
+    def read(self, data: bytes, now: float) -> list[Sample]:
+        """Return the frames that are complete with a datagram; see `DatagramReader`."""
+        messages = read_messages(data)
+        if not any(message.address.startswith(PREFIX) for message in messages):
+            raise DatagramError(NOTHING)
+        self._now = now
+        samples: list[Sample] = []
+        for message in messages:
+            samples += self._take(message)
+        return samples
+
+    def newest(self) -> Sample | None:
+        """Return what the sender says now, also where a frame is not complete."""
+        return self._sample(self._now) if self._bones or self._expressions else None
+
+    def _take(self, message: Message) -> list[Sample]:
+        """Take a message; return the frame that it ends."""
+        address, arguments = message
+        if address == "/VMC/Ext/T":
+            (time,) = _numbers(arguments[:1], 1)
+            return self._end(time)
+        if address == "/VMC/Ext/Blend/Apply" and not self._timed:
+            return self._end(None)
+        if address == "/VMC/Ext/Root/Pos":
+            self._bones[""] = _turn(arguments)
+        elif address == "/VMC/Ext/Bone/Pos":
+            name = arguments[0] if arguments else None
+            if not isinstance(name, str):
+                raise DatagramError(WRONG)
+            if name not in unity_bones.parents():
+                return []
+            ended = self._end(None) if name in self._sent and not self._timed else []
+            self._bones[name] = _turn(arguments)
+            self._sent.add(name)
+            return ended
+        elif address == "/VMC/Ext/Blend/Val":
+            name = arguments[0] if arguments else None
+            (value,) = _numbers(arguments[1:2], 1)
+            if not isinstance(name, str) or abs(value) > MAX_VALUE:
+                raise DatagramError(WRONG)
+            if name in self._expressions or len(self._expressions) < MAX_NAMES:
+                self._expressions[name] = value
+                self._sent.add(f"/{name}")
+        return []
+
+    def _end(self, time: float | None) -> list[Sample]:
+        """End a frame. time: of the next one, where the sender says it; None otherwise."""
+        before, self._time, self._timed = self._time, time, time is not None
+        if not self._sent or (time is not None and before == time):
+            return []
+        self._sent.clear()
+        return [self._sample(before if before is not None else self._clock.time(self._now))]
+
+    def _sample(self, time: float) -> Sample:
+        names = tuple(self._expressions)
+        return Sample(time, names, np.array(list(self._expressions.values())), bones=dict(self._bones))
+
+
+def _numbers(arguments: Sequence[Argument], count: int) -> list[float]:
+    """Return arguments as numbers; DatagramError for other arguments, or too few."""
+    result = [float(one) for one in arguments if isinstance(one, int | float) and math.isfinite(one)]
+    if len(result) != count:
+        raise DatagramError(WRONG)
+    return result
+
+
+def _turn(arguments: Sequence[Argument]) -> BoneTurn:
+    """Return the position and the rotation behind the name of a bone."""
+    numbers = np.array(_numbers(arguments[1:8], 7))
+    rotation = unity_bones.rotation(numbers[3:])
+    if rotation is None or np.abs(numbers[:3]).max() > MAX_COORDINATE:
+        raise DatagramError(WRONG)
+    return BoneTurn(unity_bones.position(numbers[:3]), rotation)

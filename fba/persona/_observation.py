@@ -1,0 +1,126 @@
+"""What is seen of a face in each frame: registered points, how far parts have moved, classes."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.arrays import Bool, Float64, Intp
+from fba.errors import FbaWarning, ModelError, OptionError, Remedy
+from fba.persona._rest import FEWEST, eye_opening, find_rest
+from fba.persona.points import Registered, TrackedFace, register
+from fba.persona.points.layout import PARTS, flat_mask
+from fba.persona.recognition import Labels, Recogniser, decide
+from fba.persona.recognition._displacements import displacements
+
+Neutral = int | tuple[float, float] | None
+WIDER = 1.35
+"""Ratio of the usual opening of eyes to that of the neutral face above which that face is not neutral."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """A face in the frames that are used: S of T.
+
+    rows: int (S,), which frames these are. points: float64 (S, 64, 2), on the standard mask. neutral: (64,
+    2). moved: part -> float64 (S, 2K). scores: part -> (S, D), principal components. labels: part ->
+    classes. registered: of all frames.
+    """
+
+    rows: Intp
+    points: Float64
+    neutral: Float64
+    moved: dict[str, Float64]
+    scores: dict[str, Float64]
+    labels: dict[str, Labels]
+    registered: Registered
+
+    def mask_motion(self, recogniser: Recogniser) -> Float64:
+        """Return how far the vertices of the face's own mask have moved: float64 (S, 86, 3), millimetres.
+
+        Depth, which no picture shows, is that of the nearest example of the mouth's class.
+        """
+        moved = flat_mask(self.points) - flat_mask(self.neutral)
+        moved[..., 2] = recogniser.find_depth(self.scores["mouth"], self.labels["mouth"].first)
+        return np.asarray(moved)
+
+
+def observe(
+    face: TrackedFace, recogniser: Recogniser, neutral: Neutral = None, *, warm_up: int = 0
+) -> Observation:
+    """Return what is seen of a face.
+
+    neutral: frames of the neutral face: None for the first second that is used, or, where the face does not
+    rest then, the frames that `find_rest` finds; a frame; or (from, to) in seconds. warm_up: frames at the
+    start that are left out, as trackers need some until they follow a face.
+
+    Raises ModelError where no frame can be used, saying why; OptionError for frames of the neutral face
+    that cannot.
+    """
+    registered = register(face)
+    usable = registered.kept.copy()
+    usable[:warm_up] = False
+    rows = np.flatnonzero(usable)
+    if not len(rows):
+        raise ModelError(_why_none(face, registered, warm_up))
+    rest = (
+        rows[find_rest(registered.points[rows], face.angles[rows], face.times[rows] - face.times[0])]
+        if neutral is None
+        else _neutral_rows(face, usable, neutral)
+    )
+    if len(rest) < FEWEST and neutral is None and len(rows) >= FEWEST:
+        raise ModelError(f"{len(rest)} frames tell the neutral face; at least {FEWEST} are needed")
+    still = np.asarray(np.median(registered.points[rest], axis=0))
+    points = registered.points[rows]
+    _check_eyes(points, still)
+    moved = {part: displacements(points, still, part) for part in PARTS}
+    scores = {part: recogniser.components[part].scores(moved[part]) for part in PARTS}
+    labels = {part: decide(recogniser.components[part].network(scores[part])) for part in PARTS}
+    return Observation(rows, points, still, moved, scores, labels, registered)
+
+
+def _check_eyes(points: Float64, still: Float64) -> None:
+    """Warn where eyes are mostly wider than in the neutral face, which then is not neutral."""
+    if np.median(eye_opening(points)) > WIDER * float(eye_opening(still)):
+        warnings.warn(
+            FbaWarning(
+                "the eyes are half closed in the frames of the neutral face, and wider in most others"
+            ).with_remedies(Remedy("neutral", "say where the face rests with {}", "2.0-2.5")),
+            stacklevel=3,
+        )
+
+
+def _neutral_rows(face: TrackedFace, usable: Bool, neutral: int | tuple[float, float]) -> Intp:
+    """Return the frames of the neutral face."""
+    if isinstance(neutral, int):
+        if not 0 <= neutral < len(face) or not usable[neutral]:
+            raise OptionError(f"neutral: frame {neutral} has no face that looks into the camera")
+        return np.array([neutral])
+    start, end = neutral
+    times = face.times - face.times[0]
+    rows = np.flatnonzero(usable & (times >= start) & (times <= end))
+    if not len(rows):
+        raise OptionError(f"neutral: no face looks into the camera from {start:g} to {end:g} s")
+    return rows
+
+
+def _why_none(face: TrackedFace, registered: Registered, warm_up: int) -> str:
+    """Return why no frame can be used."""
+    count = len(face)
+    if not count:
+        return "the recording has no frames"
+    turned, alien, lost = (int(one.sum()) for one in (registered.turned, registered.alien, ~face.tracked))
+    reasons = [
+        text
+        for number, text in (
+            (lost, f"{lost} without a face"),
+            (turned, f"{turned} with a head turned by more than 30 degrees"),
+            (alien, f"{alien} whose points do not lie as on a face"),
+        )
+        if number
+    ]
+    if warm_up:
+        reasons.append(f"the first {warm_up} for the tracker to find the face")
+    return f"none of the {count} frames can be used: {', '.join(reasons)}"

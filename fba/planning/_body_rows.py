@@ -1,0 +1,268 @@
+"""Points of a body at which its errors are kept: 3 cm off joints, and under the soles.
+
+An error of a BAP moves the points below its joint along a slope: about an axis, or along one. Errors of all
+BAPs add up at every point. Points that always move as one body are as far apart as their outermost ones, so
+that some dozens stand for all.
+
+Bounds of the compiled loops: joints and rows of points come from `BodyRows`, of the skeleton whose matrices
+and points are given; `BodyRows.points` and `BodyTarget` make the results, with a frame for each of theirs.
+What a loop makes itself is as long as the rows that it goes through.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from fba.arrays import Float32, Float64, Int64
+from fba.body import SIDES, BapSolver, Skeleton
+from fba.body.displacement import REACH
+from fba.body.stance import find_stance, sole_points
+from fba.compiled import compiled
+from fba.planning._tolerance import Tolerance
+
+BLOCK_FRAMES = 1024
+"""Number of frames that are posed at once."""
+DIRECTIONS = 48
+"""Directions in which the outermost points of a rigid part count."""
+
+
+class BodyRows:
+    """Points of a skeleton that stand for all that move with some of its joints.
+
+    joints: int64 (R,), the joint that each point moves with. offsets: float64 (R, 3), from its centre, in
+    its frame. soles: int64 (R,), 0 or 1 for a point under the left or the right sole, else -1.
+    """
+
+    def __init__(self, skeleton: Skeleton, moving: set[int]) -> None:
+        """moving: numbers of the joints that turn in any frame."""
+        parts: dict[int, list[tuple[int, Float64]]] = {}
+        for joint in range(len(skeleton)):
+            part = joint
+            while part not in moving and part > 0:
+                part = int(skeleton.parents[part])
+            for axis in np.eye(3):
+                parts.setdefault(part, []).append((joint, REACH * axis))
+        directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3))
+        rows: list[tuple[int, Float64, int]] = []
+        for points in parts.values():
+            at = np.array([skeleton.centres[joint] + offset for joint, offset in points])
+            rows += [(*points[one], -1) for one in np.unique((at @ directions.T).argmax(axis=0))]
+        for foot, side in enumerate(SIDES):
+            for name, point in (sole_points(skeleton, side) or {}).items():
+                number = skeleton.number(name)
+                rows.append((number, point - skeleton.centres[number], foot))
+        self.joints: Int64 = np.array([row[0] for row in rows], dtype=np.int64)
+        self.offsets = np.array([row[1] for row in rows])
+        self.soles: Int64 = np.array([row[2] for row in rows], dtype=np.int64)
+
+    def points(self, matrices: Float64) -> Float64:
+        """Return where the points are: float64 (T, R, 3). matrices: (T, J, 4, 4)."""
+        result = np.zeros((len(matrices), len(self.joints), 3))
+        _place_points(matrices, self.joints, self.offsets, result)
+        return result
+
+    def below(self, skeleton: Skeleton, joint: int) -> Int64:
+        """Return the rows of points that a joint moves: int64 (K,)."""
+        return np.flatnonzero(np.isin(self.joints, skeleton.descendants(joint))).astype(np.int64)
+
+
+class BodyTarget:
+    """Where a body is to be, and how near.
+
+    values: float64 (T, 296), BAPs, without jumps of full turns. tolerances: float32 (T, 3), metres: at
+    joints, and at the soles of the left and the right foot.
+    """
+
+    def __init__(self, values: Float64, rate: float, tolerance: Tolerance) -> None:
+        """rate: frames a second, by which feet stand."""
+        self.values = values
+        self.solver = BapSolver()
+        self.tolerances = np.full((len(values), 3), tolerance.joint, dtype=np.float32)
+        for block in blocks(len(values)):
+            stands = find_stance(self.solver.skeleton, self.solver.pose(values[block]), rate)
+            self.tolerances[block, 1:][stands.T] = tolerance.foot
+
+    def weights(self, rows: BodyRows) -> Float32:
+        """Return by what errors at the points are multiplied to be shares of the tolerance: (T, R)."""
+        return np.reciprocal(self.tolerances)[:, rows.soles + 1]
+
+    def longest(self, shown: Float64, rows: BodyRows, frames: slice = slice(None)) -> Float64:
+        """Return the largest error of BAPs (F, 296) at some frames, in shares of the tolerance: (F,)."""
+        wanted = self.values[frames]
+        weights = self.weights(rows)[frames]
+        result = np.zeros(len(shown))
+        for block in blocks(len(shown)):
+            apart = rows.points(self.solver.pose(shown[block])) - rows.points(self.solver.pose(wanted[block]))
+            result[block] = (np.linalg.norm(apart, axis=2) * weights[block]).max(axis=1)
+        return result
+
+
+def all_rows(skeleton: Skeleton) -> BodyRows:
+    """Return all points, as if every joint turned."""
+    return BodyRows(skeleton, set(range(len(skeleton))))
+
+
+def blocks(count: int) -> list[slice]:
+    """Return slices of about `BLOCK_FRAMES` frames, none of them much shorter."""
+    ends = np.linspace(0, count, max(count // BLOCK_FRAMES, 1) + 1).astype(int)
+    return [slice(int(start), int(end)) for start, end in pairwise(ends)]
+
+
+@compiled
+def _place_points(matrices: Float64, joints: Int64, offsets: Float64, result: Float64) -> None:
+    """Set result (T, R, 3) to where points are that move with joints (R,), offsets (R, 3) from them."""
+    for frame in range(len(result)):
+        for row in range(len(joints)):
+            own = matrices[frame, joints[row]]
+            for axis in range(3):
+                result[frame, row, axis] = (
+                    own[axis, 3]
+                    + own[axis, 0] * offsets[row, 0]
+                    + own[axis, 1] * offsets[row, 1]
+                    + own[axis, 2] * offsets[row, 2]
+                )
+
+
+@compiled
+def _find_longest(apart: Float64, joints: Int64, offsets: Float64, weights: Float32, result: Float64) -> None:
+    """Set result (T,) to the largest weighted error of the points of `_place_points`.
+
+    apart: (T, J, 4, 4), differences of joint matrices. weights: (T, R).
+    """
+    for frame in range(len(result)):
+        largest = 0.0
+        for row in range(len(joints)):
+            own = apart[frame, joints[row]]
+            total = 0.0
+            for axis in range(3):
+                off = (
+                    own[axis, 3]
+                    + own[axis, 0] * offsets[row, 0]
+                    + own[axis, 1] * offsets[row, 1]
+                    + own[axis, 2] * offsets[row, 2]
+                )
+                total += off * off
+            largest = max(largest, total * float(weights[frame, row]) ** 2)
+        result[frame] = np.sqrt(largest)
+
+
+@compiled
+def add_error(
+    errors: Float32, points: Float32, weights: Float32, rows: Int64, centre: Float32, axis: Float32,
+    turns: bool, change: Float64,
+) -> None:  # fmt: skip
+    """Add to errors (T, R, 3), shares of the tolerance, what a change (T,) of one BAP moves.
+
+    points: (T, R, 3). weights: (T, R), see `BodyTarget.weights`. rows: int64 (K,), below its joint. centre,
+    axis: (T, 3), see `BapMotion`; the centre does not matter unless it turns.
+    """
+    for frame in range(len(change)):
+        if change[frame] == 0.0:
+            continue
+        amount = np.float32(change[frame])
+        ax, ay, az = amount * axis[frame, 0], amount * axis[frame, 1], amount * axis[frame, 2]
+        for k in range(len(rows)):
+            row = int(rows[k])
+            weight = weights[frame, row]
+            error = errors[frame, row]
+            if turns:
+                x = points[frame, row, 0] - centre[frame, 0]
+                y = points[frame, row, 1] - centre[frame, 1]
+                z = points[frame, row, 2] - centre[frame, 2]
+                error[0] += weight * (ay * z - az * y)
+                error[1] += weight * (az * x - ax * z)
+                error[2] += weight * (ax * y - ay * x)
+            else:
+                error[0] += weight * ax
+                error[1] += weight * ay
+                error[2] += weight * az
+
+
+@compiled
+def free_room(
+    errors: Float32, points: Float32, weights: Float32, rows: Int64, centre: Float32, axis: Float32,
+    turns: bool, limit: Float64,
+) -> Float64:  # fmt: skip
+    """Return how far one BAP may move down and up at each frame, and its longest slope: float64 (3, T).
+
+    So far no error (T, R, 3) below its joint becomes longer than limit (T,). Where there is no such way, both
+    are the one that makes the longest error shortest. Arguments: as in `add_error`.
+    """
+    count = len(rows)
+    room = np.zeros((3, len(errors)))
+    steep, along, length = np.zeros(count), np.zeros(count), np.zeros(count)
+    for frame in range(len(errors)):
+        ax, ay, az = float(axis[frame, 0]), float(axis[frame, 1]), float(axis[frame, 2])
+        for k in range(count):
+            row = int(rows[k])
+            weight = float(weights[frame, row])
+            gx, gy, gz = ax, ay, az
+            if turns:
+                x = float(points[frame, row, 0]) - float(centre[frame, 0])
+                y = float(points[frame, row, 1]) - float(centre[frame, 1])
+                z = float(points[frame, row, 2]) - float(centre[frame, 2])
+                gx, gy, gz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+            error = errors[frame, row]
+            ex, ey, ez = float(error[0]), float(error[1]), float(error[2])
+            steep[k] = weight * weight * (gx * gx + gy * gy + gz * gz)
+            along[k] = weight * (ex * gx + ey * gy + ez * gz)
+            length[k] = ex * ex + ey * ey + ez * ez
+        low, high, steepest = _interval(steep, along, length, limit[frame] * limit[frame])
+        if low > high:
+            low = _shortest_longest(steep, along, length)
+            high = low
+        room[0, frame], room[1, frame], room[2, frame] = low, high, np.sqrt(steepest)
+    return room
+
+
+MIN_SLOPE_SQUARE = 1e-16
+"""Square of a slope, in shares of the tolerance for a step of 1, below which a BAP does not move a point."""
+
+
+@compiled
+def _interval(steep: Float64, along: Float64, length: Float64, allowed: float) -> tuple[float, float, float]:
+    """Return the change down and up that keeps all squares of errors to what is allowed, and the steepest.
+
+    The square of error k after a change c is length[k] + 2 along[k] c + steep[k] c c. Down is above up where
+    there is no such change.
+    """
+    low, high, steepest = -1e9, 1e9, 0.0
+    for k in range(len(steep)):
+        square = float(steep[k])
+        if square < MIN_SLOPE_SQUARE:
+            continue
+        steepest = max(steepest, square)
+        inside = float(along[k]) * float(along[k]) - square * (float(length[k]) - allowed)
+        if inside < 0.0:
+            low, high = 1e9, -1e9
+            continue
+        half = np.sqrt(inside)
+        low = max(low, (-float(along[k]) - half) / square)
+        high = min(high, (-float(along[k]) + half) / square)
+    return low, high, steepest
+
+
+@compiled
+def _shortest_longest(steep: Float64, along: Float64, length: Float64) -> float:
+    """Return the change with the shortest longest error: the longest is convex, so halves are left out."""
+    low, high = 0.0, 0.0
+    for k in range(len(steep)):
+        if steep[k] >= MIN_SLOPE_SQUARE:
+            own = -float(along[k]) / float(steep[k])
+            low, high = min(low, own), max(high, own)
+    for _ in range(40):
+        one, other = low + (high - low) / 3, high - (high - low) / 3
+        longest_one, longest_other = 0.0, 0.0
+        for k in range(len(steep)):
+            if steep[k] < MIN_SLOPE_SQUARE:
+                continue
+            base, rise, curve = float(length[k]), 2 * float(along[k]), float(steep[k])
+            longest_one = max(longest_one, base + one * (rise + curve * one))
+            longest_other = max(longest_other, base + other * (rise + curve * other))
+        if longest_one < longest_other:
+            high = other
+        else:
+            low = one
+    return (low + high) / 2

@@ -1,0 +1,324 @@
+"""A body within a tolerance: the BAPs to send, their quantiser, and what a decoder makes of the stream."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Bool, Float64, Int32
+from fba.body import Skeleton
+from fba.body.displacement import displacements
+from fba.body.solve.conventions import NO_BAP
+from fba.codec import EncoderOptions, EncoderStatistics, decode, encode_with_statistics, step_scale
+from fba.codec.settings import QUANT_MAX
+from fba.errors import RangeError
+from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_steps, baps
+from fba.planning._body_rows import BodyTarget, all_rows, blocks
+from fba.planning._body_search import HOPELESS, BodyEffort, FoundBaps, search_baps
+from fba.planning._plan import encode_planned
+from fba.planning._tolerance import Tolerance
+from fba.tracks import BodyTrack, hold
+
+FULL_TURN = 628319
+"""2 pi in 1e-5 rad, as the codec turns angles."""
+ARM = 0.9
+"""Metres from the hips to the fingers of arms that hang: how far half a step of an angle moves something."""
+REDUCED = (0.5, 0.3)
+"""Shares of the tolerance that joints which are no longer turned may take."""
+EFFORTS = ((0.5, 0.8), (0.7, 0.7), (0.5, 0.6))
+"""Share of a BAP and share of gaps, see `BodyEffort`, of the searches that are tried for each of those."""
+MARGINS = (0.99, 0.93, 0.86, 0.78)
+"""Shares of the tolerance that searches fill: the next where the one before left frames beyond it."""
+GIVEN_UP = 2
+"""Searches far beyond the tolerance after which a quantiser is too coarse."""
+STANDING = 0.9
+"""Share of the tolerance of feet that half a step of the root may take: legs must make up for it."""
+SPARE = 0.15
+"""Share of the tolerance that is left for quantisers where frames are left out."""
+FRAMES_SEARCHED = 1600
+"""Frames, times searches: longer streams are searched less often."""
+REDUCTION_FRAMES = 160
+"""Number of frames by which the joints to turn are chosen; the choice is then checked at all frames."""
+
+
+@dataclass(frozen=True)
+class BodyErrors:
+    """How far a decoded body is from its source, at all frames of the source.
+
+    largest, percentile_99: metres, of a point 3 cm off a joint, in the world; joint, frame: where it is
+    largest. share: of all joints in all frames, within the tolerance. foot: metres, of a sole that stands.
+    """
+
+    largest: float
+    percentile_99: float
+    share: float
+    joint: str
+    frame: int
+    foot: float
+
+    def is_within(self, tolerance: Tolerance) -> bool:
+        """Whether joints and feet are within a tolerance."""
+        return self.largest <= tolerance.joint and self.foot <= tolerance.foot
+
+
+@dataclass(frozen=True, eq=False)
+class CodedBody:
+    """What encoding a body within a tolerance came to.
+
+    statistics: of the encoder. bap_quant: quantiser of BAPs. left_out: frames that are not sent. errors: of
+    the decoded stream.
+    """
+
+    statistics: EncoderStatistics
+    bap_quant: int
+    left_out: int
+    errors: BodyErrors
+
+
+def encode_body_within_tolerance(
+    animation: Animation,
+    tolerance: Tolerance | None = None,
+    options: EncoderOptions | None = None,
+    *,
+    every_frame: bool = False,
+) -> tuple[bytes, CodedBody]:
+    """Return a stream whose body stays within a tolerance of an animation's, and what it came to.
+
+    Errors are measured where the source has frames, on the decoded stream: a frame that was left out is
+    interpolated, as `fba.player` does it. options: the quantiser of BAPs is ignored; angles beyond half a
+    turn are sent as they go on. every_frame: leave no frame out.
+
+    ValueError for an animation with a face, without a body or without frames, RangeError where not even the
+    finest quantiser keeps within the tolerance.
+    """
+    tolerance, options = tolerance or Tolerance(), replace(options or EncoderOptions(), clamp=True)
+    if animation.face is not None or animation.body is None:
+        raise ValueError("an animation with a body and no face is needed")
+    if not len(animation):
+        raise ValueError("there is no frame to encode")
+    smallest: tuple[bytes, CodedBody] | None = None
+    nearest: BodyErrors | None = None
+    for sent, chosen in body_candidates(animation, tolerance, options, gaps=not every_frame):
+        streams = [encode_with_statistics(sent, chosen), encode_planned(sent, chosen)]
+        for data, statistics in sorted(streams, key=lambda one: len(one[0])):
+            if smallest is not None and len(data) >= len(smallest[0]):
+                break
+            errors = body_errors(animation, decode(data, bap_steps=options.bap_steps), tolerance)
+            if errors.is_within(tolerance):
+                left_out = len(animation) - len(sent)
+                smallest = data, CodedBody(statistics, chosen.bap_quant, left_out, errors)
+                break
+            if nearest is None or errors.largest < nearest.largest:
+                nearest = errors
+    if smallest is None:
+        assert nearest is not None
+        raise beyond_body(nearest, tolerance)
+    return smallest
+
+
+def fit_bodies(
+    animation: Animation, tolerance: Tolerance, options: EncoderOptions
+) -> list[tuple[BodyTrack, int]]:
+    """Return bodies within a tolerance of an animation's, and their quantisers, the cheapest first.
+
+    For streams with a face, too: all frames are sent.
+    """
+    own = Animation(animation.rate, animation.index, None, animation.body)
+    fitted = []
+    for sent, chosen in body_candidates(own, tolerance, replace(options, clamp=True), gaps=False):
+        assert sent.body is not None
+        size = len(encode_with_statistics(sent, chosen)[0])
+        fitted.append((size, sent.body, chosen.bap_quant))
+    return [(body, quant) for _, body, quant in sorted(fitted, key=lambda one: one[0])]
+
+
+def body_candidates(
+    animation: Animation, tolerance: Tolerance, options: EncoderOptions, *, gaps: bool = True
+) -> Iterator[tuple[Animation, EncoderOptions]]:
+    """Yield animations to send that may keep a body within a tolerance, and the quantisers for them.
+
+    The last ones are the source's own values, with finer and finer quantisers. gaps: whether frames may be
+    left out.
+    """
+    assert animation.body is not None
+    count = len(animation)
+    values = held_angles(animation.body)
+    inner = np.zeros(count, dtype=np.bool_)
+    if gaps:
+        inner[1:-1] = np.diff(animation.index, n=2) == 0
+        inner[1:-1] &= np.diff(animation.index)[:-1] == 1
+    if values[:, :BAP_STANDARD_COUNT].any() and not values[:, BAP_STANDARD_COUNT:].any():
+        yield from _searched(animation, values, inner, tolerance, options)
+    for quant in range(QUANT_MAX, 0, -1):
+        chosen = replace(options, bap_quant=quant)
+        steps = bap_steps(options.bap_steps) * step_scale(chosen, body=True)
+        rounded: Float64 = np.rint(values / steps) * steps
+        keys = np.arange(count)
+        sent = _to_send(animation, FoundBaps(keys, rounded.astype(np.int32), 0.0, 0.0))
+        off = displacements(values, rounded, float(animation.rate))
+        kept = np.array_equal(rounded[:, BAP_STANDARD_COUNT:], values[:, BAP_STANDARD_COUNT:])
+        within = off.joints.max() <= tolerance.joint and off.feet.max() <= tolerance.foot
+        if quant == 1 or (within and kept):
+            yield sent, chosen
+            return
+
+
+def _searched(
+    animation: Animation, values: Float64, gaps: Bool, tolerance: Tolerance, options: EncoderOptions
+) -> Iterator[tuple[Animation, EncoderOptions]]:
+    """Yield what searches find within the tolerance; with the finest quantiser, also the first beyond it."""
+    target = BodyTarget(values, float(animation.rate), tolerance)
+    searches = max(FRAMES_SEARCHED // len(animation), 1)
+    bases = [_unwrapped(reduce_joints(target, share)) for share in REDUCED[:searches]]
+    efforts = [(*effort, base) for effort in EFFORTS for base in bases][: max(searches, 2)]
+    for quant in _quantisers(target, tolerance, options):
+        chosen = replace(options, bap_quant=quant)
+        scale = step_scale(chosen, body=True)
+        steps = bap_steps(options.bap_steps) * scale
+        within, hopeless = False, 0
+        for share, gap_share, base in efforts:
+            for margin in MARGINS:
+                effort = BodyEffort(steps, scale, share, min(gap_share, margin - SPARE), margin)
+                found = search_baps(target, base, gaps, effort)
+                if found.longest <= 1 or found.longest > HOPELESS:
+                    break
+            if found.longest <= 1 or (quant == 1 and not hopeless):
+                within |= found.longest <= 1
+                yield _to_send(animation, found), chosen
+            hopeless += found.longest > 1 and (quant == 1 or found.longest > HOPELESS)
+            if (within and searches == 1) or hopeless == GIVEN_UP:
+                break
+        if within:  # finer ones take more
+            return
+
+
+def _quantisers(target: BodyTarget, tolerance: Tolerance, options: EncoderOptions) -> list[int]:
+    """Return quantisers, coarsest first, of which half a step moves nothing beyond the tolerance."""
+    steps = bap_steps(options.bap_steps)
+    moving = np.flatnonzero(target.values[:, :BAP_STANDARD_COUNT].any(axis=0)).tolist()
+    stands = bool((target.tolerances[:, 1:] < tolerance.joint).any())
+    way = tolerance.joint / (STANDING * tolerance.foot) if stands else 1.0  # feet have only this to go
+    reach = [steps[one] * (ARM * 1e-5 if is_angle(one) else max(way, 1.0) * 1e-3) / 2 for one in moving]
+    fitting = [
+        quant
+        for quant in range(QUANT_MAX, 0, -1)
+        if max(reach) * step_scale(replace(options, bap_quant=quant), body=True) <= tolerance.joint
+    ]
+    return fitting or [1]
+
+
+def body_errors(source: Animation, decoded: Animation, tolerance: Tolerance) -> BodyErrors:
+    """Return how far a decoded body is from its source, where the source has frames."""
+    assert source.body is not None
+    values = held_angles(source.body)
+    shown = np.zeros((len(source), BAP_COUNT))
+    if decoded.body is not None:
+        sent = held_angles(decoded.body)
+        frames, keys = source.index - source.index[0], decoded.index - decoded.index[0]
+        for column in np.flatnonzero(sent.any(axis=0)).tolist():
+            shown[:, column] = np.interp(frames, keys, sent[:, column])
+    off = displacements(values, shown, float(source.rate))
+    frame, joint = np.unravel_index(int(off.joints.argmax()), off.joints.shape)
+    return BodyErrors(
+        float(off.joints[frame, joint]),
+        float(np.percentile(off.joints, 99)),
+        off.share_within(tolerance.joint),
+        Skeleton.default().names[joint],
+        int(frame),
+        float(off.feet.max()),
+    )
+
+
+def held_angles(body: BodyTrack) -> Float64:
+    """Return the BAPs in force at every frame, float64 (T, 296); angles go on without full turns."""
+    values: Int32 = hold(body.values, body.mask, np.zeros(BAP_COUNT, dtype=np.int32))
+    return _unwrapped(values.astype(np.float64))
+
+
+def is_angle(column: int) -> bool:
+    """Whether the BAP of a column is an angle."""
+    return baps()[column].unit == "1e-5 rad"
+
+
+def _unwrapped(values: Float64) -> Float64:
+    """Return values (T, 296) whose angles take the short way from frame to frame."""
+    angles = [column for column in np.flatnonzero(values.any(axis=0)).tolist() if is_angle(column)]
+    result = values.copy()
+    turns = np.cumsum(-np.rint(np.diff(values[:, angles], axis=0) / FULL_TURN), axis=0)
+    result[1:, angles] += turns * FULL_TURN
+    return result
+
+
+def _to_send(animation: Animation, found: FoundBaps) -> Animation:
+    """Return the frames that are sent, with the BAPs that were found and are not 0 throughout."""
+    mask = np.broadcast_to(found.values.any(axis=0), found.values.shape)
+    return Animation(
+        animation.rate, animation.index[found.keys], None, BodyTrack(found.values, mask), animation.name
+    )
+
+
+def beyond_body(nearest: BodyErrors, tolerance: Tolerance) -> RangeError:
+    """Return the error for a body beyond a tolerance. nearest: what the best stream came to."""
+    return RangeError(
+        f"no quantiser keeps the body within {tolerance.joint * 1000:g} mm, and feet that stand within "
+        f"{tolerance.foot * 1000:g} mm: with the finest, a point 3 cm off {nearest.joint} is "
+        f"{nearest.largest * 1000:.2f} mm off, and a foot {nearest.foot * 1000:.2f} mm; allow that much",
+        frame=nearest.frame,
+    )
+
+
+def reduce_joints(target: BodyTarget, share: float) -> Float64:
+    """Return BAPs (T, 296) that turn as few joints as can be, within a share of the tolerance at every frame.
+
+    What is left out is made up for by the joints below: a spine bends at a few vertebrae instead of all.
+    """
+    solver = target.solver
+    rows = all_rows(solver.skeleton)
+    rules = solver.convention
+    moved = np.asarray(target.values.any(axis=0))
+    used = [
+        joint
+        for joint, columns in zip(rules.joints, rules.bap, strict=True)
+        if joint in solver.skeleton and moved[columns[columns != NO_BAP]].any()
+    ]
+    frames = np.unique(np.linspace(0, len(target.values) - 1, REDUCTION_FRAMES).astype(int))
+    matrices = solver.pose(target.values[frames])
+    wanted, weights = rows.points(matrices), target.weights(rows)[frames]
+
+    def off_without(joint: str) -> float:
+        solved = solver.solve(matrices, [one for one in kept if one != joint], target.values[0])
+        apart = rows.points(solver.pose(solved)) - wanted
+        return float((np.linalg.norm(apart, axis=2) * weights).max())
+
+    root = solver.skeleton.names[0]
+    kept, dropped = list(used), []
+    candidates = [joint for joint in used if joint != root]
+    while candidates:
+        off = {joint: off_without(joint) for joint in candidates}
+        candidates = [joint for joint in candidates if off[joint] <= share]
+        if candidates:
+            best = min(candidates, key=lambda joint: off[joint])
+            candidates.remove(best)
+            kept.remove(best)
+            dropped.append(best)
+    while dropped:
+        reduced = _solve_joints(target, kept)
+        if target.longest(reduced, rows).max(initial=0.0) <= share:
+            return reduced
+        kept.append(dropped.pop())
+    return target.values
+
+
+def _solve_joints(target: BodyTarget, joints: list[str]) -> Float64:
+    """Return BAPs (T, 296) of the same poses that turn only these joints."""
+    result = np.zeros_like(target.values)
+    previous = target.values[0]
+    for block in blocks(len(result)):
+        matrices = target.solver.pose(target.values[block])
+        result[block] = target.solver.solve(matrices, joints, previous)
+        previous = result[block.stop - 1]
+    result[:, 186:] = target.values[:, 186:]
+    return result

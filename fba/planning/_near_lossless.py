@@ -1,0 +1,365 @@
+"""`encode_within_tolerance`: a stream that shows nearly what its source does, measured after decoding."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Bool, Float64
+from fba.codec import EncoderOptions, EncoderStatistics, decode
+from fba.errors import FbaWarning, RangeError
+from fba.face import FaceModel, resolve
+from fba.face.deform.displacements import DisplacementMeter, Displacements
+from fba.face.mates import donors
+from fba.face.resolve import known_faps
+from fba.parameters import fap_steps
+from fba.planning._body_tolerance import (
+    BodyErrors,
+    beyond_body,
+    body_errors,
+    encode_body_within_tolerance,
+    fit_bodies,
+)
+from fba.planning._derived_faps import interpolated_faps, related_faps
+from fba.planning._face_search import Effort, FoundFaps, Segment, search_faps
+from fba.planning._mesh_error import ErrorBasis
+from fba.planning._plan import Plan, encode_planned, plan_compact, plan_exact
+from fba.planning._tolerance import Tolerance
+from fba.tracks import FaceTrack
+
+QUANTS = (1, 2, 3, 4, 5, 6, 8, 10, 12)
+"""Quantisers of FAPs that are tried."""
+TRIED = 3
+"""Number of them that are tried: the coarsest that each FAP by itself could take, and the next finer ones."""
+EFFORTS = ((0.9, 1.1, 4), (1.1, 0.9, 4), (0.7, 1.1, 4), (0.9, 0.9, 10), (0.9, 1.1, 10), (1.1, 0.7, 4))
+"""Share, share of gaps, and most frames left out, of the searches that are tried; the best of all first."""
+FAILURES = 3
+"""Searches without a result after which a quantiser is given up."""
+WORSE = 1.1
+"""How much more a finer quantiser takes than a coarser one, for still finer ones not to be tried."""
+FRAMES_SEARCHED = 18_000
+"""Frames, times searches: longer streams are searched less often."""
+INTRA_BITS = 2000
+"""What an I plane counts: differences take less than half of what they do if all is kept."""
+MAX_SEGMENT_FRAMES = 3000
+"""Frames of the longest segment, which bounds the memory of a search."""
+
+
+@dataclass(frozen=True)
+class FaceErrors:
+    """How far a decoded face is from its source, at all frames of the source.
+
+    largest, percentile_99: metres, of a vertex, in the frame of the head; frame, vertex: where it is
+    largest. head, gaze: degrees, the most that one of the head's three angles, or of an eye's, is off.
+    """
+
+    largest: float
+    percentile_99: float
+    frame: int
+    vertex: int
+    head: float
+    gaze: float
+
+    def is_within(self, tolerance: Tolerance) -> bool:
+        """Whether all are within a tolerance."""
+        pairs = ((self.largest, tolerance.face), (self.head, tolerance.head), (self.gaze, tolerance.gaze))
+        return all(off <= allowed for off, allowed in pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class NearLossless:
+    """What encoding within a tolerance came to.
+
+    statistics: of the encoder. fap_quant, bap_quant: quantisers. left_out: frames that are not sent. face,
+    body: errors, None for a part that there is not, or that does not move. compact: whether nothing was
+    smaller than what keeps all that is shown.
+    """
+
+    statistics: EncoderStatistics
+    fap_quant: int
+    left_out: int
+    face: FaceErrors | None
+    compact: bool
+    bap_quant: int = 1
+    body: BodyErrors | None = None
+
+
+def encode_within_tolerance(
+    animation: Animation,
+    tolerance: Tolerance | None = None,
+    options: EncoderOptions | None = None,
+    model: FaceModel | None = None,
+    *,
+    every_frame: bool = False,
+) -> tuple[bytes, NearLossless]:
+    """Return a stream that stays within a tolerance of what an animation shows, and what it came to.
+
+    Both are measured where the source has frames, on the decoded stream: a frame that was left out is
+    interpolated linearly, as `fba.player` and `Animation.resample` do. Visemes and expressions are kept as
+    they are. Never larger than with the preset "compact", which is taken where nothing else is smaller.
+
+    A body that moves is kept within the tolerance of joints and feet; where there is a face, too, all frames
+    are sent.
+
+    options: quantisers are ignored. model: the head to measure on; default: the built-in one. every_frame:
+    send all frames, for players that hold a frame until the next comes. RangeError where not even the finest
+    quantiser keeps within the tolerance, ValueError without frames.
+    """
+    tolerance, options = tolerance or Tolerance(), replace(options or EncoderOptions(), fap_quant=1)
+    if not len(animation):
+        raise ValueError("there is no frame to encode")
+    model = model or FaceModel.default()
+    if animation.body is None or not animation.body.values.any():
+        return _encode_face(animation, tolerance, options, model, every_frame)
+    if animation.face is None:
+        data, coded = encode_body_within_tolerance(animation, tolerance, options, every_frame=every_frame)
+        return data, NearLossless(
+            coded.statistics, 1, coded.left_out, None, False, coded.bap_quant, coded.errors
+        )
+    nearest: BodyErrors | None = None
+    for body, quant in fit_bodies(animation, tolerance, options):
+        chosen = replace(options, bap_quant=quant, clamp=True)
+        data, near = _encode_face(replace(animation, body=body), tolerance, chosen, model, every_frame)
+        errors = body_errors(animation, decode(data, bap_steps=options.bap_steps), tolerance)
+        if errors.is_within(tolerance):
+            return data, replace(near, bap_quant=quant, body=errors)
+        if nearest is None or errors.largest < nearest.largest:
+            nearest = errors
+    assert nearest is not None
+    raise beyond_body(nearest, tolerance)
+
+
+def _encode_face(
+    animation: Animation,
+    tolerance: Tolerance,
+    options: EncoderOptions,
+    model: FaceModel,
+    every_frame: bool,
+) -> tuple[bytes, NearLossless]:
+    """Return a stream whose face stays within a tolerance, and what it came to; a body is sent as it is."""
+    source = _Source(animation, model, options, every_frame)
+    data, statistics = encode_planned(animation, options, preset="compact")
+    smallest = _measured(data, statistics, source, options, compact=True)
+    if animation.face is not None and _is_plain(animation.face):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)  # given above
+            for plan in _search(source, tolerance):
+                try:
+                    found_data, statistics = plan.encode()
+                except RangeError:  # between frames left out, values change by more than a plane carries
+                    continue
+                if len(found_data) < len(data) or not _is_within(smallest, tolerance):
+                    found = _measured(found_data, statistics, source, plan.options)
+                    if _is_within(found, tolerance):
+                        data, smallest = found_data, found
+    _check(smallest, tolerance)
+    return data, smallest
+
+
+class _Source:
+    """What is encoded, and the head that shows it."""
+
+    def __init__(
+        self, animation: Animation, model: FaceModel, options: EncoderOptions, every_frame: bool
+    ) -> None:
+        self.animation, self.options = animation, options
+        self.may_skip = not every_frame and animation.body is None
+        self.fit = model if model.fit is not None else None
+        self.shown: Float64 = np.zeros((len(animation), 68))
+        if animation.face is not None:
+            self.shown = resolve(animation.face, self.fit).astype(np.float64)
+            self.meter = DisplacementMeter(model)
+
+    def plan(self) -> Plan:
+        """Return what is sent, and where I planes come, if all that is shown is kept."""
+        face_only = replace(self.animation, body=None)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)
+            if self.fit is not None:
+                return plan_exact(face_only, self.options)
+            return plan_compact(face_only, self.options, intra_bits=INTRA_BITS)
+
+
+def _is_plain(face: FaceTrack) -> bool:
+    """Whether no frame defines a viseme or an expression by the FAPs that it sends."""
+    defines = face.mask[:, 0] & (face.viseme[:, 3] == 1) | face.mask[:, 1] & (face.expression[:, 5] == 1)
+    return not defines.any()
+
+
+def _search(source: _Source, tolerance: Tolerance) -> Iterator[Plan]:
+    """Yield plans that keep within the tolerance, with different quantisers of FAPs."""
+    plan = source.plan()
+    face = source.animation.face
+    assert face is not None
+    assert plan.animation.face is not None
+    basis = ErrorBasis(source.meter, tolerance)
+    segments = _segments(source, plan)
+    if not any(one.groups for _, one in segments):
+        return
+    efforts = min(max(FRAMES_SEARCHED // len(source.animation), 1), len(EFFORTS))
+    tried, least = TRIED if efforts > 1 else 1, np.inf
+    for quant in reversed(QUANTS):
+        if not tried:
+            break
+        if not all(_may_take(quant, one, basis) for _, one in segments):
+            continue
+        found = []
+        for frames, segment in segments:
+            best = _best(segment, basis, source.meter, quant, efforts)
+            if best is None:
+                break
+            found.append((frames, best))
+        else:
+            tried -= 1
+            yield _assemble(source, plan, segments, found, quant)
+            bits = sum(one.bits for _, one in found)
+            if bits > WORSE * least:  # still finer ones take still more
+                return
+            least = min(least, bits)
+
+
+def _best(
+    segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, quant: int, efforts: int
+) -> FoundFaps | None:
+    """Return the cheapest of several searches; None where the quantiser is too coarse."""
+    best = None
+    for number, (share, gap_share, most) in enumerate(EFFORTS[:efforts]):
+        if best is None and number >= FAILURES:
+            break
+        below = best.bits if best is not None else np.inf
+        found = search_faps(segment, basis, meter, Effort(quant, share, gap_share, most), below)
+        best = found if found.within else best
+    return best
+
+
+def _segments(source: _Source, plan: Plan) -> list[tuple[slice, Segment]]:
+    """Return the segments of a plan, none too long, and what is sent of each."""
+    track = plan.animation.face
+    assert track is not None
+    assert source.animation.face is not None
+    values, known = known_faps(source.animation.face)
+    shown_by_sent = known_faps(track)[1]
+    index = source.animation.index
+    consecutive = np.zeros(len(index), dtype=np.bool_)
+    consecutive[1:-1] = (index[1:-1] - index[:-2] == 1) & (index[2:] - index[1:-1] == 1)
+    consecutive &= ~track.mask[:, :2].any(axis=1) & source.may_skip
+    result = []
+    for whole in plan.segments:
+        for start in range(whole.start, whole.stop, MAX_SEGMENT_FRAMES):
+            frames = slice(start, min(start + MAX_SEGMENT_FRAMES, whole.stop))
+            groups = _groups(track.mask[start], known[start] & shown_by_sent[start])
+            gaps = consecutive[frames].copy()
+            gaps[[0, -1]] = False
+            own = Segment(source.shown[frames], values[frames].astype(np.float64), groups, gaps)
+            result.append((frames, own))
+    return result
+
+
+def _groups(sent: Bool, known: Bool) -> dict[int, tuple[int, ...]]:
+    """Return for each low-level FAP that is sent the columns that a player shows with its values."""
+    groups = {int(column): [int(column)] for column in np.flatnonzero(sent) if column > 1}
+    for column in np.flatnonzero(known & ~sent):
+        donor = next((int(one[column]) for one in donors() if sent[one[column]]), None)
+        if donor in groups:
+            groups[donor].append(int(column))
+    return {column: tuple(columns) for column, columns in groups.items()}
+
+
+def _may_take(quant: int, segment: Segment, basis: ErrorBasis) -> bool:
+    """Whether each FAP by itself has a level within the tolerance at every frame that must be sent."""
+    needed = ~segment.gaps
+    for column, columns in segment.groups.items():
+        step = int(fap_steps()[column]) * quant
+        own = segment.values[needed, column]
+        off = np.abs(own - np.rint(own / step) * step).max(initial=0.0)
+        if off * basis.slopes(columns, segment.shown[needed]).largest > 1:
+            return False
+    return True
+
+
+def _assemble(
+    source: _Source,
+    plan: Plan,
+    segments: list[tuple[slice, Segment]],
+    found: list[tuple[slice, FoundFaps]],
+    quant: int,
+) -> Plan:
+    """Return the plan that sends what was found."""
+    animation, track = source.animation, plan.animation.face
+    assert track is not None
+    moving = np.zeros(track.mask.shape[1], dtype=np.bool_)
+    for _, one in found:
+        moving |= one.values.any(axis=0)
+    if track.mask[:, :2].any():  # a FAP that is sent as 0 holds against a viseme
+        moving[:] = True
+    for related in related_faps():  # and against a mate that moves
+        moving[list(related)] = moving[list(related)].any()
+    keys = np.concatenate([frames.start + one.keys for frames, one in found])
+    mask = track.mask[keys] & moving
+    mask[:, :2] = track.mask[keys, :2]
+    values = np.where(mask, np.concatenate([one.values for _, one in found]), 0).astype(np.int32)
+    asked = interpolated_faps(mask, known_faps(track)[1][keys] & moving)
+    face = FaceTrack(values, mask, track.viseme[keys], track.expression[keys], asked)
+    body = None if animation.body is None else animation.body
+    if body is not None:
+        body = replace(body, values=body.values[keys], mask=body.mask[keys])
+    sent = Animation(animation.rate, animation.index[keys], face, body, animation.name)
+    ends = np.cumsum([len(one.keys) for _, one in found])
+    slices = tuple(
+        slice(int(end - len(one.keys)), int(end)) for end, (_, one) in zip(ends, found, strict=True)
+    )
+    return Plan(sent, slices, replace(source.options, fap_quant=quant))
+
+
+def _measured(
+    data: bytes,
+    statistics: EncoderStatistics,
+    source: _Source,
+    options: EncoderOptions,
+    *,
+    compact: bool = False,
+) -> NearLossless:
+    """Return what a stream came to: decoded, and compared with its source."""
+    decoded = decode(data, bap_steps=options.bap_steps)
+    errors = None
+    if source.animation.face is not None and decoded.face is not None:
+        index = source.animation.index - source.animation.index[0]
+        sent = decoded.index - decoded.index[0]
+        if sent[-1] != index[-1]:
+            raise AssertionError("a stream lasts as long as its source")
+        shown = resolve(decoded.face, source.fit).astype(np.float64)
+        if len(sent) < len(index):
+            shown = np.stack([np.interp(index, sent, column) for column in shown.T], axis=1)
+        off = source.meter.measure(source.shown, shown)
+        errors = _errors(off, *source.meter.angles(source.shown, shown))
+    left_out = len(source.animation) - len(decoded)
+    return NearLossless(statistics, options.fap_quant, left_out, errors, compact)
+
+
+def _errors(off: Displacements, head: float, gaze: float) -> FaceErrors:
+    frame = int(off.largest.argmax())
+    return FaceErrors(float(off.largest[frame]), off.percentile(99), frame, int(off.worst[frame]), head, gaze)
+
+
+def _is_within(result: NearLossless, tolerance: Tolerance) -> bool:
+    """Whether a stream keeps within a tolerance."""
+    return result.face is None or result.face.is_within(tolerance)
+
+
+def _check(result: NearLossless, tolerance: Tolerance) -> None:
+    """Raise RangeError for a stream that is not within the tolerance: no quantiser is fine enough."""
+    if _is_within(result, tolerance):
+        return
+    assert result.face is not None
+    face, mm = result.face, 1000
+    raise RangeError(
+        f"no quantiser keeps within {tolerance.face * mm:g} mm, {tolerance.head:g} degrees of the head and "
+        f"{tolerance.gaze:g} of the eyes: the finest moves vertex {face.vertex} by "
+        f"{face.largest * mm:.4f} mm, and turns the head by {face.head:.4f} and an eye by {face.gaze:.4f} "
+        "degrees; allow that much, or send values unquantised, without a tolerance (fap_quant 0)",
+        frame=face.frame,
+    )

@@ -1,0 +1,200 @@
+"""Constant data of a face's parts: shapes with colours, pictures and hairs, and how far its neck bends."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fba.arrays import Float32, Float64, Int32, Intp
+from fba.easing import smoothstep
+from fba.errors import FbaWarning
+from fba.face import FaceModel, Part
+from fba.face.model import point_row
+from fba_player._mesh.simplify import DetailLevels
+from fba_player._mesh.textures import RELIEF, FacePicture, load_picture, texture_breadth
+from fba_player.view._geometry import unit_rows
+from fba_player.view._view import FaceShape
+
+if TYPE_CHECKING:
+    from fba.body import BodyModel
+    from fba.body.model import BodyPart
+
+
+SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}
+TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
+HAIRY = ("lash", "brow", "hair")
+MAX_HAIR_WIDTH = 0.0012
+"""Strips wider than this (m) are not single hairs."""
+ROUGH = 0.36
+"""Strength of the skin's relief."""
+NECK = 2.3
+"""Length over which the neck bends, in multiples of the eye-nose separation (ENS)."""
+MAX_BENT_SHARE, BENT_COSINE, LONG_EDGE = 0.1, 0.8, 0.005
+"""Light is computed for every pixel if more than this share of a part's edges bend by more than the angle
+with this cosine and are longer than this (m)."""
+NORMAL_WEIGHT, TEXTURE_WEIGHT, COLOUR_WEIGHT = 0.002, 0.5, 0.004
+"""Weights for simplification: the error in metres that equals a normal off by its length, a texture off by a
+metre, and a colour off by its whole range."""
+
+
+def compute_sway(model: FaceModel) -> Float32:
+    """float32 (V,): how far each vertex turns with the head, from 1 above jaw and ears to 0 down the neck."""
+    chin = known_middle(model, ("2.1", "2.10"))
+    lobe = known_middle(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
+    if chin is None or lobe is None:
+        return np.ones(len(model.vertices), dtype=np.float32)
+    reach = NECK * model.fapu.ENS * 1024
+    y, z = model.vertices[:, 1].astype(np.float64), model.vertices[:, 2].astype(np.float64)
+    # The border between head and neck rises from below the chin to below the ears, and is level behind them.
+    along = np.clip((z - lobe[2]) / max(chin[2] - lobe[2], 1e-6), 0.0, 1.0)
+    border = lobe[1] + (chin[1] - 0.12 * reach - lobe[1]) * along
+    return smoothstep(1 - (border - y) / reach).astype(np.float32)
+
+
+def known_middle(model: FaceModel, names: Sequence[str]) -> Float64 | None:
+    """(3,): the middle of the first two of the named feature points that the face has, or None."""
+    points = np.array([model.points[point_row(name)] for name in names])
+    known = points[np.isfinite(points).all(axis=1)][:2]
+    return np.asarray(known.mean(axis=0)) if len(known) else None
+
+
+def make_shape(part: Part, sways: Float32) -> FaceShape:
+    """The constant data of a part. sways: (V,), how far its vertices turn with the head."""
+    colours = part.colours
+    if colours is None:
+        row = (*part.material.colour, 1.0 - part.material.roughness)
+        colours = np.tile(np.array(row, dtype=np.float32), (len(part.vertices), 1))
+    picture = _picture(part) if part.texcoords is not None else None
+    return FaceShape(
+        part.triangles,
+        colours,
+        sways if part.kind in ("skin", "hair", "other") else np.ones_like(sways),
+        part.texcoords,
+        picture,
+        SCATTER.get(part.kind, 0.0),
+        _relief(part),
+        part.kind in TWO_SIDED or part.material.two_sided,
+        find_hairs(part) if part.kind in HAIRY and picture is None else None,
+        name=part.name,
+        kind=part.kind,
+        smooth=_is_smooth(part),
+        alpha=part.material.alpha,
+        opacity=part.material.opacity,
+        cutoff=part.material.cutoff,
+    )
+
+
+def detail_levels(
+    part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None
+) -> DetailLevels:
+    """Levels of detail of a part for these poses, (V, 3) each. more: (V, N), attributes to preserve besides
+    normals, colours and texture, scaled to metres."""
+    columns = list(poses)
+    if part.normals is not None:
+        columns.append(part.normals * NORMAL_WEIGHT)
+    if part.texcoords is not None and len(part.triangles):
+        metres = texture_breadth(part.vertices, part.texcoords, part.triangles)
+        columns.append(part.texcoords * (TEXTURE_WEIGHT * metres))
+    if part.colours is not None:
+        columns.append(part.colours[:, :3] * COLOUR_WEIGHT)
+    if more is not None:
+        columns.append(more)
+    return DetailLevels(np.concatenate(columns, axis=1).astype(np.float32), len(poses), part.triangles)
+
+
+def part_rows(model: FaceModel | BodyModel, name: str) -> slice:
+    """The slice of a part's vertices in the arrays of its model. Raises KeyError for an unknown name."""
+    start = model.starts[name]
+    return slice(start, start + len(model.part(name).vertices))
+
+
+def with_triangles(shape: FaceShape, triangles: Int32) -> FaceShape:
+    """The shape with these triangles (F, 3) only."""
+    triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+    coarser = None if shape.coarser is None else replace(shape.coarser, triangles=triangles)
+    return replace(shape, triangles=triangles, coarser=coarser)
+
+
+def find_hairs(part: Part) -> Float32 | None:
+    """float32 (V, 8) as in `FaceShape.across`, or None if a part does not consist of single hairs.
+
+    A hair is a strip of two rows of vertices that ends in a point; the vertex opposite to another is the
+    nearest one joined to it by an edge.
+    """
+    if not len(part.triangles):
+        return None
+    vertices, count = part.vertices.astype(np.float64), len(part.vertices)
+    edges = part.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.intp)
+    edges = np.concatenate([edges, edges[:, ::-1]])
+    apart = vertices[edges[:, 0]] - vertices[edges[:, 1]]
+    length = np.linalg.norm(apart, axis=1)
+    order = np.lexsort((length, edges[:, 0]))
+    rows, first = np.unique(edges[order, 0], return_index=True)
+    nearest = order[first]
+    opposite = np.arange(count)
+    opposite[rows] = edges[nearest, 1]
+    paired = (opposite[opposite] == np.arange(count)) & (opposite != np.arange(count))
+    half = np.zeros(count)
+    half[rows] = length[nearest] / 2
+    if not paired.any() or 2 * float(np.median(half[paired])) > MAX_HAIR_WIDTH:
+        return None
+    hair = _pieces(edges, count)
+    tip = np.full(count, -1)
+    tip[hair[~paired]] = np.flatnonzero(~paired)  # unpaired: a tip's nearest has a nearer one
+    complete = paired & (tip[hair] >= 0)
+    across = np.zeros((count, 8), dtype=np.float32)
+    across[:, 7] = np.where(np.arange(count) < opposite, 1, -1)
+    across[complete, :3] = unit_rows(vertices[complete] - vertices[opposite[complete]])
+    across[complete, 3] = half[complete]
+    across[complete, 4:7] = unit_rows(vertices[tip[hair[complete]]] - vertices[complete])
+    return across
+
+
+def _pieces(edges: Intp, count: int) -> Intp:
+    """(V,): the lowest vertex in each vertex's connected piece. edges: (E, 2), in both directions."""
+    lowest = np.arange(count)
+    while True:  # each round halves the remaining distance
+        lower = lowest.copy()
+        np.minimum.at(lower, edges[:, 0], lowest[edges[:, 1]])
+        np.minimum.at(lower, lowest, lower)
+        lower = lower[lower]
+        if np.array_equal(lower, lowest):
+            return lowest
+        lowest = lower
+
+
+def _relief(part: Part) -> tuple[float, float]:
+    """Strength of the skin's relief and its repetitions, so that each is `RELIEF` metres wide."""
+    if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
+        return (0.0, 1.0)
+    metres = texture_breadth(part.vertices, part.texcoords, part.triangles)
+    return (ROUGH, min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
+
+
+def _is_smooth(part: Part) -> bool:
+    """Whether most edges bend so little that light may be interpolated between vertices."""
+    if part.normals is None or not len(part.triangles):
+        return True
+    normals, corners = part.normals[part.triangles], part.vertices[part.triangles]
+    cosines = np.einsum("tkn,tkn->tk", normals, np.roll(normals, 1, axis=1))
+    lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    return bool(((cosines < BENT_COSINE) & (lengths > LONG_EDGE)).mean() < MAX_BENT_SHARE)
+
+
+def _picture(part: Part) -> FacePicture | None:
+    """The part's texture, or None, with an FbaWarning if it cannot be read."""
+    if part.material.texture is None:
+        return None
+    try:
+        return load_picture(part.material.texture)
+    except (OSError, ValueError, SyntaxError) as error:
+        warnings.warn(
+            f"the texture of part {part.name!r} cannot be read ({error}): its colour is shown instead",
+            FbaWarning,
+            stacklevel=2,
+        )
+        return None

@@ -1,0 +1,220 @@
+"""How much light reaches the vertices of a face as it turns and opens its mouth."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
+from fba.cache import load_or_make
+from fba.compiled import is_compiled
+from fba.face import Deformer, FaceModel
+from fba.face.model import point_row
+from fba_player._figure._face_light_loops import Table, blend_swaying, light_vertices
+from fba_player._figure._face_parts import part_rows
+from fba_player._figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
+
+KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
+"""Directions of key and rim light; the same as in shaders/lighting.glsl."""
+LIGHTS = np.array([KEY_DIRECTION, RIM_DIRECTION])
+MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
+              51: -250, 55: -200, 56: -200, 52: -900, 57: -700, 58: -700}  # fmt: skip
+"""FAPs of a mouth so wide open that light falls in."""
+FREE = (0.9, 0.8, 0.0, 0.3)
+"""Light on a tongue that is put out: key, sky, through, rim."""
+ON_TEETH = 0.3
+"""Share of the missing light that is added on teeth when the mouth is open."""
+STEP = 2
+"""Decimals to which the head's rotation is rounded; the light changes invisibly little."""
+MIN_SWAY = 0.05
+"""Occlusion is not computed at vertices that turn with the head by less than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Baked:
+    """Visibility with the mouth shut and wide open; near: bool (V,), where these differ; gaps: distances of
+    the lips in both, metres."""
+
+    shut: Visibility
+    wide: Visibility
+    near: Bool
+    gaps: tuple[float, float]
+
+
+class FaceLight:
+    """Light on a face model.
+
+    sway (V,): how far each vertex goes with the head. Occlusion is computed on first use, for the mouth shut
+    and open, in about a second, and stored in the disk cache.
+    """
+
+    def __init__(self, model: FaceModel, deformer: Deformer, sway: Float32) -> None:
+        self._model = model
+        self._deformer = deformer
+        self._sway = sway
+        self._last: tuple[tuple[object, ...], Float32] | None = None
+        lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
+        self._lips = lips if min(lips) >= 0 else None
+        self._tongues = [part_rows(model, part.name) for part in model.of_kind("tongue")]
+
+    def shade(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
+        """float32 (V, 4), 0..1: the share of light that reaches each vertex, as in `FaceMesh.light`.
+
+        positions: (V, 3), without the head's turn (3, 3). matrix: (3, 3), the face's rotation in the world.
+        Returns the same array until something changes.
+        """
+        share = round(self._mouth_open(positions, self.baked.gaps), 2)
+        out = [self._out_of_mouth(positions[rows, 2], positions) for rows in self._tongues]
+        # In steps too small to be seen, so that a pose looks the same whatever was shown before it.
+        turned, still = np.round((matrix @ turn).T, STEP), np.round(matrix.T, STEP)
+        key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
+        if self._last is None or self._last[0] != key:
+            lights = _basis(turned) if np.array_equal(turned, still) else _basis(turned, still)
+            self._last = (key, self._shaded(share, lights, out))
+        return self._last[1]
+
+    def _shaded(self, share: float, lights: Float32, out: list[Float32]) -> Float32:
+        """float32 (V, 4) for a mouth open by `share`. out: (N,) for each tongue, how far it is out."""
+        light = np.empty((len(self._sway), 4), dtype=np.float32)
+        for part, baked in zip(self._model.parts, self._part_lights, strict=True):
+            # Teeth get more light than falls in, as a photographer would have it.
+            baked.shade(share, lights, ON_TEETH * share if part.kind == "teeth" else 0.0, light[baked.rows])
+        for rows, outside in zip(self._tongues, out, strict=True):
+            if outside.any():
+                light[rows] += (np.array(FREE, dtype=np.float32) - light[rows]) * outside[:, None]
+        return light
+
+    @cached_property
+    def _part_lights(self) -> list[_PartLight]:
+        return [
+            _part_light(self.baked, part_rows(self._model, part.name), self._sway)
+            for part in self._model.parts
+        ]
+
+    def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
+        if self._lips is None:
+            return 0.0
+        share = (self._gap(positions) - gaps[0]) / max(gaps[1] - gaps[0], 1e-6)
+        return float(min(max(share, 0.0), 1.0) ** 0.4)  # the first millimetres let in most of the light
+
+    def _gap(self, positions: Float32) -> float:
+        assert self._lips is not None
+        way = positions[self._lips[0]] - positions[self._lips[1]]
+        return math.sqrt(float(way @ way))
+
+    def _out_of_mouth(self, depths: Float32, positions: Float32) -> Float32:
+        """float32 (N,), 0..1: how far vertices of a tongue at these depths (z) are out between the lips."""
+        if self._lips is None:
+            return np.zeros(len(depths), dtype=np.float32)
+        reach = 0.12 * self._model.fapu.ENS * 1024
+        lips = min(positions[self._lips[0], 2], positions[self._lips[1], 2])
+        if depths.max(initial=lips) <= lips:  # the usual case
+            return np.zeros(len(depths), dtype=np.float32)
+        share: Float32 = np.clip((depths - lips) / reach, 0.0, 1.0)
+        return share.astype(np.float32)
+
+    @cached_property
+    def baked(self) -> Baked:
+        """Visibility of every vertex past the rest of the face."""
+        solid = [part for part in self._model.parts if part.kind not in ("brow", "lash")]
+        joined = [part.triangles + self._model.starts[part.name] for part in solid]
+        triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
+        faps = np.zeros(68, dtype=np.float32)
+        still, normals = self._posed(faps)
+        shut = cached_visibility(still, normals, triangles, self._sway > MIN_SWAY)
+        if self._lips is None:
+            return Baked(shut, shut, np.zeros(len(still), dtype=bool), (0.0, 0.0))
+        for fap, value in MOUTH_OPEN.items():
+            faps[fap - 1] = value
+        moved, normals = self._posed(faps)
+        near = self._near_mouth(still)
+        wide = cached_visibility(moved, normals, triangles, near)
+        arrays = [
+            np.where(near[:, None] if before.ndim == 2 else near, after, before)
+            for before, after in zip(shut.arrays, wide.arrays, strict=True)
+        ]
+        return Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
+
+    def _posed(self, faps: Float32) -> tuple[Float32, Float32]:
+        positions = np.empty((len(self._sway), 3), dtype=np.float32)
+        normals = np.empty_like(positions)
+        return self._deformer.local(faps, out=positions, normals=normals), normals
+
+    def _near_mouth(self, positions: Float32) -> Bool:
+        """bool (V,): vertices about as near to the mouth as the eyes are to the nose."""
+        away = np.linalg.norm(positions - positions[self._lips].mean(axis=0), axis=1)
+        return np.asarray(away < 1.1 * self._model.fapu.ENS * 1024)
+
+
+def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
+    """What `bake` returns, stored in the disk cache: computing it takes half a second of every start."""
+
+    def make() -> list[Float16]:
+        return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
+
+    digest = hashlib.sha256(BAKING.encode())
+    for array in (positions, normals, triangles, within):
+        digest.update(np.ascontiguousarray(array).data)
+    count = len(within)
+    shapes = ((count, HARMONICS), (count, HARMONICS), (count,))
+    arrays = load_or_make(f"light-{digest.hexdigest()[:32]}", shapes, make) if is_compiled() else make()
+    return Visibility(*(array.astype(np.float32) for array in arrays))
+
+
+@dataclass(frozen=True, eq=False)
+class _PartLight:
+    """What the light at the vertices of one part is computed from.
+
+    rows: of the part in the model. table: of its N vertices. swaying: those (M,) that do not go with the head
+    all the way, sway: (M,), how far, and still: their table.
+    """
+
+    rows: slice
+    table: Table
+    swaying: Intp
+    still: Table
+    sway: Float32
+
+    def shade(self, share: float, lights: Float32, on_teeth: float, light: Float32) -> None:
+        """Write light (N, 4): key light, sky, through, rim light.
+
+        share: how far the mouth is wide open. lights: (2, 16), weights of the harmonics for key and rim light
+        for what goes with the head, then, where they differ, two more rows for what stands still. on_teeth:
+        the share of the missing light that is added.
+        """
+        light_vertices(self.table, lights[:2], share, on_teeth, light)
+        if len(lights) > 2 and len(self.swaying):
+            still = np.empty((len(self.swaying), 4), dtype=np.float32)
+            light_vertices(self.still, lights[2:], share, on_teeth, still)
+            blend_swaying(light, still, self.swaying, self.sway)
+
+
+def _part_light(baked: Baked, rows: slice, sway: Float32) -> _PartLight:
+    """The tables of a part's rows of a model. sway: (V,), of all vertices of the model."""
+    vertices = np.arange(rows.start, rows.stop)
+    swaying = np.flatnonzero(sway[vertices] < 1)
+    still = _table(baked, vertices[swaying])
+    return _PartLight(rows, _table(baked, vertices), swaying, still, sway[vertices[swaying]])
+
+
+def _table(baked: Baked, vertices: Intp) -> Table:
+    """The visibility of some vertices of a model."""
+    near = np.flatnonzero(baked.near[vertices])
+    shut, wide = (
+        [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]
+        for visibility, rows in ((baked.shut, vertices), (baked.wide, vertices[near]))
+    )
+    return Table(shut[0], shut[1], shut[2], wide[0], wide[1], wide[2], near)
+
+
+def _basis(*turns: Float64) -> Float32:
+    """float32 (2 N, 16): weights of the harmonics for key and rim light under N rotations (3, 3)."""
+    towards = np.empty((2 * len(turns), 3))
+    for k, into in enumerate(turns):
+        np.dot(LIGHTS, into.T, out=towards[2 * k : 2 * k + 2])
+    towards /= np.sqrt(np.einsum("ij,ij->i", towards, towards))[:, None]
+    return weights(towards).astype(np.float32)

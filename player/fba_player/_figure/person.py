@@ -1,0 +1,203 @@
+"""A person: a body model with a face model on it, as one skin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from fba.arrays import Bool, Float32, Float64
+from fba.body import BodyModel
+from fba.body.head_attachment import AttachedHead, attach_head, skull_of
+from fba.body.model import BodyPart
+from fba.face import Part
+from fba.face.model import point_row
+from fba_player._figure._face_parts import detail_levels, make_shape, part_rows, with_triangles
+from fba_player._figure.body_light import BodyLight, build_body_light
+from fba_player._figure.face import FaceFigure
+from fba_player._figure.wrinkles import wrinkle_strengths
+from fba_player.view._view import Eye, FaceMesh, FaceShape
+
+SCATTER = {"skin": 1.0, "neck": 1.0}
+SEEN_WEIGHTS, BEND = 6, 0.02
+"""Simplification preserves skin weights in this many random projections, scaled to this many metres."""
+HEAD_SHARE = 0.3
+"""A part of a body with its own head is drawn in full detail if more than this share of it is on the head."""
+WORLD, NOWHERE = np.eye(4), np.zeros(3)
+CARRIED = ("skin", "mouth", "hair", "other")
+"""Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """Body and face, moved by joint matrices and FAPs; see `build_person`.
+
+    head: the face on the body, or None for a body with a head of its own. body_shapes, face_shapes: the parts
+    that are drawn, by name. light: that on the body.
+    """
+
+    body: BodyModel
+    figure: FaceFigure
+    head: AttachedHead | None
+    body_shapes: dict[str, FaceShape]
+    face_shapes: dict[str, FaceShape]
+    light: BodyLight
+
+    @property
+    def headroom(self) -> float:
+        """Metres from the joint that carries the head to the top of the body's own; 0 without one."""
+        rows = head_rows(self.body)
+        if self.head is not None or not rows.any():
+            return 0.0
+        skull = self.body.bind[skull_of(self.body)]
+        return float(1.1 * ((self.body.vertices[rows] - skull[:3, 3]) @ skull[:3, :3])[:, 1].max())
+
+    def joints(self, faps: Float32, matrices: Float64) -> Float64:
+        """Joint matrices (J, 4, 4) with the head turned on the skull base by FAPs (68,)."""
+        turn = self.figure.pose(faps).turn
+        return (
+            turn_own_head(self.body, matrices, turn)
+            if self.head is None
+            else self.head.matrices(matrices, turn)
+        )
+
+    def frame(self, joints: Float64) -> Float64:
+        """(4, 4): from the face model's frame into the world."""
+        if self.head is not None:
+            return self.head.frame(joints)
+        skull = skull_of(self.body)
+        place = np.eye(4)
+        place[:3, 3] = head_middle(self.body) - np.array(self.figure.subject.centre)
+        frame: Float64 = joints[skull] @ np.linalg.inv(self.body.bind[skull]) @ place
+        return frame
+
+    def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
+        """All parts but the eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
+        positions, normals = np.empty_like(self.body.vertices), np.empty_like(self.body.vertices)
+        own = self.body.own_head if self.head is None else None
+        if own is None:
+            self.body.skin(joints, positions, normals)
+        else:
+            moved = own.move(self.body.vertices, faps)
+            self.body.skinner.skin_vertices(moved, self.body.normals, joints, positions, normals)
+        light = self.light.shade(positions, normals, joints)
+        meshes = [
+            _mesh_in_world(shape, part_rows(self.body, name), positions, normals, light)
+            for name, shape in self.body_shapes.items()
+        ]
+        if self.head is None:
+            return meshes
+        pose = self.figure.pose(faps)
+        positions, normals = np.empty_like(pose.positions), np.empty_like(pose.positions)
+        self.head.skin(pose.positions, joints, positions, local_normals=pose.normals, normals=normals)
+        light = self.figure.shade(faps, self.frame(joints))
+        wrinkles = wrinkle_strengths(faps)
+        for name, shape in self.face_shapes.items():
+            mesh = _mesh_in_world(shape, self.figure.rows(name), positions, normals, light)
+            meshes.append(replace(mesh, wrinkles=wrinkles))
+        return meshes
+
+    def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
+        """The eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
+        return [] if self.head is None else self.figure.eyes(faps, self.frame(joints), turned=True)
+
+
+def build_person(body: BodyModel, figure: FaceFigure) -> Person:
+    """A person of a body and a face, which is put where the body says that the pupils are.
+
+    Triangles of the face under the body's clothes are left out, and so are parts of kind "other" that lie
+    wholly below the chin. A body that does not say so keeps its own head, which FAPs turn.
+    """
+    model = figure.model
+    if body.eyes is None:
+        rows = head_rows(body)
+        shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts}
+        for name, shape in shapes.items():  # a coarser face would let its teeth and eyes through
+            if rows[part_rows(body, name)].mean() > HEAD_SHARE:
+                shapes[name] = replace(shape, coarser=None)
+        light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
+        return Person(body, figure, None, shapes, {}, light)
+    skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])
+    eyes = model.points[[point_row("3.5"), point_row("3.6")]]
+    head = attach_head(body, model.vertices, eyes, skull)
+    left_out = ("head", "neck") if head.brings_neck else ("head",)
+    shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts if part.kind not in left_out}
+    light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
+    return Person(body, figure, head, shapes, _face_shapes(figure, head), light)
+
+
+def head_rows(body: BodyModel) -> Bool:
+    """Mask (V,) of the body's vertices that its skull carries more than any other joint."""
+    below = body.skeleton.descendants(skull_of(body))
+    mask: Bool = np.isin(body.joints[:, 0], below) & (body.weights[:, 0] > 0)
+    return mask
+
+
+def head_middle(body: BodyModel) -> Float64:
+    """(3,): the middle of the head of a body that has one, as modelled; else the joint that carries heads."""
+    rows = head_rows(body)
+    if not rows.any():
+        joint: Float64 = body.bind[skull_of(body), :3, 3]
+        return joint
+    of_head = body.vertices[rows].astype(np.float64)
+    middle: Float64 = (of_head.min(axis=0) + of_head.max(axis=0)) / 2
+    return middle
+
+
+def turn_own_head(body: BodyModel, matrices: Float64, turn: Float64) -> Float64:
+    """Joint matrices (J, 4, 4) with the head turned about the joint that carries it.
+
+    turn: (4, 4), what FAPs do to a face.
+    """
+    if np.array_equal(turn, np.eye(4)):
+        return matrices
+    skull = skull_of(body)
+    within = np.eye(4)
+    within[:3, :3] = turn[:3, :3]
+    within[:3, 3] = body.bind[skull, :3, 3] - turn[:3, :3] @ body.bind[skull, :3, 3]
+    bind = body.bind[skull]
+    motion = matrices[skull] @ np.linalg.inv(bind) @ within @ bind @ np.linalg.inv(matrices[skull])
+    turned = matrices.copy()
+    below = body.skeleton.descendants(skull)
+    turned[below] = motion @ turned[below]
+    return turned
+
+
+def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]:
+    """The face's parts by name, without the triangles that clothes hide."""
+    model, shapes = figure.model, {}
+    chin = model.points[point_row("2.1")][1]
+    for name, shape in figure.shapes.items():
+        part = model.part(name)
+        if part.kind == "other" and part.vertices[:, 1].max() < chin:
+            continue
+        hidden = head.hidden[figure.rows(name)]
+        visible = ~hidden[shape.triangles].all(axis=1)
+        if visible.any():
+            shapes[name] = with_triangles(shape, shape.triangles[visible])
+    return shapes
+
+
+def _shape(part: BodyPart, joints: int) -> FaceShape:
+    shape = make_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
+    # Vertices must remain where joints bend the body: preserve the weights, in a few fixed projections.
+    random = np.random.default_rng(7).standard_normal((joints, SEEN_WEIGHTS)) / SEEN_WEIGHTS**0.5
+    carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * BEND
+    coarser = detail_levels(part, [part.vertices], carried.astype(np.float32))
+    open_surface = part.material.two_sided
+    return replace(
+        shape,
+        scatter=SCATTER.get(part.kind, 0.0),
+        two_sided=open_surface,
+        closed=not open_surface,
+        name="",
+        coarser=coarser,
+    )
+
+
+def _mesh_in_world(
+    shape: FaceShape, rows: slice, positions: Float32, normals: Float32, light: Float32
+) -> FaceMesh:
+    """A part, cut from its model's arrays (V, 3), (V, 3) and (V, 4), which are in the world already."""
+    return FaceMesh(shape, positions[rows], normals[rows], light[rows], WORLD, NOWHERE, NOWHERE)

@@ -1,0 +1,130 @@
+"""Levels of detail: meshes with fewer triangles, for what is small on the screen."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fba.arrays import Bool, Float32, Float64, Int32
+from fba.cache import load_or_make
+from fba.compiled import is_compiled
+
+TOLERANCES = (0.0001, 0.0002, 0.0004, 0.0008, 0.0016, 0.0032, 0.0064)
+"""Root-mean-square errors of the levels of detail, metres."""
+MIN_TRIANGLES = 200
+"""Meshes with fewer triangles than this are not simplified."""
+MAX_PASSES = 40
+MIN_REMOVED_SHARE = 0.004
+"""A pass that removes less than this share of the vertices is the last one of its level."""
+MAKING = "2"
+"""Cache version; increment when `simplify` gives other results."""
+
+
+@dataclass(frozen=True, eq=False)
+class DetailLevels:
+    """One mesh at several levels of detail, computed on first use and stored in the disk cache.
+
+    points: (V, N), each vertex's positions in all poses that count (3 x poses columns), then any attributes
+    to be preserved, scaled so that a difference of 1 weighs as much as a metre. triangles: int32 (F, 3).
+    """
+
+    points: Float32
+    poses: int
+    triangles: Int32
+
+    def triangles_within(self, tolerance: float) -> Int32 | None:
+        """int32 (F, 3): triangles of the coarsest level whose error is at most `tolerance` (m); None for the
+        mesh as it is."""
+        level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
+        if level < 0 or len(self.triangles) < MIN_TRIANGLES or not is_compiled():
+            return None
+        onto, first = self._collapses
+        target = np.arange(len(onto), dtype=np.int32)
+        collapses = first <= level
+        for _ in range(MAX_PASSES * len(TOLERANCES)):  # no more steps than passes were made
+            if not collapses[target].any():
+                break
+            target = np.where(collapses[target], onto[target], target)
+        return _without_flat(target[self.triangles])
+
+    @cached_property
+    def _collapses(self) -> tuple[Int32, Int32]:
+        """What `simplify` returns."""
+        digest = hashlib.sha256(MAKING.encode())
+        for array in (self.points, self.triangles):
+            digest.update(np.ascontiguousarray(array).data)
+
+        def make() -> list[Int32]:
+            return list(simplify(self.points.astype(np.float64), self.poses, self.triangles))
+
+        count = len(self.points)
+        onto, first = load_or_make(f"coarse-{digest.hexdigest()[:32]}", ((count,), (count,)), make, np.int32)
+        if (onto < 0).any() or (onto >= count).any():
+            onto, first = make()
+        return onto, first
+
+
+def simplify(
+    points: Float64, poses: int, triangles: Int32, tolerances: Sequence[float] = TOLERANCES
+) -> tuple[Int32, Int32]:
+    """For each vertex, int32 (V,) twice: the vertex that it collapses onto, and the level at which it does.
+
+    The level is an index into tolerances (m, rising), or their number for a vertex that stays. points, poses,
+    triangles: as in `DetailLevels`. Borders keep their course; vertices that share a position stay.
+    ValueError for triangles of other vertices, and for poses that points do not have.
+    """
+    from fba_player._mesh import _simplify_loops as loops
+
+    count, size = points.shape
+    left = np.ascontiguousarray(triangles, dtype=np.int32).copy()
+    if left.size and not 0 <= left.min() <= left.max() < count:
+        raise ValueError(f"triangles name vertices that there are not: there are {count}")
+    if not 0 <= 3 * poses <= size:
+        raise ValueError(f"points of {size} coordinates have no {poses} poses")
+    start = np.zeros(count + 1, dtype=np.int64)
+    owners = np.empty(3 * len(left), dtype=np.int32)
+    loops.around(left, count, start, owners)
+    border = np.zeros(count, dtype=bool)
+    loops.borders(left, start, owners, border)
+    a, b = np.zeros((count, size, size)), np.zeros((count, size))
+    c, w = np.zeros(count), np.zeros(count)
+    loops.quadrics(points, left, start, owners, a, b, c, w)
+    locked = _share_positions(points[:, :3])
+    goal, cost = np.empty(count, dtype=np.int32), np.empty(count)
+    touched = np.empty(count, dtype=bool)
+    onto = np.arange(count, dtype=np.int32)
+    first = np.full(count, len(tolerances), dtype=np.int32)
+    for level, tolerance in enumerate(tolerances):
+        for _ in range(MAX_PASSES):
+            candidates = loops.candidates(
+                points, poses, left, start, owners, border, locked, a, b, c, w, tolerance**2, goal, cost
+            )
+            if not candidates:
+                break
+            movable = np.flatnonzero(goal >= 0)
+            order = movable[np.argsort(cost[movable], kind="stable")]
+            done = loops.collapse(order, goal, left, start, owners, touched, onto, a, b, c, w)
+            first[(onto != np.arange(count)) & (first == len(tolerances))] = level
+            left = _without_flat(left)
+            loops.around(left, count, start, owners)
+            if done < MIN_REMOVED_SHARE * len(left):
+                break
+    return onto, first
+
+
+def _without_flat(triangles: Int32) -> Int32:
+    """The triangles (F, 3) with three different corners."""
+    a, b, c = triangles.T
+    return np.ascontiguousarray(triangles[(a != b) & (b != c) & (c != a)])
+
+
+def _share_positions(positions: Float64) -> Bool:
+    """bool (V,): whether another vertex has the same position, as along a seam, which would gape."""
+    rounded = np.ascontiguousarray(np.round(positions * 1e6).astype(np.int64))
+    _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
+    shared: Bool = counts[inverse.ravel()] > 1
+    return shared

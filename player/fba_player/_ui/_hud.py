@@ -1,0 +1,144 @@
+"""The overlay of the picture: file name and panel buttons at the top, notices above the bar."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from fba_player._ui import theme
+from fba_player._ui._docks import EDGE
+from fba_player._ui.panels.panel import STANDING, Panel, tooltip
+from fba_player.playback.live import LiveAnimation
+from fba_player.playback.timeline import clock_text
+from fba_player.scene.compare import CompareScene
+from fba_player.scene.scene import Scene
+from fba_player.session._session import Session
+
+ABOVE = 40.0
+"""Points from the bar to notices, which leaves room for the text under the mouse of the timeline."""
+FADE_SECONDS = 0.4
+"""Seconds in which a notice fades."""
+MAX_BUTTONS_SHARE = 0.55
+"""Share of the window's width; wider buttons become one with a menu, so that they do not cover the figure."""
+MIN_NAME_WIDTH = 560.0
+"""Width in points below which the name is left out."""
+
+
+def draw_recording(session: Session) -> float:
+    """Draw "REC" and the time in the upper left corner during a recording; returns its width in points."""
+    if session.recording is None:
+        return 0.0
+    to = imgui.get_background_draw_list()
+    x, y = EDGE + 4, EDGE + 7
+    text = f"REC {clock_text(session.recording)[:-2]}"
+    to.add_circle_filled((x + 6, y + 9), 6.0, theme.packed(theme.ALERT))
+    _draw_shadowed(to, (x + 20, y), theme.packed(theme.TEXT), text)
+    return 40.0 + float(imgui.calc_text_size(text).x)
+
+
+def draw_name(session: Session, display: tuple[float, float], taken: float, room: float) -> None:
+    """Draw the name and rate of the file in the upper left corner.
+
+    taken: points that are used at the left. room: right limit in points.
+    """
+    if display[0] < MIN_NAME_WIDTH or display[1] < 200:
+        return
+    to = imgui.get_background_draw_list()
+    x, y = EDGE + 4 + taken, EDGE + 7
+    name = session.source.name or session.scene.title
+    scene = session.scene
+    animation: object = scene.animation if isinstance(scene, Scene) else None
+    facts = (animation.message if isinstance(animation, LiveAnimation) else "") or _facts(session)
+    if imgui.calc_text_size(name + facts).x + x > room:
+        facts = ""
+    while name and imgui.calc_text_size(name).x + x > room:
+        name = name[: max(len(name) - 8, 0)]
+    _draw_shadowed(to, (x, y), theme.packed(theme.TEXT), name)
+    _draw_shadowed(to, (x + imgui.calc_text_size(name).x + 14, y), theme.packed(theme.TEXT, 0.72), facts)
+
+
+def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
+    """Draw a button for each panel, or one for all, in the upper right corner; returns their left edge."""
+    if display[0] < 130 or display[1] < 200:
+        return display[0]
+    labels = [panel.label for panel in panels]
+    wide = _width(labels)
+    together = wide > MAX_BUTTONS_SHARE * display[0]
+    if together:
+        wide = _width(["Panels"])
+    left = display[0] - EDGE - wide
+    imgui.set_next_window_pos((left, EDGE))
+    imgui.set_next_window_size((wide, 34))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, (5, 4))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, (4, 4))
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, (11, (26 - imgui.get_font_size()) / 2))
+    imgui.begin("##buttons", None, STANDING)
+    if together:
+        if _flat_button("Panels", lit=bool(session.open)):
+            imgui.open_popup("panels")
+    else:
+        for panel in panels:
+            if _flat_button(panel.label, lit=panel.name in session.open):
+                session.toggle_panel(panel.name)
+            tooltip(panel.title, panel.key)
+            imgui.same_line()
+    imgui.pop_style_var(3)
+    if imgui.begin_popup("panels"):
+        for panel in panels:
+            if imgui.menu_item(panel.title, panel.key, panel.name in session.open)[0]:
+                session.toggle_panel(panel.name)
+        imgui.end_popup()
+    imgui.end()
+    return left
+
+
+def _width(labels: list[str]) -> float:
+    return sum(imgui.calc_text_size(label).x + 22 for label in labels) + 4 * (len(labels) - 1) + 10
+
+
+def _flat_button(label: str, *, lit: bool) -> bool:
+    imgui.push_style_color(imgui.Col_.button, (0.36, 0.68, 0.90, 0.22) if lit else (0, 0, 0, 0))
+    imgui.push_style_color(imgui.Col_.text, theme.TEXT if lit else theme.FAINT)
+    imgui.push_style_var(imgui.StyleVar_.frame_border_size, 0.0)
+    pressed = imgui.button(label)
+    imgui.pop_style_var()
+    imgui.pop_style_color(2)
+    return bool(pressed)
+
+
+def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:
+    """Draw the notices, centred above the bar."""
+    to = imgui.get_foreground_draw_list()
+    y = display[1] - above - ABOVE
+    for notice in reversed(session.notices()):
+        alpha = min((notice.until - session.clock()) / FADE_SECONDS, 1.0)
+        colour = {"error": theme.ALERT, "warning": theme.WARM}.get(notice.kind, theme.ACCENT)
+        size = imgui.calc_text_size(notice.text, False, max(display[0] - 80, 60))
+        left = (display[0] - size.x) / 2
+        y -= size.y + 16
+        corner = (left - 20, y), (left + size.x + 14, y + size.y + 16)
+        to.add_rect_filled(*corner, theme.packed((0.105, 0.112, 0.124, 0.96), alpha), rounding=8.0)
+        to.add_rect_filled(
+            (left - 13, y + 8), (left - 10, y + size.y + 8), theme.packed(colour, alpha), rounding=1.5
+        )
+        to.add_text(
+            imgui.get_font(), imgui.get_font_size(), (left, y + 8), theme.packed(theme.TEXT, alpha),
+            notice.text, max(display[0] - 80, 60),
+        )  # fmt: skip
+        y -= 8
+
+
+def _facts(session: Session) -> str:
+    if isinstance(session.scene, CompareScene):
+        return ""  # each file has its own label
+    info = session.source.info
+    parts = [f"{session.scene.timeline.frames} frames", f"{float(session.scene.timeline.rate):g} frames/s"]
+    if info.size and info.plane_bits is not None:
+        parts.append(f"{info.bits_per_second / 1000:.1f} kbit/s")
+    return "   ".join(parts)
+
+
+def _draw_shadowed(to: imgui.ImDrawList, place: tuple[float, float], colour: int, text: str) -> None:
+    """Draw text with a shadow, readable over light and dark."""
+    x, y = place
+    to.add_text((x + 1, y + 1), theme.packed((0, 0, 0, 0.55), (colour >> 24) / 255), text)
+    to.add_text((x, y), colour, text)

@@ -1,0 +1,142 @@
+"""The row below the timeline: time code, buttons to play and step, marks, speed, captures, sound."""
+
+from __future__ import annotations
+
+import math
+
+from imgui_bundle import imgui
+
+from fba_player._ui import _icons as icons
+from fba_player._ui import theme
+from fba_player._ui.panels.panel import icon_button, tooltip
+from fba_player.playback.transport import SPEEDS
+from fba_player.session._actions import act
+from fba_player.session._keys import key_of
+from fba_player.session._session import Session
+
+MARGIN = 18.0
+
+
+class Buttons:
+    """Draws the row; buttons without room are left out."""
+
+    def __init__(self) -> None:
+        self.slider = (0.0, 0.0)
+        """Left and right end of the speed slider in points; for tests."""
+
+    def draw(self, session: Session, wide: float, y: float) -> None:
+        """Draw the row. wide: of the display, y: of the upper edge, in points."""
+        transport = session.transport
+        room = wide >= 640
+        if room:
+            self._clock(session, y, full=wide >= 860)
+        centre = wide / 2
+        size, gap, big = 30.0, 4.0, 38.0
+        buttons = [
+            ("first", icons.first, "first frame"),
+            ("back", icons.back, "one frame back"),
+            ("toggle", icons.pause if transport.playing else icons.play, "play, pause"),
+            ("on", icons.on, "one frame forward"),
+            ("last", icons.last, "last frame"),
+        ]
+        x = centre - (4 * size + big + 4 * gap) / 2
+        for action, icon, text in buttons:
+            mine = big if action == "toggle" else size
+            imgui.set_cursor_screen_pos((x, y - (mine - size) / 2))
+            if icon_button(action, icon, mine, filled=action == "toggle"):
+                act(session, action)
+            tooltip(text, key_of(action))
+            x += mine + gap
+        if wide >= 460:
+            x += 10
+            for action, icon, text, lit in (
+                ("mark_in", icons.mark_in, "start of the loop here", transport.mark_in is not None),
+                ("mark_out", icons.mark_out, "end of the loop here", transport.mark_out is not None),
+                ("loop", icons.loop, "loop", transport.loop),
+            ):
+                imgui.set_cursor_screen_pos((x, y))
+                colour = theme.WARM if lit and action != "loop" else None
+                if icon_button(action, icon, size, lit=lit, colour=colour):
+                    act(session, action)
+                tooltip(text, key_of(action))
+                x += size + gap
+        if room:
+            self._right(session, wide, y, x)
+
+    def _clock(self, session: Session, y: float, *, full: bool) -> None:
+        transport = session.transport
+        imgui.set_cursor_screen_pos((MARGIN, y + 3))
+        imgui.push_font(None, theme.LARGE)
+        imgui.text_unformatted(transport.timecode())
+        imgui.pop_font()
+        if full:
+            imgui.same_line(0, 16)
+            imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + 4)
+            text = transport.frame_text()
+            imgui.text_colored(theme.FAINT, text + ("   waiting" if transport.waiting else ""))
+
+    def _right(self, session: Session, wide: float, y: float, taken: float) -> None:
+        transport = session.transport
+        size, gap = 30.0, 4.0
+        buttons = [
+            ("fullscreen", icons.full_screen, "full screen", False),
+            ("record", icons.record, "record to an MP4 file", session.recording is not None),
+            ("screenshot", icons.camera, "picture of the view", False),
+            (
+                "interpolate",
+                icons.smooth if transport.interpolate else icons.stepped,
+                "smooth between frames" if transport.interpolate else "frame by frame",
+                False,
+            ),
+        ]
+        if session.audio is not None:
+            quiet = session.audio.muted
+            text = f"sound at {session.audio.volume:.0%}; turn the wheel here for more or less"
+            if session.sound_offset:
+                way = "later" if session.sound_offset > 0 else "earlier"
+                text += f"\nbegins {abs(session.sound_offset):.2f} s {way}"
+            buttons.append(("mute", icons.muted if quiet else icons.sound, text, False))
+        x = wide - MARGIN + gap
+        for action, icon, text, lit in buttons:
+            x -= size + gap
+            if x < taken + 8:
+                return
+            imgui.set_cursor_screen_pos((x, y))
+            if icon_button(action, icon, size, colour=theme.ALERT if lit else None):
+                act(session, action)
+            if action == "mute" and session.audio is not None and imgui.is_item_hovered():
+                louder = session.audio.volume + 0.05 * imgui.get_io().mouse_wheel
+                session.audio.volume = min(max(louder, 0.0), 1.0)
+            tooltip(text, key_of(action))
+        slider = min(118.0, x - taken - 26)
+        if slider < 70:
+            return
+        text = f"{transport.speed:g}x"
+        wide_text = imgui.calc_text_size(text).x
+        if x - slider - 12 - wide_text - 10 > taken:
+            imgui.set_cursor_screen_pos((x - slider - 20 - wide_text, y + 7))
+            imgui.text_colored(theme.FAINT if transport.speed == 1.0 else theme.ACCENT, text)
+            text = ""
+        self.slider = (x - slider - 12, x - 12)
+        imgui.set_cursor_screen_pos((x - slider - 12, y + 2))
+        imgui.set_next_item_width(slider)
+        changed, speed = imgui.slider_float(
+            "##speed",
+            transport.speed,
+            SPEEDS[0],
+            SPEEDS[-1],
+            text,
+            imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp,
+        )
+        if changed:
+            transport.set_speed(snap_speed(speed))
+        if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
+            transport.set_speed(1.0)
+        tooltip("speed; double click for normal", f"{key_of('slower')} {key_of('faster')}")
+
+
+def snap_speed(speed: float) -> float:
+    """The speed for a position of the slider: one of `SPEEDS` if it is near, else with two digits."""
+    speed = min(max(speed, SPEEDS[0]), SPEEDS[-1])
+    near = min(SPEEDS, key=lambda step: abs(math.log(step / speed)))
+    return near if abs(math.log(near / speed)) < 0.045 else round(speed, 2)

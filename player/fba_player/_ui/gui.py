@@ -1,0 +1,179 @@
+"""Everything over the picture: the imgui context, the bar and the panels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import imgui, implot
+
+from fba_player._ui import theme
+from fba_player._ui._bar import Bar
+from fba_player._ui._hud import draw_buttons, draw_name, draw_notices, draw_recording
+from fba_player._ui._imgui_renderer import ImguiRenderer
+from fba_player._ui._panel_windows import PanelWindows
+from fba_player._ui.panels.registry import make_panels
+from fba_player.session._controls import Controls
+from fba_player.session._pages import page_of
+from fba_player.session._session import Session
+
+HIDE_SECONDS = 3.0
+"""Seconds without input after which the bar is hidden while playing."""
+FADE_SECONDS = 0.25
+"""Seconds in which the bar fades."""
+
+
+class Gui:
+    """Draws the bar and panels of a session on a moderngl context, in a window or into memory.
+
+    hides: whether the bar is hidden while playing. Raises RuntimeError if this build of imgui cannot be used.
+    """
+
+    def __init__(self, context: Any, session: Session, *, hides: bool = True) -> None:
+        self.session = session
+        self.controls = Controls(session)
+        self.hides = hides
+        self._context: Any = imgui.create_context()
+        imgui.set_current_context(self._context)
+        self._plots = implot.create_context()
+        io = imgui.get_io()
+        io.set_ini_filename(None)
+        io.config_windows_move_from_title_bar_only = True
+        io.config_input_trickle_event_queue = True
+        theme.apply_theme()
+        self._renderer = ImguiRenderer(context)
+        self.bar = Bar(self._renderer)
+        page = page_of(session)
+        self._page = page
+        self._plays = page is None or page.plays
+        self.panels = make_panels(page.panel if page is not None else "")
+        self._panel_windows = PanelWindows()
+        self._open: set[str] = set()
+        self._cover()
+        session.viewpoint.camera = session.viewpoint.beginning
+        self._button = -1
+        self._listed = False
+        self.shown = 1.0
+        """Opacity of the bar, 0 to 1."""
+
+    @property
+    def io(self) -> imgui.IO:
+        """Input for imgui, in points: `add_mouse_pos_event` and so on."""
+        imgui.set_current_context(self._context)
+        return imgui.get_io()
+
+    @property
+    def cursor(self) -> str:
+        """The mouse cursor that imgui asks for, by its name, such as "arrow"."""
+        imgui.set_current_context(self._context)
+        shape = imgui.get_mouse_cursor()
+        return imgui.MouseCursor_(shape).name or "arrow"
+
+    def draw(self, delta: float) -> None:
+        """Draw over the bound framebuffer, which has the session's size. delta: seconds since the last call.
+
+        Input over the picture moves the camera.
+        """
+        session = self.session
+        io = self.io
+        implot.set_current_context(self._plots)
+        scale = session.scale
+        display = (session.size[0] / scale, session.size[1] / scale)
+        io.display_size = imgui.ImVec2(*display)
+        io.display_framebuffer_scale = imgui.ImVec2(scale, scale)
+        io.delta_time = min(max(delta, 1e-4), 0.25)
+        self._cover()
+        session.viewpoint.refit()
+        imgui.new_frame()
+        if imgui.get_frame_count() > 2:  # before, imgui does not know the layout yet
+            self._mouse(io)
+        if not session.bare:
+            self._draw_all(display, io)
+        if session.recording is None:  # opening a panel must not move the picture of a film
+            sides = (0.0, 0.0) if session.bare else self._panel_windows.sides
+            session.viewpoint.uncover(*sides, smoothly=self.hides)
+        draw_notices(session, display, self._bar_height(display) * self.shown if not session.bare else 0.0)
+        self._popups()
+        imgui.render()
+        self._renderer.draw(imgui.get_draw_data())
+
+    def close(self) -> None:
+        """Release its resources; safe to call twice."""
+        if self._context is None:
+            return
+        imgui.set_current_context(self._context)
+        for panel in self.panels:
+            panel.closed(self.session)
+        self._renderer.close()
+        implot.destroy_context(self._plots)
+        imgui.destroy_context(self._context)
+        self._context = None
+
+    def _popups(self) -> None:
+        """Tell the session whether a list is open, and close it if the session asks for that."""
+        flags = imgui.PopupFlags_
+        is_open = imgui.is_popup_open("", flags.any_popup_id | flags.any_popup_level)
+        if is_open and self._listed and not self.session.popup:
+            imgui.internal.close_popup_to_level(0, True)
+            is_open = False
+        self._listed = self.session.popup = is_open
+
+    def _cover(self) -> None:
+        """Tell the camera how much of the picture the bar covers."""
+        session = self.session
+        wide, high = (pixels / session.scale for pixels in session.size)
+        session.viewpoint.covered = 0.0 if session.bare else self._bar_height((wide, high)) / max(high, 1.0)
+
+    def _draw_all(self, display: tuple[float, float], io: imgui.IO) -> None:
+        session = self.session
+        self._hide(io)
+        below = self._bar_height(display)
+        taken = draw_recording(session)
+        if self.shown > 0 and self._plays:
+            imgui.push_style_var(imgui.StyleVar_.alpha, self.shown)
+            self.bar.draw(session, display)
+            available = [panel for panel in self.panels if panel.available(session)]
+            left = draw_buttons(session, available, display)
+            if self._page is None:  # the title of a page's window says it
+                draw_name(session, display, taken, left - 20)
+            imgui.pop_style_var()
+        closed = self._open - session.open
+        self._panel_windows.forget(closed)
+        for panel in self.panels:
+            if panel.name in closed:
+                panel.closed(session)
+            elif panel.name in session.open and not panel.available(session):
+                session.open.discard(panel.name)
+                session.say(f"{panel.title}: there is nothing to show here", "warning")
+        shown = [panel for panel in self.panels if panel.name in session.open and panel.available(session)]
+        self._panel_windows.draw(shown, session, display, below)
+        self._open = set(session.open)
+
+    def _bar_height(self, display: tuple[float, float]) -> float:
+        """Height of the bar in points; 0 in a window that plays nothing."""
+        return self.bar.height(display) if self._plays else 0.0
+
+    def _hide(self, io: imgui.IO) -> None:
+        session = self.session
+        busy = imgui.is_any_item_active() or (io.want_capture_mouse and session.idle < 10 * HIDE_SECONDS)
+        away = self.hides and session.transport.playing and session.idle > HIDE_SECONDS and not busy
+        step = io.delta_time / FADE_SECONDS
+        self.shown = max(self.shown - step, 0.0) if away else min(self.shown + 2 * step, 1.0)
+
+    def _mouse(self, io: imgui.IO) -> None:
+        """Pass the mouse to the controls where no panel is under it."""
+        controls, scale = self.controls, self.session.scale
+        x, y = io.mouse_pos.x * scale, io.mouse_pos.y * scale
+        if controls.holding:
+            controls.move(x, y)
+            if not imgui.is_mouse_down(self._button):
+                controls.release()
+        elif not io.want_capture_mouse:
+            for button, name in enumerate(("left", "right", "middle")):
+                if imgui.is_mouse_clicked(button):
+                    self._button = button
+                    controls.press(name, x, y)
+                    break
+            if imgui.is_mouse_double_clicked(0) and self._page is None:
+                self.session.viewpoint.reset()
+            if io.mouse_wheel:
+                controls.scroll(io.mouse_wheel)

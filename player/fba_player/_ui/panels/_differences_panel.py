@@ -1,0 +1,153 @@
+"""D: the panel of differences between animations that are compared, by parameter and over time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from imgui_bundle import imgui, implot
+
+from fba.arrays import Float64
+from fba_player._ui import theme
+from fba_player._ui.panels.panel import Panel, choose_name, heading, tooltip
+from fba_player.scene._differences import Differences, Largest
+from fba_player.scene.compare import ARRANGEMENTS, CompareScene
+from fba_player.session._session import Session
+
+ROWS = 9
+"""Number of parameters listed: those that differ most."""
+POINTS = 1500
+"""Most points of a curve; longer ones are thinned to the largest value of each part."""
+ARRANGEMENT_LABELS = {"side": "side by side", "over": "over each other"}
+DEGREES = 180 / np.pi * 1e-5
+
+
+class DifferencesPanel(Panel):
+    """The parameters that differ most, and the difference in one of them over time."""
+
+    name, title, label = "differences", "Differences", "Differences"
+    width, height, fitted, least = 390.0, 450.0, True, 260.0
+
+    def __init__(self) -> None:
+        self._second = 1
+        self._known: tuple[Differences, list[Largest]] | None = None
+        self._chosen: tuple[str, int] | None = None
+        self._curve: tuple[object, Float64, Float64] | None = None
+
+    def available(self, session: Session) -> bool:
+        """Whether several animations are compared."""
+        return isinstance(session.scene, CompareScene) and len(session.scene.scenes) > 1
+
+    def draw(self, session: Session) -> None:
+        """Draw the content."""
+        scene: Any = session.scene
+        self._arrangement(session, scene)
+        self._second = min(self._second, len(scene.scenes) - 1)
+        if len(scene.scenes) > 2:
+            self._second = 1 + choose_name("##second", scene.names[1:], self._second - 1)
+        differences = scene.differences(self._second)
+        if self._known is None or self._known[0] is not differences:
+            self._known = (differences, differences.largest(ROWS))
+        largest = self._known[1]
+        heading(f"{_short(scene.names[self._second])} minus {_short(scene.names[0])}", exact=True)
+        if not largest:
+            imgui.text_colored(theme.FAINT, _why_nothing_differs(scene, self._second, differences))
+            return
+        if self._chosen not in [(one.kind, one.number) for one in largest]:
+            self._chosen = (largest[0].kind, largest[0].number)
+        self._table(session, largest)
+        chosen = next(one for one in largest if (one.kind, one.number) == self._chosen)
+        self._plot(session, differences, chosen)
+
+    def _arrangement(self, session: Session, scene: Any) -> None:
+        for number, name in enumerate(ARRANGEMENTS):
+            if number:
+                imgui.same_line()
+            if imgui.radio_button(ARRANGEMENT_LABELS[name], scene.arrangement == name):
+                scene.arrangement = name
+                session.viewpoint.reset()
+
+    def _table(self, session: Session, largest: list[Largest]) -> None:
+        flags = imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.row_bg | imgui.TableFlags_.pad_outer_x
+        if not imgui.begin_table("largest", 4, flags):
+            return
+        imgui.table_setup_column("parameter", imgui.TableColumnFlags_.width_stretch)
+        for title in ("most", "rms", "unit"):
+            imgui.table_setup_column(title)
+        imgui.table_headers_row()
+        for one in largest:
+            imgui.table_next_row()
+            imgui.table_next_column()
+            chosen = (one.kind, one.number) == self._chosen
+            if imgui.selectable(
+                f"{one.number} {one.name}##{one.kind}", chosen, imgui.SelectableFlags_.span_all_columns
+            )[0]:
+                self._chosen = (one.kind, one.number)
+                session.transport.seek(one.time)
+            tooltip(f"{one.kind.upper()} {one.number}: shows its course, and goes to where it differs most")
+            for text in (f"{one.most:.0f}", f"{one.rms:.1f}", _unit(one.unit, one.most)):
+                imgui.table_next_column()
+                imgui.text_colored(theme.TEXT if chosen else theme.FAINT, text)
+        imgui.end_table()
+
+    def _plot(self, session: Session, differences: Differences, chosen: Largest) -> None:
+        key = (differences, self._chosen)
+        if self._curve is None or self._curve[0] != key:
+            values = differences.faps if chosen.kind == "fap" else differences.baps
+            self._curve = (
+                key,
+                *thin_curve(differences.times, values[:, chosen.number - 1].astype(np.float64), POINTS),
+            )
+        _, times, values = self._curve
+        imgui.dummy((0, 2))
+        implot.push_style_color(implot.Col_.frame_bg, (0, 0, 0, 0))
+        implot.push_style_color(implot.Col_.plot_bg, (0, 0, 0, 0.22))
+        flags = implot.Flags_.no_legend | implot.Flags_.no_mouse_text | implot.Flags_.no_menus
+        if implot.begin_plot("##course", imgui.ImVec2(-1, 150), flags):
+            axis = implot.AxisFlags_
+            implot.setup_axes("", "", axis.no_label, axis.no_label | axis.auto_fit)
+            transport = session.transport
+            implot.setup_axis_limits(implot.ImAxis_.x1, transport.start, transport.end, implot.Cond_.once)
+            spec = implot.Spec()
+            spec.line_color = imgui.ImVec4(*theme.ACCENT)
+            spec.line_weight = 1.4
+            implot.plot_line("difference", times, values, spec=spec)
+            spec = implot.Spec()
+            spec.line_color = imgui.ImVec4(*theme.TEXT)
+            implot.plot_inf_lines("now", np.array([transport.time]), spec=spec)
+            if implot.is_plot_hovered() and imgui.is_mouse_clicked(imgui.MouseButton_.left):
+                transport.seek(implot.get_plot_mouse_pos().x)
+            implot.end_plot()
+        implot.pop_style_color(2)
+        now = float(np.interp(session.transport.time, times, values))
+        imgui.text_colored(theme.FAINT, f"now {now:+.0f} {_unit(chosen.unit, now)}")
+
+
+def _why_nothing_differs(scene: Any, second: int, differences: Differences) -> str:
+    """The text shown where nothing differs: the reason."""
+    one, other = (scene.scenes[number].animation for number in (0, second))
+    both_faces = one.face is not None and other.face is not None
+    both_bodies = one.body is not None and other.body is not None
+    if not (both_faces or both_bodies):
+        return "one is a face, the other a body: nothing to compare"
+    return "nothing differs" if len(differences.times) else "they have no time in common"
+
+
+def thin_curve(times: Float64, values: Float64, most: int) -> tuple[Float64, Float64]:
+    """A curve of at most `most` points: of each part, the value furthest from 0 at its time."""
+    if len(times) <= most:
+        return times, values
+    borders = np.linspace(0, len(times), most + 1).astype(int)
+    rows = np.array(
+        [low + int(np.abs(values[low:high]).argmax()) for low, high in pairwise(borders.tolist())]
+    )
+    return times[rows], values[rows]
+
+
+def _unit(unit: str, amount: float) -> str:
+    return f"1e-5 rad ({abs(amount) * DEGREES:.1f} deg)" if unit == "1e-5 rad" else unit
+
+
+def _short(name: str, most: int = 22) -> str:
+    return name if len(name) <= most else name[: most - 1] + "…"

@@ -1,0 +1,85 @@
+"""F1: the help about keys and mouse."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from fba_player._ui import theme
+from fba_player._ui.panels.panel import Panel, heading
+from fba_player.session._keys import keys, mouse
+from fba_player.session._session import Session
+
+WIDE = 296.0
+"""Least width of a column in points."""
+KEY = 104.0
+"""Width of the keys in a column, in points."""
+
+
+class HelpPanel(Panel):
+    """The keys of actions and switches, and the mouse; in as many columns as fit."""
+
+    name, title, label = "help", "Keys and mouse", "Help"
+    side = "middle"
+    width, height = 1240.0, 520.0
+
+    def draw(self, session: Session) -> None:
+        """Draw the content."""
+        groups = _groups(session)
+        columns = min(int(imgui.get_content_region_avail().x // WIDE), 4)
+        imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
+        if columns > 1 and imgui.begin_table("columns", columns):
+            imgui.table_next_row()
+            for names in _columns(columns):
+                imgui.table_next_column()
+                for name in names:
+                    _group(name, groups.get(name, []))
+            imgui.end_table()
+        elif columns <= 1:
+            for name, rows in groups.items():
+                _group(name, rows)
+        imgui.pop_style_var()
+
+
+def _columns(count: int) -> list[list[str]]:
+    """Names of the groups in each of `count` columns, 2 to 4."""
+    if count == 2:
+        return [["Play", "Save", "Window"], ["View", "Switches", "Mouse"]]
+    if count == 3:
+        return [["Play"], ["View", "Switches", "Save"], ["Window", "Mouse"]]
+    return [["Play"], ["View", "Switches", "Save"], ["Window"], ["Mouse"]]
+
+
+def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
+    """(keys, what they do) by name of the group."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for row in keys():
+        groups.setdefault(row.group, []).append((row.shown, row.does))
+    groups["Switches"] = session.switch_keys()
+    groups["Mouse"] = list(mouse())
+    return groups
+
+
+def _group(name: str, rows: list[tuple[str, str]]) -> None:
+    if not rows:
+        return
+    heading(name)
+    imgui.begin_table(name, 2, imgui.TableFlags_.sizing_fixed_fit)
+    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY)
+    imgui.table_setup_column("does", imgui.TableColumnFlags_.width_stretch)
+    for key, does in rows:
+        _line(key, does)
+    imgui.end_table()
+
+
+def _line(key: str, does: str) -> None:
+    imgui.table_next_row()
+    imgui.table_next_column()
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(key)
+    imgui.pop_text_wrap_pos()
+    imgui.table_next_column()
+    imgui.push_style_color(imgui.Col_.text, theme.FAINT)
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(does)
+    imgui.pop_text_wrap_pos()
+    imgui.pop_style_color()

@@ -1,0 +1,201 @@
+"""Emotions in the puppeteer panel: the plane of activation and evaluation, and a slider for each mood."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from imgui_bundle import imgui
+
+from fba.emotion import NEUTRAL_POINT, expressions, known_points
+from fba.emotion.plane import HIGHEST, LOWEST
+from fba_player._ui import theme
+from fba_player._ui.panels.panel import choose_name, heading, shorten, tooltip
+from fba_player.session._mood import PuppetMood
+
+MAX_PLANE_HEIGHT, MIN_PLANE_HEIGHT = 240.0, 130.0
+"""Height of the plane in points, at most and at least; between them it leaves room for what is below it."""
+WIDE = 300.0
+"""Width in points from which the sliders stand in two columns."""
+TITLE = 130.0
+"""Width in points of a slider's title, at most."""
+DOT, HANDLE = 2.5, 7.0
+"""Radii of a named emotion and of the point, in points."""
+LABEL, CAPTION = 12.0, 11.0
+"""Sizes of letters in points: names of emotions, and the ends of the axes."""
+SIDE = 10.0
+"""Space around the plane for the dots at its edge, in points."""
+
+
+Box = tuple[float, float, float, float]
+"""Left, top, right, bottom, in points."""
+
+
+class EmotionTab:
+    """Draws the plane and the sliders. areas: of the plane, (left, top, right, bottom), and of sliders by
+    name, (left, right, middle), in points; for tests."""
+
+    def __init__(self) -> None:
+        self.plane = (0.0, 0.0, 0.0, 0.0)
+        self.sliders: dict[str, tuple[float, float, float]] = {}
+        self.labels: dict[str, Box] = {}
+        """Left, top, right and bottom of the names of emotions in points; for tests."""
+        self.hidden = 0.0
+        """Height in points of what has to be scrolled to; for tests."""
+
+    def draw(self, mood: PuppetMood) -> None:
+        """Draw the content."""
+        heading("Activation and evaluation")
+        columns = 2 if imgui.get_content_region_avail().x >= WIDE else 1
+        self._plane(mood, self._height_below(mood, columns))
+        heading("Moods")
+        self.sliders = {}
+        left, gap = imgui.get_cursor_pos_x(), imgui.get_style().item_spacing.x
+        wide = (imgui.get_content_region_avail().x - (columns - 1) * gap) / columns
+        for number, (name, intensity) in enumerate(mood.weights.items()):
+            column = number % columns
+            if column:
+                imgui.same_line()
+            imgui.set_cursor_pos_x(left + column * (wide + gap))
+            self._slider(mood, name, intensity, wide)
+        self._add(mood, imgui.get_content_region_avail().x * 0.6)
+        imgui.same_line()
+        imgui.begin_disabled(not mood.active)
+        if imgui.button("Release##mood"):
+            mood.release()
+        imgui.end_disabled()
+        tooltip("the face follows the animation again")
+        text = f"{mood.blend}: activation {mood.blend.activation:.1f}, evaluation {mood.blend.evaluation:.1f}"
+        imgui.push_text_wrap_pos(0.0)
+        imgui.text_colored(theme.FAINT, text if mood.active else "no mood")
+        imgui.pop_text_wrap_pos()
+        self.hidden = imgui.get_scroll_max_y()
+
+    def _height_below(self, mood: PuppetMood, columns: int) -> float:
+        """Points that a heading, the sliders, the row of buttons and two lines of text take."""
+        rows = -(-len(mood.weights) // columns) + 1
+        return rows * imgui.get_frame_height_with_spacing() + 3.5 * imgui.get_text_line_height_with_spacing()
+
+    def _plane(self, mood: PuppetMood, below: float) -> None:
+        """Draw the plane with the named emotions; the mouse drags the point.
+
+        below: points that it leaves free.
+        """
+        wide, room = imgui.get_content_region_avail()
+        high = min(max(min(MAX_PLANE_HEIGHT, room - below), MIN_PLANE_HEIGHT), wide * 0.8)
+        x, y = imgui.get_cursor_screen_pos()
+        self.plane = (x + SIDE, y + SIDE, x + wide - SIDE, y + high - SIDE)
+        imgui.invisible_button("plane", (max(wide, 1), high))
+        if imgui.is_item_active():
+            mood.move_point(*self._value(*imgui.get_io().mouse_pos))
+        to = imgui.get_window_draw_list()
+        to.add_rect_filled((x, y), (x + wide, y + high), theme.packed(theme.RAISED), rounding=6.0)
+        left, top, right, bottom = self.plane
+        middle_x, middle_y = self._place(*NEUTRAL_POINT)
+        line = theme.packed(theme.LINE)
+        to.add_line((left, middle_y), (right, middle_y), line)
+        to.add_line((middle_x, top), (middle_x, bottom), line)
+        font = imgui.get_font()
+        ends = (
+            ("active", middle_x + 4, y + 2),
+            ("passive", middle_x + 4, y + high - 14),
+            ("negative", x + 6, y + high - 14),
+            ("positive", x + wide - _width("positive", CAPTION) - 6, y + high - 14),
+        )
+        for text, at, above in ends:
+            to.add_text(font, CAPTION, (at, above), theme.packed(theme.FAINT), text)
+        taken = [(at, above, at + _width(text, CAPTION), above + CAPTION) for text, at, above in ends]
+        places = {name: self._place(*point) for name, point in known_points().items()}
+        self.labels = place_labels(
+            places,
+            {name: (_width(name, LABEL), LABEL) for name in places},
+            (x, y, x + wide, y + high),
+            taken,
+        )
+        for name, place in places.items():
+            to.add_circle_filled(place, DOT, theme.packed(theme.WARM))
+            to.add_text(font, LABEL, self.labels[name][:2], theme.packed(theme.TEXT, 0.8), name)
+        if mood.point is not None:
+            point = self._place(*mood.point)
+            to.add_circle_filled(point, HANDLE, theme.packed(theme.ACCENT))
+            to.add_circle(point, HANDLE, theme.packed(theme.TEXT), thickness=1.5)
+
+    def _place(self, activation: float, evaluation: float) -> tuple[float, float]:
+        """Where a point of the plane is drawn: evaluation to the right, activation upwards."""
+        left, top, right, bottom = self.plane
+        along, up = ((value - LOWEST) / (HIGHEST - LOWEST) for value in (evaluation, activation))
+        return left + along * (right - left), bottom - up * (bottom - top)
+
+    def _value(self, x: float, y: float) -> tuple[float, float]:
+        """Activation and evaluation at a place, in points; `PuppetMood.move_point` limits them."""
+        left, top, right, bottom = self.plane
+        along, up = (x - left) / max(right - left, 1.0), (bottom - y) / max(bottom - top, 1.0)
+        return LOWEST + up * (HIGHEST - LOWEST), LOWEST + along * (HIGHEST - LOWEST)
+
+    def _slider(self, mood: PuppetMood, name: str, intensity: float, wide: float) -> None:
+        x, y = imgui.get_cursor_screen_pos()
+        start = imgui.get_cursor_pos_x()
+        title = min(TITLE, wide * 0.45)
+        imgui.align_text_to_frame_padding()
+        imgui.text_colored(theme.TEXT if intensity else theme.FAINT, shorten(name, title - 6))
+        imgui.same_line()
+        imgui.set_cursor_pos_x(start + title)
+        imgui.set_next_item_width(wide - title)
+        changed, value = imgui.slider_float(
+            f"##{name}", intensity, 0.0, 100.0, "%.0f", imgui.SliderFlags_.always_clamp
+        )
+        self.sliders[name] = (x + title, x + wide, y + imgui.get_frame_height() / 2)
+        if changed:
+            mood.set_weight(name, value)
+
+    def _add(self, mood: PuppetMood, wide: float) -> None:
+        """Draw the list of the expressions that have no slider yet."""
+        others = [one.name for one in expressions() if one.name not in mood.weights]
+        chosen = choose_name("##more", ("more ...", *others), 0, wide)
+        if chosen:
+            mood.set_weight(others[chosen - 1], 0.0)
+
+
+def place_labels(
+    dots: Mapping[str, tuple[float, float]],
+    sizes: Mapping[str, tuple[float, float]],
+    within: Box,
+    taken: Sequence[Box] = (),
+) -> dict[str, Box]:
+    """Places for the names of dots where they cover no dot and no other name, the nearest first.
+
+    dots: x and y by name. sizes: width and height of each name. taken: boxes that are to stay free as well.
+    Where there is no free place, the one that covers least is taken.
+    """
+    clear = DOT + 2
+    points = [(x - clear, y - clear, x + clear, y + clear) for x, y in dots.values()]
+    used = [*taken, *points]
+    placed: dict[str, Box] = {}
+    for name, (x, y) in sorted(dots.items(), key=lambda one: one[1][1]):
+        wide, high = sizes[name]
+        beside, middle = clear + 1, y - high / 2
+        best, least = (x, y, x, y), math.inf
+        for step in range(4):
+            up, down = y - clear - high - step * high / 2, y + clear + step * high / 2
+            corners = [(x + beside, middle), (x - beside - wide, middle)] if not step else []
+            corners += [(x + side, at) for at in (down, up) for side in (beside, -wide / 2, -beside - wide)]
+            for left, top in corners:
+                box = (left, top, left + wide, top + high)
+                covers = sum(_overlap(box, other) for other in used) + wide * high - _overlap(box, within)
+                if covers < least - 0.5:
+                    best, least = box, covers
+        placed[name] = best
+        used.append(best)
+    return placed
+
+
+def _overlap(one: Box, other: Box) -> float:
+    """Area that two boxes share."""
+    wide = min(one[2], other[2]) - max(one[0], other[0])
+    high = min(one[3], other[3]) - max(one[1], other[1])
+    return max(wide, 0.0) * max(high, 0.0)
+
+
+def _width(text: str, size: float) -> float:
+    """Width of a text in letters of a size, in points."""
+    return float(imgui.calc_text_size(text).x * size / imgui.get_font_size())

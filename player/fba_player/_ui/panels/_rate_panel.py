@@ -1,0 +1,193 @@
+"""F6: the panel of the bit rate over time, the bits of each plane, and totals of I and P planes."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+from imgui_bundle import imgui
+
+from fba.animation import Animation
+from fba.codec import StreamInfo
+from fba_player._ui import theme
+from fba_player._ui.panels._bit_rates import Rates, bars_of_planes, measure_rates, probe_encoded
+from fba_player._ui.panels._curve_data import Course, TimeZoom
+from fba_player._ui.panels._curve_plot import CURVE, LABEL_HEIGHT, Lane, Lanes
+from fba_player._ui.panels.panel import Panel, tooltip
+from fba_player._ui.ruler import Ruler
+from fba_player.playback.timeline import clock_text
+from fba_player.scene.compare import CompareScene
+from fba_player.scene.scene import Scene
+from fba_player.session._session import Session
+
+BARS = 34.0
+"""Height of the bars in points."""
+MIN_LISTED_SHARE = 0.02
+"""Least share of bits around the planes that is listed."""
+MIN_TABLE_WIDTH = 340.0
+"""Least width in points for all columns of the table; a narrower one has one less."""
+MIN_BAR_WIDTH = 3.0
+"""Least width in points of a bar with its gap."""
+
+
+class RatePanel(Panel):
+    """kbit/s in the last second, a bar for each plane, and a table.
+
+    An animation that is no stream is encoded to measure it.
+    """
+
+    name, title, label = "rate", "Bit rate", "Bit rate"
+    side = "left"
+    width, height, least = 430.0, 238.0, 230.0
+
+    def __init__(self) -> None:
+        self._rates: tuple[StreamInfo, Rates | None, list[Lane]] | None = None
+        self._bars: tuple[tuple[object, ...], list[tuple[float, float, float, bool]]] = ((), [])
+        self._encoded: tuple[Any, list[StreamInfo | None]] | None = None
+        self.time_zoom = TimeZoom()
+        self.lanes = Lanes()
+        self.bars = (0.0, 0.0, 0.0, 0.0)
+        """Left, top, right, bottom of the bars in points; for tests."""
+
+    def available(self, session: Session) -> bool:
+        """Whether a single animation is shown."""
+        return not isinstance(session.scene, CompareScene)
+
+    def draw(self, session: Session) -> None:
+        """Draw the content."""
+        info, note = self._stream(session)
+        if info is None:
+            imgui.text_colored(theme.FAINT, note)
+            return
+        if self._rates is None or self._rates[0] is not info:
+            rates = measure_rates(info)
+            self._rates = (info, rates, _lanes(rates, note) if rates is not None else [])
+        _, rates, lanes = self._rates
+        if rates is None:
+            imgui.text_colored(theme.FAINT, "There are no planes.")
+            return
+        transport = session.transport
+        self.time_zoom.bound(transport.start, max(float(rates.times[-1]), transport.start))
+        high = BARS + 6 + imgui.get_text_line_height_with_spacing() * 2.5
+        imgui.begin_child(
+            "rate", (0, max(imgui.get_content_region_avail().y - high, LABEL_HEIGHT + CURVE + 24))
+        )
+        row = _row(rates, transport.time) - (len(rates.times) - len(rates.rate))
+        now = {("rate", 0): float(rates.rate[row])} if row >= 0 else {}
+        self.lanes.draw(session, lanes, self.time_zoom, now)
+        imgui.end_child()
+        self._planes(session, rates)
+        _table(rates)
+
+    def closed(self, session: Session) -> None:
+        """Stop asking for pictures; what was encoded stays."""
+        session.rolling.discard(self.name)
+
+    def _stream(self, session: Session) -> tuple[StreamInfo | None, str]:
+        """(stream to measure, note about it); without a stream, the note is the text to show."""
+        info = session.source.info
+        if info.plane_bits is not None:
+            return info, ""
+        if session.source.probing:
+            return None, "Reading..."
+        animation = session.scene.animation if isinstance(session.scene, Scene) else None
+        if not isinstance(animation, Animation):
+            return None, "There are no planes."
+        if self._encoded is None or self._encoded[0] is not animation:
+            result: list[StreamInfo | None] = []
+            self._encoded = (animation, result)
+            threading.Thread(
+                target=lambda: result.append(probe_encoded(animation)), name="fba rate", daemon=True
+            ).start()
+        if not self._encoded[1]:
+            session.rolling.add(self.name)
+            return None, "Encoding, to measure its bit rate..."
+        session.rolling.discard(self.name)
+        encoded = self._encoded[1][0]
+        return (
+            encoded,
+            "if encoded" if encoded else "It cannot be encoded, or is too long.",
+        )
+
+    def _planes(self, session: Session, rates: Rates) -> None:
+        """Draw the bars; a click seeks."""
+        left, top = imgui.get_cursor_screen_pos()
+        wide = max(imgui.get_content_region_avail().x, 8.0)
+        imgui.invisible_button("planes", (wide, BARS))
+        ruler = Ruler(self.time_zoom.low, self.time_zoom.high, left, left + wide)
+        self.bars = (left, top, left + wide, top + BARS)
+        mouse = imgui.get_io().mouse_pos.x
+        if imgui.is_item_active():
+            session.touched()
+            session.transport.seek(ruler.time(mouse))
+        elif imgui.is_item_hovered():
+            row = _row(rates, ruler.time(mouse))
+            kind = "I" if rates.intra[row] else "P"
+            imgui.set_tooltip(f"{clock_text(rates.times[row])}   {kind} plane, {rates.bits[row]:.0f} bits")
+        to = imgui.get_window_draw_list()
+        to.add_rect_filled(
+            (left, top), (left + wide, top + BARS), theme.packed((0, 0, 0, 0.22)), rounding=3.0
+        )
+        plain, key = theme.packed(theme.ACCENT, 0.75), theme.packed(theme.WARM)
+        for x, right, tall, intra in self._bar_boxes(rates, wide):
+            to.add_rect_filled(
+                (left + x, top + BARS - tall), (left + right, top + BARS), key if intra else plain
+            )
+        at = ruler.x(session.transport.time)
+        if self.time_zoom.low <= session.transport.time <= self.time_zoom.high:
+            to.add_line((at, top), (at, top + BARS), theme.packed(theme.TEXT, 0.8))
+
+    def _bar_boxes(self, rates: Rates, wide: float) -> list[tuple[float, float, float, bool]]:
+        """(left, right, height, I plane) of the bars; cached until something changes."""
+        time_zoom = self.time_zoom
+        made_for = (rates, time_zoom.low, time_zoom.high, wide)
+        if self._bars[0] == made_for:
+            return self._bars[1]
+        inside = int(((rates.times >= time_zoom.low) & (rates.times <= time_zoom.high)).sum())
+        count = max(min(int(wide / MIN_BAR_WIDTH), inside), 1)
+        tall, intra = bars_of_planes(
+            rates.times, rates.bits, rates.intra, time_zoom.low, time_zoom.high, count
+        )
+        heights = np.where(tall > 0, 2 + (BARS - 6) * np.sqrt(tall / max(float(rates.bits.max()), 1.0)), 0.0)
+        each = wide / count
+        gap = 1 if each >= MIN_BAR_WIDTH else 0
+        bars = [
+            (number * each, (number + 1) * each - gap, float(height), bool(key))
+            for number, (height, key) in enumerate(zip(heights, intra, strict=True))
+            if height
+        ]
+        self._bars = (made_for, bars)
+        return bars
+
+
+def _lanes(rates: Rates, note: str) -> list[Lane]:
+    count = len(rates.rate)
+    course = Course("rate", 0, rates.times[-count:], rates.rate, np.ones(count, bool))
+    title = f"{note or 'in one second'}; {rates.mean:.2f} on average"
+    return [Lane(course, title, lambda value: (f"{value:.2f}", "kbit/s"), theme.ACCENT)]
+
+
+def _row(rates: Rates, time: float) -> int:
+    """Position of the plane shown at a time."""
+    return int(np.clip(np.searchsorted(rates.times, time + 1e-6, side="right") - 1, 0, len(rates.times) - 1))
+
+
+def _table(rates: Rates) -> None:
+    narrow = imgui.get_content_region_avail().x < MIN_TABLE_WIDTH
+    if not imgui.begin_table("totals", 4 if narrow else 5, imgui.TableFlags_.sizing_fixed_fit):
+        return
+    for total in rates.totals:
+        if total.planes is None and total.share < MIN_LISTED_SHARE:
+            continue
+        imgui.table_next_row()
+        count = "" if total.planes is None else f"{total.planes} plane{'s' * (total.planes != 1)}"
+        mean = f"{total.bits / total.planes:.0f} bits each" if total.planes else ""
+        cells = [total.name, count, mean, f"{total.bits / 8:.0f} bytes", f"{total.share:.1%}"]
+        if narrow:
+            del cells[3]
+        for column, text in enumerate(cells):
+            imgui.table_next_column()
+            imgui.text_colored(theme.FAINT if column else theme.TEXT, text)
+    imgui.end_table()
+    tooltip("the height of a bar is proportional to the square root of its bits")

@@ -1,0 +1,114 @@
+"""A framebuffer with antialiasing.
+
+Either with several samples per pixel (best, but slow in software OpenGL), or with one sample and a pass that
+smooths edges in the finished picture.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fba.errors import DisplayError
+from fba_player.gl._antialias_region import Steps
+from fba_player.gl._context import import_moderngl
+from fba_player.gl._resources import load_program, write_buffer
+
+
+class Target:
+    """A framebuffer of a fixed size on a moderngl context.
+
+    samples: samples per pixel; 0 for one sample and smoothed edges. `begin`, draw, then `finish` gives the
+    framebuffer that holds the picture. Raises DisplayError if the driver cannot allocate it.
+    """
+
+    def __init__(self, context: Any, size: tuple[int, int], samples: int) -> None:
+        self._gl = context
+        self.size = size
+        self._parts: list[Any] = []
+        largest = min(context.info["GL_MAX_RENDERBUFFER_SIZE"], *context.info["GL_MAX_VIEWPORT_DIMS"])
+        if max(size) > largest:
+            raise DisplayError(
+                f"this OpenGL driver draws at most {largest}x{largest} pixels, not {size[0]}x{size[1]}: "
+                "choose a smaller size"
+            )
+        samples = min(samples, context.max_samples)
+        try:
+            self._allocate(samples)
+        except (import_moderngl().Error, MemoryError) as error:
+            self.close()
+            raise DisplayError(
+                f"OpenGL has no room for a picture of {size[0]}x{size[1]} pixels with {samples} samples "
+                f"each ({error}): choose a smaller size"
+            ) from error
+
+    def _allocate(self, samples: int) -> None:
+        gl, size = self._gl, self.size
+        self._result = self._own(gl.framebuffer([self._own(gl.renderbuffer(size, 4))]))
+        depth = self._own(gl.depth_renderbuffer(size, samples=samples))
+        self._pass: Any = None
+        self._bands: Any = None
+        self._along: Any = None
+        if samples:
+            colour = self._own(gl.renderbuffer(size, 4, samples=samples))
+        else:
+            colour = self._own(gl.texture(size, 4))
+            colour.filter = (gl.LINEAR, gl.LINEAR)
+            colour.repeat_x = colour.repeat_y = False
+            self._program = self._own(load_program(gl, "smooth"))
+            corners = self._own(gl.buffer(np.array([-1, -1, 3, -1, -1, 3], dtype="f4").tobytes()))
+            self._pass = self._own(gl.vertex_array(self._program, [(corners, "2f", "in_corner")]))
+        self._colour = colour
+        self._drawn = self._own(gl.framebuffer([colour], depth))
+
+    def _own(self, part: Any) -> Any:
+        """The OpenGL object, which `close` will release."""
+        self._parts.append(part)
+        return part
+
+    def begin(self) -> None:
+        """Bind it for drawing."""
+        self._drawn.use()
+
+    def finish(self, into: Any = None, within: Steps | None = None) -> Any:
+        """The framebuffer that holds the finished picture: one of its own, or, with samples = 0, `into`.
+
+        within: the regions to be smoothed; everywhere by default.
+
+        `into` may be a window's framebuffer: its size is taken to be that of this target, as moderngl does
+        not notice that a window was resized.
+        """
+        if self._pass is None:
+            self._gl.copy_framebuffer(self._result, self._drawn)
+            return self._result
+        result = self._result if into is None else into
+        everything = (0, 0, *self.size)
+        rectangles = [everything] if within is None else within.rectangles
+        if everything not in rectangles:
+            self._gl.copy_framebuffer(result, self._drawn)
+        result.use()
+        self._gl.viewport = everything
+        self._gl.enable_only(self._gl.NOTHING)
+        self._colour.use(0)
+        for rectangle in rectangles:
+            self._gl.scissor = rectangle
+            self._pass.render()
+        self._gl.scissor = None
+        if within is not None and len(within.bands) and everything not in rectangles:
+            self._smooth_bands(within)
+        return result
+
+    def _smooth_bands(self, within: Steps) -> None:
+        data = np.ascontiguousarray(within.bands, dtype="f4")
+        if self._bands is None or self._bands.size < data.nbytes:
+            self._bands = self._own(self._gl.buffer(reserve=2 * data.nbytes, dynamic=True))
+            self._along = self._own(self._gl.vertex_array(self._program, [(self._bands, "2f", "in_corner")]))
+        write_buffer(self._bands, data)
+        self._along.render(vertices=len(data))
+
+    def close(self) -> None:
+        """Free all OpenGL objects."""
+        for part in reversed(self._parts):
+            part.release()
+        self._parts.clear()

@@ -1,0 +1,117 @@
+"""Actions of a window by name, for keys, buttons and menus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fba_player.playback.transport import Transport
+from fba_player.session._session import Session
+
+SHIFT = 0.02
+"""Seconds by which one key press shifts the sound."""
+
+
+def act(session: Session, name: str) -> bool:
+    """Do an action of the table of keys, such as "toggle", "camera front" or "panel file".
+
+    Returns whether it exists.
+    """
+    word, _, rest = name.partition(" ")
+    if rest and word in _ACTIONS_WITH_NAME:
+        _ACTIONS_WITH_NAME[word](session, rest)
+    elif not rest and word in _ACTIONS:
+        _ACTIONS[word](session)
+    else:
+        return False
+    return True
+
+
+def _mark_in(session: Session) -> None:
+    session.transport.mark_in = session.transport.time
+
+
+def _mark_out(session: Session) -> None:
+    session.transport.mark_out = session.transport.time
+
+
+def _interpolate(session: Session) -> None:
+    transport = session.transport
+    transport.interpolate = not transport.interpolate
+    session.say("smooth between frames" if transport.interpolate else "frame by frame", about="motion")
+
+
+def _follow(session: Session) -> None:
+    session.viewpoint.toggle_follow(session.transport.time)
+    session.say("the camera follows" if session.viewpoint.follow else "the camera stays", about="camera")
+
+
+def _mute(session: Session) -> None:
+    if session.audio is None:
+        what = "there is no sound" if session.sound is None else "there is no sound device"
+        session.say(what, "warning")
+        return
+    session.audio.muted = not session.audio.muted
+    session.say("sound off" if session.audio.muted else "sound on", about="mute")
+
+
+def _shift_sound(seconds: float) -> Callable[[Session], None]:
+    def shift(session: Session) -> None:
+        if session.sound is None:
+            session.say("there is no sound", "warning")
+            return
+        session.shift_sound(seconds)
+        now = session.sound_offset
+        way = f"{abs(now):.2f} s {'later' if now > 0 else 'earlier'}" if now else "with the first frame"
+        session.say(f"sound {way}", about="sound")
+
+    return shift
+
+
+def _bare(session: Session) -> None:
+    session.bare = not session.bare
+
+
+def _on_transport(action: Callable[[Transport], None]) -> Callable[[Session], None]:
+    return lambda session: action(session.transport)
+
+
+def _step(frames: int) -> Callable[[Session], None]:
+    return lambda session: session.transport.step(frames)
+
+
+def _request(what: str) -> Callable[[Session], None]:
+    return lambda session: session.request(what)
+
+
+_ACTIONS: dict[str, Callable[[Session], None]] = {
+    "toggle": _on_transport(Transport.toggle),
+    "stop": _on_transport(Transport.stop),
+    "back": _step(-1),
+    "on": _step(1),
+    "back10": _step(-10),
+    "on10": _step(10),
+    "first": _on_transport(Transport.first),
+    "last": _on_transport(Transport.last),
+    "mark_in": _mark_in,
+    "mark_out": _mark_out,
+    "clear_marks": _on_transport(Transport.clear_marks),
+    "loop": _on_transport(Transport.toggle_loop),
+    "faster": _on_transport(Transport.faster),
+    "slower": _on_transport(Transport.slower),
+    "normal_speed": lambda session: session.transport.set_speed(1.0),
+    "interpolate": _interpolate,
+    "reset_view": lambda session: session.viewpoint.reset(),
+    "follow": _follow,
+    "points": Session.toggle_view,
+    "mute": _mute,
+    "sound_earlier": _shift_sound(-SHIFT),
+    "sound_later": _shift_sound(SHIFT),
+    "bare": _bare,
+    "close": Session.leave,
+    "escape": Session.escape,
+    **{name: _request(name) for name in ("screenshot", "transparent", "record", "fullscreen")},
+}
+_ACTIONS_WITH_NAME: dict[str, Callable[[Session, str], None]] = {
+    "camera": lambda session, name: session.viewpoint.preset(name),
+    "panel": Session.toggle_panel,
+}

@@ -1,0 +1,189 @@
+"""Screenshots and films of a window."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fba.arrays import UInt8
+from fba.errors import FbaError
+from fba_player.export.image_files import write_picture
+from fba_player.export.offscreen import cut_out
+from fba_player.export.recorder import Recorder
+from fba_player.gl._framebuffer import Target
+from fba_player.gl.renderer import Renderer
+from fba_player.session._session import Session
+from fba_player.sound._recorded_sound import FilmSound
+
+RATE = 30
+"""Frames per second of a film of the window."""
+SAMPLES = 4
+"""Samples per pixel of a screenshot, which need not be fast."""
+
+
+class Captures:
+    """Saves the screenshots and records the films that a session requests.
+
+    folder: where they are saved; by default the current one. They are named after the file shown, screenshots
+    also after the frame; no file is overwritten.
+    """
+
+    def __init__(self, session: Session, folder: str | os.PathLike[str] | None = None) -> None:
+        self.session = session
+        self.folder = Path(folder) if folder is not None else Path()
+        self._recorder: Recorder | None = None
+        self._sound: FilmSound | None = None
+        self._begun = 0.0
+        self._read: tuple[float, Callable[[], UInt8]] | None = None
+
+    @property
+    def recording(self) -> bool:
+        """Whether a film is being recorded."""
+        return self._recorder is not None
+
+    def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
+        """Save a picture, uint8 (H, W, 4), as PNG; returns its path, or None, with a notice, if it fails."""
+        path = self._unused_path(f"-{self.session.transport.frame:04d}", ".png")
+        try:
+            write_picture(path, pixels, transparent=transparent)
+        except (OSError, FbaError) as error:
+            self.session.say(f"The picture could not be saved: {error}", "error", 8.0)
+            return None
+        self.session.say(f"Saved as {path}")
+        return path
+
+    def toggle_recording(self) -> None:
+        """Start recording a film, or finish it."""
+        if self._recorder is not None:
+            self._finish()
+            return
+        path = self._unused_path("-film", ".mp4")
+        sound = self._open_sound()
+        try:
+            self._recorder = Recorder(path, self.session.size, rate=RATE, audio=sound)
+        except (OSError, FbaError, ValueError) as error:
+            if sound is not None:
+                sound.close()
+            self.session.say(f"No film can be recorded: {error}", "error", 8.0)
+            return
+        self._sound = sound
+        self._begun = self.session.clock()
+        self.session.recording = 0.0
+
+    def begin_picture(self) -> None:
+        """Add the last picture to the film, mix its sound up to now; call before each picture is drawn."""
+        self._add_read()
+        if self._recorder is None:
+            return
+        self.session.recording = self.session.clock() - self._begun
+        if self._sound is not None:
+            self._sound.advance(self.session.recording)
+
+    def add_picture(self, start: Callable[[], Callable[[], UInt8]]) -> None:
+        """Have the picture drawn since `begin_picture` in the film.
+
+        start: begins to read it, and returns what gives it, uint8 (H, W, 4). That is called when the next
+        picture begins, so that none is waited for. Not called where the film needs no frame.
+        """
+        seconds = self.session.recording
+        if self._recorder is not None and seconds is not None and self._recorder.wants(seconds):
+            self._read = seconds, start()
+
+    def close(self) -> Path | None:
+        """Finish the film; returns its path, None if none is being recorded. Raises FbaError, OSError."""
+        self._add_read()
+        if self._recorder is None:
+            return None
+        recorder, sound = self._recorder, self._sound
+        self._recorder = self._sound = self.session.recording = None
+        if sound is not None:
+            sound.advance(self.session.clock() - self._begun)
+            sound.end()
+        return recorder.close()
+
+    def _add_read(self) -> None:
+        """Add the picture that is being read to the film, if there is one."""
+        read, self._read = self._read, None
+        if self._recorder is None or read is None:
+            return
+        seconds, fetch = read
+        try:
+            self._recorder.add(fetch(), seconds, wait=False)
+        except (OSError, FbaError) as error:
+            self._recorder = self._sound = self.session.recording = None
+            self.session.say(f"Recording stopped: {error}", "error", 8.0)
+
+    def _open_sound(self) -> FilmSound | None:
+        """The sound for a new film; None without sound, with a notice if the file cannot be used."""
+        session = self.session
+        if session.sound is None:
+            return None
+        if session.audio is not None and session.audio.muted:
+            session.say("The sound is off: the film is silent until it is on (V)", "warning")
+        try:
+            return FilmSound(
+                session.sound,
+                session.transport,
+                offset=lambda: session.sound_offset,
+                muted=lambda: session.audio is not None and session.audio.muted,
+            )
+        except (OSError, FbaError) as error:
+            session.say(f"The film is silent: {error}", "warning", 8.0)
+            return None
+
+    def _finish(self) -> None:
+        try:
+            path = self.close()
+        except (OSError, FbaError) as error:
+            self.session.say(f"Recording stopped: {error}", "error", 8.0)
+            return
+        if path is not None:
+            self.session.say(f"Saved as {path}")
+
+    def _unused_path(self, what: str, suffix: str) -> Path:
+        """The path of a new file, named after the source."""
+        stem = Path(self.session.source.name or "fba").stem
+        stem = re.sub(r"[^\w. -]", "_", stem)[:60].strip(" .") or "fba"
+        path, number = self.folder / f"{stem}{what}{suffix}", 2
+        while path.exists():
+            path, number = self.folder / f"{stem}{what}-{number}{suffix}", number + 1
+        return path
+
+
+def draw_screenshot(
+    context: Any, renderer: Renderer, session: Session, *, transparent: bool = False
+) -> UInt8:
+    """Draw the current view without panels: uint8 (H, W, 4), top row first.
+
+    transparent: without a background. Raises DisplayError if the graphics card lacks the memory.
+    """
+    time, scene = session.transport.time, session.scene
+    target = Target(context, session.size, SAMPLES)
+    before = scene.switches["background"]
+    try:
+        if transparent:
+            scene.show("background", "transparent")
+        view, camera = session.view(time), session.viewpoint.camera_without_panels(time)
+        views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)] if transparent else [view]
+        pictures = []
+        for one in views:
+            target.begin()
+            within = renderer.draw(one, camera, session.size)
+            pictures.append(read_pixels(target.finish(within=within), session.size))
+    finally:
+        scene.show("background", before)
+        target.close()
+    return cut_out(*pictures) if transparent else pictures[0]
+
+
+def read_pixels(framebuffer: Any, size: tuple[int, int]) -> UInt8:
+    """The pixels of a framebuffer: uint8 (H, W, 4), top row first."""
+    width, height = size
+    data = framebuffer.read((0, 0, width, height), components=4, alignment=1)
+    return np.frombuffer(data, np.uint8).reshape(height, width, 4)[::-1]

@@ -1,0 +1,261 @@
+"""The state of a window: scene, transport, camera, selection, notices and requests.
+
+Panels read and change it; it knows no imgui and no OpenGL.
+"""
+
+from __future__ import annotations
+
+import math
+import time as wall
+import warnings
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fba.arrays import Float32, Float64
+from fba.atomic import PathLike
+from fba_player.playback.transport import Transport
+from fba_player.scene.scene import Scene
+from fba_player.session._camera_controller import Viewpoint
+from fba_player.session._keys import by_name
+from fba_player.session._source import Source
+from fba_player.view._view import View
+from fba_player.view.camera import Camera
+from fba_player.view.protocols import Showable
+from fba_player.view.switches import SWITCHES, Switch
+
+if TYPE_CHECKING:
+    from fba_player.sound.player import Audio
+
+Hook = Callable[[Float32, Float64], None]
+
+NOTICE_SECONDS = 4.0
+LEAVING = 6.0
+"""Seconds in which closing again discards unsaved work."""
+IDLE_MOUSE = 3.0
+"""Seconds without input after which a full screen hides the mouse cursor while it plays."""
+NOTICE_FADES = 0.5
+"""Last seconds of a notice, in which it fades."""
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """A message to the user.
+
+    kind: "done", "warning" or "error". until: end of its time on the session's clock. about: its subject; a
+    newer notice about the same subject replaces it.
+    """
+
+    text: str
+    kind: str
+    until: float
+    about: str
+
+
+@dataclass
+class Selection:
+    """The FAPs and BAPs that the user has selected, by number, in the order of selection."""
+
+    faps: list[int] = field(default_factory=list)
+    baps: list[int] = field(default_factory=list)
+
+    def toggle(self, kind: str, number: int) -> None:
+        """Add a parameter to the selection, or remove it. kind: "fap" or "bap"."""
+        selected = self.faps if kind == "fap" else self.baps
+        if number in selected:
+            selected.remove(number)
+        else:
+            selected.append(number)
+
+
+class Session:
+    """The state that the window and its panels share.
+
+    scene, transport, viewpoint: what is shown, its current time, and the camera. source: the file behind it.
+    selection: FAPs and BAPs. open: names of the open panels. bare: whether everything but the picture is
+    hidden. size: of the picture in pixels. scale: pixels per point of the display.
+
+    before_frame: functions called as hook(faps, baps) before each picture; they may change the values that
+    will be shown in place: FAPs, float32 (68,), and BAPs, float64 (296,), zeros without a body.
+
+    requests: what the window shall do after this picture, see `request`. recording: seconds of the film so
+    far, None if none is being recorded. values: FAPs and BAPs of the last picture, after the hooks. sound:
+    path of the sound file; audio: its player, None without a sound device; the sound begins sound_offset
+    seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures all the time.
+    unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next, see `drop`.
+    popup: whether a list is open over the picture; set to False to close it.
+    """
+
+    def __init__(
+        self,
+        scene: Showable,
+        transport: Transport | None = None,
+        *,
+        source: Source | None = None,
+        camera: Camera | str | None = None,
+        size: tuple[int, int] = (1280, 720),
+        scale: float = 1.0,
+        clock: Callable[[], float] = wall.monotonic,
+    ) -> None:
+        self.scene = scene
+        self.transport = transport or Transport(scene.timeline)
+        self.source = source or Source(scene)
+        self.size = size
+        self.scale = scale
+        self.viewpoint = Viewpoint(scene, size[0] / max(size[1], 1), camera, clock=clock)
+        self.selection = Selection()
+        self.open: set[str] = set()
+        self.bare = False
+        self.closing = False
+        self.before_frame: list[Hook] = []
+        self.requests: deque[str] = deque()
+        self.recording: float | None = None
+        self.rolling: set[str] = set()
+        self.unsaved: set[str] = set()
+        self.dropped: tuple[Path, ...] = ()
+        self.full_screen = False
+        self.popup = False
+        self.audio: Audio | None = None
+        self.sound: PathLike | None = None
+        self.sound_offset = 0.0
+        self.values: tuple[Float32, Float64] = (np.zeros(68, np.float32), np.zeros(296))
+        self.clock = clock
+        self.last_input = clock()
+        self._notices: list[Notice] = []
+        self._leave_again_until = -math.inf
+
+    def toggle_panel(self, name: str) -> None:
+        """Open or close a panel; if everything is hidden, show it."""
+        if self.bare:
+            self.bare = False
+            self.open.add(name)
+        else:
+            self.open ^= {name}
+
+    def say(self, text: str, kind: str = "done", seconds: float = NOTICE_SECONDS, *, about: str = "") -> None:
+        """Show a notice for some seconds. kind: "done", "warning" or "error".
+
+        It replaces an older one about the same subject; by default the subject is the text.
+        """
+        about = about or text
+        self._notices = [one for one in self.notices() if one.about != about][-2:]
+        self._notices.append(Notice(text, kind, self.clock() + seconds, about))
+
+    def notices(self) -> list[Notice]:
+        """The current notices, oldest first."""
+        now = self.clock()
+        self._notices = [one for one in self._notices if one.until > now]
+        return list(self._notices)
+
+    def request(self, what: str) -> None:
+        """Request "screenshot", "transparent", "record" or "fullscreen" from the window."""
+        self.requests.append(what)
+
+    def escape(self) -> None:
+        """Close an open list, else leave full screen, else close the window."""
+        if self.popup:
+            self.popup = False
+        elif self.full_screen:
+            self.request("fullscreen")
+        else:
+            self.leave()
+
+    def leave(self) -> None:
+        """Close the window; with unsaved work, warn first and close at the second call."""
+        if self.unsaved and self.clock() > self._leave_again_until:
+            self._leave_again_until = self.clock() + LEAVING
+            what = " and ".join(sorted(self.unsaved))
+            self.say(f"Unsaved: {what}. Close again to discard", "warning", LEAVING, about="leave")
+            return
+        self.closing = True
+
+    def drop(self, paths: tuple[Path, ...]) -> None:
+        """Close the window to open dropped files; if one cannot be read, say so and stay open."""
+        from fba.errors import FbaError
+        from fba.formats import read
+
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # given again when they are opened
+                for path in paths:
+                    read(path)
+        except (FbaError, OSError) as error:
+            self.say(f"Cannot be opened: {error}", "error", 8.0, about="drop")
+            return
+        self.leave()
+        if self.closing:
+            self.dropped = paths
+
+    def touched(self) -> None:
+        """Note that the user moved the mouse or pressed something, so that hidden controls come back."""
+        self.last_input = self.clock()
+
+    @property
+    def idle(self) -> float:
+        """Seconds since the last input of the user."""
+        return self.clock() - self.last_input
+
+    @property
+    def hides_mouse(self) -> bool:
+        """Whether a full screen shows no mouse cursor: it plays, and the user leaves the mouse alone."""
+        return self.transport.playing and self.idle > IDLE_MOUSE
+
+    @property
+    def restless(self) -> bool:
+        """Whether the picture changes without input of the user."""
+        fades_from = self.clock() + NOTICE_FADES
+        return (
+            self.transport.playing
+            or self.viewpoint.gliding
+            or bool(self.rolling)
+            or self.recording is not None
+            or any(notice.until < fades_from for notice in self._notices)
+        )
+
+    def shift_sound(self, seconds: float) -> None:
+        """Let the sound begin this number of seconds later than now; earlier if negative."""
+        self.sound_offset = round(self.sound_offset + seconds, 6)
+        if self.audio is not None:
+            self.audio.offset = self.sound_offset
+
+    def view(self, time: float) -> View:
+        """What is drawn at a time in seconds, after the hooks of `before_frame`."""
+        scene = self.scene
+        if not self.before_frame or not isinstance(scene, Scene):
+            return scene.view_at(time)
+        faps, baps = scene.timeline.faps(time).copy(), scene.timeline.baps(time).copy()
+        for hook in tuple(self.before_frame):
+            hook(faps, baps)
+        self.values = (faps, baps)
+        return scene.view_for(faps, baps)
+
+    def toggle_view(self) -> None:
+        """Switch between the figure and its feature points and bones, where the scene has both views."""
+        if isinstance(self.scene, Scene):
+            self.scene.view = "figure" if self.scene.view == "points" else "points"
+
+    def switch_key(self, switch: Switch) -> str:
+        """The key of a switch; "" if it has none, or the window uses that key for something else."""
+        return "" if switch.key.lower() in by_name() else switch.key
+
+    def switch_keys(self) -> list[tuple[str, str]]:
+        """(key, label) of all switches that have a key."""
+        return [(self.switch_key(one), one.label) for one in SWITCHES.values() if self.switch_key(one)]
+
+    def press_switch(self, key: str) -> bool:
+        """Turn the switch with this key to its next value; returns False without one."""
+        for name, switch in SWITCHES.items():
+            if self.switch_key(switch).lower() == key:
+                self.touched()
+                self.scene.switches.press(name)
+                self.say(f"{switch.label}: {self.scene.switches.text(name)}", about=name)
+                return True
+        return False
+
+    def camera(self, time: float) -> Camera:
+        """The camera at a time in seconds."""
+        return self.viewpoint.camera_at(time)

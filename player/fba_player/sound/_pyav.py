@@ -1,0 +1,25 @@
+"""The import of PyAV, from version 12 on, which encodes films and decodes sound."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fba.errors import DisplayError
+from fba_player.gl._context import cure
+
+
+def import_av(purpose: str = "films need") -> Any:
+    """The module `av`; DisplayError where it cannot be imported. purpose: the beginning of the message."""
+    try:
+        import av
+    except ImportError as error:
+        raise DisplayError(
+            f"{purpose} the Python package av (PyAV), which cannot be imported: {error}. "
+            + cure(error, "mpeg4-fba[films]")
+        ) from error
+    return av
+
+
+def av_version(av: Any) -> int:
+    """The major version of PyAV."""
+    return int(av.__version__.split(".")[0])

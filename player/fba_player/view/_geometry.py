@@ -1,0 +1,120 @@
+"""Vertices of face meshes in the world, as the shader `face.vert` computes them; rotations, shifts, rays."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.arrays import Float32, Float64, Floating
+from fba_player.view._view import FaceMesh
+from fba_player.view.camera import Camera
+
+
+def world_positions(mesh: FaceMesh) -> Float32:
+    """float32 (V, 3): the mesh's positions in the world."""
+    turned = turn_partly(mesh.positions, mesh.shape.sway, mesh.turn, mesh.centre)
+    world: Float32 = (turned @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]).astype(np.float32)
+    return world
+
+
+def world_normals(mesh: FaceMesh) -> Float32:
+    """float32 (V, 3): the mesh's unit normals in the world."""
+    turned = turn_partly(mesh.normals, mesh.shape.sway, mesh.turn, np.zeros(3)) @ mesh.matrix[:3, :3].T
+    return unit_rows(turned).astype(np.float32)
+
+
+def unit_rows(vectors: Float64) -> Float64:
+    """float64 (N, 3): vectors scaled to length 1; those of length 0 stay."""
+    unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)
+    return unit
+
+
+def turn_partly(positions: Floating, sway: Floating, turn: Float64, centre: Float64) -> Float64:
+    """float64 (V, 3): positions turned about `centre` (3,), each by its share `sway` (V,) of a rotation.
+
+    turn: (3,), the rotation's axis times its angle.
+    """
+    start = positions.astype(np.float64)
+    angle = float(np.linalg.norm(turn))
+    if angle < 1e-6:
+        return start
+    axis, arm = turn / angle, start - centre
+    angles = angle * sway.astype(np.float64)[:, None]
+    along = (arm @ axis)[:, None] * axis
+    turned: Float64 = (
+        arm * np.cos(angles) + np.cross(axis, arm) * np.sin(angles) + along * (1 - np.cos(angles)) + centre
+    )
+    return turned
+
+
+def rotation_vector(matrix: Float64) -> Float64:
+    """(3,): the axis of a rotation matrix (3, 3) times its angle, 0..pi."""
+    # Through the quaternion and its largest component, which is exact near half a turn, too.
+    trace = float(np.trace(matrix))
+    squares = np.array([trace, *np.diag(matrix)])
+    largest = int(squares.argmax())
+    if largest == 0:
+        q = np.array([
+            1 + trace,
+            matrix[2, 1] - matrix[1, 2],
+            matrix[0, 2] - matrix[2, 0],
+            matrix[1, 0] - matrix[0, 1],
+        ])  # fmt: skip
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = np.zeros(4)
+        q[0] = matrix[k, j] - matrix[j, k]
+        q[1 + i] = 1 + 2 * matrix[i, i] - trace
+        q[1 + j], q[1 + k] = matrix[j, i] + matrix[i, j], matrix[k, i] + matrix[i, k]
+    q = q / np.linalg.norm(q)
+    sine = float(np.linalg.norm(q[1:]))
+    if sine < 1e-12:
+        return np.zeros(3)
+    angle = 2 * np.arctan2(sine, abs(q[0])) * (1 if q[0] >= 0 else -1)
+    vector: Float64 = q[1:] / sine * angle
+    return vector
+
+
+def translation(offset: npt.ArrayLike) -> Float64:
+    """(4, 4) matrix of a translation by (3,)."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
+
+
+def ray_through(camera: Camera, x: float, y: float, size: tuple[int, int]) -> tuple[Float64, Float64]:
+    """(origin (3,), unit direction (3,)) of the ray through a pixel, in the world.
+
+    x, y: in pixels from the upper left corner of a picture of this size.
+    """
+    tall = math.tan(math.radians(camera.field_of_view) / 2)
+    right = (2 * x / size[0] - 1) * tall * size[0] / size[1]
+    up = (1 - 2 * y / size[1]) * tall
+    direction = np.array([right, up, -1.0]) @ camera.view_matrix()[:3, :3]
+    return camera.eye, direction / np.linalg.norm(direction)
+
+
+def first_hit(origin: Float64, direction: Float64, corners: Float64) -> tuple[int, Float64] | None:
+    """(number of the first triangle that a ray meets, the shares (3,) of its corners there), or None.
+
+    corners: float64 (F, 3, 3). Both sides of a triangle count. After Moeller and Trumbore (1997).
+    """
+    start = corners[:, 0]
+    first, second = corners[:, 1] - start, corners[:, 2] - start
+    across = np.cross(direction, second)
+    volume = np.einsum("ij,ij->i", first, across)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1.0 / volume
+        arm = origin - start
+        u = np.einsum("ij,ij->i", arm, across) * inverse
+        aside = np.cross(arm, first)
+        v = (aside @ direction) * inverse
+        away = np.einsum("ij,ij->i", second, aside) * inverse
+        met = (u >= 0) & (v >= 0) & (u + v <= 1) & (away > 0) & np.isfinite(away)
+    if not met.any():
+        return None
+    hit = int(np.where(met, away, np.inf).argmin())
+    return hit, np.array([1.0 - u[hit] - v[hit], u[hit], v[hit]])
