@@ -13,7 +13,7 @@ from PIL import Image
 import fba
 from fba.capture import MarkerMotion, from_markers
 from fba.capture.virtual_markers import propose_mapping, read_head
-from fba.formats.c3d._reader import read_markers
+from fba.formats import read_face
 from fba_player.export.offscreen import Offscreen
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.scene.markers_scene import MarkersScene
@@ -39,7 +39,7 @@ def draw(scene: Showable) -> Image.Image:
 
 
 def main() -> None:
-    motion = read_markers(SAMPLE)
+    motion = read_face(SAMPLE)
     moved = MarkersScene(edit(motion))
     moved.editing.shows_weights = False
     moved.place_cloud("over")

@@ -14,8 +14,7 @@ from fba.animation import Animation
 from fba.arrays import UInt8
 from fba.face import FaceModel, feature_point_names
 from fba.face.importers.head_surface import read_head_surface
-from fba.formats import merge
-from fba.formats.c3d._reader import read_markers
+from fba.formats import merge, read_face
 from fba_player._ui.panels.puppet_panel import PuppetPanel
 from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement
@@ -95,7 +94,7 @@ def points() -> UInt8:
 
 def markers() -> UInt8:
     """Markers beside the built-in head, and the reach of one of them."""
-    editing = edit(read_markers(SAMPLES / "talk.c3d"))
+    editing = edit(read_face(SAMPLES / "talk.c3d"))
     editing.choose("LPB")
     session = Session(MarkersScene(editing, "talk.c3d"), size=SIZE)
     return picture(session, ("markers",))

@@ -4,11 +4,9 @@ from pathlib import Path
 
 import fba
 from fba.capture import from_skeleton, retarget_report
-from fba.formats import format_of
+from fba.formats import read_motion
 
 path = Path(fba.__file__).parent / "samples" / "hello.bvh"  # made by a script in the form of a capture
-read_motion = format_of(path).read_motion
-assert read_motion is not None
 motion = read_motion(path)
 animation = from_skeleton(motion)  # the same as fba.read(path)
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import fba
 from fba.capture import from_markers
 from fba.capture.markers import find_face
-from fba.formats.c3d._reader import read_markers
+from fba.formats import read_face
 
 path = Path(fba.__file__).parent / "samples" / "talk.c3d"  # made by a script in the form of a capture
-motion = read_markers(path)
+motion = read_face(path)
 face = find_face(motion)
 eyes, opening = (1024e3 * unit for unit in (face.fapu.ES, face.fapu.IRISD))
 print(f"{len(motion.names)} markers, found by {face.found_by}; {len(face.sent)} FAPs can be told")

@@ -246,16 +246,53 @@ def reachable(graph: dict[str, set[str]], module: str) -> set[str]:
     return found
 
 
+def house_room(module: str) -> str:
+    """The room that shares private modules: a package of `fba` with all in it, or another package."""
+    parts = module.split(".")
+    if parts[0] != "fba":
+        return parts[0]
+    return ".".join(parts[:2]) if len(parts) > 2 or is_package(module) else "fba"
+
+
+def is_private(module: str) -> bool:
+    return any(part.startswith("_") for part in module.split("."))
+
+
 def test_private_modules_are_imported_by_their_room_only() -> None:
     wrong = [
         f"{module} imports {target}"
         for module, targets in imports().items()
         for target in targets
-        if target.rpartition(".")[2].startswith("_")
-        and not is_package(target)
-        and not (room(module) == room(target) or module == "fba.formats.registry")
+        if is_private(target) and house_room(module) != house_room(target)
     ]
     assert wrong == []
+
+
+def test_modules_that_no_other_room_uses_are_private() -> None:
+    """A module without an underscore is one that other rooms import, or that a page or an example names."""
+    used = {
+        target
+        for module, targets in imports().items()
+        for target in targets
+        if house_room(module) != house_room(target)
+    }
+    files = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").rglob("*.py")]
+    pages = "\n".join(path.read_text(encoding="utf-8") for path in files)
+    named = {
+        module
+        for module in modules()
+        if re.search(rf"(?<![\w.]){re.escape(module)}(?!\w)", pages) is not None
+    }
+    public = [
+        module
+        for module in modules()
+        if module.count(".") > 1
+        and not is_package(module)
+        and not is_private(module)
+        and not module.startswith("fba.cli.")
+        and not module.endswith("__main__")
+    ]
+    assert [module for module in public if module not in used | named] == []
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -19,6 +19,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -367,3 +368,10 @@ def test_examples_under_help_are_accepted(name: str, tmp_path: Path, monkeypatch
                 accept(arguments)
             except click.ClickException as error:
                 pytest.fail(f"fba {shlex.join(arguments)}: {error.format_message()}")
+
+
+def test_the_page_of_public_names_is_what_its_script_makes() -> None:
+    script = DOCS / "make_api_page.py"
+    program = f"import runpy; print(runpy.run_path({str(script)!r})['make_page'](), end='')"
+    made = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert made == (DOCS / "api.md").read_text(encoding="utf-8"), "run: python docs/make_api_page.py"

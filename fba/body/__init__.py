@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fba.body._definition import BodyDefinition
+    from fba.body.head_attachment import attach_head
     from fba.body.model import BodyModel
     from fba.body.skeleton import SIDES, Skeleton
     from fba.body.solve.conventions import convention_names
@@ -22,6 +23,7 @@ _MODULE_OF = {
     "Limit": "fba.body.solve.limits",
     "Limits": "fba.body.solve.limits",
     "Skeleton": "fba.body.skeleton",
+    "attach_head": "fba.body.head_attachment",
     "convention_names": "fba.body.solve.conventions",
     "wrapped": "fba.body.solve.solver",
 }
@@ -35,6 +37,7 @@ __all__ = [
     "Limit",
     "Limits",
     "Skeleton",
+    "attach_head",
     "convention_names",
     "wrapped",
 ]

@@ -213,30 +213,30 @@ _FORMATS = (
         "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
         _lazy("smpl._reader", "sniff"), read_motion=_lazy("smpl._reader", "read_motion"), kind="skeleton",
     ),
-    _face("openface", ".csv", "action units, pose and gaze of OpenFace", "openface"),
-    _face("pyfeat", ".csv", "blendshapes or action units of py-feat", "pyfeat"),
+    _face("openface", ".csv", "action units, pose and gaze of OpenFace", "_openface"),
+    _face("pyfeat", ".csv", "blendshapes or action units of py-feat", "_pyfeat"),
     _face(
-        "livelink", ".csv", "table of blendshapes: Live Link Face's, or with ARKit's names", "livelink_csv",
+        "livelink", ".csv", "table of blendshapes: Live Link Face's, or with ARKit's names", "_livelink_csv",
         write=_lazy("face_tables._livelink_writer", "write"),
         written="table of blendshapes as Live Link Face's",
     ),
     _face("livelink-udp", ".udp", "recorded datagrams of Live Link Face", "livelink_udp"),
     _face("ifacialmocap", ".txt", "records of iFacialMocap and Facemotion3d", "ifacialmocap"),
-    _face("shapes-json", ".json", "blendshapes in JSON: MediaPipe's scores, BEAT", "shapes_json"),
+    _face("shapes-json", ".json", "blendshapes in JSON: MediaPipe's scores, BEAT", "_shapes_json"),
     Format(
         "points", (".csv", ".json", ".npz", ".npy", ".jsonl"),
         "points of a tracked face: MediaPipe's 478, iBUG's 68; tables, JSON, NumPy's arrays",
-        _lazy("face_tables._tracked_points", "sniff"), read_face=_lazy("face_tables._tracked_points", "read_points"),
-        kind="points",
+        _lazy("face_tables._tracked_points", "sniff"),
+        read_face=_lazy("face_tables._tracked_points", "read_points"), kind="points",
     ),
-    _markers("c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face", "c3d.reader"),
-    _markers("trc", (".trc",), "TRC (track row column): markers of a face", "markers.trc"),
-    _markers("motive", (".csv",), "OptiTrack Motive's CSV export: markers of a face", "markers.motive"),
-    _markers("nexus", (".csv",), "Vicon Nexus' CSV export: markers of a face", "markers.nexus"),
+    _markers("c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face", "c3d._reader"),
+    _markers("trc", (".trc",), "TRC (track row column): markers of a face", "markers._trc"),
+    _markers("motive", (".csv",), "OptiTrack Motive's CSV export: markers of a face", "markers._motive"),
+    _markers("nexus", (".csv",), "Vicon Nexus' CSV export: markers of a face", "markers._nexus"),
     _markers(
-        "qualisys", (".tsv",), "Qualisys Track Manager's TSV export: markers of a face", "markers.qualisys"
+        "qualisys", (".tsv",), "Qualisys Track Manager's TSV export: markers of a face", "markers._qualisys"
     ),
-    _markers("markers", (".csv", ".tsv"), "table of a face's markers, wide or long", "markers.table"),
+    _markers("markers", (".csv", ".tsv"), "table of a face's markers, wide or long", "markers._table"),
 )  # fmt: skip
 """In the order in which they are tried on a content: those quick to import first."""
 
@@ -285,6 +285,35 @@ def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
     reader = format_of(path, format)
     _check_options(reader.name, "reading", options, reader.read_options)
     return reader.read(path, **options)
+
+
+def read_motion(path: Path, *, format: str | None = None, **options: Any) -> SkeletonMotion:
+    """Return the motion of a captured skeleton as the file has it, before it is retargeted.
+
+    format and errors: as for `read`. options: those of the format, e.g. `limits`, or `clip` for glTF.
+    """
+    reader = format_of(path, format)
+    motion: SkeletonMotion = _call_reader(reader, reader.read_motion, "a captured skeleton", path, options)
+    return motion
+
+
+def read_face(path: Path, *, format: str | None = None, **options: Any) -> Any:
+    """Return a captured face as the file has it, before FAPs are made of it.
+
+    Shape weights give a ShapeMotion, action units an ActionUnitMotion, markers a MarkerMotion, points of an
+    image a PointMotion. format and errors: as for `read`. options: those of the format, e.g. `limits`.
+    """
+    reader = format_of(path, format)
+    return _call_reader(reader, reader.read_face, "a captured face", path, options)
+
+
+def _call_reader(
+    reader: Format, function: Callable[..., Any] | None, content: str, path: Path, options: dict[str, Any]
+) -> Any:
+    if function is None:
+        raise FormatError(f"is {reader.name.upper()}, which holds no such thing as {content}", path=path)
+    _check_options(reader.name, "reading", options, _option_names(function))
+    return function(path, **options)
 
 
 def write(path: Path, animation: Animation, *, format: str | None = None, **options: Any) -> None:

@@ -133,7 +133,9 @@ READING = {
     "bap": ("fba.formats.text.bap", "fba.formats.text._frame_reader"),
     "epf": ("fba.formats.epf._reader",),
     "bvh": ("fba.formats.bvh._reader",),
-    "gltf": ("fba.gltf._reader", "fba.gltf._nodes", "fba.formats.gltf._reader", "fba.formats.gltf._face_motion"),
+    "gltf": (
+        "fba.gltf._reader", "fba.gltf._nodes", "fba.formats.gltf._reader", "fba.formats.gltf._face_motion",
+    ),
     "capture": (
         "fba.formats.c3d._reader", "fba.formats.c3d._parameters", "fba.formats.markers._motive",
         "fba.formats.markers._nexus", "fba.formats.markers._qualisys", "fba.formats.markers._table",

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Array, Float32, Float64
-from fba.body import BodyModel
-from fba.body.head_attachment import AttachedHead, attach_head
+from fba.body import BodyModel, attach_head
+from fba.body.head_attachment import AttachedHead
 from fba.face import HEAD, Deformer, FaceModel, Part
 from fba.face.model import point_row
 from fba.formats.gltf._fap_joints import FapJoint

@@ -8,8 +8,8 @@ from typing import cast
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
-from fba.body import BodyModel
-from fba.body.head_attachment import AttachedHead, attach_head, skull_of
+from fba.body import BodyModel, attach_head
+from fba.body.head_attachment import AttachedHead, skull_of
 from fba.body.model import BodyPart
 from fba.face import Part
 from fba.face.model import point_row
