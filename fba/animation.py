@@ -356,13 +356,7 @@ def _body_angles() -> Bool:
     return np.array([bap.unit == "1e-5 rad" for bap in baps()])
 
 
-def _resample_face(
-    face: FaceTrack,
-    before: Intp,
-    after: Intp,
-    weight: Float64,
-    is_first: Bool,
-) -> FaceTrack:
+def _resample_face(face: FaceTrack, before: Intp, after: Intp, weight: Float64, is_first: Bool) -> FaceTrack:
     """Return a face track resampled as by `_between`. is_first: (S,), whether an old frame begins."""
     mask = face.mask[before]
     both = mask & face.mask[after]

@@ -37,10 +37,7 @@ def sole_points(skeleton: Skeleton, side: str) -> dict[str, Float64] | None:
     if not all(joint in skeleton for joint in (ankle, heel, middle, ball)):
         return None
     above, front = (skeleton.centres[skeleton.number(joint)] for joint in (ankle, ball))
-    return {
-        heel: np.array([above[0], 0.0, above[2] - HEEL]),
-        middle: np.array([front[0], 0.0, front[2]]),
-    }
+    return {heel: np.array([above[0], 0.0, above[2] - HEEL]), middle: np.array([front[0], 0.0, front[2]])}
 
 
 def find_stance(skeleton: Skeleton, matrices: Float64, rate: float) -> Bool:

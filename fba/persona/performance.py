@@ -152,12 +152,7 @@ def user_maps(persona: Persona, recogniser: Recogniser, user: Persona | None = N
 
 
 def choose_masks(
-    style: PartStyle,
-    part: str,
-    own: Float64,
-    scale: Float64,
-    labels: Labels,
-    classes: tuple[str, ...],
+    style: PartStyle, part: str, own: Float64, scale: Float64, labels: Labels, classes: tuple[str, ...]
 ) -> Intp:
     """Return the number of the mask that each frame shows, -1 for none: int (S,).
 

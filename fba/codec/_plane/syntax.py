@@ -22,12 +22,7 @@ from fba.arrays import Bool
 from fba.codec._plane import header_loops, slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, BitWriter, OutOfDataError
-from fba.codec._plane.header_loops import (
-    MARKER_EVERY,
-    MASK_INTERPOLATE,
-    MASK_KEEP,
-    RANGE_BITS,
-)
+from fba.codec._plane.header_loops import MARKER_EVERY, MASK_INTERPOLATE, MASK_KEEP, RANGE_BITS
 from fba.codec._plane.loops import STATUS_TEXT
 from fba.codec._plane.loops import read_skip as read_skip_words
 from fba.codec.settings import FrameRate, PartSettings, RangeLists, TimeCode

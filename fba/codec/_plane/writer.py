@@ -177,14 +177,7 @@ class PlaneWriter:
         done = 0
         while done < len(rows):
             count, status, writer.bit, slot, self._before = loops.encode_run(
-                writer.data,
-                writer.bit,
-                self._before,
-                mask,
-                layout,
-                models.state,
-                rows[done:],
-                skips[done:],
+                writer.data, writer.bit, self._before, mask, layout, models.state, rows[done:], skips[done:]
             )
             done += count
             self.planes += count

@@ -14,13 +14,7 @@ from fba.face import Fapu, feature_point_names
 from fba.face.feature_points import row_of
 from fba.face.points import DIRECTIONS
 from fba.parameters import FAP_COUNT, faps
-from fba.persona.points.layout import (
-    IRIS,
-    SAME,
-    TRACKED,
-    point_weights,
-    standard_points,
-)
+from fba.persona.points.layout import IRIS, SAME, TRACKED, point_weights, standard_points
 from fba.persona.recognition.recogniser import JAW_FAPS
 
 PUPILS = {"3.5": (61, 63), "3.6": (62, 64)}
