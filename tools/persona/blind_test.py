@@ -27,7 +27,7 @@ from fba.parameters import FAP_COUNT
 from fba.persona import Persona, TrackedFace, learn, play
 from fba.persona.motion import Motion, flatten, measure_motion
 from fba.persona.observation import Observation, observe
-from fba.persona.points.distances import mask_distance
+from fba.persona.points import mask_distance
 from fba.persona.points.layout import PARTS, part_points, part_vertices, standard_mask
 from fba.persona.recognition import Recogniser
 from fba.persona.recognition.faps import face_scale, measure_fapu

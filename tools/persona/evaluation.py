@@ -22,10 +22,10 @@ from fba.persona.learning import learn
 from fba.persona.observation import observe
 from fba.persona.performance import perform
 from fba.persona.persona import MEANS, Persona
-from fba.persona.points.distances import mask_distance
+from fba.persona.points import mask_distance
 from fba.persona.points.layout import PARTS, SAME, flat_mask, standard_mask
 from fba.persona.recognition import Recogniser, decide
-from fba.persona.recognition.displacements import displacements
+from fba.persona.recognition.component import displacements
 from tools.persona.actors import Act, Style, act, all_contents, contents, named_styles
 
 TAUGHT = 2

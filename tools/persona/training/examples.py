@@ -9,8 +9,8 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.parameters import FAP_COUNT
+from fba.persona.points import fit_similarity
 from fba.persona.points.layout import REGISTERED, mask_of_face, points_of_face, standard_points
-from fba.persona.points.procrustes import fit_similarity
 from fba.persona.points.registration import register_points
 from tools.persona.training.camera import photograph
 from tools.persona.training.classes import class_faps
