@@ -52,8 +52,8 @@ class NeckBlend(NamedTuple):
 def blend_with_neck(neck: list[BodyPart], joints: int, skull: int, placed: Float64, free: Bool) -> NeckBlend:
     """Return the joints and weights by which a body's neck moves a face's vertices (V, 3), metres.
 
-    neck: the body's parts of that kind, with vertices. joints: number of the body's joints. skull: the joint that
-    carries the head. free: (V,) vertices that the neck may bend.
+    neck: the body's parts of that kind, with vertices. joints: number of the body's joints. skull: the joint
+    that carries the head. free: (V,) vertices that the neck may bend.
     """
 
     def make() -> list[Array]:

@@ -89,7 +89,7 @@ def _sole_displacements(skeleton: Skeleton, apart: Float64) -> Float64:
 
 
 def _stance(solver: BapSolver, baps: Int32 | Float64, rate: float) -> Bool:
-    """Return bool (2, T): when feet stand. Pieces of a long motion have their own ground, as captures climb."""
+    """Return bool (2, T): when feet stand. Each piece of a long motion has its ground, as captures climb."""
     pieces = np.array_split(baps, max(len(baps) // BLOCK, 1))
     stances = [find_stance(solver.skeleton, solver.pose(piece), rate) for piece in pieces]
     return np.concatenate(stances, axis=1)

@@ -11,8 +11,8 @@ from fba.arrays import Float64
 GROUND_PERCENTILE = 20
 """Percentile of the lower foot's height that is the ground: single frames may be below it."""
 MAX_HEIGHT = 0.15
-"""Largest height of the ground, metres; higher feet stand on a chair, or leap. Its depth has no limit: no feet
-are under it."""
+"""Largest height of the ground, metres; higher feet stand on a chair, or leap. Its depth has no limit: feet
+are never under it."""
 MAX_SLOPE = 0.08
 """Largest slope of the ground, rise over run; a steeper source climbs or uses stairs."""
 MIN_EXTENT = 1.0

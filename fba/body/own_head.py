@@ -46,7 +46,7 @@ class OwnEye:
 
 @dataclass(frozen=True, eq=False)
 class OwnHead:
-    """Shapes and eyes of a body's own head. ranges: (68,), largest values of FAPs, to which they are scaled."""
+    """Shapes and eyes of a body's own head. ranges: (68,), largest FAPs, to which others are scaled."""
 
     ranges: Float64
     shapes: Sequence[HeadShape] = ()

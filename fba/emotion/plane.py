@@ -14,8 +14,9 @@ from fba.emotion.expressions import expressions
 from fba.emotion.rules import Rules
 from fba.errors import OptionError
 
-SCALE = (1.0, 7.0)
-"""Lowest and highest value of both of Whissel's scales."""
+SCALE_MIN = 1.0
+"""Lowest value of both of Whissel's scales."""
+SCALE_MAX = 7.0
 
 
 def known_points() -> dict[str, tuple[float, float]]:
@@ -32,10 +33,9 @@ def expression_at(activation: float, evaluation: float, rules: Rules | None = No
 
     activation, evaluation: 1 to 7 each; OptionError for others.
     """
-    low, high = SCALE
     for name, value in (("activation", activation), ("evaluation", evaluation)):
-        if not math.isfinite(value) or not low <= value <= high:
-            raise OptionError(f"the {name} must be from {low:g} to {high:g}, not {value:g}")
+        if not math.isfinite(value) or not SCALE_MIN <= value <= SCALE_MAX:
+            raise OptionError(f"the {name} must be from {SCALE_MIN:g} to {SCALE_MAX:g}, not {value:g}")
     names, points, triangles, outline = _triangulation()
     point = np.array([activation, evaluation])
     shares = _in_triangle(point, points, triangles)

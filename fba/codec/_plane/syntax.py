@@ -31,7 +31,7 @@ from fba.parameters import bap_groups, fap_groups
 
 START_CODE_PREFIX = b"\x00\x00\x01"
 OBJECT_CODES = (0xBA, 0x01)
-"""Last bytes of fba_object_start_code: the standard's, and one of old tools, which is only read."""
+"""Last bytes of fba_object_start_code: the standard's, and that of old tools, which is only read."""
 PLANE_CODES = (0xBB, 0x03)
 """Last bytes of fba_object_plane_start_code: likewise."""
 END_CODE = 0xB1
