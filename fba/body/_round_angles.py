@@ -100,7 +100,7 @@ def _round(angles: Int64, step: int, unit: float) -> Bool:
 
 
 def _improbability(hits: int, expected: float) -> float:
-    """Return -log10 of Chernoff's bound on the probability of so many hits: 6 for one in a million."""
+    """Return -log10 of Chernoff's bound on the probability of this number of hits: 6 for one in a million."""
     if hits <= expected:
         return 0.0
     return float((hits * np.log(hits / expected) - hits + expected) / np.log(10))

@@ -39,7 +39,7 @@ OWN, FACE = "own", "face only"
 KNOWN_USER = "motion, user known"
 """As "motion", with a Persona of the user, too."""
 IN_STYLE = "user in that style"
-"""The user who performs in the actor's style: as near as another person comes, with a body of his own."""
+"""The user who performs in the actor's style: as near as another person comes."""
 WAYS = (FACE, IN_STYLE, KNOWN_USER, *MEANS)
 ALIKE = (
     frozenset({"LFAU_26", "LFAU_27", "E_SURPRISE", "CAU_A26A12Lw"}),
@@ -237,7 +237,7 @@ def _agreement(acted: Float64, persona: Persona, labels: dict[str, list[str]], k
 
 
 def _same(one: str, other: str) -> bool:
-    """Whether two labels have a class in common, or one that is hardly told apart."""
+    """Return whether two labels have a class in common, or a class that is hardly distinguishable."""
     here, there = set(one.split("/")), set(other.split("/"))
     return bool(here & there) or any(here & group and there & group for group in ALIKE)
 
