@@ -23,7 +23,7 @@ MOST_SECONDS = 3.0
 MOST_SECONDS_PER_BYTE = 0.002
 """Further processor time for each byte of an input, seconds."""
 SEED_SECONDS = 60.0
-"""Processor time of a seed, seconds: a search on head and body takes several, whatever the length of the seed."""
+"""Processor time of a seed of any length, seconds: a search on head and body takes several."""
 MOST_MEMORY = 200_000_000
 """Memory of an input beyond that of the process before it, bytes."""
 MOST_MEMORY_PER_BYTE = 20

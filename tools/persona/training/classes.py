@@ -25,7 +25,6 @@ from fba.parameters import FAP_COUNT
 from fba.persona.points.layout import PARTS
 
 NEUTRAL = "NEUTRAL"
-LATERAL = {"12L", "12R"}
 
 
 @dataclass(frozen=True)

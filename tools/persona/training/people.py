@@ -46,7 +46,7 @@ LIDS_DOWN = ("3.3", "3.4", "3.9", "3.10")
 
 @dataclass(frozen=True, eq=False)
 class People:
-    """Synthetic faces. points: float64 (N, 84, 3), metres. base: int (N,), 0 or 1. gains: (N, 68), of FAPs."""
+    """Synthetic faces. points: float64 (N, 84, 3), metres. base: int (N,), 0 or 1. gains: (N, 68)."""
 
     points: Float64
     base: Intp
