@@ -39,10 +39,10 @@ def axis_matrices(axis: int, angle: npt.ArrayLike) -> Float64:
     angle = np.asarray(angle, dtype=np.float64)
     sine, cosine = np.sin(angle), np.cos(angle)
     result = np.zeros((*angle.shape, 3, 3))
-    one, two = (axis + 1) % 3, (axis + 2) % 3
+    a, b = (axis + 1) % 3, (axis + 2) % 3
     result[..., axis, axis] = 1.0
-    result[..., one, one] = result[..., two, two] = cosine
-    result[..., two, one], result[..., one, two] = sine, -sine
+    result[..., a, a] = result[..., b, b] = cosine
+    result[..., b, a], result[..., a, b] = sine, -sine
     return result
 
 

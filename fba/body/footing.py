@@ -1,4 +1,4 @@
-"""Where the soles of a body are, and poses in which a body of other proportions stands on the same ground.
+"""Heights of the soles of a body, and poses in which a body of other proportions stands on the same ground.
 
 BAPs give the root's position in metres, which fits one length of legs. `GroundedPoser` raises or lowers a
 body whose legs differ from the default skeleton's, so that its lower foot is as high as that one's.
@@ -24,9 +24,8 @@ OUTLINE = (
     ("metatarsal", 0.059, 0.0, 0.0025), ("metatarsal", -0.0455, 0.004, -0.002),
     ("metatarsal", 0.065, 0.004, -0.0115), ("metatarsal", 0.063, 0.004, 0.003),
 )  # fmt: skip
-"""Edge of the shown person's soles, which is bevelled: the joint that it moves with, and metres from that
-joint, outwards and ahead, at a height above the ground in the default posture. Vertices of
-`fba/body/builtin/body.glb`."""
+"""The bevelled edge of the built-in person's soles, from vertices of `fba/body/builtin/body.glb`: joint that
+moves it, metres outwards from that joint, metres above the ground in the default posture, metres ahead."""
 TIP = (
     ("metatarsal", -0.041, 0.002, 0.028), ("metatarsal", 0.050, 0.002, 0.029),
     ("metatarsal", -0.031, 0.0067, 0.066), ("metatarsal", 0.021, 0.0062, 0.059),
@@ -35,7 +34,7 @@ TIP = (
     ("metatarsal", -0.033, 0.0105, 0.069), ("metatarsal", 0.023, 0.010, 0.063),
     ("metatarsal", -0.005, 0.0105, 0.0735), ("metatarsal", -0.019, 0.0105, 0.0745),
 )  # fmt: skip
-"""The same for what is ahead of the ball."""
+"""The same for the part ahead of the ball."""
 
 
 SOLE = (*OUTLINE, *TIP)
@@ -96,9 +95,9 @@ def has_feet(skeleton: Skeleton) -> bool:
 
 
 class GroundedPoser:
-    """Poses of a body of any proportions, in which its lower foot is as high as the default skeleton's.
+    """Poses a body of any proportions so that its lower foot is as high as the default skeleton's.
 
-    A body without feet, and the default skeleton itself, stay where the BAPs put them. axes: see `BapSolver`.
+    A body without feet, and the default skeleton, are posed as the BAPs say. axes: see `BapSolver`.
     """
 
     def __init__(self, skeleton: Skeleton, axes: str = "iso") -> None:
@@ -118,9 +117,9 @@ class GroundedPoser:
         rows = np.atleast_2d(np.asarray(baps))
         if self._default is None:
             return np.zeros(len(rows))
-        theirs, ours = (
+        wanted, present = (
             lowest_sole(solver.skeleton, solver.pose(rows)) for solver in (self._default, self._solver)
         )
-        assert theirs is not None
-        assert ours is not None
-        return theirs - ours
+        assert wanted is not None
+        assert present is not None
+        return wanted - present

@@ -1,4 +1,4 @@
-"""Which feet stand: heights and ways of soles, and when a foot is on the ground."""
+"""Stance: when a foot stands on the ground, by the height and the motion of its sole."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ STILL_SPEED = 0.15
 LEVEL_SPEED = 0.15
 """Speed in metres per second, up or down, below which the lower foot stands, wherever it slides."""
 STILL_SECONDS = 0.1
-"""Seconds for which a foot that stands is still: at the top of a leap, feet are still for less."""
+"""Seconds for which a standing foot is still, longer than at the top of a leap."""
 SUPPORT_HEIGHT = 0.08
-"""Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
+"""Height of a sole up to which it may stand on the ground, metres; higher, it is on a step."""
 PLACED_HEIGHT = 0.025
-"""Metres above the lower foot up to which a foot stands on its ground if it is still for `PLACED_SECONDS`."""
+"""Height over the lower foot up to which a foot stands if it is still for `PLACED_SECONDS`, metres."""
 PLACED_SECONDS = 0.5
 """Seconds for which a foot must be still to stand on ground that is higher than the lower foot."""
 
 
 def sole_points(skeleton: Skeleton, side: str) -> dict[str, Float64] | None:
-    """Return the points (3,) of a sole under heel and ball, by the joint that each moves with.
+    """Return the points (3,) of a sole under heel and ball, by the joint that moves them.
 
     In the default posture, metres. side: "l" or "r". None for a skeleton that lacks a joint of the foot.
     """
@@ -36,14 +36,11 @@ def sole_points(skeleton: Skeleton, side: str) -> dict[str, Float64] | None:
     if not all(joint in skeleton for joint in (ankle, heel, middle, ball)):
         return None
     above, front = (skeleton.centres[skeleton.number(joint)] for joint in (ankle, ball))
-    return {
-        heel: np.array([above[0], 0.0, above[2] - HEEL]),
-        middle: np.array([front[0], 0.0, front[2]]),
-    }
+    return {heel: np.array([above[0], 0.0, above[2] - HEEL]), middle: np.array([front[0], 0.0, front[2]])}
 
 
 def find_stance(skeleton: Skeleton, matrices: Float64, rate: float) -> Bool:
-    """Return bool (2, T): when the left and the right foot of a body stand on the ground, by their own ways.
+    """Return bool (2, T): when the left and the right foot of a body stand on the ground.
 
     matrices: (T, J, 4, 4), as `BapSolver.pose` returns them. rate: frames a second. All False for a skeleton
     without feet.
@@ -79,9 +76,9 @@ def find_standing(above: Float64, points: Float64, rate: float) -> Bool:
     """Return bool (2, T): when feet stand on the ground.
 
     above: (2, T), heights of the soles above the ground, metres. points: (2, 2, T, 3), heels and balls. The
-    lower foot, while it is level and not far from the ground, stands on it, even if it slides or a treadmill
-    carries it; so does the other one while an end of it is still, up to `PLACED_HEIGHT` higher, by which
-    captures of feet are often off.
+    lower foot stands while its height is steady and near the ground, even if it slides or a treadmill carries
+    it. The other foot stands while its heel or ball is still; as captures are often wrong by that much, it
+    may be up to `PLACED_HEIGHT` higher.
     """
     if above.shape[1] < 2:
         return np.zeros(above.shape, dtype=np.bool_)
@@ -97,7 +94,7 @@ def find_standing(above: Float64, points: Float64, rate: float) -> Bool:
 
 
 def _fastest(speed: Float64, rate: float, seconds: float) -> Float64:
-    """Return the highest of speeds (2, T) within this number of seconds around each frame."""
+    """Return the highest of speeds (2, T) within a window of `seconds` around each frame."""
     half = round(seconds * rate / 2)
     around = np.pad(speed, ((0, 0), (half, half)), mode="edge")
     result: Float64 = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2)

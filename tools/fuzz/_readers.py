@@ -74,7 +74,7 @@ def _check_written(
     read_again: Callable[[Path], Any],
     content: Callable[[Any], object],
 ) -> Outcome:
-    """Read a file, write what it holds, and read that again. content: what must then be the same."""
+    """Read a file, write its content, and read it again. content: returns the part that must be equal."""
 
     def copy(path: Path) -> None:
         found = read(path)
@@ -195,7 +195,7 @@ def check_mtl(data: bytes, folder: Path) -> Outcome:
 
 
 def check_mapping(data: bytes, folder: Path) -> Outcome:
-    """Read a mapping of virtual markers; what was read is written, and read as the same."""
+    """Read a mapping of virtual markers, write it, and read the same again."""
 
     def read_twice(path: Path) -> None:
         mapping = read_mapping(path)
@@ -235,7 +235,7 @@ def check_import(data: bytes, folder: Path) -> Outcome:
     (folder / "head.wrl").write_bytes(small_head_vrml())
     (folder / "input.points.csv").write_bytes(small_head_points())
     (folder / "input.obj").write_bytes(small_head_obj())
-    suffix = ".wfm" if data.startswith(b"# VERTEX") else ""  # nothing else tells wire frames
+    suffix = ".wfm" if data.startswith(b"# VERTEX") else ""  # wire frames are recognised by it alone
     return _check_file(data, folder / f"input{suffix}", import_model)
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Int64
-from fba.body.skin._girdle_loops import Girdle, straighten_armpits, turn_girdles
+from fba.body.skin._girdle import Girdle, straighten_armpits, turn_girdles
 from fba.compiled import compiled, inlined
 from fba.easing import smoothstep_of_one
 

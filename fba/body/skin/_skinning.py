@@ -11,8 +11,7 @@ import numpy.typing as npt
 from fba.arrays import Float32, Float64, Int32, Int64
 from fba.body.skeleton import Skeleton
 from fba.body.skin import _loops as loops
-from fba.body.skin._girdle import find_girdle
-from fba.body.skin._girdle_loops import Girdle
+from fba.body.skin._girdle import Girdle, find_girdle
 from fba.body.skin._loops import Twisting
 from fba.body.skin._moving_normals import normal_rings
 from fba.body.skin._twisting import find_twists

@@ -71,13 +71,7 @@ class Counts(NamedTuple):
 
 @compiled
 def decode_segment(
-    data: UInt8,
-    bit: int,
-    end: int,
-    slots: Int64,
-    models: Counts,
-    adaptive: bool,
-    symbols: Int64,
+    data: UInt8, bit: int, end: int, slots: Int64, models: Counts, adaptive: bool, symbols: Int64
 ) -> tuple[int, int]:
     """Decode one segment that starts at `bit`: symbols[k] becomes the symbol of slot slots[k].
 
@@ -164,12 +158,7 @@ def decode_segment(
 
 @compiled
 def encode_segment(
-    data: UInt8,
-    bit: int,
-    slots: Int64,
-    models: Counts,
-    adaptive: bool,
-    symbols: Int64,
+    data: UInt8, bit: int, slots: Int64, models: Counts, adaptive: bool, symbols: Int64
 ) -> int:
     """Encode symbols[k] for slot slots[k] into one segment that starts at `bit`; return the bit after it.
 

@@ -435,13 +435,7 @@ def quantise_change(value: int, last: int, step: int) -> int:
 
 @compiled
 def encode_values(
-    data: UInt8,
-    bit: int,
-    layout: Layout,
-    coding: Coding,
-    adaptive: bool,
-    symbols: Int64,
-    flags: Int64,
+    data: UInt8, bit: int, layout: Layout, coding: Coding, adaptive: bool, symbols: Int64, flags: Int64
 ) -> int:
     """Encode the segments of one plane at `bit`; return the bit after them.
 
