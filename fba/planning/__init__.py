@@ -4,12 +4,12 @@ May use: the codec; faces and bodies, for what they show and by how much it move
 """
 
 from fba.planning._encoding import BitRate, Encoded, Goal, encode, encode_stream
-from fba.planning.body_tolerance import BodyErrors, body_errors
+from fba.planning.body_tolerance import body_errors
 from fba.planning.live_encoder import LiveEncoder
-from fba.planning.near_lossless import FaceErrors, NearLossless, encode_within_tolerance
+from fba.planning.near_lossless import encode_within_tolerance
 from fba.planning.plan import Plan, encode_planned, plan_compact, plan_exact
 from fba.planning.stillness import hold_still
-from fba.planning.tolerance import Tolerance
+from fba.planning.tolerance import BodyErrors, FaceErrors, NearLossless, Tolerance
 
 __all__ = [
     "BitRate",
