@@ -51,11 +51,6 @@ class Measurement:
     deviation: float
     sign: int
 
-    @property
-    def fap_mean(self) -> float:
-        """The mean as a FAP, or as the sum of two."""
-        return self.sign * self.mean
-
 
 @cache
 def vocabulary(family: str) -> tuple[Movement, ...]:

@@ -6,6 +6,8 @@ Expressions keep their moments: nothing is moved in time. A lip or lid that the 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fba.arrays import Float64, Intp
@@ -39,37 +41,43 @@ UPPER_LID = 0.8
 """Share of a lid's closing that the upper one does."""
 
 
+class Take(NamedTuple):
+    """Frames of a take. classes: (S,), -1 for none. frames: (S,), their numbers. rate: frames per second."""
+
+    classes: Intp
+    frames: Intp
+    rate: float
+
+
 def restyle(
     part: str,
     own: Float64,
     mapped: Float64,
-    classes: Intp,
-    frames: Intp,
-    rate: float,
+    take: Take,
     actor: Motion,
     reach: Float64,
     user: Motion | None,
 ) -> Float64:
     """Return displacements (S, 2V) of a part, on the standard face, that move as the actor does.
 
-    own: the user's. mapped: what the actor's curves make of them. classes: (S,), -1 for none. frames: (S,),
-    their numbers. rate: frames per second. reach: (2V,), of the actor, see `PartStyle.reach`. user: how the
-    user moves as a rule; None: as in this take.
+    own: the user's. mapped: what the actor's curves make of them. reach: (2V,), of the actor, see
+    `PartStyle.reach`. user: how the user moves as a rule; None: as in this take.
     """
+    classes, frames, rate = take
     count = len(actor.seconds) - 1
     moved = mix(own, mapped)
-    shown = measure_motion(moved, classes, frames, rate, count)
+    shown = measure_motion(moved, *take, count)
     known = shown
     if user is not None:
-        known = shift_reference(user, measure_motion(own, classes, frames, rate, count), shown)
+        known = shift_reference(user, measure_motion(own, *take, count), shown)
     gains = fill_gaps(find_gains(actor, known)[classes], frames)
     moved = moved * np.exp(smooth(gains, EASE * rate)[frames - frames[0]])
     if part in RETIMED:
-        before = measure_motion(moved, classes, frames, rate, count)
+        before = measure_motion(moved, *take, count)
         goal = shown.speed[-1] + np.clip(find_pace(actor, known), -MOST_PACE, MOST_PACE)
         every = fill_gaps(moved, frames)
         moved = retime(every, rate, float(goal - before.speed[-1]))[frames - frames[0]]
-        after = measure_motion(moved, classes, frames, rate, count)
+        after = measure_motion(moved, *take, count)
         moved = moved * np.exp((before.spread[-1] - after.spread[-1]).mean())
     return limit_reach(moved, own, reach)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,12 +50,14 @@ def learn(
     known = Recogniser.default() if recogniser is None else recogniser
     seen = [observe(face, known, rest, warm_up=warm_up) for face, rest in zip(faces, rests, strict=True)]
     still = np.asarray(np.mean([one.neutral for one in seen], axis=0))
-    moved = np.concatenate([one.mask_motion(known) for one in seen])
-    source = np.concatenate([np.full(len(one.rows), n) for n, one in enumerate(seen)])
-    frame = np.concatenate([one.rows for one in seen])
-    rates = [float(face.rate) for face in faces]
-    parts = {part: _learn_part(part, seen, rates, moved, source, frame, still, known) for part in PARTS}
-    if not _moves(moved):
+    used = _Used(
+        moved=np.concatenate([one.mask_motion(known) for one in seen]),
+        source=np.concatenate([np.full(len(one.rows), n) for n, one in enumerate(seen)]),
+        frame=np.concatenate([one.rows for one in seen]),
+        rates=[float(face.rate) for face in faces],
+    )
+    parts = {part: _learn_part(part, seen, used, still, known) for part in PARTS}
+    if not _moves(used.moved):
         raise ModelError("the actor's face rests in all frames: there is no expression to learn")
     frames, turned = sum(map(len, faces)), sum(int(one.registered.turned.sum()) for one in seen)
     lost = sum(int((~face.tracked).sum()) for face in faces)
@@ -63,7 +66,7 @@ def learn(
             f"of {frames} frames, {lost} have no face, and in {turned} the head is turned by more than "
             "30 degrees: they are left out", FbaWarning, stacklevel=2,
         )  # fmt: skip
-    return Persona(name or faces[0].name, still, parts, frames, len(frame), turned, lost)
+    return Persona(name or faces[0].name, still, parts, frames, len(used.frame), turned, lost)
 
 
 def _moves(moved: Float64) -> bool:
@@ -75,17 +78,20 @@ def _moves(moved: Float64) -> bool:
     return False
 
 
+class _Used(NamedTuple):
+    """All frames that are used. moved: (S, 86, 3). source, frame: (S,), the recording of each, and its number
+    there. rates: frames per second of the recordings."""
+
+    moved: Float64
+    source: Intp
+    frame: Intp
+    rates: list[float]
+
+
 def _learn_part(
-    part: str,
-    seen: list[Observation],
-    rates: list[float],
-    moved: Float64,
-    source: Intp,
-    frame: Intp,
-    still: Float64,
-    known: Recogniser,
+    part: str, seen: list[Observation], used: _Used, still: Float64, known: Recogniser
 ) -> PartStyle:
-    """Return what the actor does with a part. moved: (S, 86, 3), of all frames that are used."""
+    """Return what the actor does with a part."""
     component = known.components[part]
     labels = Labels(
         np.concatenate([one.labels[part].first for one in seen]),
@@ -93,6 +99,7 @@ def _learn_part(
     )
     names = labels.names(component.classes)
     vertices, points = part_vertices(part), len(part_points(part))
+    moved, source, frame, rates = used
     own = moved[:, vertices]
     rows = prune(own[:, :points, :2], names, SHARE_OF_WIDTH * part_width(still, part))
     even = own[..., :2] / face_scale(measure_fapu(still), part)

@@ -12,7 +12,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64, Intp
 from fba.errors import FbaWarning, OptionError, did_you_mean
 from fba.parameters import FAP_COUNT
-from fba.persona._restyle import keep_shut, restyle
+from fba.persona._restyle import Take, keep_shut, restyle
 from fba.persona.curves import CurveMap, fit_curves, general_curves
 from fba.persona.motion import flatten, unflatten
 from fba.persona.observation import Neutral, Observation, observe
@@ -103,10 +103,8 @@ def perform(
             moved = maps[part](flat)
             if means == "motion" and style.motion is not None:
                 usual = None if user is None else user.parts[part].motion
-                moved = restyle(
-                    part, flat, moved, seen.labels[part].first, seen.rows, float(face.rate),
-                    style.motion, style.reach(there), usual,
-                )  # fmt: skip
+                take = Take(seen.labels[part].first, seen.rows, float(face.rate))
+                moved = restyle(part, flat, moved, take, style.motion, style.reach(there), usual)
             acted[:, part_vertices(part), :2] = there * unflatten(moved)
             continue
         chosen[part] = choose_masks(style, part, even, there, seen.labels[part], classes)

@@ -74,9 +74,8 @@ def train_component(
     variance, axes = find_axes(standard[~check])
     axes = axes[: DIMENSIONS[part]]
     scores = standard @ axes.T
-    learnt, held = used & ~check, used & check
     training = train(
-        scores[learnt], targets[learnt], scores[held], targets[held],
+        scores[used], targets[used], check[used],
         units=UNITS[part], enough=WANTED_ACCURACY[part], tries=tries, seed=seed,
     )  # fmt: skip
     return Component(part, classes, mean, spread, axes, variance, training.network, training.share)

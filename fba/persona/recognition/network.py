@@ -51,8 +51,7 @@ class Training:
 def train(
     inputs: Float64,
     targets: Bool,
-    check_inputs: Float64,
-    check_targets: Bool,
+    check: Bool,
     *,
     units: int,
     enough: float,
@@ -62,15 +61,15 @@ def train(
     """Return the first network that is right for more than `enough` of the validation examples, or the best
     one.
 
-    inputs: (N, D); targets: bool (N, C), the classes of each, one or several; `check_`: the same for
-    validation. A network is right where its largest output is one of the classes. The examples of a class
+    inputs: (N, D); targets: bool (N, C), the classes of each, one or several; check: bool (N,), those kept
+    for validation. A network is right where its largest output is one of the classes. The examples of a class
     count as much as they would in equal numbers; training ends when the error of validation rises.
     """
     random = np.random.default_rng(seed)
     best: Training | None = None
     for number in range(tries):
-        network = _train_once(inputs, targets, check_inputs, check_targets, units, random)
-        share = share_right(network(check_inputs), check_targets)
+        network = _train_once(inputs, targets, check, units, random)
+        share = share_right(network(inputs[check]), targets[check])
         if best is None or share > best.share:
             best = Training(network, share, number + 1)
         if share > enough:
@@ -85,13 +84,9 @@ def share_right(outputs: Float64, targets: Bool) -> float:
 
 
 def _train_once(
-    inputs: Float64,
-    targets: Bool,
-    check: Float64,
-    check_targets: Bool,
-    units: int,
-    random: np.random.Generator,
+    inputs: Float64, targets: Bool, check: Bool, units: int, random: np.random.Generator
 ) -> Network:
+    """Return a network trained from random weights; arguments as of `train`."""
     from scipy.optimize import minimize
 
     sizes = [inputs.shape[1], units, targets.shape[1]]
@@ -101,16 +96,18 @@ def _train_once(
         random.normal(0, 1 / np.sqrt(units), (units, sizes[2])), np.zeros(sizes[2]),
     ]  # fmt: skip
     weights = np.concatenate([part.ravel() for part in parts])
-    wanted, importance = np.where(targets, 1.0, -1.0), _importance(targets)
-    checked, check_importance = np.where(check_targets, 1.0, -1.0), _importance(check_targets)
+    wanted = np.where(targets, 1.0, -1.0)
+    importance, check_importance = _importance(targets[~check]), _importance(targets[check])
     best, best_error, risen = weights, np.inf, 0
     for _ in range(MAX_ROUNDS):
         found = minimize(
-            _loss, weights, args=(sizes, inputs, wanted, importance), jac=True, method="L-BFGS-B",
-            options={"maxiter": ROUND_STEPS, "maxcor": 20},
+            _loss, weights, args=(sizes, inputs[~check], wanted[~check], importance), jac=True,
+            method="L-BFGS-B", options={"maxiter": ROUND_STEPS, "maxcor": 20},
         )  # fmt: skip
         weights = found.x
-        error = float((check_importance * (_unpack(weights, sizes)(check) - checked) ** 2).sum())
+        error = float(
+            (check_importance * (_unpack(weights, sizes)(inputs[check]) - wanted[check]) ** 2).sum()
+        )
         if error < best_error:
             best, best_error, risen = weights, error, 0
         else:
