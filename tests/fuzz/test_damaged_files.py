@@ -88,5 +88,5 @@ def test_damage_is_an_error_of_ours_or_a_result_that_holds(
     report = engine.run_files(target, [damage(files[n % len(files)], rng) for n in range(count)])
     assert not report.findings, report.findings[0].reason
     assert report.accepted + report.refused == count
-    assert report.refused > 0 or name == "live"
+    assert report.refused > 0 or name in ("live", "mtl")  # of which any beginning is read
     assert report.accepted > 10 or damage is not edited
