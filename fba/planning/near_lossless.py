@@ -12,7 +12,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.codec import EncoderOptions, EncoderStatistics, decode
 from fba.errors import FbaWarning, RangeError
-from fba.face.deform.displacements import DisplacementMeter, Displacements
+from fba.face.deform.displacements import DisplacementMeter
 from fba.face.mates import donors
 from fba.face.model import FaceModel
 from fba.face.resolve import known_faps, resolve
@@ -245,7 +245,7 @@ def _assemble(
     quant: int,
 ) -> Plan:
     """Return the plan that sends what was found."""
-    animation, track = source.animation, plan.animation.face
+    animation, track, body = source.animation, plan.animation.face, source.animation.body
     assert track is not None
     moving = np.zeros(track.mask.shape[1], dtype=np.bool_)
     for _, one in found:
@@ -260,7 +260,6 @@ def _assemble(
     values = np.where(mask, np.concatenate([one.values for _, one in found]), 0).astype(np.int32)
     asked = interpolated_faps(mask, known_faps(track)[1][keys] & moving)
     face = FaceTrack(values, mask, track.viseme[keys], track.expression[keys], asked)
-    body = None if animation.body is None else animation.body
     if body is not None:
         body = replace(body, values=body.values[keys], mask=body.mask[keys])
     sent = Animation(animation.rate, animation.index[keys], face, body, animation.name)
@@ -291,14 +290,13 @@ def _measured(
         if len(sent) < len(index):
             shown = np.stack([np.interp(index, sent, column) for column in shown.T], axis=1)
         off = source.meter.measure(source.shown, shown)
-        errors = _errors(off, *source.meter.angles(source.shown, shown))
+        frame = int(off.largest.argmax())
+        errors = FaceErrors(
+            float(off.largest[frame]), off.percentile(99), frame, int(off.worst[frame]),
+            *source.meter.angles(source.shown, shown),
+        )  # fmt: skip
     left_out = len(source.animation) - len(decoded)
     return NearLossless(statistics, options.fap_quant, left_out, errors, compact)
-
-
-def _errors(off: Displacements, head: float, gaze: float) -> FaceErrors:
-    frame = int(off.largest.argmax())
-    return FaceErrors(float(off.largest[frame]), off.percentile(99), frame, int(off.worst[frame]), head, gaze)
 
 
 def _is_within(result: NearLossless, tolerance: Tolerance) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from fba.animation import Animation, Frame
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, write_mark
 from fba.errors import FbaWarning, OptionError, RangeError, Remedy
-from fba.planning.frame_order import check_order
+from fba.planning.live_encoder import check_order
 from fba.planning.rate.bucket import LeakyBucket
 from fba.planning.rate.expectations import expected_motion, quantiser_for
 from fba.planning.rate.visibility import slot_weights
