@@ -156,10 +156,6 @@ class FeaturePointFace:
         matrices = _head_matrices(values)
         return matrices[0] if single else matrices
 
-    def jaw_angle(self, faps: npt.ArrayLike) -> Float64:
-        """(T,) angle by which the jaw is open, radians."""
-        return self._jaw_angle(_as_frames(faps)[0])
-
     def eyeballs(self, faps: npt.ArrayLike) -> Eyeballs:
         """Centres, gaze and pupils of the two eyes, (T, 2, ...)."""
         values, _ = _as_frames(faps)

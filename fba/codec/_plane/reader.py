@@ -226,10 +226,10 @@ class PlaneReader:
         if self._run is None:
             self._run = _Run.prepare(self._settings)
         run = self._run
+        planes = loops.PlaneRows(run.rows, self._parts, self._skips, self._borders)
         count, status, carried, place = loops.decode_run(
-            data, bit, end, after_code, run.layouts, self._models.state,
-            run.rows, self._parts, self._skips, self._borders,
-        )  # fmt: skip
+            data, bit, end, after_code, run.layouts, self._models.state, planes
+        )
         if count == 0:
             if status == loops.MISSING_PART:
                 mask = BitReader(data, bit + 1, end).read(2)

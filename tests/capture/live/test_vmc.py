@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from fractions import Fraction
 
 import numpy as np
@@ -243,16 +242,3 @@ def test_bundles_in_bundles_end_somewhere() -> None:
     assert read_messages(data)[0].address == "/VMC/Ext/OK"
     with pytest.raises(DatagramError):
         read_messages(bundle(data))
-
-
-def test_bytes_that_changed_on_the_way_are_an_error_or_a_message() -> None:
-    random.seed(4)
-    whole = SENT[0][2]
-    for _ in range(2000):
-        data = bytearray(whole)
-        for _ in range(random.randint(1, 6)):
-            data[random.randrange(len(data))] = random.randrange(256)
-        try:
-            VmcReader().read(bytes(data[: random.randint(0, len(data))]), 0.0)
-        except DatagramError:
-            continue
