@@ -229,7 +229,7 @@ class _Sent:
         return right.mean(), 1 - here.mean(), wrong.mean(), doubted.mean(), float(error), outage
 
     def errors(self, data: bytes) -> Float64:
-        """Return how far each frame that is shown is from what was sent, (T,)."""
+        """Return the distance of each shown frame from the sent frame, (T,)."""
         return self._errors(_salvage(data)[0])
 
     def _arrived(self, animation: Animation) -> tuple[Int64, Bool]:
@@ -239,7 +239,7 @@ class _Sent:
         return np.maximum(position, 0), here
 
     def _errors(self, animation: Animation | None) -> Float64:
-        """Return how far each frame that is shown is from what was sent, (T,); without one, the rest pose."""
+        """Return the distance of each shown frame, or of the rest pose, from the sent frame, (T,)."""
         if animation is None:
             shown = np.zeros_like(self._values)
         else:

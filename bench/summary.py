@@ -360,7 +360,7 @@ def _near(shown: str, measured: str) -> bool:
 
 
 def check() -> int:
-    """Measures what is the same on every machine, and compares it with the page; 1 where they differ."""
+    """Compare the figures that are the same on every machine with the page; return 1 if any differs."""
     rows = [row for row in ROWS if row.fixed]
     shown = dict(zip(ROWS, shown_figures(), strict=True))
     with tempfile.TemporaryDirectory() as folder, redirect_stdout(sys.stderr):

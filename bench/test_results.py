@@ -22,7 +22,7 @@ from fba.capture import from_skeleton, retarget_report
 from fba.errors import FbaWarning
 from fba.face import FaceModel, checks
 from fba.face.importers import import_model
-from fba.formats import read_motion
+from fba.formats.bvh._reader import read_motion
 from fba_conformance.suite.index import read_vectors
 from fba_conformance.suite.runner import check
 

@@ -20,7 +20,7 @@ from fba.capture.bones import find_bones
 from fba.capture.comparison import compare
 from fba.cli.capture_report import CaptureReport, draw_sights
 from fba.errors import FbaWarning
-from fba.formats import read_motion
+from fba.formats.bvh._reader import read_motion
 from fba.parameters import bap_numbers
 
 ROOT = Path(__file__).parents[1]

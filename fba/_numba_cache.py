@@ -1,4 +1,4 @@
-"""Disk cache of compiled functions: numba's own cache, but with files that are checked.
+"""Disk cache of compiled functions: numba's cache, but with files that are checked.
 
 Numba trusts its index and its files of machine code: a truncated file breaks the program, and a flipped bit
 may crash it. Here one file contains everything for one signature, and begins with a digest of its content and
@@ -69,7 +69,7 @@ class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types here
 
 
 class CodeFiles:
-    """The files of one function, one for each key; replaces numba's `IndexDataCacheFile`."""
+    """The files of a function, one for each key; replaces numba's `IndexDataCacheFile`."""
 
     def __init__(self, folder: str, name: str, function: FunctionType) -> None:
         self._folder, self._name, self._function = Path(folder), name, function

@@ -108,7 +108,7 @@ class Animation:
 
     @classmethod
     def from_frames(cls, frames: Iterable[Frame], name: str = "") -> Animation:
-        """Join frames of one rate, such as those from a `Decoder`. ValueError without frames."""
+        """Return the animation of frames with equal rates. ValueError without frames."""
         frames = list(frames)
         if not frames:
             raise ValueError("Animation.from_frames: no frames")
@@ -123,7 +123,7 @@ class Animation:
 
     @staticmethod
     def concatenate(parts: Sequence[Animation]) -> Animation:
-        """Join animations one after another; each begins one frame after the end of the one before.
+        """Return animations joined; each begins a frame after the end of the previous one.
 
         ValueError without parts, or if rates differ (resample first).
         """
@@ -219,7 +219,7 @@ class Animation:
         return self[first:last]
 
     def to_dataframe(self) -> Any:
-        """Return a `pandas.DataFrame` of what is sent: a row for each frame, indexed by its time in seconds.
+        """Return a `pandas.DataFrame` of sent parameters: a row for each frame, indexed by time in seconds.
 
         Columns are the parameters that any frame sends, by name: integers in the standard's units, missing
         (`pandas.NA`) in frames that do not send them. The fields of visemes and expressions stand in place of
@@ -325,7 +325,7 @@ def _between(
     """Return values (S, columns) between frames before (S,) and after (S,), by weight (S,) in 0..1.
 
     both: bool (S, columns), True where both frames sent the value; elsewhere that of before holds.
-    angles: bool (columns,), True for what takes the shorter way round. It stays within +-pi where both are.
+    angles: bool (columns,), True for angles, which turn the shorter way and stay within +-pi if both are.
     """
     result = np.empty((len(before), values.shape[1]), dtype=values.dtype)
     for first in range(0, len(before), _CHUNK):
@@ -356,13 +356,7 @@ def _body_angles() -> Bool:
     return np.array([bap.unit == "1e-5 rad" for bap in baps()])
 
 
-def _resample_face(
-    face: FaceTrack,
-    before: Intp,
-    after: Intp,
-    weight: Float64,
-    is_first: Bool,
-) -> FaceTrack:
+def _resample_face(face: FaceTrack, before: Intp, after: Intp, weight: Float64, is_first: Bool) -> FaceTrack:
     """Return a face track resampled as by `_between`. is_first: (S,), whether an old frame begins."""
     mask = face.mask[before]
     both = mask & face.mask[after]

@@ -184,13 +184,13 @@ def _remove_unfinished() -> None:
 
 @contextlib.contextmanager
 def _open_directly(name: str) -> Iterator[BinaryIO]:
-    """Open what no file can replace: a device, a pipe, an open file."""
+    """Open a target that a file cannot replace: a device, a pipe, an open file."""
     number = _descriptor(name)
     try:
         if number is not None:
             handle = os.dup(number)
         else:
-            # without O_NONBLOCK, opening a pipe that nobody reads would wait for ever
+            # without O_NONBLOCK, opening a pipe without a reader would wait for ever
             handle = os.open(name, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
             os.set_blocking(handle, True)
         with os.fdopen(handle, "wb") as file:

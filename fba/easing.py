@@ -18,6 +18,6 @@ def smoothstep(value: npt.ArrayLike) -> Float64:
 
 @inlined
 def smoothstep_of_one(value: float) -> float:
-    """Return `smoothstep` of one number, for compiled loops."""
+    """Return `smoothstep` of a single number, for compiled loops."""
     t = min(max(value, 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)

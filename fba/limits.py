@@ -12,12 +12,12 @@ GROWTH = 20
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits for what is read, so that a damaged or hostile file cannot fill the memory or run for hours.
+    """Limits of input, so that a damaged or hostile file cannot fill the memory or run for hours.
 
-    The defaults are beyond what honest files need; what needs more is a LimitError, which names the limit.
+    The defaults exceed the needs of honest files; larger input is a LimitError, which names the limit.
 
-    frames: of an animation, also of one that is resampled.
-    bytes: of memory for what is decoded, in addition to 20 for each byte of the input.
+    frames: of an animation, also after resampling.
+    bytes: of memory for decoded content, in addition to 20 for each byte of the input.
     pixels: of a picture, width times height.
     seconds: from the first frame of an animation to the last, where every moment between them needs a frame.
 

@@ -91,7 +91,7 @@ def change_known_names(
     check_value: Callable[[str], None],
     shared: str = "",
 ) -> dict[str, str]:
-    """Return the same in the order of the names that are known: all names of the source.
+    """Return the names in the order of `known`, the names of the source.
 
     what: begins the message of a name that it lacks, "the capture has no marker".
     """

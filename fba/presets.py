@@ -1,11 +1,11 @@
-"""Presets: what of an animation a stream has. docs/encode.md compares them."""
+"""Presets: the parts of an animation that a stream has. docs/encode.md compares them."""
 
 from __future__ import annotations
 
 from typing import Final, Literal
 
 PlannedPreset = Literal["exact", "compact"]
-"""Not what never moves; of FAPs, only those that a player does not derive from others. See `fba.planning`."""
+"""Without parameters that never move, and FAPs that players derive from others. See `fba.planning`."""
 Preset = Literal["reference", PlannedPreset]
 """`REFERENCE`, or a planned preset."""
 

@@ -1,4 +1,4 @@
-"""Guess what a file is from its first bytes, for errors of readers that expected something else."""
+"""Guesses of a file's format from its first bytes, for errors of readers that expected another."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ CSV_LINES = 3
 
 
 def recognise(head: bytes) -> str:
-    """Return what a file with this beginning seems to be, such as "a PNG picture"; "" if that is unknown."""
+    """Return a guess of the format of a file with this beginning, such as "a PNG picture", or ""."""
     if not head:
         return ""
     if _is_program_stream(head):
@@ -90,7 +90,7 @@ def _is_program_stream(head: bytes) -> bool:
 
 
 def _recognise_text(head: bytes) -> str:
-    """Return what a text file seems to be."""
+    """Return a guess of the format of a text file."""
     if head.startswith(b"{"):
         return "glTF" if b'"asset"' in head else "JSON"
     start = head[:2000].lower()

@@ -39,10 +39,10 @@ def axis_matrices(axis: int, angle: npt.ArrayLike) -> Float64:
     angle = np.asarray(angle, dtype=np.float64)
     sine, cosine = np.sin(angle), np.cos(angle)
     result = np.zeros((*angle.shape, 3, 3))
-    one, two = (axis + 1) % 3, (axis + 2) % 3
+    a, b = (axis + 1) % 3, (axis + 2) % 3
     result[..., axis, axis] = 1.0
-    result[..., one, one] = result[..., two, two] = cosine
-    result[..., two, one], result[..., one, two] = sine, -sine
+    result[..., a, a] = result[..., b, b] = cosine
+    result[..., b, a], result[..., a, b] = sine, -sine
     return result
 
 
@@ -115,6 +115,19 @@ def dot(a: Float64, b: Float64) -> Float64:
 def lengths(vectors: Float64) -> Float64:
     """Return the lengths (...) of vectors (..., 3)."""
     return np.sqrt(dot(vectors, vectors))
+
+
+def unit(vectors: Float64) -> Float64:
+    """Return vectors (..., 3) of length 1; zero stays zero."""
+    result: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+    return result
+
+
+def degrees_between(a: Float64, b: Float64) -> Float64:
+    """Return the angles in degrees between vectors (..., 3)."""
+    sine = np.linalg.norm(np.cross(a, b), axis=-1)
+    result: Float64 = np.degrees(np.arctan2(sine, np.sum(a * b, axis=-1)))
+    return result
 
 
 def turn(axis: Float64, angle: Float64) -> Float64:

@@ -32,7 +32,7 @@ def open_source(path: Path) -> tuple[BinaryIO, int]:
     """Return the file, opened for binary reading, and its size in bytes when it was opened.
 
     Readers stop at that size, even if the file grows meanwhile. Raises FormatError for a missing
-    file, a folder, a pipe or device, an empty or unreadable file, OptionError for what is no name of a file.
+    file, a folder, a pipe or device, an empty or unreadable file; OptionError for other values.
     """
     if not isinstance(path, str | os.PathLike):
         hint = (

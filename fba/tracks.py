@@ -28,7 +28,7 @@ _CHUNK = 4096
 
 
 class CompactFrames(Protocol):
-    """Frames as a decoder holds them, without what was not sent: a track's arrays are made when asked for."""
+    """Frames with columns only for sent parameters, as a decoder has them; arrays are made on demand."""
 
     def __len__(self) -> int: ...
 
@@ -413,7 +413,7 @@ def freeze(instance: object, **fields: object) -> None:
 
 
 def _stack(arrays: list[Array]) -> Array:
-    """Return all arrays as one, read-only, so that a track need not copy it."""
+    """Return the arrays joined, read-only, so that a track need not copy them."""
     stacked = np.concatenate(arrays)
     stacked.flags.writeable = False
     return stacked
@@ -426,6 +426,6 @@ def hold(values: Array, mask: Bool, before: Array) -> Array:
     """
     last = np.where(mask, np.arange(1, len(mask) + 1, dtype=np.int32)[:, None], np.int32(0))
     np.maximum.accumulate(last, axis=0, out=last)
-    known = np.concatenate([before[None].astype(values.dtype), values])
-    held: Array = np.take_along_axis(known, np.broadcast_to(last, values.shape), axis=0)
-    return held
+    extended = np.concatenate([before[None].astype(values.dtype), values])
+    result: Array = np.take_along_axis(extended, np.broadcast_to(last, values.shape), axis=0)
+    return result

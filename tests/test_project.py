@@ -21,6 +21,7 @@ from packaging.requirements import InvalidRequirement, Requirement
 from packaging.utils import canonicalize_name
 
 import fba
+from tools import release
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = {"fba": "fba", "fba_player": "player/fba_player", "fba_conformance": "conformance/fba_conformance"}
@@ -131,6 +132,20 @@ def test_pythons_are_found_once_each_and_shims_do_not_count(tmp_path: Path) -> N
 
 def test_version_is_the_same_everywhere() -> None:
     assert pyproject()["project"]["version"] == fba.__version__
+    assert f"\nversion: {fba.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_a_release_needs_a_date_an_address_and_one_version(tmp_path: Path) -> None:
+    def write(urls: str, heading: str, cited: str) -> list[str]:
+        (tmp_path / "pyproject.toml").write_text(f'[project]\nversion = "1.2"\n{urls}')
+        (tmp_path / "CHANGELOG.md").write_text(f"# Changelog\n\n## {heading}\n")
+        (tmp_path / "CITATION.cff").write_text(f"title: x\nversion: {cited}\n")
+        return [fault.partition(":")[0] for fault in release.faults_of_files(tmp_path)]
+
+    urls = '[project.urls]\nSource = "https://example.org/fba"\n'
+    assert write(urls, "1.2 (2026-12-01)", "1.2") == []
+    assert write("", "1.2 (unreleased)", "1.1") == ["pyproject.toml", "CHANGELOG.md", "CITATION.cff"]
+    assert write(urls, "1.1 (2026-12-01)", "1.2") == ["CHANGELOG.md"]
 
 
 @pytest.mark.parametrize("name", sorted(fba.__all__))

@@ -85,7 +85,7 @@ class Fit:
         ])  # fmt: skip
 
     def residuals(self, vector: np.ndarray) -> np.ndarray:
-        """Return what is to be as small as possible, in squares."""
+        """Return the residuals of the fit."""
         percent, angles, jerks = self.walk(vector)
         apart = self.apart(percent, angles)
         people = np.array(

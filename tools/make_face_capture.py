@@ -1,4 +1,4 @@
-"""Make the captured face that comes with fba: talk.c3d, 50 markers on somebody who says what hello.fap says.
+"""Make the captured face that comes with fba: talk.c3d, 50 markers on a speaker of hello.fap.
 
     python tools/make_face_capture.py [FILE]        # default: fba/samples/talk.c3d of this checkout
 

@@ -34,7 +34,7 @@ from fba.parameters import BAP_STEPS_AUTO
 SAMPLES = ("hello.fap", "talk.c3d", "hello.bvh")
 """What is measured where no file is given: it comes with fba."""
 FINE = "visage"
-"""The table of BAP steps for what is no stream."""
+"""The table of BAP steps for files that are not streams."""
 TABLE = "results.csv"
 PAGE = "bitrate.md"
 

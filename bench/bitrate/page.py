@@ -42,7 +42,12 @@ def make_page(results: Sequence[Result]) -> str:
     for group in _groups(results):
         own = compare(group)[0].own
         lines += [f"## {own.data}: {subjects_text(own)}", "", *make_section(group)]
-    lines += ["## Published rates of others", "", "On data of their own, and not measured again here.", ""]
+    lines += [
+        "## Published rates of others",
+        "",
+        "As published, on other data, and not measured again here.",
+        "",
+    ]
     return "\n".join([*lines, *tables.published_table(), "", method_text()])
 
 

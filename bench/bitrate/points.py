@@ -27,7 +27,7 @@ KNOWN = "FBA, ranges known"
 RATES = {FACE: (2.0, 3.0, 4.0), BODY: (6.0, 12.0, 24.0)}
 """Mean rates, kbit/s, that a live encoder holds."""
 NO_SPARE_INTRA = 1e9
-"""Bits that an I plane counts where only needed ones shall come."""
+"""Price of an I plane, bits, where only necessary I planes are wanted."""
 TOLERANCES = {FACE: (0.2, 0.5, 1.0, 2.0), BODY: (10.0, 20.0)}
 """Millimetres by which vertices of the face, or points 3 cm off joints of the body, may be off."""
 WITH_RIVALS = {FACE: (1, 2, 6, 12, 24), BODY: (1, 2, 4, 6, 12)}

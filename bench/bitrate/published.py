@@ -1,4 +1,4 @@
-"""Published rates of others, on data of their own: anchors, which nobody here has measured again."""
+"""Published rates of others, on other data: for orientation, not measured again here."""
 
 from __future__ import annotations
 

@@ -9,12 +9,13 @@ if TYPE_CHECKING:
     from fba.body._definition import BodyDefinition
     from fba.body.head_attachment import attach_head
     from fba.body.model import BodyModel
-    from fba.body.skeleton import Skeleton
+    from fba.body.skeleton import SIDES, Skeleton
     from fba.body.solve.conventions import convention_names
     from fba.body.solve.limits import Excess, Limit, Limits
     from fba.body.solve.solver import BapSolver, wrapped
 
 _MODULE_OF = {
+    "SIDES": "fba.body.skeleton",
     "BapSolver": "fba.body.solve.solver",
     "BodyDefinition": "fba.body._definition",
     "BodyModel": "fba.body.model",
@@ -28,6 +29,7 @@ _MODULE_OF = {
 }
 
 __all__ = [
+    "SIDES",
     "BapSolver",
     "BodyDefinition",
     "BodyModel",

@@ -1,8 +1,8 @@
-"""Body definition parameters: the joint centres of the body that a sender's BAPs are for.
+"""Body definition parameters: the joint centres of the sender's body.
 
 Three behaviours of a decoder (K. Karpouzis, Adaptive parametric models of human faces and bodies, chapter 4):
 "simple" ignores the definition and moves its own generic body; "calibration" scales the generic body's
-segments to the joint centres that were sent; and "predictable" replaces it with the body that was sent.
+segments to the sent joint centres; and "predictable" replaces it with the sent body.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ class BodyDefinition:
     def skeleton(self, profile: str = "calibration", generic: Skeleton | None = None) -> Skeleton:
         """Return the skeleton that a decoder of this profile moves.
 
-        profile: one of `PROFILES`. generic: the decoder's own body, the default one where None. Raises
-        ModelError where "predictable" lacks parents, or they contradict each other.
+        profile: one of `PROFILES`. generic: the decoder's body, by default the built-in one. Raises
+        ModelError for "predictable" if parents are missing or contradict each other.
         """
         if profile not in PROFILES:
             raise ValueError(f"profile must be one of {', '.join(PROFILES)}, not {profile!r}")
@@ -107,9 +107,8 @@ class BodyDefinition:
 def calibrate(generic: Skeleton, centres: Mapping[str, Sequence[float]]) -> Skeleton:
     """Return the skeleton with its segments scaled so that joints are at the given centres (metres).
 
-    A joint between two given ones keeps its relative position along the line between them; one beyond the
-    last given joint keeps its direction from it, at that joint's scale. Joints that the skeleton lacks have
-    no effect.
+    A joint between two given joints keeps its relative position along the line between them; a joint beyond
+    the last given joint keeps its direction from it, at that joint's scale. Unknown joints are ignored.
     """
     given = {generic.number(name): np.array(place, dtype=np.float64) for name, place in centres.items()
              if name in generic}  # fmt: skip

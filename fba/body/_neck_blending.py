@@ -13,20 +13,20 @@ from fba.cache import load_or_make, make_key
 from fba.easing import smoothstep
 
 WITH_NECK = 0.010
-"""Metres from the body's neck up to which a vertex of the face moves with the neck."""
+"""Distance from the body's neck up to which a vertex of the face moves with the neck, metres."""
 WITH_SKULL = 0.030
-"""Metres from the body's neck beyond which a vertex of the face moves with the skull alone."""
+"""Distance from the body's neck from which a vertex of the face moves with the skull only, metres."""
 NEIGHBOURS = 4
 SAME_PLACE = 1e-5
 """Metres within which two vertices are the same."""
 PAIR_DISTANCE = 0.01
 """Metres within which vertices are paired at first."""
 MAX_ROUNDS = 20
-"""Rounds, at most, in which a face is moved by the median offset of its pairs."""
+"""Largest number of rounds in which a face is moved by the median offset of its pairs."""
 RIM = 0.3
-"""Share of a neck's width that its lower rim has at least."""
+"""Smallest width of a neck's lower rim, as a share of the neck's."""
 SEAM = 0.002
-"""A face whose vertices come this close (m) to those of the body's neck brings its own neck."""
+"""Distance to the body's neck, metres, up to which a face's own neck meets it."""
 
 CACHED_VERTICES = 4000
 """Number of vertices from which results for a face are cached on disk."""
@@ -50,10 +50,10 @@ class NeckBlend(NamedTuple):
 
 
 def blend_with_neck(neck: list[BodyPart], joints: int, skull: int, placed: Float64, free: Bool) -> NeckBlend:
-    """Joints and weights with which a body's neck moves a face's vertices `placed` (V, 3), metres.
+    """Return the joints and weights by which a body's neck moves a face's vertices (V, 3), metres.
 
-    neck: the body's parts of that kind, with vertices. joints: how many the body has. skull: the joint that
-    carries the head. free: (V,) vertices that the neck may bend.
+    neck: the body's parts of that kind, with vertices. joints: number of the body's joints. skull: the joint
+    that carries the head. free: (V,) vertices that the neck may bend.
     """
 
     def make() -> list[Array]:
@@ -93,7 +93,7 @@ def _compute_blend(neck: list[BodyPart], joints: int, skull: int, placed: Float6
 def _measure_offset(anchors: Float32, placed: Float64) -> Float64:
     """Return (3,) offset, metres, between a face and a body whose neck it shares vertex by vertex; else 0.
 
-    Needed because readers differ a little in where they find pupils.
+    Needed because readers differ a little in the positions of pupils.
     """
     from scipy.spatial import cKDTree
 

@@ -1,4 +1,4 @@
-"""Which table of BAP steps makes angles round, as people set them by hand: `find_rounder_table`."""
+"""The table of BAP steps in which angles are round, as animators set them: `find_rounder_table`."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
 from fba.parameters import BAP_STEP_TABLES, bap_steps
 
 ROUND_DEGREES = 5.0
-"""Degrees of which angles are multiples that were set by hand in degrees."""
+"""Unit of angles that were set by hand in degrees."""
 ROUND_RADIANS = 0.1
-"""Radians of which angles are multiples that were set by hand in radians."""
+"""Unit of angles that were set by hand in radians."""
 UNITS = {
     f"{ROUND_DEGREES:g} degrees": ROUND_DEGREES / DEGREES,
     f"{ROUND_RADIANS:g} rad": ROUND_RADIANS / UNIT,
 }
-"""Their names, and how many units of BAPs they are."""
+"""Both, by name, in units of BAPs."""
 MIN_IMPROBABILITY = 6.0
-"""How improbable round angles must be, as `_improbability` counts."""
+"""Smallest improbability of round angles, see `_improbability`."""
 MIN_ADVANTAGE = 2.0
-"""Factor by which they must be more improbable than under the other table."""
+"""Smallest ratio of that to the other table's."""
 MIN_IMPROBABILITY_ALL_ROUND = 1.3
-"""How improbable they must be where every key is round with one table, and not with the other."""
+"""The same if every key is round with this table, and not with the other."""
 
 
 @dataclass(frozen=True)
 class Roundness:
-    """How round angles are.
+    """Roundness of angles.
 
-    score: how improbable it is that chance made this number of them round. every: whether all keys are round.
-    unit: what they are multiples of.
+    score: improbability of this number of round angles by chance. every: whether all keys are round. unit: of
+    which they are multiples.
     """
 
     score: float
@@ -42,7 +42,7 @@ class Roundness:
 
 
 def find_rounder_table(levels: Int64, used: str) -> tuple[str, str] | None:
-    """Return the table with which angles are round far more often than with `used`, and the unit; or None.
+    """Return the table in which angles are round far more often than in `used`, and the unit; or None.
 
     levels: (T, 296), in steps.
     """
@@ -60,10 +60,10 @@ def find_rounder_table(levels: Int64, used: str) -> tuple[str, str] | None:
 
 
 def _roundness(levels: Int64, steps: Int64) -> Roundness:
-    """Return how round the angles of levels (T, K), in steps (K,), are, by the unit that fits them best.
+    """Return the roundness of levels (T, K), in steps (K,), by the unit that fits best.
 
-    Of each joint, the first and last angle and those where it turns back or rests are counted, each value
-    once, because keys lie there; if all of them are round, every angle is.
+    The first and last angle of each joint, and those where it turns back or rests, are counted as keys, each
+    value once; if all of them are round, all angles are counted as well.
     """
     changes = np.sign(np.diff(levels, axis=0))
     keys = np.ones(levels.shape, dtype=bool)
@@ -82,7 +82,7 @@ def _roundness(levels: Int64, steps: Int64) -> Roundness:
 
 
 def _count_round(levels: Int64, counted: Bool, steps: Int64, unit: float) -> tuple[int, int, float]:
-    """Return how many different angles other than 0 there are, how many are round, and how many by chance."""
+    """Return the number of different angles except 0, of round ones, and of those expected by chance."""
     count, hits, expected = 0, 0, 0.0
     for column, chosen, step in zip(levels.T, counted.T, steps.tolist(), strict=True):
         used = np.unique(np.abs(column[chosen & (column != 0)]))
@@ -100,10 +100,7 @@ def _round(angles: Int64, step: int, unit: float) -> Bool:
 
 
 def _improbability(hits: int, expected: float) -> float:
-    """Return -log10 of the most (Chernoff's bound) that chance can have for this number of hits; 0 for few.
-
-    It is 6 for one in a million.
-    """
+    """Return -log10 of Chernoff's bound on the probability of this number of hits: 6 for one in a million."""
     if hits <= expected:
         return 0.0
     return float((hits * np.log(hits / expected) - hits + expected) / np.log(10))

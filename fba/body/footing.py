@@ -1,4 +1,4 @@
-"""Where the soles of a body are, and poses in which a body of other proportions stands on the same ground.
+"""Heights of the soles of a body, and poses in which a body of other proportions stands on the same ground.
 
 BAPs give the root's position in metres, which fits one length of legs. `GroundedPoser` raises or lowers a
 body whose legs differ from the default skeleton's, so that its lower foot is as high as that one's.
@@ -6,11 +6,13 @@ body whose legs differ from the default skeleton's, so that its lower foot is as
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64
-from fba.body.skeleton import Skeleton
+from fba.body.skeleton import SIDES, Skeleton
 from fba.body.solve.solver import BapSolver
 
 OUTLINE = (
@@ -22,9 +24,8 @@ OUTLINE = (
     ("metatarsal", 0.059, 0.0, 0.0025), ("metatarsal", -0.0455, 0.004, -0.002),
     ("metatarsal", 0.065, 0.004, -0.0115), ("metatarsal", 0.063, 0.004, 0.003),
 )  # fmt: skip
-"""Edge of the shown person's soles, which is bevelled: the joint that it moves with, and metres from that
-joint, outwards and ahead, at a height above the ground in the default posture. Vertices of
-`fba/body/builtin/body.glb`."""
+"""The bevelled edge of the built-in person's soles, from vertices of `fba/body/builtin/body.glb`: joint that
+moves it, metres outwards from that joint, metres above the ground in the default posture, metres ahead."""
 TIP = (
     ("metatarsal", -0.041, 0.002, 0.028), ("metatarsal", 0.050, 0.002, 0.029),
     ("metatarsal", -0.031, 0.0067, 0.066), ("metatarsal", 0.021, 0.0062, 0.059),
@@ -33,7 +34,47 @@ TIP = (
     ("metatarsal", -0.033, 0.0105, 0.069), ("metatarsal", 0.023, 0.010, 0.063),
     ("metatarsal", -0.005, 0.0105, 0.0735), ("metatarsal", -0.019, 0.0105, 0.0745),
 )  # fmt: skip
-"""The same for what is ahead of the ball."""
+"""The same for the part ahead of the ball."""
+
+
+SOLE = (*OUTLINE, *TIP)
+"""The whole edge."""
+FOOT = ("ankle", "subtalar", "midtarsal", "metatarsal")
+"""Joints of a foot."""
+
+
+def foot_frames(skeleton: Skeleton, matrices: Float64, side: str) -> dict[str, tuple[Float64, Float64]]:
+    """Return position (T, 3) and rotation (T, 3, 3) of the joints of a foot that a skeleton has, by name.
+
+    matrices: (T, J, 4, 4), as `BapSolver.pose` returns them. side: "l" or "r".
+    """
+    names = [f"{side}_{joint}" for joint in FOOT if f"{side}_{joint}" in skeleton]
+    rows = {name: matrices[:, skeleton.number(name)] for name in names}
+    return {name: (row[:, :3, 3], row[:, :3, :3]) for name, row in rows.items()}
+
+
+def lowest_edge(
+    skeleton: Skeleton,
+    frames: Mapping[str, tuple[Float64, Float64]],
+    side: str,
+    edge: Sequence[tuple[str, float, float, float]],
+) -> Float64:
+    """Return the height (T,) of the lowest point of a sole's edge.
+
+    frames: joint -> position (T, 3) and rotation (T, 3, 3). edge: `SOLE`, or a part of it.
+    """
+    outwards = 1.0 if side == "l" else -1.0
+    points: dict[str, list[Float64]] = {}
+    for joint, x, y, z in edge:
+        name = f"{side}_{joint}"
+        height = skeleton.centres[skeleton.number(name), 1]
+        points.setdefault(name, []).append(np.array([outwards * x, y - height, z]))
+    heights = []
+    for name, own in points.items():
+        position, frame = frames[name]
+        heights.append(position[:, 1] + (frame[..., 1, :] @ np.array(own).T).min(axis=-1))
+    lowest: Float64 = np.min(heights, axis=0)
+    return lowest
 
 
 def lowest_sole(skeleton: Skeleton, matrices: Float64) -> Float64 | None:
@@ -41,29 +82,28 @@ def lowest_sole(skeleton: Skeleton, matrices: Float64) -> Float64 | None:
 
     matrices: (T, J, 4, 4), as `BapSolver.pose` returns them.
     """
-    lows = []
-    for side, outwards in (("l", 1.0), ("r", -1.0)):
-        if not all(f"{side}_{joint}" in skeleton for joint in ("ankle", "metatarsal")):
-            return None
-        for joint, x, y, z in (*OUTLINE, *TIP):
-            number = skeleton.number(f"{side}_{joint}")
-            point = np.array([outwards * x, y - skeleton.centres[number, 1], z])
-            lows.append(matrices[:, number, 1, 3] + matrices[:, number, 1, :3] @ point)
+    if not has_feet(skeleton):
+        return None
+    lows = [lowest_edge(skeleton, foot_frames(skeleton, matrices, side), side, SOLE) for side in SIDES]
     result: Float64 = np.min(lows, axis=0)
     return result
 
 
-class GroundedPoser:
-    """Poses of a body of any proportions, in which its lower foot is as high as the default skeleton's.
+def has_feet(skeleton: Skeleton) -> bool:
+    """Whether a skeleton has the joints that move the edges of the soles."""
+    return all(f"{side}_{joint}" in skeleton for side in SIDES for joint in ("ankle", "metatarsal"))
 
-    A body without feet, and the default skeleton itself, stay where the BAPs put them. axes: see `BapSolver`.
+
+class GroundedPoser:
+    """Poses a body of any proportions so that its lower foot is as high as the default skeleton's.
+
+    A body without feet, and the default skeleton, are posed as the BAPs say. axes: see `BapSolver`.
     """
 
     def __init__(self, skeleton: Skeleton, axes: str = "iso") -> None:
         self._solver = BapSolver(skeleton, axes)
-        feet = all(f"{side}_{joint}" in skeleton for side in "lr" for joint in ("ankle", "metatarsal"))
         default = Skeleton.default()
-        self._default = BapSolver(default, axes) if feet and skeleton is not default else None
+        self._default = BapSolver(default, axes) if has_feet(skeleton) and skeleton is not default else None
 
     def pose(self, baps: npt.ArrayLike) -> Float64:
         """Return joint matrices, see `BapSolver.pose`."""
@@ -77,9 +117,9 @@ class GroundedPoser:
         rows = np.atleast_2d(np.asarray(baps))
         if self._default is None:
             return np.zeros(len(rows))
-        theirs, ours = (
+        wanted, present = (
             lowest_sole(solver.skeleton, solver.pose(rows)) for solver in (self._default, self._solver)
         )
-        assert theirs is not None
-        assert ours is not None
-        return theirs - ours
+        assert wanted is not None
+        assert present is not None
+        return wanted - present

@@ -1,4 +1,4 @@
-"""Find the ground that the source's feet stand on: level, or sloping if a capture was not levelled."""
+"""The ground under the feet of a capture: level, or sloping if the capture was not levelled."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 from fba.arrays import Float64
 
 GROUND_PERCENTILE = 20
-"""Percentile of the lower foot's height that counts as the ground: single frames may be below it."""
+"""Percentile of the lower foot's height that is the ground: single frames may be below it."""
 MAX_HEIGHT = 0.15
-"""Metres above 0 up to which the ground may be; beyond, feet stand on a chair, or leap. Below 0, the ground
-may be at any depth: no feet are under it."""
+"""Largest height of the ground, metres; higher feet stand on a chair, or leap. Its depth has no limit: feet
+are never under it."""
 MAX_SLOPE = 0.08
-"""Rise over run up to which the ground may slope; beyond, the source climbs or uses stairs."""
+"""Largest slope of the ground, rise over run; a steeper source climbs or uses stairs."""
 MIN_EXTENT = 1.0
-"""Metres that the feet must cover for a slope to be estimated."""
+"""Smallest extent of the feet's path for which a slope is estimated, metres."""
 MIN_RISE = 0.015
-"""Metres that a slope must rise under the feet."""
+"""Smallest rise of a slope under the feet, metres."""
 WEIGHT_ABOVE = 0.05
-"""Weight of feet above the plane relative to feet below it: the plane shall be under them."""
+"""Weight of feet above the plane relative to feet below it: the plane must be under the feet."""
 FULL_WEIGHT_DISTANCE = 0.03
 """Metres from the plane beyond which feet count less."""
 STEPS = 20
@@ -39,8 +39,17 @@ class Ground:
         return result
 
 
+def level_under(lowest: Float64, points: Float64) -> Float64:
+    """Return the heights (2, T) of the ground under feet.
+
+    lowest: (2, T), heights of the lowest points of the feet. points: (2, 2, T, 3), their heels and balls.
+    """
+    middles = points.mean(axis=1)
+    return find(lowest, middles).under(middles)
+
+
 def find(lowest: Float64, points: Float64) -> Ground:
-    """Return the ground under feet that stand on it now and then; at height 0 if they are never near it.
+    """Return the ground under feet that sometimes stand on it; at height 0 if they are never near it.
 
     lowest: (2, T), heights of the lowest points of the feet. points: (2, T, 3), positions of the feet.
     Metres.
@@ -68,7 +77,7 @@ def find(lowest: Float64, points: Float64) -> Ground:
 
 
 def _plane(heights: Float64, across: Float64) -> Float64:
-    """Return height and slopes (3,) of the plane under most points: least squares, with less weight above."""
+    """Return height and slopes (3,) of the plane under most points: least squares, less weight above."""
     columns = np.column_stack([np.ones(len(heights)), across])
     hold = np.diag([0.0, 1.0, 1.0]) * len(heights) * (0.3 * MIN_EXTENT) ** 2 * WEIGHT_ABOVE
     plane = np.array([np.percentile(heights, 30), 0.0, 0.0])

@@ -1,9 +1,8 @@
-"""A face on a body: neck and skull move its vertices, so that both share one skin."""
+"""A face on a body: neck and skull move its vertices, so that face and body share a skin."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +18,7 @@ from fba.mesh import checked_rows
 SKULL = "skullbase"
 """The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""
 SAME_SIZE = 0.005
-"""Sizes that differ by less than this share are taken as the same."""
+"""Difference from size 1 up to which a face keeps its size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +81,7 @@ class AttachedHead:
         local: float32 (V, 3), the face moved by its FAPs in its own frame without the head's turn
         (`Deformer.local`). matrices: (J, 4, 4), with the head's turn (`matrices`). out: written to and
         returned. local_normals: float32 (V, 3), normals of the face in its own frame; normals: filled with
-        those on the body. method: as of `BodyModel.skin`. ValueError for arrays of other shapes.
+        those on the body. method: see `BodyModel.skin`. ValueError for arrays of other shapes.
         """
         from fba.body.skin._loops import scale_and_shift
 
@@ -156,9 +155,3 @@ def placement(body: BodyModel, eyes: npt.ArrayLike) -> Float64:
     place = np.diag([size, size, size, 1.0])
     place[:3, 3] = body.eyes.mean(axis=0) - size * given.mean(axis=0)
     return place
-
-
-def __getattr__(name: str) -> Any:
-    if name == "HeadOnBody":
-        raise ImportError("HeadOnBody(...) is now attach_head(...), of the same module and arguments")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

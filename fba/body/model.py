@@ -26,8 +26,8 @@ __all__ = ["BODY_PART_KINDS", "BodyModel", "BodyPart", "Material"]
 
 
 BODY_PART_KINDS = ("skin", "neck", "head", "cloth", "shoe", "hair", "other")
-"""What a part is. "neck": neck and shoulders under the clothes, shown only where the face that stands on the
-body brings none of its own. "head": the head of a body that has one, left out where a face is put on it."""
+"""Kinds of parts. "neck": neck and shoulders under the clothes, shown only if the face on the body has none.
+"head": the body's own head, left out if a face is put on it."""
 RIGID_TOLERANCE = 1e-6
 
 
@@ -75,12 +75,11 @@ class BodyPart:
 class BodyModel(Meshes[BodyPart]):
     """A body that joint matrices move.
 
-    parts: its meshes; vertices of the whole model are counted through them in order. skeleton: its joints
-    in the default posture, named as in the standard where BAPs are to move them. bind: float64 (J, 4, 4),
-    the joints as the meshes are modelled, each rotation relative to the default posture, as
-    `BapSolver.pose` gives them. eyes: float64 (2, 3), where the pupils of a face on this body are as
-    modelled (feature points 3.5 and 3.6), or None where it has no place for a face. name, notes: what it
-    is, its origin, licence and the like.
+    parts: its meshes; vertices of the whole model are numbered through them in order. skeleton: its joints in
+    the default posture, with the standard's names where BAPs move them. bind: float64 (J, 4, 4), the joints
+    as the meshes are modelled, relative to the default posture, as `BapSolver.pose` returns them. eyes:
+    float64 (2, 3), positions of the pupils of a face on this body as modelled (feature points 3.5 and 3.6),
+    or None if it cannot carry a face. notes: origin, licence and the like.
 
     Axes: +x the subject's left, +y up, +z forward; metres. Raises ModelError naming the part or joint
     that is wrong.

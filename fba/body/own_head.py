@@ -1,4 +1,4 @@
-"""The head of a body that brings one with shapes: FAPs mix its shapes and turn its eyes."""
+"""A body's own head with shapes: FAPs mix its shapes and turn its eyes."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ ASIDE = np.array([1.0, 0.0, 0.0])
 SMALL_WEIGHT = 0.1
 """Weight of keeping shapes small, relative to reaching the largest values of a FAP."""
 FEW_WEIGHT = 0.03
-"""Weight of keeping shapes few, relative to reaching the largest values of a FAP."""
+"""Weight of using few shapes, relative to reaching the largest values of a FAP."""
 
 
 @dataclass(frozen=True, eq=False)
 class HeadShape:
     """A shape of a head.
 
-    faps: float64 (68,), the FAPs that it shows at weight 1. rows: (N,), vertices of the body that it moves,
-    by shifts, float32 (N, 3), metres, in the body's axes as modelled.
+    faps: float64 (68,), shown at weight 1. rows: (N,), vertices of the body that it moves. shifts: float32
+    (N, 3), by which it moves them, metres, in the body's axes as modelled.
     """
 
     name: str
@@ -46,10 +46,7 @@ class OwnEye:
 
 @dataclass(frozen=True, eq=False)
 class OwnHead:
-    """Shapes and eyes of the head that a body brings.
-
-    ranges: (68,), values of FAPs that count as one: those that a face shows at most.
-    """
+    """Shapes and eyes of a body's own head. ranges: (68,), largest FAPs, to which others are scaled."""
 
     ranges: Float64
     shapes: Sequence[HeadShape] = ()
@@ -60,7 +57,7 @@ class OwnHead:
     def _matrix(self) -> tuple[Float64, Float64]:
         """Scales (68,) of FAPs, and the matrix (68 + K, K) that mixes shapes."""
         faps = np.array([shape.faps for shape in self.shapes]).reshape(-1, FAP_COUNT).copy()
-        for eye in self.eyes:  # the eyeballs turn; shapes that look aside have nothing to add
+        for eye in self.eyes:  # the eyeballs turn, so shapes need not look aside
             for what in ("yaw", "pitch"):
                 faps[:, fap_numbers()[f"{what}_{eye.side}_eyeball"] - 1] = 0
         used = np.abs(faps).max(axis=0, initial=0.0) > 0
@@ -82,7 +79,7 @@ class OwnHead:
         chosen = nnls(matrix, np.concatenate([reached, np.full(count, -FEW_WEIGHT / SMALL_WEIGHT)]))[0] > 0
         result: Float64 = np.zeros(count)
         matrix = matrix[:FAP_COUNT]
-        while chosen.any():  # a shape that would be overdone stays at 1, and the others make up for it
+        while chosen.any():  # shapes above 1 are fixed at 1, and the others compensate
             result[chosen] = nnls(matrix[:, chosen], reached - matrix[:, ~chosen] @ result[~chosen])[0]
             over = result > 1
             if not over.any():

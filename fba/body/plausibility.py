@@ -1,17 +1,17 @@
-"""Checks whether a decoded body moves like a person, or would under the other table of BAP steps.
+"""Check whether a decoded body moves like a person, or would with the other table of BAP steps.
 
 Two tables of BAP quantiser steps are in use and no bit of a stream says which (docs/bitstream.md). Under
 the wrong one the root's translation comes out 32 times too large or too small, and joint angles up to 2.7
 times. `find_doubt` measures the motion under the table it was decoded with and under the other, and reports
-only where the first looks wrong and the second does not. It also looks at angles: people who animate by hand
-set joints to whole fives of degrees or tenths of a radian, which come out as such under the right table only
-(`_round_angles`). Of a body that stays where it is, the head shows the scale, because it keeps looking ahead
-while the trunk turns (`_head_turns`). The bounds are set so that none of the 177 foreign streams and none of
-our captures, walks and vectors is doubted when it is decoded with its own table.
+only where the first looks wrong and the second does not. It also looks at angles: animators set joints to
+multiples of 5 degrees or 0.1 radians, which only the right table shows (`_round_angles`). In a body that
+stays in place, the head shows the scale, because it keeps looking ahead while the trunk turns (`HeadBounds`).
+The bounds are set so that none of the 177 foreign streams and none of our captures, walks and vectors is
+doubted with its own table.
 
-People who sway move their hips over feet that stand, so the feet move against the root. A root that goes to
-and fro by decimetres while both feet stay where they are under it is a skater, or a sway of some millimetres
-read with steps that are too large.
+People who sway move their hips over standing feet, so the feet move against the root. A root that moves back
+and forth by decimetres while both feet keep their places under it is a skater, or a sway of some millimetres
+decoded with too large steps.
 """
 
 from __future__ import annotations
@@ -19,67 +19,78 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Bool, Float64, Int64
-from fba.body._head_turns import head_turns_too_far
 from fba.body._round_angles import find_rounder_table
 from fba.body.skeleton import Skeleton
 from fba.body.solve._pose_loops import MILLIMETRE, UNIT
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
-from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
+from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps, baps
 from fba.tracks import BodyTrack, batches
 
-SAMPLES = 32
-RUN = 64
-"""At most SAMPLES runs of RUN successive frames, spread evenly, are examined, to bound the cost."""
-MIN_SECONDS = 1.0
-"""Seconds that a motion must last to be judged."""
-MARGIN = 20.0
-"""Degrees that a joint must be beyond `limits.widest` to count."""
-BEYOND = 0.3
-"""Difference between the tables in the share of frames with such a joint that counts as a fault."""
-SWAY = 0.08
-"""Metres a second that the root may sway over standing feet."""
-SLACK = 2.0
-"""The root may go this many times as fast as legs and sway carry it."""
-FASTEST = 8.0
-"""Metres a second that nobody exceeds on average over a whole motion."""
-STRIDING = 0.2
-"""Metres a second from which the legs certainly walk."""
-STANDS = 0.15
-"""Share of the legs' speed below which the root counts as staying where it is."""
-SLIDES = 0.06
-"""Metres that a body on such legs may slide along the ground, beyond what a quantiser step explains."""
-AWAY_DISTANCE = 25.0
-"""Metres from the origin of a capture beyond which nobody stands who stays in place."""
-IN_PLACE = 0.1
-"""Share of its distance from the origin within which a body stays that stays in place."""
-JUMP = 1.0
-"""Metres that the root's height may change by jumping, crouching and lying down, which count as no travel."""
-SUNK = -2.0
-"""Height of the root over that of the default posture, metres, at which the whole body is underground."""
+RUNS = 32
+RUN_FRAMES = 64
+"""At most `RUNS` runs of this many successive frames, spread evenly, are examined, to limit the time."""
 _FEET = ("l_ankle", "r_ankle", "l_metatarsal", "r_metatarsal")
 _ROOT = ("vertical", "lateral", "frontal")
-REST_DISTANCE = 0.02
-"""Metres that the feet of legs at rest may move against the root, in any direction."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Bounds of plausible motion, chosen so that no stream is doubted with its own table (see above)."""
+
+    min_seconds: float = 1.0  # shortest motion that is judged
+    joint_margin: float = 20.0  # degrees beyond `widest_limits` from which a joint counts
+    joint_share: float = 0.3  # difference between the tables in the share of frames with such joints
+    sway: float = 0.08  # m/s of the root over standing feet
+    slack: float = 2.0  # largest ratio of the root's speed to that of legs and sway
+    max_speed: float = 8.0  # m/s, mean over a motion
+    walking: float = 0.2  # m/s from which legs certainly walk
+    standing: float = 0.15  # share of the legs' speed below which the root stays in place
+    slide: float = 0.06  # m that a body slides on resting legs, beyond a quantiser step
+    distance: float = 25.0  # m from the origin of a capture to a body that stays in place
+    in_place: float = 0.1  # travel of a body that stays in place, share of its distance from the origin
+    height_change: float = 1.0  # m, by jumping, crouching and lying down; not counted as travel
+    sunk: float = -2.0  # m of the root over that of the default posture: the whole body is underground
+    rest: float = 0.02  # m that feet may move against the root on resting legs, in any direction
+
+
+@dataclass(frozen=True)
+class HeadBounds:
+    """Bounds of a head that keeps looking ahead while the body turns under it.
+
+    While the pelvis turns by a few degrees, spine and neck turn back by about as much. Of 80 captures by some
+    25 makers, 20 have a pelvis that turns by 2 to 45 degrees against the head; in 18 of them the head turns
+    back 0.8 to 1.7 times as far, in two 2.4 times.
+    """
+
+    min_turn: float = np.radians(2.0)  # of the body, radians
+    max_turn: float = np.radians(45.0)
+    opposed: float = -0.6  # largest correlation of body and head
+    too_far: float = -1.8  # slope of the head over the body below which it looks away
+    follows: float = -0.4  # slope above which it follows the body
+
+
+BOUNDS = Bounds()
+HEAD = HeadBounds()
 
 
 @dataclass(frozen=True)
 class Motion:
     """Measurements of a motion.
 
-    beyond: share of the frames (0..1) in which a joint is `MARGIN` or more beyond all limits. travel: metres
-    a second that the root goes, without jumps (see `JUMP`); along: on the ground alone. carried: metres a
-    second that the lowest foot moves against the root, which is how fast the legs carry it. jump: metres, the
-    longest way of the root from a frame to the next. hops: whether one of these ways is more than a quantiser
-    step long. slid: metres that the body slides to and fro along the ground while its legs rest, less the
-    quantiser step that rounding alone moves it. away: metres along the ground from the origin of a body that
-    stays there (see `IN_PLACE`), else 0. height: metres, median of the root's height over that of the
-    default posture.
+    beyond: share of the frames (0..1) in which a joint exceeds all limits by `joint_margin`. travel: speed of
+    the root, m/s, without `height_change`. along: the same on the ground only. carried: speed of the lowest
+    foot against the root, m/s, at which the legs carry the body. jump: longest step of the root from a frame
+    to the next, m. hops: whether a step is longer than a quantiser step. slid: distance that the body slides
+    back and forth along the ground while its legs rest, m, less a quantiser step, which rounding alone makes.
+    away: distance from the origin along the ground of a body that stays in place, m, else 0. height: median
+    height of the root over that of the default posture, m.
     """
 
     beyond: float
@@ -94,15 +105,15 @@ class Motion:
 
     @property
     def runs_away(self) -> bool:
-        """Whether the root goes faster than legs and sway can account for, or than anybody does."""
-        return self.travel > min(FASTEST, SLACK * (SWAY + self.carried))
+        """Whether the root is faster than legs and sway explain, or than any person."""
+        return self.travel > min(BOUNDS.max_speed, BOUNDS.slack * (BOUNDS.sway + self.carried))
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """A motion that looks wrong under the table of BAP steps it was decoded with, and right under another.
+    """A motion that looks wrong with the table of BAP steps it was decoded with, and right with another.
 
-    used, likely: names of the tables. findings: what is wrong, in words.
+    used, likely: names of the tables. findings: faults, in words.
     """
 
     used: str
@@ -117,12 +128,11 @@ class Doubt:
 
 
 def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str) -> Doubt | None:
-    """Return the reasons why a body looks wrong under the table `used` and right under the other, or None.
+    """Return the doubt about a body that looks wrong with the table `used` and right with the other, or None.
 
-    index: (T,) numbers of the frames, at rate frames a second. Values must be as decoded: where they are not
-    multiples of the table's steps (bap_quant 0, or resampled), the table has no effect, and None is
-    returned; None as well where both tables or neither look wrong. At most 2048 frames are examined, in
-    20 ms. Raises ValueError for an unknown table.
+    index: (T,) numbers of the frames, at rate frames a second. Values must be as decoded; if they are not
+    multiples of the table's steps (bap_quant 0, or resampled), the result is None. At most 2048 frames are
+    examined, in 20 ms. Raises ValueError for an unknown table.
     """
     steps = bap_steps(used)
     if not len(body):
@@ -139,7 +149,7 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
     if (rounder := find_rounder_table(levels, used)) is not None:
         table, unit = rounder
         return Doubt(used, table, (f"angles are odd that {table} makes multiples of {unit}",))
-    if numbers[-1] - numbers[0] < MIN_SECONDS * rate:
+    if numbers[-1] - numbers[0] < BOUNDS.min_seconds * rate:
         return None
     now = measure(levels * steps, numbers[sampled], rate)
     for other in BAP_STEP_TABLES:
@@ -148,7 +158,7 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
             continue
         findings = _new_faults(now, measure(levels * bap_steps(other), numbers[sampled], rate))
         if not findings and not levels[:, _root_columns()].any():
-            back = head_turns_too_far(levels * steps, levels * bap_steps(other))
+            back = _head_turns_too_far(levels * steps, levels * bap_steps(other))
             if back is not None:
                 findings = (f"the head turns back {back:.1f} times as far as the body turns",)
         if findings:
@@ -157,14 +167,14 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
 
 
 def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
-    """Measurements of BAPs int64 (T, 296) at frame numbers (T,), taken between successive frames."""
+    """Return measurements of BAPs, int64 (T, 296), at frame numbers (T,), taken between successive frames."""
     pairs = np.flatnonzero(np.diff(index) == 1)
     root = values[:, _root_columns()]
-    ways = np.abs(root[pairs + 1] - root[pairs])
-    if np.ptp(root[:, 0]) <= JUMP / MILLIMETRE:
-        ways[:, 0] = 0
-    quantum = np.gcd.reduce(ways, axis=0)  # rounding alone moves a root by one quantiser step
-    lengths = np.linalg.norm(ways, axis=1) * MILLIMETRE
+    steps = np.abs(root[pairs + 1] - root[pairs])
+    if np.ptp(root[:, 0]) <= BOUNDS.height_change / MILLIMETRE:
+        steps[:, 0] = 0
+    quantum = np.gcd.reduce(steps, axis=0)  # rounding alone moves a root by one quantiser step
+    lengths = np.linalg.norm(steps, axis=1) * MILLIMETRE
     feet = _feet(values)
     lowest = np.argmin(feet[pairs, :, 1], axis=1)
     swing = feet[pairs + 1, lowest] - feet[pairs, lowest]
@@ -174,10 +184,10 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
     return Motion(
         beyond=float(_beyond(values).mean()),
         travel=float(lengths.sum() / seconds),
-        along=float(np.linalg.norm(ways[:, 1:], axis=1).sum() * MILLIMETRE / seconds),
+        along=float(np.linalg.norm(steps[:, 1:], axis=1).sum() * MILLIMETRE / seconds),
         carried=float(np.linalg.norm(swing[:, [0, 2]], axis=1).sum() / seconds),
         jump=float(lengths.max(initial=0.0)),
-        hops=bool((ways > quantum).any()),
+        hops=bool((steps > quantum).any()),
         slid=_slide_on_resting_legs(root[:, 1:], _feet(ahead), index),
         away=_distance(root[:, 1:]) * MILLIMETRE,
         height=float(np.median(root[:, 0])) * MILLIMETRE,
@@ -186,53 +196,93 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
 
 def _root_columns() -> list[int]:
     """Return the columns of the root's translation: up, sideways, ahead."""
-    return [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in _ROOT]
+    return [bap_numbers()[f"HumanoidRoot_tr_{axis}"] - 1 for axis in _ROOT]
 
 
 def _distance(ground: Int64) -> float:
-    """Return how far from the origin (T, 2), in mm, along the ground, keep; 0 if they go far themselves."""
+    """Return the distance from the origin of positions (T, 2) that stay in place, mm; 0 if they do not."""
     distance = float(np.linalg.norm(np.median(ground, axis=0)))
-    return distance if np.ptp(ground, axis=0).max() < IN_PLACE * distance else 0.0
+    return distance if np.ptp(ground, axis=0).max() < BOUNDS.in_place * distance else 0.0
 
 
 def _new_faults(now: Motion, other: Motion) -> tuple[str, ...]:
     """Return the faults of `now` that the other reading of the same motion does not have."""
     findings = []
-    if now.beyond - other.beyond > BEYOND:
+    if now.beyond - other.beyond > BOUNDS.joint_share:
         findings.append(f"joints beyond human limits in {100 * now.beyond:.0f} % of frames")
-    if now.runs_away and (now.hops or now.travel > FASTEST) and not other.runs_away:
+    if now.runs_away and (now.hops or now.travel > BOUNDS.max_speed) and not other.runs_away:
         findings.append(
             f"the root goes {now.travel:.1f} m/s where the legs carry it {now.carried:.1f} m/s, "
             f"in jumps of up to {now.jump:.1f} m"
         )
-    striding = now.carried > STRIDING and other.carried > STRIDING
-    if striding and now.along < STANDS * now.carried and 0.5 < other.along / other.carried < SLACK:
+    striding = min(now.carried, other.carried) > BOUNDS.walking
+    if (
+        striding
+        and now.along < BOUNDS.standing * now.carried
+        and 0.5 < other.along / other.carried < BOUNDS.slack
+    ):
         findings.append(f"the root stays where it is while the legs carry it {now.carried:.1f} m/s")
-    if now.slid > SLIDES > other.slid and other.travel < SWAY:
+    if now.slid > BOUNDS.slide > other.slid and other.travel < BOUNDS.sway:
         findings.append(f"the body slides {now.slid:.1f} m to and fro on legs that rest")
-    if now.away > AWAY_DISTANCE > other.away:
+    if now.away > BOUNDS.distance > other.away:
         findings.append(f"the body stands {now.away:.0f} m away from the origin")
-    if now.height < SUNK < other.height:
+    if now.height < BOUNDS.sunk < other.height:
         findings.append(f"the body {-now.height:.0f} m under the ground")
-    wrong = (other.runs_away and other.hops) or other.height < SUNK or other.beyond - now.beyond > BEYOND
+    beyond = other.beyond - now.beyond > BOUNDS.joint_share
+    wrong = (other.runs_away and other.hops) or other.height < BOUNDS.sunk or beyond
     return () if wrong else tuple(findings)
 
 
+def _head_turns_too_far(values: Int64, other: Int64) -> float | None:
+    """Return the turn of the head against the body, relative to the body's, if it is too large.
+
+    values, other: BAPs (T, 296) of the same motion by two tables. None if the head in `values` turns
+    back as people's do, or the head in `other` does not.
+    """
+    now, then = _head_by_body(values), _head_by_body(other)
+    if now is None or then is None or not HEAD.min_turn <= then[0] <= HEAD.max_turn:
+        return None
+    return -now[1] if now[1] < HEAD.too_far <= then[1] <= HEAD.follows else None
+
+
+def _head_by_body(values: Int64) -> tuple[float, float] | None:
+    """Return the turn of a body, radians, and the slope of its head's; None if not opposed."""
+    root, columns = _turning_columns()
+    body = np.unwrap(values[:, root] * UNIT)
+    head = values[:, columns].sum(axis=1) * UNIT
+    if not body.any() or not head.any() or np.ptp(body) == 0 or np.ptp(head) == 0:
+        return None
+    if np.corrcoef(body, head)[0, 1] > HEAD.opposed:
+        return None
+    return float(np.ptp(body)), float(np.polyfit(body, head, 1)[0])
+
+
+@cache
+def _turning_columns() -> tuple[int, tuple[int, ...]]:
+    """Return the column of the body's turn, and those of the turns between pelvis and head."""
+    spine = tuple(
+        bap.number - 1
+        for bap in baps()
+        if bap.name.endswith("_torsion") and not bap.name.startswith("sacroiliac")
+    )
+    return bap_numbers()["HumanoidRoot_rt_body_turn"] - 1, spine
+
+
 def _samples(count: int) -> Int64:
-    """Return indices of the frames to examine: all of them, or runs of successive ones."""
-    if count <= SAMPLES * RUN:
+    """Return indices of the frames to examine: all, or runs of successive frames."""
+    if count <= RUNS * RUN_FRAMES:
         return np.arange(count)
-    starts = np.linspace(0, count - RUN, SAMPLES).astype(np.int64)
-    return np.asarray((starts[:, None] + np.arange(RUN)).reshape(-1))
+    starts = np.linspace(0, count - RUN_FRAMES, RUNS).astype(np.int64)
+    return np.asarray((starts[:, None] + np.arange(RUN_FRAMES)).reshape(-1))
 
 
 def _beyond(values: Int64) -> Bool:
-    """Return bool (T,): whether a joint exceeds all limits by more than `MARGIN`, ignoring whole turns."""
+    """Return bool (T,): whether a joint exceeds all limits by the margin, ignoring whole turns."""
     turning = np.flatnonzero(widest_limits().any(axis=1))
     low, high = widest_limits()[turning].T
     angles = values[:, turning] * DEGREES
     angles -= FULL_TURN * np.rint((angles - (low + high) / 2) / FULL_TURN)
-    over: Bool = ((angles < low - MARGIN) | (angles > high + MARGIN)).any(axis=1)
+    over: Bool = ((angles < low - BOUNDS.joint_margin) | (angles > high + BOUNDS.joint_margin)).any(axis=1)
     return over
 
 
@@ -263,27 +313,27 @@ def _rotate_points(point: Float64, values: Int64, row: int) -> None:
             continue
         angle = values[:, bap] * (sign * UNIT)
         sine, cosine = np.sin(angle), np.cos(angle)
-        one, two = (axis + 1) % 3, (axis + 2) % 3
-        first, second = point[:, one].copy(), point[:, two].copy()
-        point[:, one] = cosine * first - sine * second
-        point[:, two] = sine * first + cosine * second
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        first, second = point[:, a].copy(), point[:, b].copy()
+        point[:, a] = cosine * first - sine * second
+        point[:, b] = sine * first + cosine * second
 
 
 def _slide_on_resting_legs(root: Int64, feet: Float64, index: Int64) -> float:
-    """Return how many metres a root goes to and fro, at most, while all feet stay in place under it.
+    """Return the largest distance that a root moves back and forth, metres, while all feet rest under it.
 
     root: (T, K), millimetres, along the ground. feet: (T, F, 3), metres, from the root. index: (T,) numbers
-    of the frames. One quantiser step an axis is taken off: by that much rounding moves a root that stands.
+    of the frames. A quantiser step on each axis is subtracted: rounding alone moves a standing root by it.
     """
     quantum = np.gcd.reduce(root - root[0], axis=0)
-    ways = [_to_and_fro(root[run]) - quantum for run in _rests(feet, index)]
-    return MILLIMETRE * max(0, int(np.max(ways)))
+    slides = [_back_and_forth(root[run]) - quantum for run in _rests(feet, index)]
+    return MILLIMETRE * max(0, int(np.max(slides)))
 
 
-def _to_and_fro(root: Int64) -> Int64:
-    """Return how far coordinates (T, K) go one way and back, each; 0 for one that goes one way only.
+def _back_and_forth(root: Int64) -> Int64:
+    """Return how far each of the coordinates (T, K) moves forth and back; 0 for motion in one direction.
 
-    Who jumps with stiff legs goes one way.
+    A jump with stiff legs has one direction.
     """
     ahead = (root - np.minimum.accumulate(root)).max(axis=0)
     back = (np.maximum.accumulate(root) - root).max(axis=0)
@@ -292,13 +342,10 @@ def _to_and_fro(root: Int64) -> Int64:
 
 
 def _rests(feet: Float64, index: Int64) -> Iterator[slice]:
-    """Yield the runs of successive frames in which every foot stays where it is under the root.
-
-    A run ends with the frame in which a foot has moved by more than `REST_DISTANCE` from where the run began.
-    """
+    """Yield the runs of successive frames in which every foot rests, within `Bounds.rest` of the first."""
     begin = 0
     for frame in range(1, len(index)):
-        if index[frame] != index[frame - 1] + 1 or np.abs(feet[frame] - feet[begin]).max() > REST_DISTANCE:
+        if index[frame] != index[frame - 1] + 1 or np.abs(feet[frame] - feet[begin]).max() > BOUNDS.rest:
             yield slice(begin, frame)
             begin = frame
     yield slice(begin, len(index))

@@ -18,6 +18,8 @@ from fba.parameters import joints
 
 MAX_JOINTS = 10_000
 ROOT = "HumanoidRoot"
+SIDES = ("l", "r")
+"""How names of joints of the left and of the right begin."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,13 +1,15 @@
-"""Which feet stand: heights and ways of soles, and when a foot is on the ground."""
+"""Stance: when a foot stands on the ground, by the height and the motion of its sole."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.body import ground
-from fba.body.footing import OUTLINE, TIP
-from fba.body.skeleton import Skeleton
+from fba.body.footing import FOOT, SOLE, foot_frames, lowest_edge
+from fba.body.skeleton import SIDES, Skeleton
 
 HEEL = 0.045
 """Metres from an ankle back to the heel."""
@@ -16,64 +18,67 @@ STILL_SPEED = 0.15
 LEVEL_SPEED = 0.15
 """Speed in metres per second, up or down, below which the lower foot stands, wherever it slides."""
 STILL_SECONDS = 0.1
-"""Seconds for which a foot that stands is still: at the top of a leap, feet are still for less."""
+"""Seconds for which a standing foot is still, longer than at the top of a leap."""
 SUPPORT_HEIGHT = 0.08
-"""Height in metres of a sole above the ground up to which it may stand on it; beyond, it is on a step."""
+"""Height of a sole up to which it may stand on the ground, metres; higher, it is on a step."""
 PLACED_HEIGHT = 0.025
-"""Metres above the lower foot up to which a foot stands on its ground if it is still for `PLACED_SECONDS`."""
+"""Height over the lower foot up to which a foot stands if it is still for `PLACED_SECONDS`, metres."""
 PLACED_SECONDS = 0.5
 """Seconds for which a foot must be still to stand on ground that is higher than the lower foot."""
-SIDES = ("l", "r")
 
 
 def sole_points(skeleton: Skeleton, side: str) -> dict[str, Float64] | None:
-    """Return the points (3,) of a sole under heel and ball, by the joint that each moves with.
+    """Return the points (3,) of a sole under heel and ball, by the joint that moves them.
 
     In the default posture, metres. side: "l" or "r". None for a skeleton that lacks a joint of the foot.
     """
-    ankle, heel, middle, ball = (
-        f"{side}_{joint}" for joint in ("ankle", "subtalar", "midtarsal", "metatarsal")
-    )
+    ankle, heel, middle, ball = (f"{side}_{joint}" for joint in FOOT)
     if not all(joint in skeleton for joint in (ankle, heel, middle, ball)):
         return None
     above, front = (skeleton.centres[skeleton.number(joint)] for joint in (ankle, ball))
-    return {
-        heel: np.array([above[0], 0.0, above[2] - HEEL]),
-        middle: np.array([front[0], 0.0, front[2]]),
-    }
+    return {heel: np.array([above[0], 0.0, above[2] - HEEL]), middle: np.array([front[0], 0.0, front[2]])}
 
 
 def find_stance(skeleton: Skeleton, matrices: Float64, rate: float) -> Bool:
-    """Return bool (2, T): when the left and the right foot of a body stand on the ground, by their own ways.
+    """Return bool (2, T): when the left and the right foot of a body stand on the ground.
 
     matrices: (T, J, 4, 4), as `BapSolver.pose` returns them. rate: frames a second. All False for a skeleton
     without feet.
     """
-    count = len(matrices)
-    soles = [sole_points(skeleton, side) for side in SIDES]
-    if count < 2 or None in soles:
-        return np.zeros((2, count), dtype=np.bool_)
-    points = np.zeros((2, 2, count, 3))
-    lowest = np.full((2, count), np.inf)
-    for foot, (side, sole) in enumerate(zip(SIDES, soles, strict=True)):
-        for place, (joint, point) in enumerate((sole or {}).items()):
-            points[foot, place] = _moved(skeleton, matrices, joint, point)
-        for joint, x, y, z in (*OUTLINE, *TIP):
-            name = f"{side}_{joint}"
-            centre = skeleton.centres[skeleton.number(name)]
-            edge = np.array([centre[0] + (x if side == "l" else -x), y, centre[2] + z])
-            lowest[foot] = np.minimum(lowest[foot], _moved(skeleton, matrices, name, edge)[:, 1])
-    middles = points.mean(axis=1)
-    return find_standing(lowest - ground.find(lowest, middles).under(middles), points, rate)
+    feet = [foot_frames(skeleton, matrices, side) for side in SIDES]
+    ends = [heel_and_ball(skeleton, foot, side) for foot, side in zip(feet, SIDES, strict=True)]
+    if len(matrices) < 2 or ends[0] is None or ends[1] is None:
+        return np.zeros((2, len(matrices)), dtype=np.bool_)
+    lowest = np.array([
+        lowest_edge(skeleton, foot, side, SOLE) for foot, side in zip(feet, SIDES, strict=True)
+    ])  # fmt: skip
+    points = np.array(ends)
+    return find_standing(lowest - ground.level_under(lowest, points), points, rate)
+
+
+def heel_and_ball(
+    skeleton: Skeleton, frames: Mapping[str, tuple[Float64, Float64]], side: str
+) -> list[Float64] | None:
+    """Return where heel and ball of a sole are, (T, 3) each; None for a skeleton that lacks a joint of it.
+
+    frames: joint -> position (T, 3) and rotation (T, 3, 3). side: "l" or "r".
+    """
+    soles = sole_points(skeleton, side)
+    if soles is None:
+        return None
+    return [
+        frames[name][0] + frames[name][1] @ (point - skeleton.centres[skeleton.number(name)])
+        for name, point in soles.items()
+    ]
 
 
 def find_standing(above: Float64, points: Float64, rate: float) -> Bool:
     """Return bool (2, T): when feet stand on the ground.
 
     above: (2, T), heights of the soles above the ground, metres. points: (2, 2, T, 3), heels and balls. The
-    lower foot, while it is level and not far from the ground, stands on it, even if it slides or a treadmill
-    carries it; so does the other one while an end of it is still, up to `PLACED_HEIGHT` higher, by which
-    captures of feet are often off.
+    lower foot stands while its height is steady and near the ground, even if it slides or a treadmill carries
+    it. The other foot stands while its heel or ball is still; as captures are often wrong by that much, it
+    may be up to `PLACED_HEIGHT` higher.
     """
     if above.shape[1] < 2:
         return np.zeros(above.shape, dtype=np.bool_)
@@ -89,16 +94,8 @@ def find_standing(above: Float64, points: Float64, rate: float) -> Bool:
 
 
 def _fastest(speed: Float64, rate: float, seconds: float) -> Float64:
-    """Return the highest of speeds (2, T) within this number of seconds around each frame."""
+    """Return the highest of speeds (2, T) within a window of `seconds` around each frame."""
     half = round(seconds * rate / 2)
     around = np.pad(speed, ((0, 0), (half, half)), mode="edge")
     result: Float64 = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2)
     return result
-
-
-def _moved(skeleton: Skeleton, matrices: Float64, joint: str, point: Float64) -> Float64:
-    """Return where a point of the default posture (3,) that moves with a joint is: (T, 3)."""
-    number = skeleton.number(joint)
-    own = matrices[:, number]
-    moved: Float64 = own[:, :3, 3] + own[:, :3, :3] @ (point - skeleton.centres[number])
-    return moved

@@ -4,28 +4,38 @@ Captured faces to FAPs: blendshapes, action units, markers, tracked points.
 May use: parameters, face and body, and the modules of `fba` itself.
 """
 
-from fba.capture._report import BoneError, FeetError, RetargetReport, retarget_report
+from fba.capture._conversion import FaceCapture, capture_options, make_animation
+from fba.capture._report import BoneError, FeetError, RetargetReport, measure_bones, retarget_report
+from fba.capture._retarget import SkeletonOptions
 from fba.capture.action_units import ActionUnitMotion, from_action_units
 from fba.capture.blendshapes import ShapeMotion, from_blendshapes, to_blendshapes
-from fba.capture.markers import MarkerMotion, from_markers
+from fba.capture.markers._faces import from_markers
+from fba.capture.markers.motion import MarkerMotion
 from fba.capture.motion import SkeletonMotion
 from fba.capture.points import PointMotion, from_points
-from fba.capture.skeleton import from_skeleton
+from fba.capture.skeleton import Captured, from_skeleton, retarget_motion
 
 __all__ = [
     "ActionUnitMotion",
     "BoneError",
+    "Captured",
+    "FaceCapture",
     "FeetError",
     "MarkerMotion",
     "PointMotion",
     "RetargetReport",
     "ShapeMotion",
     "SkeletonMotion",
+    "SkeletonOptions",
+    "capture_options",
     "from_action_units",
     "from_blendshapes",
     "from_markers",
     "from_points",
     "from_skeleton",
+    "make_animation",
+    "measure_bones",
+    "retarget_motion",
     "retarget_report",
     "to_blendshapes",
 ]

@@ -14,7 +14,7 @@ from fba.body import BapSolver, ground
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture._limbs import soles
 from fba.capture.motion import SkeletonMotion
-from fba.capture.preparation import prepare
+from fba.capture.preparation import Preparation, prepare
 from fba.errors import ModelError
 
 POSED_FRAMES = 2048
@@ -101,14 +101,22 @@ def retarget_report(
     frame in common with the motion; errors of names and skeletons as from `from_skeleton`.
     """
     solver = solver if solver is not None else BapSolver()
-    skeleton = solver.skeleton
     if animation.body is None:
         raise ModelError("retarget_report: the animation has no body")
     if not len(motion) or not len(animation):
         raise ModelError("retarget_report: the motion and the animation have no frame in common")
-    ready = prepare(motion, skeleton, joints=joints, rest=rest, up=up)
-    motion, mapped, family = ready.motion, ready.mapped, ready.family
-    motion = motion.resample(animation.rate)
+    ready = prepare(motion, solver.skeleton, joints=joints, rest=rest, up=up)
+    return measure_bones(ready, animation, scale=scale, solver=solver)
+
+
+def measure_bones(
+    ready: Preparation, animation: Animation, *, scale: float | None = None, solver: BapSolver | None = None
+) -> RetargetReport:
+    """Return the same as `retarget_report` for a motion that was prepared, and an animation with a body."""
+    solver = solver if solver is not None else BapSolver()
+    skeleton, mapped = solver.skeleton, ready.mapped
+    motion = ready.motion.resample(animation.rate)
+    assert animation.body is not None
     count = min(len(motion), len(animation))
 
     alignment = rest_alignment.align(motion, mapped, skeleton)
@@ -130,7 +138,7 @@ def retarget_report(
                 bone = skeleton.centres[order[aim]] - skeleton.centres[order[joint]]
                 frames_of_bone = rotations.matrices(turned[begin:end, mapped[joint]])
                 theirs = frames_of_bone @ (alignment.corrections[joint] @ bone)
-            angles[begin:end, column] = _between(ours, theirs)
+            angles[begin:end, column] = rotations.degrees_between(ours, theirs)
         frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
         own = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3])
         has_feet = own is not None
@@ -150,7 +158,7 @@ def retarget_report(
     standing = _feet(source, heights, float(motion.rate)) if has_feet and source is not None else None
     used = set(mapped.values())
     return RetargetReport(
-        family,
+        ready.family,
         count,
         bones,
         standing,
@@ -163,17 +171,9 @@ def retarget_report(
     )
 
 
-def _between(a: Float64, b: Float64) -> Float64:
-    """Return degrees (T,) between vectors (T, 3)."""
-    sine = np.linalg.norm(np.cross(a, b), axis=1)
-    result: Float64 = np.degrees(np.arctan2(sine, np.sum(a * b, axis=1)))
-    return result
-
-
 def _feet(source: soles.Soles, body: Float64, rate: float) -> FeetError | None:
     """Return the errors of the soles' heights, body (2, T); None if no foot is on the ground."""
-    middles = source.points.mean(axis=1)
-    level = ground.find(source.lowest, middles).under(middles)
+    level = ground.level_under(source.lowest, source.points)
     above = soles.settle(source.lowest - level, source.points, rate)[:, : body.shape[1]]
     level = level[:, : body.shape[1]]
     standing = above < MAX_GROUND_HEIGHT

@@ -8,7 +8,6 @@ default posture clavicles are as in someone whose arms hang, and soles are flat.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -38,8 +37,8 @@ USUAL_SLOPE = -27.0
 
 def correct_rest(motion: SkeletonMotion, mapped: Mapping[str, int]) -> SkeletonMotion:
     """Return a motion, y up, whose rest pose has clavicles as with hanging arms, and flat feet."""
-    rows = np.unique(np.linspace(0, len(motion) - 1, min(len(motion), FRAMES)).astype(np.intp))
-    few = replace(motion, rotations=motion.rotations[rows], positions=motion.positions[rows])
+    rows = motion.spread(FRAMES)
+    few = motion.select(rows)
     quaternions, positions = few.world()
     turned = rotations.matrices(quaternions)
     rest = np.tile(np.eye(3), (len(motion.names), 1, 1))
@@ -57,7 +56,7 @@ def _correct_clavicle(
     if not all(joint in mapped for joint in needed):
         return
     inner, shoulder, elbow = (mapped[joint] for joint in needed)
-    arm = standing.unit(positions[:, elbow] - positions[:, shoulder])
+    arm = rotations.unit(positions[:, elbow] - positions[:, shoulder])
     low = np.flatnonzero(arm[:, 1] < -LOW_ARM)
     above = int(motion.parents[inner])
     if above < 0 or len(low) < FEWEST_LOW:
@@ -89,7 +88,7 @@ def _correct_feet(
         up = turned[still, ankle][:, 1].mean(axis=0)  # world up as the foot sees it
         if np.degrees(np.arccos(np.clip(np.linalg.norm(up), 0.0, 1.0))) > STEADY:
             return
-        ups.append(standing.unit(up))
+        ups.append(rotations.unit(up))
     facing = standing.measure(at_rest[None], mapped)
     ahead, left = np.cross(facing.left[0], [0.0, 1.0, 0.0]), facing.left[0]
     pitch = [float(np.degrees(np.arctan2(up @ ahead, up[1]))) for up in ups]

@@ -58,8 +58,7 @@ def rest_from_motion(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton
 
     mapped: joint of the body -> number of the source's joint.
     """
-    rows = np.unique(np.linspace(0, len(motion) - 1, min(len(motion), FRAMES)).astype(np.intp))
-    few = replace(motion, rotations=motion.rotations[rows], positions=motion.positions[rows])
+    few = motion.select(motion.spread(FRAMES))
     return _Finder(few, mapped, skeleton).apply(motion)
 
 
@@ -72,7 +71,7 @@ class _Finder:
         self.turned = rotations.matrices(turned)  # (T, J, 3, 3)
         self.axes = rotations.matrices(motion.axes)
         stance = standing.measure(self.positions, mapped)
-        tilt = standing.between(stance.up, np.array([0.0, 1.0, 0.0]))
+        tilt = rotations.degrees_between(stance.up, np.array([0.0, 1.0, 0.0]))
         self.distance = np.hypot(stance.distance, tilt)
         count = max(1, round(STANDING_SHARE * len(self.distance)))
         self.standing: Intp = np.argsort(self.distance, kind="stable")[:count].astype(np.intp)
@@ -114,16 +113,16 @@ class _Finder:
 
         like: axis of the bone above, which counts within `SAME_AXIS`.
         """
-        direction = standing.unit(direction)
+        direction = rotations.unit(direction)
         axes = self.axes[joint].T  # rows: the joint's own axes
         sizes = axes @ direction
         best = int(np.argmax(np.abs(sizes)))
         axis: Float64 = axes[best] * np.sign(sizes[best])
-        angle = float(standing.between(axis, direction))
+        angle = float(rotations.degrees_between(axis, direction))
         self.on_axes.append(angle <= within)
         if angle <= within:
             return axis
-        if like is not None and angle <= SAME_AXIS and float(standing.between(axis, like)) < 1.0:
+        if like is not None and angle <= SAME_AXIS and float(rotations.degrees_between(axis, like)) < 1.0:
             return axis
         return direction
 
@@ -135,12 +134,12 @@ class _Finder:
             line = self.positions[:, self.mapped[aim]] - self.positions[:, self.mapped[joint]]
             local = self._local(self.mapped[joint], line)
             if np.linalg.norm(local) > 1e-9:
-                return aim, standing.unit(local)
+                return aim, rotations.unit(local)
         return None
 
     def _default(self, joint: str, aim: str) -> Float64:
         centres, number = self.skeleton.centres, self.skeleton.number
-        return standing.unit(centres[number(aim)] - centres[number(joint)])
+        return rotations.unit(centres[number(aim)] - centres[number(joint)])
 
     def _set(self, joint: int, own: tuple[Float64, Float64], body: tuple[Float64, Float64]) -> None:
         """Let two directions of a joint, the first exactly, be two of the body in the default posture."""
@@ -159,7 +158,7 @@ class _Finder:
         for position, joint in enumerate(spine):
             number = self.mapped[joint]
             share = min(position / max(len(back) - 1, 1), 1.0)
-            row = standing.unit(rows["hips"] * (1 - share) + rows["chest"] * share)
+            row = rotations.unit(rows["hips"] * (1 - share) + rows["chest"] * share)
             rigid = joint in (ROOT, back[-1])
             if joint == back[-1] and chest is not None and len(back) > 1:
                 left = self._local(number, chest)
@@ -191,7 +190,7 @@ class _Finder:
         size = float(np.ptp(self.positions[0], axis=0).max())
         if np.linalg.norm(line, axis=1).min() < 0.01 * size:
             return None
-        return standing.unit(line)
+        return rotations.unit(line)
 
     def _limbs(self) -> None:
         x = np.array([1.0, 0.0, 0.0])
@@ -220,8 +219,8 @@ class _Finder:
             self._set(high, (first[1], mean), (self._default(upper, lower), axis))
             return
         low = self.mapped[lower]
-        thigh = standing.unit(self.positions[:, low] - self.positions[:, high])
-        shank = standing.unit(self.positions[:, self.mapped[end]] - self.positions[:, low])
+        thigh = rotations.unit(self.positions[:, low] - self.positions[:, high])
+        shank = rotations.unit(self.positions[:, self.mapped[end]] - self.positions[:, low])
         bend = np.cross(thigh, shank)  # longer where the bend is clearer
         sines = np.linalg.norm(bend, axis=1)
         clear = sines > LEAST_BEND
@@ -248,7 +247,7 @@ class _Finder:
         ends = self.motion.end_offsets[self.motion.end_parents == number]
         line = self._bone(f"{side}_index1", f"{side}_pinky1") or self._bone(f"{side}_index1", f"{side}_ring1")
         if bone is not None and line is not None:
-            row = standing.unit(
+            row = rotations.unit(
                 self.positions[:, self.mapped[line[0]]] - self.positions[:, self.mapped[f"{side}_index1"]]
             )
             across = self._local(number, row)
@@ -265,9 +264,9 @@ class _Finder:
         if bone is not None:
             along, body = bone[1], self._default(wrist, bone[0])
         elif len(ends) and np.linalg.norm(ends.mean(axis=0)) > 0:
-            along, body = standing.unit(ends.mean(axis=0)), self._default(wrist, f"{side}_middle1")
+            along, body = rotations.unit(ends.mean(axis=0)), self._default(wrist, f"{side}_middle1")
         else:
-            forearm = standing.unit(self.positions[:, number] - self.positions[:, above])
+            forearm = rotations.unit(self.positions[:, number] - self.positions[:, above])
             along = self._snap(number, self._local(number, forearm), CLOSE_AXIS)
             body = self._default(wrist, f"{side}_middle1")
         self._set(number, (along, seen), (body, axis))
@@ -304,7 +303,7 @@ class _Finder:
         above = self._known_above(number)
         rows = self.standing
         if shoulder in self.mapped and elbow in self.mapped:
-            arm = standing.unit(
+            arm = rotations.unit(
                 self.positions[:, self.mapped[elbow]] - self.positions[:, self.mapped[shoulder]]
             )
             low = np.flatnonzero(arm[:, 1] < -LOW_ARM)
@@ -375,17 +374,17 @@ def with_rest(motion: SkeletonMotion, rest: Float64) -> SkeletonMotion:
 
 def _frame(first: Float64, second: Float64) -> Float64:
     """Return axes as columns (3, 3): the first direction, the second made square to it, and their product."""
-    a = standing.unit(first)
+    a = rotations.unit(first)
     b = second - a * (a @ second)
     if np.linalg.norm(b) < 1e-6:
         b = np.cross(a, np.eye(3)[int(np.argmin(np.abs(a)))])
-    b = standing.unit(b)
+    b = rotations.unit(b)
     return np.stack([a, b, np.cross(a, b)], axis=1)
 
 
 def _across(direction: Float64, bone: Float64) -> Float64:
     """Return the part of a direction that is square to a bone."""
-    result: Float64 = standing.unit(direction - bone * (bone @ direction))
+    result: Float64 = rotations.unit(direction - bone * (bone @ direction))
     return result
 
 

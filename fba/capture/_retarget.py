@@ -1,8 +1,9 @@
-"""Find the targets of the body's joints that make it move like a captured skeleton."""
+"""`SkeletonOptions`, and the targets of joints with which a body moves like a captured skeleton."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -22,6 +23,9 @@ from fba.capture.motion import SkeletonMotion
 from fba.errors import FbaWarning, ModelError, Remedy
 from fba.parameters import baps
 
+ORIGINS = ("source", "start", "middle")
+GROUNDS = ("floor", "source", "none")
+SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spine.GROUPS}
 HINGES = (("shoulder", "elbow"), ("hip", "knee"))
 LOOSE = 1e-3
 """Weight of staying close to the source's angles, relative to a bone's direction."""
@@ -40,24 +44,67 @@ CLAVICLE_SHARE = 0.5
 """Share of the clavicle's turn at the breastbone's joint; the joint at the shoulder blade takes the rest."""
 
 
-@dataclass(frozen=True)
-class Retargeting:
-    """How a body follows a source.
+@dataclass(frozen=True, kw_only=True)
+class SkeletonOptions:
+    """How the motion of a skeleton becomes BAPs.
 
-    groups: number of groups of vertebrae that share the spine's rotations, 0 for only the joints of the
-    source. with_anchors: the source's joints turn, too. scale, ground, plant: as for
-    `fba.capture.from_skeleton`.
+    scale: metres of the body for one unit of the source's root translation; None for the ratio of leg
+    lengths, so that the source's unit does not matter and feet do not slide.
+
+    origin: what is at the body's default position: "source", the source's own origin; "start", the first
+    frame; "middle", the middle of the path, which keeps long walks within the ranges of a stream. ground: how
+    the height of the feet is corrected for the body's own proportions: "floor", feet stand on the ground at
+    height 0, whatever the height of the source's ground; "source", at the height of the source's ground;
+    "none", not corrected. plant: also bend and swing the legs a little, and move the body, so that feet have
+    exactly the height of the source's and slip no more than these; no effect with ground "none".
+
+    spine: "spread" divides the spine's rotations between the vertebrae of groups Spine1 and Spine2 and those
+    of the source's joints, "full" between all vertebrae; both keep the directions of the source's bones
+    exactly. "simple" turns the four vertebrae of group Spine1 only, a number those of the groups Spine1 up to
+    that one: these keep the rotation of the head, and the rest as closely as possible. "joints" turns one
+    vertebra for each joint of the source.
+
+    joints: source joint name -> joint of the standard, in place of what the motion declares and of the
+    built-in families of names. rest, up: the rest pose and the axis that points up; by default both are
+    found, see `fba.capture.preparation.prepare`.
+
+    Raises ValueError for a wrong value.
     """
 
-    groups: int
-    with_anchors: bool
-    scale: float | None
-    ground: str
-    plant: bool
+    scale: float | None = None
+    origin: str = "source"
+    ground: str = "floor"
+    plant: bool = True
+    spine: str | int = "spread"
+    joints: Mapping[str, str] | None = None
+    rest: str | int = "auto"
+    up: str = "auto"
+
+    def __post_init__(self) -> None:
+        if self.origin not in ORIGINS:
+            raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {self.origin!r}")
+        if self.ground not in GROUNDS:
+            raise ValueError(f"ground must be one of {', '.join(GROUNDS)}, not {self.ground!r}")
+        if not 0 <= self.groups <= SPINES["full"]:
+            raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {self.spine!r}")
+        if self.scale is not None and not (np.isfinite(self.scale) and self.scale > 0):
+            raise ValueError(f"scale must be a positive number, not {self.scale}")
+
+    @property
+    def groups(self) -> int:
+        """Groups of vertebrae that share the spine's rotations; -1 for what is no choice."""
+        if isinstance(self.spine, str):
+            return SPINES.get(self.spine, -1)
+        return self.spine if isinstance(self.spine, int) else -1
+
+    @property
+    def turns_same_joints(self) -> bool:
+        """Whether the joints of the source's spine turn, too."""
+        return self.spine in ("spread", "joints")
 
 
 def find_targets(
-    motion: SkeletonMotion, mapped: dict[str, int], solver: BapSolver, how: Retargeting
+    motion: SkeletonMotion, mapped: dict[str, int], solver: BapSolver, options: SkeletonOptions
 ) -> tuple[dict[str, Float64], Float64]:
     """Return targets of the body's joints and its root, in world axes.
 
@@ -73,9 +120,9 @@ def find_targets(
         turned[joint] = rotations.matrices(source_rotations[:, source]) @ correction
     _turn_pelvis(motion, mapped, source_rotations, source_positions, turned)
     anchors = [joint for joint in spine.joints(skeleton) if joint in mapped]
-    if how.groups and len(anchors) > 1:
+    if options.groups and len(anchors) > 1:
         positions = {joint: source_positions[:, mapped[joint]] for joint in anchors}
-        spine.spread(skeleton, turned, positions, anchors, how.groups, how.with_anchors)
+        spine.spread(skeleton, turned, positions, anchors, options.groups, options.turns_same_joints)
     feet = {
         side: turned[f"{side}_ankle"]
         for side in "lr"
@@ -92,10 +139,10 @@ def find_targets(
         turn_foot(targets, side)
         for finger in FINGERS:
             _curl_finger(targets, f"{side}_{finger}")
-    metres = _metres_per_unit(targets) if how.scale is None else how.scale
+    metres = _metres_per_unit(targets) if options.scale is None else options.scale
     root = _root_positions(targets, metres)
-    if how.ground != "none":
-        root = plant_feet(targets, root, metres, how.ground, how.plant)
+    if options.ground != "none":
+        root = plant_feet(targets, root, metres, options.ground, options.plant)
     return targets.rotations, root
 
 

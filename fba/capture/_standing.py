@@ -13,6 +13,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.body.skeleton import ROOT
+from fba.rotations import degrees_between, unit
 
 MAX_ANGLES = {
     "thigh": 45.0,
@@ -129,31 +130,31 @@ def measure(positions: Float64, mapped: Mapping[str, int]) -> Stance:
         ):
             limbs[side, a] = bone(f"{side}_{a}", f"{side}_{b}")
         if (thigh := limbs[side, "hip"]) is not None:
-            add("thigh", between(thigh, np.array([0.0, -1.0, 0.0])))
+            add("thigh", degrees_between(thigh, np.array([0.0, -1.0, 0.0])))
             if (shank := limbs[side, "knee"]) is not None:
-                add("knee", between(thigh, shank))
+                add("knee", degrees_between(thigh, shank))
         if (arm := limbs[side, "shoulder"]) is not None and (fore := limbs[side, "elbow"]) is not None:
-            add("elbow", between(arm, fore))
+            add("elbow", degrees_between(arm, fore))
         if (foot := limbs[side, "ankle"]) is not None:
             add(
                 "toes",
-                between(
+                degrees_between(
                     foot * np.array([1.0, 0.0, 1.0]) + np.array([0.0, 0.0, 1e-9]), np.array([0.0, 0.0, 1.0])
                 ),
             )
         if (clavicle := bone(f"{side}_sternoclavicular", f"{side}_shoulder")) is not None:
-            add("clavicles", between(clavicle, np.array([1.0 if side == "l" else -1.0, 0.0, 0.0])))
+            add("clavicles", degrees_between(clavicle, np.array([1.0 if side == "l" else -1.0, 0.0, 0.0])))
     for what, a in (("legs", "hip"), ("legs", "knee"), ("arms", "shoulder"), ("arms", "elbow")):
         one, other = limbs["l", a], limbs["r", a]
         if one is not None and other is not None:
-            add(what, between(one, other * [-1.0, 1.0, 1.0]))
+            add(what, degrees_between(one, other * [-1.0, 1.0, 1.0]))
     shoulders = middle("l_shoulder"), middle("r_shoulder")
     if shoulders[0] is not None and shoulders[1] is not None:
         line = (axes @ unit(shoulders[0] - shoulders[1])[:, :, None])[:, :, 0]
-        add("shoulders", between(line, np.array([1.0, 0.0, 0.0])))
+        add("shoulders", degrees_between(line, np.array([1.0, 0.0, 0.0])))
     neck = bone("vc7", "skullbase")
     if neck is not None:
-        add("back", between(neck, np.array([0.0, 1.0, 0.0])) * 0.8)
+        add("back", degrees_between(neck, np.array([0.0, 1.0, 0.0])) * 0.8)
     return Stance(up, left, angles)
 
 
@@ -164,17 +165,4 @@ def row_turn(frames: Float64, row: Float64, at_rest: Float64) -> float:
     hip to the left one, or the same of shoulders. at_rest: (3,). 0 if the row has no length.
     """
     mean = np.einsum("tij,ti->j", frames, unit(row))
-    return float(between(mean, at_rest))
-
-
-def unit(vectors: Float64) -> Float64:
-    """Return vectors (..., 3) of length 1; zero stays zero."""
-    result: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
-    return result
-
-
-def between(a: Float64, b: Float64) -> Float64:
-    """Return the angles in degrees between vectors (..., 3)."""
-    sine = np.linalg.norm(np.cross(a, b), axis=-1)
-    result: Float64 = np.degrees(np.arctan2(sine, np.sum(a * b, axis=-1)))
-    return result
+    return float(degrees_between(mean, at_rest))

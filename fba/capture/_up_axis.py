@@ -55,6 +55,15 @@ class _Floor:
     carries: bool
 
 
+@dataclass(frozen=True, eq=False)
+class _Moments:
+    """Places (T, J, 3) of joints, and where they are some seconds later."""
+
+    places: Float64
+    later: Float64
+    seconds: float
+
+
 def find_up_axis(
     motion: SkeletonMotion,
     positions: Float64,
@@ -88,7 +97,8 @@ def find_up_axis(
         return Up(own, max(clear, 0.8), (
             f"{own}: people stand along it, as in the rest pose ({100 * clear:.0f} %)"
         ))  # fmt: skip
-    floors = {name: _find_floor(motion, mapped, name) for name in UPS}
+    moments = _find_moments(motion)
+    floors = {name: _find_floor(moments, mapped, name) for name in UPS}
     stood = upright and floors[trunk].carries
     if floors[own].carries or (floors[own].touched and not stood):
         doubt = ""
@@ -117,7 +127,8 @@ def _find_freely(
     if not stands and trunk[1] == "x":
         return Up(trunk, 0.4, f"perhaps {trunk}: trunks point along it, but nobody ever stands")
     first = [trunk] if clear >= MIN_UP_LENGTH and trunk in ("+y", "+z") else []
-    floors = {name: _find_floor(motion, mapped, name) for name in {"+y", "+z", trunk}}
+    moments = _find_moments(motion)
+    floors = {name: _find_floor(moments, mapped, name) for name in {"+y", "+z", trunk}}
     found = next((name for name in (*first, "+y", "+z") if floors[name].touched), trunk)
     if found != trunk:
         doubt = f"joints rest on a floor along it, but trunks point along {trunk}, and nobody can rest so"
@@ -132,24 +143,27 @@ def _find_freely(
     return Up(trunk, clear, f"{trunk}: people stand along it ({100 * clear:.0f} %)", doubt)
 
 
-def _find_floor(motion: SkeletonMotion, mapped: Mapping[str, int], up: str) -> _Floor:
-    """Return what joints rest on if an axis points up: the lowest of all that keep their places."""
+def _find_moments(motion: SkeletonMotion) -> _Moments:
+    """Return where joints are in some frames, and a little later."""
     step = max(1, round(REST_INTERVAL * motion.rate))
     last = max(len(motion) - 1 - step, 0)
     rows = np.unique(np.linspace(0, last, min(last + 1, SAMPLE_FRAMES)).astype(np.intp))
-    places, later = (
-        replace(motion, rotations=motion.rotations[some], positions=motion.positions[some]).world()[1]
-        for some in (rows, np.minimum(rows + step, len(motion) - 1))
+    later = np.minimum(rows + step, len(motion) - 1)
+    return _Moments(
+        motion.select(rows).world()[1], motion.select(later).world()[1], step / float(motion.rate)
     )
+
+
+def _find_floor(moments: _Moments, mapped: Mapping[str, int], up: str) -> _Floor:
+    """Return what joints rest on if an axis points up: the lowest of all that keep their places."""
+    places = moments.places
     joints = sorted(set(mapped.values()))
     size = _height(places, mapped)
     axis = read_axis(up)
     heights = places[:, joints] @ axis
     level = float(np.percentile(heights.min(axis=1), 10))
-    moved = np.linalg.norm(later[:, joints] - places[:, joints], axis=2)
-    rests = (heights < level + MAX_FLOOR_DISTANCE * size) & (
-        moved < MAX_REST_SPEED * size * step / float(motion.rate)
-    )
+    moved = np.linalg.norm(moments.later[:, joints] - places[:, joints], axis=2)
+    rests = (heights < level + MAX_FLOOR_DISTANCE * size) & (moved < MAX_REST_SPEED * size * moments.seconds)
     touched = rests.any(axis=1)
     middle = [joints.index(mapped[name]) for name in MIDDLE if name in mapped] or list(range(len(joints)))
     flat = places[:, joints] * (1 - np.abs(axis))

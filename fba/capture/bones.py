@@ -14,10 +14,10 @@ import numpy as np
 from fba.body import Skeleton
 from fba.body.skeleton import ROOT
 from fba.capture import _named_bones as named_bones
-from fba.capture import _standing as standing
 from fba.capture import matching
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError, Remedy
+from fba.rotations import unit
 
 CORE = tuple(
     f"{side}_{joint}" for side in "lr" for joint in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
@@ -187,14 +187,14 @@ def refuse_swapped_sides(motion: SkeletonMotion, mapped: Mapping[str, int]) -> N
     knees: list[float] = []
     for side in "lr":
         hip, knee, ankle = (positions[:, mapped[f"{side}_{joint}"]] for joint in ("hip", "knee", "ankle"))
-        ahead = standing.unit(np.cross(left, hip - ankle))  # as this leg sees it, however the trunk leans
-        line, thigh = standing.unit(ankle - hip), knee - hip
+        ahead = unit(np.cross(left, hip - ankle))  # as this leg sees it, however the trunk leans
+        line, thigh = unit(ankle - hip), knee - hip
         off = thigh - line * (thigh * line).sum(axis=1, keepdims=True)
         reach = np.linalg.norm(thigh, axis=1) + np.linalg.norm(ankle - knee, axis=1)
         bent = np.linalg.norm(off, axis=1) > MIN_KNEE_BEND * reach
-        knees += (standing.unit(off[bent]) * ahead[bent]).sum(axis=1).tolist()
+        knees += (unit(off[bent]) * ahead[bent]).sum(axis=1).tolist()
         if f"{side}_metatarsal" in mapped:
-            way = standing.unit(positions[:, mapped[f"{side}_metatarsal"]] - ankle)
+            way = unit(positions[:, mapped[f"{side}_metatarsal"]] - ankle)
             toes += (way * ahead).sum(axis=1).tolist()
     toe = float(np.mean(toes)) if toes else None
     main = float(np.mean(knees)) if len(knees) >= MIN_BENT_FRAMES else toe

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
 from fba import rotations
-from fba.arrays import Float64, Int64
+from fba.arrays import Float64, Int64, Intp
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.tracks import FaceTrack
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +30,8 @@ class SkeletonMotion:
     axes: float64 (J, 4), quaternions of the joints' own axes in the rest pose,
         in the frame of the source; empty for the frame's own axes. posed: whether the rest pose may be any
         pose, since the source does not say which it is. up: the axis that the format says is up, such as
-        "+y"; empty where it says nothing.
+        "+y"; empty where it says nothing. face: returns the FAPs of the same person at times (F,), seconds
+        from the first frame, or None if the face does not move; None where the source has no face.
 
     Raises ModelError if the parts contradict each other or are not finite.
     """
@@ -46,6 +49,7 @@ class SkeletonMotion:
     axes: Float64 = field(default_factory=lambda: np.zeros((0, 4)))
     posed: bool = False
     up: str = ""
+    face: Callable[[Float64], FaceTrack | None] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "declared", dict(self.declared))
@@ -120,8 +124,22 @@ class SkeletonMotion:
         turned = rotations.interpolate(self.rotations, before, after, weight)
         return replace(self, rate=rate, rotations=turned, positions=positions)
 
+    def spread(self, most: int) -> Intp:
+        """Return the numbers of at most `most` frames, spread evenly over the motion."""
+        return np.unique(np.linspace(0, len(self) - 1, min(len(self), most)).astype(np.intp))
+
+    def select(self, rows: slice | Intp) -> SkeletonMotion:
+        """Return some frames of the motion, without the face, whose times they no longer have."""
+        if isinstance(rows, slice) and rows.indices(len(self)) == (0, len(self), 1):
+            return self
+        return replace(self, rotations=self.rotations[rows], positions=self.positions[rows], face=None)
+
     def world(self) -> tuple[Float64, Float64]:
-        """Return world rotations (T, J, 4), quaternions, and joint positions (T, J, 3)."""
+        """Return world rotations (T, J, 4), quaternions, and joint positions (T, J, 3), read-only."""
+        return self._world
+
+    @cached_property
+    def _world(self) -> tuple[Float64, Float64]:
         turned = np.array(self.rotations)
         positions = np.empty((len(self), len(self.names), 3))  # every joint is written below
         for joint, parent in enumerate(self.parents):
@@ -131,6 +149,7 @@ class SkeletonMotion:
             turned[:, joint] = rotations.multiply(turned[:, parent], self.rotations[:, joint])
             offset = rotations.matrices(turned[:, parent]) @ self.offsets[joint]
             positions[:, joint] = positions[:, parent] + offset
+        turned.flags.writeable = positions.flags.writeable = False
         return turned, positions
 
     def rest(self) -> Float64:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -91,7 +91,7 @@ def prepare(
     check_extent(motion)
     family, mapped, sure, how = find_bones(motion, joints, skeleton)
     confidence, reasons = {"bones": sure}, {"bones": how}
-    few = _few(motion)
+    few = motion.select(motion.spread(SAMPLE_FRAMES))
     quaternions, positions = few.world()
     at_rest = standing.measure(motion.rest()[None], mapped)
     found_up = find_up_axis(motion, positions, mapped, at_rest, up)
@@ -130,13 +130,8 @@ def prepare(
 
 def rest_on_frame(motion: SkeletonMotion, other: SkeletonMotion, frame: int) -> SkeletonMotion:
     """Return a motion whose rest pose is a frame of another of the same skeleton, or of itself."""
-    row = replace(other, rotations=other.rotations[[frame]], positions=other.positions[[frame]])
+    row = other.select(slice(frame, frame + 1))
     return with_rest(motion, rotations.matrices(row.world()[0][0]))
-
-
-def _few(motion: SkeletonMotion) -> SkeletonMotion:
-    rows = np.unique(np.linspace(0, len(motion) - 1, min(len(motion), SAMPLE_FRAMES)).astype(np.intp))
-    return replace(motion, rotations=motion.rotations[rows], positions=motion.positions[rows])
 
 
 def _refuse_doubt(result: Preparation, given_joints: bool, given_rest: bool, given_up: bool) -> None:
@@ -239,7 +234,7 @@ def _arms_out(positions: Float64, mapped: Mapping[str, int], stance: standing.St
     for side, sign in (("l", 1.0), ("r", -1.0)):
         if f"{side}_shoulder" not in mapped or f"{side}_wrist" not in mapped:
             return False
-        arm = standing.unit(positions[mapped[f"{side}_wrist"]] - positions[mapped[f"{side}_shoulder"]])
+        arm = rotations.unit(positions[mapped[f"{side}_wrist"]] - positions[mapped[f"{side}_shoulder"]])
         if float(arm @ stance.left[0]) * sign < np.cos(np.radians(10.0)):
             return False
     return True

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -17,17 +18,14 @@ from fba.body import BapSolver, Skeleton
 from fba.body.solve.solver import solve_track
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _retarget as retarget
-from fba.capture import _spine as spines
+from fba.capture._retarget import SkeletonOptions
 from fba.capture.bones import LIMBS
 from fba.capture.motion import SkeletonMotion
-from fba.capture.preparation import prepare
+from fba.capture.preparation import Preparation, prepare
 from fba.errors import FbaWarning, ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.tracks import BodyTrack
 
-ORIGINS = ("source", "start", "middle")
-GROUNDS = ("floor", "source", "none")
-SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spines.GROUPS}
 MAX_FRAMES = 500_000
 """Frames of the longest motion: more than an hour at 120 frames/s."""
 FRAME_BYTES = 2400
@@ -42,43 +40,33 @@ LIMB_BONES = tuple(bone for limb in LIMBS for bone in pairwise(limb))
 """Joints at both ends of each bone of a limb."""
 
 
+@dataclass(frozen=True, eq=False)
+class Captured:
+    """An animation that was made of a capture.
+
+    capture: the capture as it was read; None where the file holds FAPs and BAPs themselves. ready: a
+    skeleton's motion as it was prepared, with the bones that were found; None where nothing was prepared.
+    """
+
+    animation: Animation
+    capture: Any = None
+    ready: Preparation | None = None
+
+
 def from_skeleton(
     motion: SkeletonMotion,
     rate: Fraction | int | str | None = None,
     *,
-    joints: Mapping[str, str] | None = None,
-    scale: float | None = None,
-    origin: str = "source",
-    ground: str = "floor",
-    plant: bool = True,
-    spine: str | int = "spread",
-    rest: str | int = "auto",
-    up: str = "auto",
     solver: BapSolver | None = None,
     limits: Limits = DEFAULT_LIMITS,
+    **options: Any,
 ) -> Animation:
     """Return the BAPs of a captured motion: a body track that sends the BAPs of the joints that were found.
 
-    rate: frames per second; None for the motion's own, else it is resampled. joints: source joint name ->
-    joint of the standard, in place of what the motion declares and of the built-in families of names. scale:
-    metres of the body for one unit of the source's root translation; None for the ratio of leg lengths, so
-    that the source's unit does not matter and feet do not slide.
-
-    origin: what is at the body's default position: "source", the source's own origin; "start", the first
-    frame; "middle", the middle of the path, which keeps long walks within the ranges of a stream. ground: how
-    the height of the feet is corrected for the body's own proportions: "floor", feet stand on the ground at
-    height 0, whatever the height of the source's ground; "source", at the height of the source's ground;
-    "none", not corrected. plant: also bend and swing the legs a little, and move the body, so that feet have
-    exactly the height of the source's and slip no more than these; no effect with ground "none".
-
-    spine: "spread" divides the spine's rotations between the vertebrae of groups Spine1 and Spine2 and those
-    of the source's joints, "full" between all vertebrae; both keep the directions of the source's bones
-    exactly. "simple" turns the four vertebrae of group Spine1 only, a number those of the groups Spine1 up to
-    that one: these keep the rotation of the head, and the rest as closely as possible. "joints" turns one
-    vertebra for each joint of the source. solver: skeleton and axes; None for the default body.
-
-    rest, up: the rest pose and the axis that points up; by default both are found, see
-    `fba.capture.preparation.prepare`.
+    rate: frames per second; None for the motion's own, else it is resampled. solver: skeleton and axes; None
+    for the default body. limits: what a motion may need at another rate, see `fba.Limits`. options: the
+    fields of `SkeletonOptions`: scale, origin, ground, plant, spine, joints, rest and up. A motion that comes
+    with a face has its FAPs, too.
 
     Bones point in the directions of the source's bones. Where the source turns about an axis that a joint
     lacks, the joint before or after it turns instead. BAPs 181..183 are millimetres from the default standing
@@ -87,64 +75,67 @@ def from_skeleton(
     joint for joint, wherever its feet are: ground has no effect, and spine only if it is "simple", "full" or
     a number.
 
-    limits: what a motion may need at another rate, see `fba.Limits`.
-
     Raises ModelError if no family of names fits, the root of the solver's skeleton is not HumanoidRoot, the
     source has no size or there are more than 500,000 frames, LimitError for more than the limits allow,
     ValueError for a bad option or joint name. Warns
     (FbaWarning) of missing joints of a limb: they stay in the default posture.
     `fba.capture.retarget_report` measures how close the result comes.
     """
-    options = _Options(joints, scale, origin, ground, plant, spine, rest, up)
+    return retarget_motion(motion, rate, SkeletonOptions(**options), solver=solver, limits=limits).animation
+
+
+def retarget_motion(
+    motion: SkeletonMotion,
+    rate: Fraction | int | str | None = None,
+    options: SkeletonOptions | None = None,
+    *,
+    solver: BapSolver | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> Captured:
+    """Return what `from_skeleton` does, together with the motion and the bones that were found."""
+    options = options if options is not None else SkeletonOptions()
     solver = solver if solver is not None else BapSolver()
     rate = motion.rate if rate is None else Fraction(rate)
     _check_frames(motion, rate, limits)
-    return _retarget(motion, rate, options, solver, limits)
+    if _needs_no_retargeting(motion, options, solver):
+        level = motion.resample(rate, limits=limits)
+        ready = None
+        turned, root = _direct_targets(level, solver.skeleton, options.scale)
+    else:
+        ready = prepare(motion, solver.skeleton, joints=options.joints, rest=options.rest, up=options.up)
+        level = ready.motion.resample(rate, limits=limits)
+        _warn_of_missing(ready.mapped)
+        turned, root = retarget.find_targets(level, ready.mapped, solver, options)
+    if options.origin != "source":
+        centre = root[0] if options.origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
+        root[:, [0, 2]] -= (centre - solver.skeleton.centres[0])[[0, 2]]
+    body = solve_targets(turned, root, solver)
+    frames = np.arange(len(root))
+    face = None if motion.face is None else motion.face(frames / float(rate))
+    return Captured(Animation(rate, frames, face, body, motion.name), motion, ready)
 
 
-@dataclass(frozen=True)
-class _Options:
-    """Options of `from_skeleton`."""
+def _needs_no_retargeting(motion: SkeletonMotion, options: SkeletonOptions, solver: BapSolver) -> bool:
+    """Whether a motion is of the standard's own joints, and no option asks for more."""
+    return (
+        options.joints is None
+        and not motion.declared
+        and options.turns_same_joints
+        and (options.rest, options.up) == ("auto", "auto")
+        and is_direct(motion, solver.skeleton)
+    )
 
-    joints: Mapping[str, str] | None
-    scale: float | None
-    origin: str
-    ground: str
-    plant: bool
-    spine: str | int
-    rest: str | int
-    up: str
 
-    def __post_init__(self) -> None:
-        if self.origin not in ORIGINS:
-            raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {self.origin!r}")
-        if self.ground not in GROUNDS:
-            raise ValueError(f"ground must be one of {', '.join(GROUNDS)}, not {self.ground!r}")
-        if not 0 <= self.groups <= spines.GROUPS:
-            raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {self.spine!r}")
-        if self.scale is not None and not (np.isfinite(self.scale) and self.scale > 0):
-            raise ValueError(f"scale must be a positive number, not {self.scale}")
-
-    @property
-    def groups(self) -> int:
-        """Groups of vertebrae that share the spine's rotations; -1 for what is no choice."""
-        if isinstance(self.spine, str):
-            return SPINES.get(self.spine, -1)
-        return self.spine if isinstance(self.spine, int) else -1
-
-    @property
-    def turns_same_joints(self) -> bool:
-        """Whether the joints of the source's spine turn, too."""
-        return self.spine in ("spread", "joints")
-
-    def is_direct(self, motion: SkeletonMotion, solver: BapSolver) -> bool:
-        """Whether a motion is of the standard's own joints and needs no retargeting."""
-        return (
-            self.joints is None
-            and not motion.declared
-            and self.turns_same_joints
-            and (self.rest, self.up) == ("auto", "auto")
-            and is_direct(motion, solver.skeleton)
+def _warn_of_missing(mapped: Mapping[str, int]) -> None:
+    """Warn of the joints that limbs lack of which others are known."""
+    missing = [
+        joint for limb in LIMBS for joint in limb if any(j in mapped for j in limb) and joint not in mapped
+    ]
+    if missing:
+        warnings.warn(
+            f"the source has no joints for {', '.join(missing)}; they stay as they are",
+            FbaWarning,
+            stacklevel=4,
         )
 
 
@@ -161,39 +152,6 @@ def _check_frames(motion: SkeletonMotion, rate: Fraction, limits: Limits) -> Non
     if frames > len(motion):
         own_bytes = motion.rotations.nbytes + motion.positions.nbytes
         check_memory(limits, frames, len(motion.names), f"the motion at {float(rate):g} frames/s", own_bytes)
-
-
-def _retarget(
-    motion: SkeletonMotion, rate: Fraction, options: _Options, solver: BapSolver, limits: Limits
-) -> Animation:
-    """Return the BAPs of a motion at a rate."""
-    direct = options.is_direct(motion, solver)
-    mapped: dict[str, int] = {}
-    if not direct:
-        ready = prepare(motion, solver.skeleton, joints=options.joints, rest=options.rest, up=options.up)
-        motion, mapped = ready.motion, ready.mapped
-    motion = motion.resample(rate, limits=limits)
-    missing = [
-        joint for limb in LIMBS for joint in limb if any(j in mapped for j in limb) and joint not in mapped
-    ]
-    if missing:
-        warnings.warn(
-            f"the source has no joints for {', '.join(missing)}; they stay as they are",
-            FbaWarning,
-            stacklevel=3,
-        )
-    if direct:
-        turned, root = _direct_targets(motion, solver.skeleton, options.scale)
-    else:
-        how = retarget.Retargeting(
-            options.groups, options.turns_same_joints, options.scale, options.ground, options.plant
-        )
-        turned, root = retarget.find_targets(motion, mapped, solver, how)
-    if options.origin != "source":
-        centre = root[0] if options.origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
-        root[:, [0, 2]] -= (centre - solver.skeleton.centres[0])[[0, 2]]
-    track = solve_targets(turned, root, solver)
-    return Animation(motion.rate, np.arange(len(root)), None, track, motion.name)
 
 
 def solve_targets(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fba.animation import Animation
-from fba.cli.inputs import Reading
+from fba.cli.inputs import ReadFile, Reading
 from fba.cli.printing import colour_grade
 from fba.errors import FbaError, FbaWarning
 from fba.parameters import baps
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from fba.arrays import Float64, UInt8
     from fba.capture import SkeletonMotion
     from fba.capture.comparison import Comparison, Difference
+    from fba.capture.preparation import Preparation
     from fba.codec import ClampedParameter
 
 NAME_WIDTH, PART_WIDTH = 16, 24
@@ -89,7 +90,7 @@ class CodedBody:
 
 
 def compare_captures(
-    captures: Sequence[Path],
+    captures: Sequence[ReadFile],
     body: CodedBody,
     options: Mapping[str, Any],
     reading: Reading,
@@ -102,44 +103,58 @@ def compare_captures(
     compare all frames, and bones before coding.
     """
     from fba import rotations
-    from fba.body import Skeleton
-    from fba.capture import retarget_report
+    from fba.capture import measure_bones
     from fba.capture.comparison import compare
-    from fba.capture.comparison.measurement import rows_of
     from fba.capture.motion import read_axis
-    from fba.capture.preparation import prepare
-    from fba.formats import format_of
 
-    given = {name: options[name] for name in ("joints", "rest", "scale", "up")}
-    asked = {name: value for name, value in given.items() if name != "scale"}
     reports = []
-    for path in captures:
-        reader = format_of(path, reading.format)
-        assert reader.read_motion is not None  # the caller names captures only
+    for file in captures:
+        if file.animation.body is None:  # the file has a face alone, and the body comes from another
+            continue
         try:
-            motion = reader.read_motion(path, **({} if reader.list_clips is None else {"clip": reading.clip}))
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", FbaWarning)  # the reader has said it
-                ready = prepare(motion, Skeleton.default(), **asked)
-            if body.lead:
-                motion = rows_of(motion.resample(body.before.rate), slice(body.lead, None))
-        except FbaError:  # the file has a face alone, and the body comes from another
+            motion, ready = _find_motion(file, options, reading)
+        except FbaError:
             if detailed:
                 raise
             continue
+        if body.lead:
+            rate, rows = body.before.rate, slice(body.lead, None)
+            motion = motion.resample(rate).select(rows)
+            ready = replace(ready, motion=ready.motion.resample(rate).select(rows))
+        path, scale = file.path, options["scale"]
         level = 0.0 if options["ground"] == "floor" else None
         up = rotations.between(read_axis(ready.up), np.array([0.0, 1.0, 0.0]))
         most = None if detailed else SAMPLE
-        scale = options["scale"]
         comparison = compare(motion, body.after, ready.mapped, scale=scale, up=up, level=level, most=most)
         comparison = comparison.with_more(_clamped_differences(body.clamped))
         bones = None
         if detailed:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", FbaWarning)
-                bones = asdict(retarget_report(motion, body.before, **given))
+            bones = asdict(measure_bones(ready, body.before, scale=scale))
         reports.append(CaptureReport(path, motion, ready.mapped, body.after, comparison, bones, up, scale))
     return reports
+
+
+def _find_motion(
+    file: ReadFile, options: Mapping[str, Any], reading: Reading
+) -> tuple[SkeletonMotion, Preparation]:
+    """Return the motion that a body was made of, and how it was prepared.
+
+    A file with BAPs has not been read as a motion, and one of the standard's own joints not been prepared.
+    """
+    from fba.body import Skeleton
+    from fba.capture.preparation import prepare
+    from fba.cli.joint_options import read_capture
+
+    assert file.captured is not None  # the caller names captures only
+    motion, ready = file.captured.capture, file.captured.ready
+    if motion is None:
+        motion = read_capture(file.path, reading)
+    if ready is None:
+        asked = {name: options[name] for name in ("joints", "rest", "up")}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)  # the reader has said it
+            ready = prepare(motion, Skeleton.default(), **asked)
+    return motion, ready
 
 
 def report_values(report: CaptureReport) -> dict[str, Any]:

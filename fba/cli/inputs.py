@@ -25,12 +25,12 @@ from fba.source import read_whole
 
 if TYPE_CHECKING:
     from fba.body import BodyModel
+    from fba.capture import Captured, FaceCapture
     from fba.codec import StreamInfo
     from fba.face import FaceModel
     from fba.formats import Format
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
-    from fba.formats.registry import FaceCapture
 
 NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
 
@@ -141,13 +141,16 @@ class Reading:
 class ReadFile:
     """An animation, and what else its file says.
 
-    format: of the file. rate: of the file, before it was resampled. table: of BAP steps, of a stream with a
-    body; else None. doubt: the warning that this table looks wrong; None without.
+    path, format: of the file. rate: of the file, before it was resampled. captured: what a capture was made
+    of; None for other files. table: of BAP steps, of a stream with a body; else None. doubt: the warning that
+    this table looks wrong; None without.
     """
 
+    path: Path
     animation: Animation
     format: Format
     rate: Fraction
+    captured: Captured | None = None
     table: str | None = None
     doubt: str | None = None
 
@@ -179,7 +182,6 @@ def read_file(
     replace a header that a file lacks. capture: options for the readers of motion capture.
     """
     from fba.codec import marked_table
-    from fba.formats import read
 
     limits, table = reading.limit, reading.bap_steps
     marked: str | None = None
@@ -201,14 +203,16 @@ def read_file(
             "clip": reading.clip,
             **(capture or {}),
         }
-        animation = read(file, format=reader.name, **_taken(reader, options))
+        taken = _taken(reader, options)
+        captured = reader.read_captured(file, **taken) if reader.is_capture else None
+        animation = reader.read(file, **taken) if captured is None else captured.animation
     has_table = is_stream and animation.body is not None
     if has_table and reading.bap_steps != BAP_STEPS_AUTO:
         doubt = step_tables.warn_of_doubt(path, animation, table, marked)
     rate = animation.rate
     if fps is not None and rate != fps:
         animation = animation.resample(fps, limits=limits)
-    return ReadFile(animation, reader, rate, table if has_table else None, doubt)
+    return ReadFile(path, animation, reader, rate, captured, table if has_table else None, doubt)
 
 
 def probe_input(path: Path, reading: Reading, *, fps: Fraction | None, face: str | None = None) -> StreamInfo:
@@ -283,21 +287,6 @@ def read_face(
     given: dict[str, Any] = {"fps": fps, **(capture or {})}
     options = {name: given[name] for name in given if name in reader.face_options and given[name] is not None}
     return reader.name, reader.read_face(path, limits=reading.limit, **options)
-
-
-def read_face_quietly(
-    path: Path, fps: Fraction | None, reading: Reading, capture: Mapping[str, object] | None = None
-) -> FaceCapture | None:
-    """Return the same face without the warnings that reading it again would repeat.
-
-    None for standard input, too, which can be read only once.
-    """
-    if str(path) == "-":
-        return None
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
-        found = read_face(path, fps, reading, capture)
-    return None if found is None else found[1]
 
 
 def check_capture_options(given: Mapping[str, str], files: Iterable[Path], reading: Reading) -> None:

@@ -141,11 +141,10 @@ def _combine(
         raise click.UsageError(f"--map: {error}") from error
 
 
-def write_joints(target: Path, joints: dict[str, str] | None, capture: Path, reading: Reading) -> int:
+def write_joints(target: Path, joints: dict[str, str] | None, motion: SkeletonMotion) -> int:
     """Write the map that was used for a capture; return the number of its joints."""
     from fba.capture.joint_maps import find_map, write_map
 
-    motion = read_capture(capture, reading)
     used = find_map(motion, joints)
     write_map(target, used, motion)
     return len(used)

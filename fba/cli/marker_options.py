@@ -123,13 +123,12 @@ def read_places(
     return changed
 
 
-def write_used_places(target: Path, places: dict[str, str] | None, capture: Path, reading: Reading) -> int:
+def write_used_places(target: Path, places: dict[str, str] | None, motion: MarkerMotion | PointMotion) -> int:
     """Write the map that was used for a capture; return the number of its markers or points."""
     from fba.capture import PointMotion
     from fba.capture.markers.marker_maps import find_map, write_map
     from fba.capture.points.places import point_places, write_places
 
-    motion = read_capture(capture, reading)
     if isinstance(motion, PointMotion):
         taken = point_places(motion.count) if places is None else places
         write_places(target, taken, motion.count)

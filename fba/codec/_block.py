@@ -18,7 +18,7 @@ from fba.codec.settings import PlaneInfo, PlaneSettings
 
 @dataclass(frozen=True)
 class Block:
-    """Consecutive planes that share their settings: an I plane, or P planes behind one.
+    """Consecutive planes with the same settings: an I plane, or P planes after it.
 
     index: int64 (T,); frame t is shown at start + (index[t] - index[0]) / rate seconds. number: that of the
     first plane. borders: int64 (T + 1,), absolute bit positions of the planes, and the end of the last.

@@ -25,9 +25,9 @@ IMPOSSIBLE_BITS = 1e9
 
 
 def code_lengths(track: FaceTrack | BodyTrack, cuts: Int64, options: EncoderOptions) -> Float64:
-    """Return the bits of each parameter from one cut to another: float64 (68 or 296, C, C).
+    """Return the bits of each parameter between cuts: float64 (68 or 296, C, C).
 
-    The element (n, a, b) is what parameter n + 1 takes when frames cuts[a] to cuts[b] - 1 are an I plane and
+    The element (n, a, b) is the bits of parameter n + 1 if frames cuts[a] to cuts[b] - 1 are an I plane and
     the P planes after it, with ranges that fit them: its ranges, its first value, and the differences. Their
     length by the adaptive model follows from how often each comes, in whatever order. 0 for a parameter that
     is 0 throughout, and where b <= a. FAPs 1 and 2 count nothing.

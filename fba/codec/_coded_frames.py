@@ -1,4 +1,4 @@
-"""Frames as planes carry them: columns for what is sent only, from which tracks make their arrays."""
+"""Decoded frames with columns only for sent slots, from which tracks make their arrays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELD
 from fba.tracks import BodyTrack, FaceTrack, compact_track
 
 _CHUNK = 1 << 14
-"""Frames that are expanded at once, which limits the memory for columns in between."""
+"""Number of frames that are expanded at once, to limit the memory."""
 
 
 class _Field(NamedTuple):
@@ -69,9 +69,9 @@ class Masks:
 class CodedFrames:
     """The FAPs or the BAPs of frames, as a `fba.tracks.CompactFrames`.
 
-    part: `slots.FACE_BIT` or `slots.BODY_BIT`. rows: int32 (T, K). places: int64 (slots,), the column of
-    each slot in rows, or -1 where it is not sent. mask: what each frame sends. interpolated: for FAPs, what a
-    decoder shall interpolate; None if there is no such FAP.
+    part: `slots.FACE_BIT` or `slots.BODY_BIT`. rows: int32 (T, K). places: int64 (slots,), the column of each
+    slot in rows, or -1 where it is not sent. mask: sent parameters of each frame. interpolated: FAPs that a
+    decoder must interpolate; None without any.
     """
 
     part: int

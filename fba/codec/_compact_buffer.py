@@ -1,4 +1,4 @@
-"""Join the blocks of a whole stream, without what was not sent: for `decode`."""
+"""The blocks of a whole stream, joined without unsent parameters, for `decode`."""
 
 from __future__ import annotations
 
@@ -62,9 +62,8 @@ class CompactBuffer:
     def animation(self, wrong: Sequence[range] = ()) -> Animation:
         """Return all frames. ValueError without frames.
 
-        Frames that were decoded before damage, and whose index the frames behind it fall back to, are left
-        out: they were misread. wrong: planes of I periods that do not match their CRC-32, which are left out
-        where any others are left.
+        Frames before damage whose index the frames after it repeat were misread, and are left out. wrong:
+        planes of I periods that do not match their CRC-32; they are left out unless they are all.
         """
         if not self.frames:
             raise ValueError("there is no frame to make an animation of")
@@ -92,7 +91,7 @@ class CompactBuffer:
         return Animation(self._times.rate, index, face, body)
 
     def _columns(self, wanted: Int64) -> Int64 | slice:
-        """Return the columns of rows in which the values of these slots are stored; make those that lack."""
+        """Return the columns of rows for these slots, making new columns where needed."""
         if wanted is not self._known[0]:
             new = wanted[self._places[wanted] < 0]
             if len(new):
@@ -125,7 +124,7 @@ class CompactBuffer:
         return self._kind_of[key]
 
     def _check_limits(self, count: int) -> None:
-        """Raise LimitError if there is no room for `count` frames more."""
+        """Raise LimitError if there is no room for `count` more frames."""
         frames = self.frames + count
         self._limits.check_frames(frames, "the stream")
         memory = frames * (4 * self._rows.width + _FRAME_BYTES) + len(self._masks) * _MASKS_BYTES
@@ -133,10 +132,10 @@ class CompactBuffer:
 
 
 def _face_key(face: PartSettings | None) -> tuple[bytes, bytes]:
-    """Return what tells masks of FAPs apart."""
+    """Return a key that is equal for equal masks of FAPs."""
     return (face.mask.tobytes(), bytes(face.mask_types)) if face is not None else (b"", b"")
 
 
 def _masks(rows: list[Bool], kinds: Array) -> Masks:
-    """Return masks that name a row only where they differ."""
+    """Return masks, with a row number for each frame only if rows differ."""
     return Masks(np.stack(rows), kinds if len(rows) > 1 else None)

@@ -14,17 +14,17 @@ from fba.limits import DEFAULT_LIMITS, Limits
 class Decoder:
     """Decodes an FBA stream that arrives in chunks of any size, down to a byte.
 
-    bap_steps: "iso" or "visage", the table of BAP quantiser steps that the stream was made with; None: "iso",
-    because a mark that says otherwise comes behind the frames (`mark` has it then, and an FbaWarning says so;
-    `decode` looks for it first). on_error: "raise", or "salvage" to continue after damage at the next start
-    code before an I plane; `damage` then lists what was lost. Frame numbers increase in any case: where a
-    time code shows that misread planes took too many frames, those behind it follow them at once.
+    bap_steps: "iso" or "visage", the stream's table of BAP quantiser steps; by default "iso", because a mark
+    with another table comes after the frames (`mark` then has it, with an FbaWarning; `decode` reads the mark
+    first). on_error: "raise", or "salvage" to continue after damage at the next start code before an I plane;
+    `damage` then lists the losses. Frame numbers always increase: where a time code shows that misread planes
+    took too many frames, the frames after it follow without a gap.
 
-    limits: see `fba.Limits`; `bytes` bounds what one call returns, and the list of damage.
+    limits: see `fba.Limits`; `bytes` applies to the result of each call, and to the list of damage.
 
-    `push` and `finish` return frames as soon as their planes are complete. `push` first returns the frames
-    before damage; the next call raises the error. `finish` raises at once; frames that it still decoded are
-    in the `blocks` of its error.
+    `push` and `finish` return frames as soon as their planes are complete. At damage, `push` returns the
+    frames before it, and the next call raises the error. `finish` raises immediately; the last frames are in
+    the `blocks` of its error.
 
     Raises BitstreamError on damage, LimitError (pass less at once, or raise the limit), UnsupportedError for
     DCT segments (object_coding_type 1, whose tables are in no public source); ValueError on wrong arguments.
@@ -43,22 +43,22 @@ class Decoder:
 
     @property
     def damage(self) -> list[Damage]:
-        """What was lost so far, when salvaging."""
+        """The damage so far, when salvaging."""
         return self._reader.damage
 
     @property
     def planes(self) -> int:
-        """Planes decoded so far."""
+        """Number of planes decoded so far."""
         return self._reader.planes
 
     @property
     def ended(self) -> bool:
-        """Whether an end code closed the last object. A stream without may have been cut off."""
+        """Whether an end code closed the last object. A stream without one may have been cut off."""
         return self._reader.objects.ended
 
     @property
     def mark(self) -> str | None:
-        """The table of BAP steps that the mark behind the last object names; None without one."""
+        """The table of BAP steps in the mark after the last object, or None."""
         return self._reader.objects.mark
 
     def push(self, chunk: bytes | bytearray | memoryview) -> list[Frame]:
@@ -70,7 +70,7 @@ class Decoder:
         return [frame for block in self.finish_blocks() for frame in block.frames()]
 
     def push_blocks(self, chunk: bytes | bytearray | memoryview) -> list[Block]:
-        """Do the same as `push`, with blocks of planes, which is faster."""
+        """Add bytes as `push` does; return blocks of planes, which is faster."""
         if self._finished:
             raise ValueError("this decoder is finished; make a new one for another stream")
         self._raise_pending()
@@ -80,7 +80,7 @@ class Decoder:
         return blocks
 
     def finish_blocks(self) -> list[Block]:
-        """Do the same as `finish`, with blocks of planes."""
+        """End the stream as `finish` does; return blocks of planes."""
         self._raise_pending()
         if self._finished:
             return []

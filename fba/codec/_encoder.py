@@ -27,15 +27,15 @@ from fba.presets import REFERENCE
 
 _CODE_BYTES = 4
 _CHUNK = 4096
-"""Frames that `encode` passes to the encoder at once, which limits its memory."""
+"""Number of frames that `encode` passes to the encoder at once, to limit its memory."""
 
 
 @dataclass
 class ClampedParameter:
-    """Values of a parameter that no plane could carry, and that were brought as near as could be.
+    """Values of a parameter that no plane can carry, clamped to the nearest that can.
 
-    count: number of them. first: frame of the first. frame, value, sent: frame, wanted and sent value of the
-    worst. Frames are counted from 0 in the order in which they were encoded.
+    count: number of them. first: frame of the first. frame, value, sent: frame, original and sent value of
+    the worst. Frames are counted from 0 in the order in which they were encoded.
     """
 
     count: int
@@ -46,7 +46,7 @@ class ClampedParameter:
 
     @property
     def off(self) -> int:
-        """How far the worst is off, in the parameter's unit."""
+        """Largest error, in the parameter's unit."""
         return abs(self.value - self.sent)
 
 
@@ -61,22 +61,22 @@ class EncoderStatistics:
     @property
     def clamped(self) -> int:
         """Number of values clamped."""
-        return sum(one.count for one in self.clamped_parameters.values())
+        return sum(clamped.count for clamped in self.clamped_parameters.values())
 
     def count_clamped(self, label: str, frame: int, value: int, sent: int) -> None:
         """Count a value of a parameter that was sent as another."""
-        one = self.clamped_parameters.setdefault(label, ClampedParameter(0, frame, frame, value, sent))
-        one.count += 1
-        if abs(value - sent) > one.off:
-            one.frame, one.value, one.sent = frame, value, sent
+        clamped = self.clamped_parameters.setdefault(label, ClampedParameter(0, frame, frame, value, sent))
+        clamped.count += 1
+        if abs(value - sent) > clamped.off:
+            clamped.frame, clamped.value, clamped.sent = frame, value, sent
 
 
 class Encoder:
     """Encodes frames as they come; `push` and `finish` return the bytes that are complete.
 
     A frame is encoded when the next one comes, because its plane states how many frames are skipped after it.
-    Ranges start from the standard's tables (or from `ranges`, as `encode` fits them) and grow: a frame that
-    does not fit them becomes an I plane with wider ones. Masks may change from frame to frame; a change needs
+    Ranges start from the standard's tables (or from `ranges`, as `encode` fits them) and grow: a frame
+    outside them becomes an I plane with wider ranges. Masks may change from frame to frame; a change needs
     an I plane, unless it only leaves a part out.
 
     Raises RangeError for a value that no range can carry (unless options.clamp) and for a frame rate that
@@ -89,8 +89,8 @@ class Encoder:
         self.options = options or EncoderOptions()
         if self.options.preset != REFERENCE:
             raise OptionError(
-                f"the preset {self.options.preset!r} plans with all frames, and here they come one by one: "
-                "use fba.encode, or fba.planning.LiveEncoder"
+                f"the preset {self.options.preset!r} needs all frames in advance, and here they come one by "
+                "one: use fba.encode, or fba.planning.LiveEncoder"
             )
         self.statistics = EncoderStatistics()
         self._writer = PlaneWriter(self.options.bap_steps)
@@ -105,10 +105,10 @@ class Encoder:
         self._finished = False
 
     def expect(self, animation: Animation) -> None:
-        """Begin with ranges that hold the values and changes of an animation, in place of the standard's.
+        """Begin with ranges that include the values and changes of an animation, in place of the standard's.
 
-        For what is coded while it comes, of which it is known how far values go: ranges that hold them from
-        the beginning need no other I planes. Ranges grow as before. ValueError after the first frame.
+        For live streams whose extremes are known: ranges that include them need no further I planes. Ranges
+        still grow if needed. ValueError after the first frame.
         """
         if self._pending is not None:
             raise ValueError("this encoder has begun; say what to expect before the first frame")
@@ -143,23 +143,20 @@ class Encoder:
         return self._take_bytes()
 
     def push_segment(self, animation: Animation) -> bytes:
-        """Add consecutive frames that begin with an I plane, with ranges that fit them.
-
-        As `push_animation`, which goes on with what is in force; return the bytes that are complete.
-        """
+        """Add consecutive frames, from an I plane on, with ranges fitted to them; return complete bytes."""
         first = self.push_animation(animation[:1])
         self._ranges = fitting_ranges(animation, self.options)
         if self.options.intra_period is None:  # only the first frame is an I plane
-            for part, own in fitting_ranges(animation[:1], self.options).items():
-                self._ranges[part].codes[:2] = own.codes[:2]
+            for part, ranges in fitting_ranges(animation[:1], self.options).items():
+                self._ranges[part].codes[:2] = ranges.codes[:2]
         self._resumable = set()  # as after a start code: the next plane is an I plane
         return first + self._push_all(animation[1:])
 
     def begin_segment(self, expected: Animation, options: EncoderOptions | None = None) -> None:
-        """Make the next frame an I plane, with ranges that hold what is expected, and with other quantisers.
+        """Make the next frame an I plane with ranges for the expected frames, or also with other quantisers.
 
-        options: from now on; they may differ in fap_quant and bap_quant only. For frames that come one by
-        one: after `settle`, or before the first.
+        options: from now on; they may differ in fap_quant and bap_quant only. Call it after `settle`, or
+        before the first frame.
         """
         self.options = options or self.options
         self._ranges = fitting_ranges(expected, self.options)
@@ -169,7 +166,7 @@ class Encoder:
         """Make the next frame an I plane with ranges for its own values, and for changes up to these limits.
 
         limits: int64 (68,) or (296,) by "face" and "body": by how many quantiser steps P planes may raise or
-        lower each parameter. As `begin_segment`, where nothing more is known of what comes.
+        lower each parameter. Like `begin_segment`, if later frames are unknown.
         """
         parts = {"face": (slots.FACE_BIT, slots.FAPS.start, 2), "body": (slots.BODY_BIT, slots.BAPS.start, 0)}
         self._ranges, self._resumable = {}, set()
@@ -194,7 +191,7 @@ class Encoder:
         return self._writer.bits
 
     def next_plane(self, frame: Animation) -> NextPlane | None:
-        """Return what the next P plane may bring for a frame, after `settle`; None for an I plane."""
+        """Return the prices of the next P plane for a frame, after `settle`; None for an I plane."""
         run = next(find_runs(frame, int(frame.index[0]) + 1, self.options.unsent))
         if not all(self._in_force(run, part) for part in run.parts):
             return None
@@ -204,7 +201,7 @@ class Encoder:
         return NextPlane(self._writer, frame, sum(run.parts), row)
 
     def _push_all(self, animation: Animation) -> bytes:
-        """Add consecutive frames in pieces, so that memory stays bounded; return the complete bytes."""
+        """Add consecutive frames in pieces, to limit the memory; return the complete bytes."""
         starts = range(0, len(animation), _CHUNK)
         return b"".join(self.push_animation(animation[start : start + _CHUNK]) for start in starts)
 
@@ -223,17 +220,17 @@ class Encoder:
         return self._take_bytes() + self._mark(checks)
 
     def ending(self) -> bytes:
-        """Return what would end the stream behind the bytes returned so far; b"" before the first.
+        """Return the bytes that would end the stream after those returned so far; b"" before the first.
 
-        With it behind them, they are a complete stream of all frames but the last one pushed, without checks
-        of its I periods. The encoder goes on as if it had not been asked.
+        Together they are a complete stream of all frames but the last one pushed, without checks of its I
+        periods. The state of the encoder does not change.
         """
         if self._finished or not self._writer.planes:
             return b""
         return self._writer.ending() + self._mark()
 
     def _mark(self, checks: bytes | None = None) -> bytes:
-        """Return the mark behind the end of a stream, with these checks; b"" without a mark."""
+        """Return the mark after the end of a stream, with these checks; b"" without a mark."""
         if not self.options.mark:
             return b""
         body = self.options.bap_quant and self._writer.settings_in_force(slots.BODY_BIT)
@@ -327,7 +324,7 @@ class Encoder:
         )
 
     def _next_intra(self, run: Run, position: int, rate: Fraction) -> int:
-        """Return the position, from this one on, of the next frame that is due to be an I plane."""
+        """Return the position, from this position on, of the next frame that is due as an I plane."""
         due = position + self._frames_before_intra(run.index[position:], rate)
         while due < len(run.rows) and not self._can_be_intra(run, run.rows[due]):
             due += 1  # put off: P planes reach values that I planes do not
@@ -431,7 +428,7 @@ class Encoder:
         return self._ranges[part]
 
     def _part_settings(self, run: Run, part: int, row: Int32) -> PartSettings:
-        """Return settings for an I plane, with ranges that hold its values; RangeError if none can."""
+        """Return settings for an I plane, with ranges that include its values; RangeError if none can."""
         options, mask, ranges = self.options, run.masks[part], self._ranges_of(part)
         ranges.widen_for_intra(mask, row, self._writer.planes)
         in_force = self._writer.settings_in_force(part)
@@ -448,10 +445,10 @@ class Encoder:
 
 
 def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes:
-    """Encode an animation as one FBA object, with ranges fitted to all of it.
+    """Return an animation encoded as one FBA object, with ranges fitted to all of it.
 
-    Raises RangeError for what the syntax cannot carry (see `EncoderOptions.clamp`), ValueError for an
-    animation without frames. Gives an FbaWarning that names what was clamped.
+    Raises RangeError for values that the syntax cannot carry (see `EncoderOptions.clamp`), ValueError for an
+    animation without frames. Gives an FbaWarning that names clamped parameters.
     """
     data, statistics = encode_with_statistics(animation, options)
     warn_of_clamped(statistics)
@@ -459,7 +456,7 @@ def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes
 
 
 def warn_of_clamped(statistics: EncoderStatistics) -> None:
-    """Give an FbaWarning that names what was clamped, if anything was; to the caller's caller."""
+    """Warn of clamped values, if there are any, with an FbaWarning to the caller's caller."""
     if statistics.clamped:
         most = sorted(statistics.clamped_parameters.items(), key=lambda pair: -pair[1].count)[:3]
         names = [
@@ -477,7 +474,7 @@ def warn_of_clamped(statistics: EncoderStatistics) -> None:
 def encode_with_statistics(
     animation: Animation, options: EncoderOptions | None = None
 ) -> tuple[bytes, EncoderStatistics]:
-    """Return the result of `encode`, and what the encoder counted."""
+    """Return the result of `encode`, and the encoder's statistics."""
     options = options or EncoderOptions()
     encoder = Encoder(options, ranges=fitting_ranges(animation, options))
     return encoder._push_all(animation) + encoder.finish(), encoder.statistics

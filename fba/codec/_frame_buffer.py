@@ -42,7 +42,7 @@ class FrameBuffer:
     """Collects decoded blocks in stream order; `decoded` returns all their frames without a copy.
 
     Arrays that it returned do not change when more blocks come. frames: their number.
-    left_out: "a face" or "a body" if one came only after `fix_parts`, else "".
+    left_out: "a face" or "a body" if it came only after `fix_parts`, else "".
     """
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ class FrameBuffer:
         self._body: dict[str, Any] = {}
 
     def fix_parts(self) -> None:
-        """From now on, ignore a face or body if there has been none so far."""
+        """Ignore a face or body from now on if there has been none so far."""
         self._parts_fixed = True
 
     def add(self, block: Block) -> None:

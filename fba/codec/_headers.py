@@ -32,7 +32,7 @@ def frame_rate(rate: Fraction) -> FrameRate:
 def first_time_code(index: int, rate: Fraction) -> TimeCode | None:
     """Return the time code with which a decoder shows the first plane at this index; None for index 0.
 
-    If none gives the index, returns None with an FbaWarning.
+    If no time code gives the index, returns None with an FbaWarning.
     """
     if index == 0:
         return None
@@ -48,7 +48,7 @@ def first_time_code(index: int, rate: Fraction) -> TimeCode | None:
 
 
 def time_code(index: int, rate: Fraction) -> TimeCode | None:
-    """Return the time code that names the frame of an index; None if none does.
+    """Return the time code of the frame with an index, or None.
 
     Time codes are whole seconds below 32 hours, and name the nearest frame.
     """

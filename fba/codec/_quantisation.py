@@ -27,7 +27,7 @@ def levels(track: FaceTrack | BodyTrack, options: EncoderOptions) -> Int64:
 def quantise(animation: Animation, options: EncoderOptions) -> Animation:
     """Return an animation with every FAP and BAP as a decoder returns it: a multiple of its step.
 
-    A value keeps its own level, as in an I plane, so that equal values stay equal. Masks stay as they are.
+    Each value is rounded by itself, as in an I plane, so that equal values stay equal. Masks do not change.
     """
     return replace(
         animation,
@@ -112,7 +112,7 @@ def count_rounded(animation: Animation, options: EncoderOptions) -> dict[str, in
 
 
 def _keeps(divisor: int, largest: int, scale: int) -> bool:
-    """Whether multiples of `divisor` table steps up to `largest` stay what they are with steps x `scale`."""
+    """Return whether multiples of `divisor` table steps up to `largest` are exact with steps x `scale`."""
     return divisor > 0 and divisor % scale == 0 and largest <= RANGE_CODE_MAX * RANGE_UNIT // scale * scale
 
 

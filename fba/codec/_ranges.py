@@ -32,7 +32,7 @@ class Ranges:
         self.changed = True
 
     def start_from_tables(self) -> None:
-        """Set the standard's own limits, for data that is not known in advance."""
+        """Set the standard's limits, for data that is not known in advance."""
         table: tuple[Fap | Bap, ...] = faps() if self._part == slots.FACE_BIT else baps()
         for column, one in enumerate(table):
             if one.i_limits is not None and one.p_limits is not None:
@@ -90,7 +90,7 @@ class Ranges:
         return RangeLists(*copies)
 
     def _levels(self, mask: Bool, row: Int32) -> tuple[Int64, Int64]:
-        """Return slots (K,) and levels (K,) of what an I plane sends, but the viseme and expression."""
+        """Return slots (K,) and levels (K,) that an I plane sends, except viseme and expression."""
         face = self._part == slots.FACE_BIT
         coded = np.flatnonzero(mask[2:]) + slots.FAPS.start if face else np.flatnonzero(mask) + self._first
         return coded, quantiser.levels(row[coded], self._step[coded - (0 if face else self._first)])

@@ -22,7 +22,7 @@ class Rows:
         self._array: Array = np.zeros((count, *shape), dtype=dtype)
 
     def append(self, rows: Array | int | None, count: int) -> None:
-        """Append `count` rows: those given, one value for all of them, or zeros."""
+        """Append `count` rows: the given rows, a value for all of them, or zeros."""
         need = self.count + count
         if need > len(self._array):
             self._resize(max(need, self.count + self.count // 8))
@@ -68,7 +68,7 @@ class Rows:
 
 
 class GrowingMasks:
-    """Masks bool (T, columns) that grow; stored as one row until there is another, which is rare."""
+    """Growing masks, bool (T, columns), stored as one row until a different one comes, which is rare."""
 
     def __init__(self, columns: int, count: int) -> None:
         self.any = False

@@ -1,4 +1,4 @@
-"""Runs of frames that send the same parameters, and the mask types that tell a decoder so."""
+"""Runs of frames that send the same parameters, and their mask types."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Run:
     """Consecutive frames that send the same parameters.
 
     rows: int32 (T, columns), see `slots`. index: int64 (T,). skips: int64 (T,), frames skipped after each.
-    masks: bool (68,) or (296,) by part, True for what is sent; parts without a track are missing.
+    masks: bool (68,) or (296,) by part, True for sent parameters; parts without a track are missing.
     mask_types: by part, the mask type of every group.
     """
 
@@ -32,7 +32,7 @@ class Run:
 
     @property
     def parts(self) -> list[int]:
-        """Parts that P planes of the run carry: those that send something, or else the first."""
+        """Parts that P planes of the run carry: those with sent parameters, or else the first."""
         return [part for part, types in self.mask_types.items() if any(types)] or [min(self.masks)]
 
 
@@ -57,7 +57,7 @@ def find_runs(frames: Animation, following: int, unsent: str) -> Iterator[Run]:
 
 
 def _changes(arrays: list[Bool]) -> list[int]:
-    """Return at which rows one of the arrays (T, columns) differs from the row before."""
+    """Return the rows at which any of the arrays (T, columns) differs from the row before."""
     if len(arrays[0]) == 1:
         return []
     changes = np.logical_or.reduce([(array[1:] != array[:-1]).any(axis=1) for array in arrays])
@@ -68,7 +68,7 @@ def _changes(arrays: list[Bool]) -> list[int]:
 def mask_types(part: int, mask: Bool, interpolated: Bool | None, unsent: str) -> tuple[int, ...]:
     """Return the mask type of every group: none, all, or masked.
 
-    mask: bool (68,) or (296,), what is sent. interpolated: bool (68,), the FAPs that the animation wants
+    mask: bool (68,) or (296,), sent parameters. interpolated: bool (68,), the FAPs that the animation wants
     interpolated, or None. unsent: "keep" or "interpolate", for groups in which the animation does not want
     all unsent FAPs interpolated. Unsent BAPs always keep their values.
     """

@@ -50,9 +50,9 @@ class StreamInfo:
     of frames (planes). duration, start: seconds, exact; duration runs from the first frame to one period
     after the last. skipped: frames left out between frames. bits_per_second: size over duration.
 
-    For FBA streams: intra_planes, start_codes (planes with one before them), plane_bits int64 (T,) and
-    plane_intra bool (T,), frame_index int64 (T,), and damage that was skipped; bap_steps, the table that the
-    mark behind the stream names, None without a mark.
+    For FBA streams: intra_planes, start_codes (number of planes after a start code), plane_bits int64 (T,)
+    and plane_intra bool (T,), frame_index int64 (T,), and damage that was skipped; bap_steps, the table that
+    the mark behind the stream names, None without a mark.
     """
 
     format: str

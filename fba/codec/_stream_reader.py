@@ -1,4 +1,4 @@
-"""Read a stream from one state to the next: outside of an object, plane by plane, and past damage."""
+"""A reader of streams with three states: outside of an object, plane by plane, and past damage."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _LARGE_PLANE = 4096
 
 
 class StreamReader:
-    """Reads a stream that arrives in chunks; `fba.codec.Decoder` says what the arguments mean.
+    """Reads a stream that arrives in chunks; arguments as of `fba.codec.Decoder`.
 
-    marks: those of the whole stream, where they are known beforehand.
+    marks: of the whole stream, if known in advance.
 
-    error: the one that ended the reading; nothing can be read behind it. planes: how many were read. damage:
-    what was skipped. times: of the planes. objects: where they begin and end. wrong: the planes of I periods
+    error: the error that ended the reading. planes: number of planes read. damage: in the skipped parts.
+    times: of the planes. objects: their borders. wrong: the planes of I periods
     that do not match their checks, when salvaging.
     """
 
@@ -62,7 +62,7 @@ class StreamReader:
         self.times = PlaneTimes(self._log if self._salvage else None)
         self.objects = ObjectBorders(bap_steps, marks)
         self.wrong: list[range] = []
-        self._was_at_end = False  # whether what stands behind the end was read, behind damage
+        self._was_at_end = False  # whether the bytes after an end were being read, after damage
         self._checks = PeriodChecks()
         self._buffer = Buffer()
         self._bit = 0  # next bit to decode, in the buffer
@@ -70,7 +70,7 @@ class StreamReader:
         self._retry_at = 0  # length of the buffer at which an incomplete plane is tried again
         # Plain functions: a bound method would hold the reader, which then waits for the garbage collector.
         self._state: Callable[[StreamReader, bool], list[Block] | None] = StreamReader._find_object
-        self._kind = ""  # what data without an object start code seems to be
+        self._kind = ""  # apparent kind of data without an object start code
         self._start_error: BitstreamError | None = None  # why the stream does not begin with an object
         self._lost_from = 0
         self._reader = PlaneReader(self.objects.table)
@@ -201,7 +201,7 @@ class StreamReader:
         return bytes_needed(words.tobytes(), self.objects.size)
 
     def _compare_checks(self) -> None:
-        """Compare the I periods of an object with the checks behind it, if any; tell which are wrong."""
+        """Compare the I periods of an object with the checks after it, if any; list those that are wrong."""
         listed, self.objects.checks = self.objects.checks, None
         if listed is None:
             return
@@ -335,7 +335,7 @@ class StreamReader:
         return None
 
     def _find_end(self, begin: int) -> int | None:
-        """Return the byte of the buffer behind the last end code; None without one after `begin`."""
+        """Return the byte of the buffer after the last end code; None without one after `begin`."""
         data = self._buffer.data[: self._buffer.length].tobytes()
         end = data.rfind(_END, begin) + len(_END)
         ended = end >= len(_END) and (end == len(data) or data.startswith(START, end))
@@ -384,7 +384,7 @@ class StreamReader:
         self._code_bit = None
 
     def _end_object(self, code: int) -> None:
-        """End the object at a start code of no plane. An unknown one is a warning, or damage."""
+        """End the object at a start code that is not a plane's; an unknown code is a warning, or damage."""
         if code != syntax.END_CODE and code not in syntax.LAYER_CODES:
             error = BitstreamError(
                 f"start code 00 00 01 {code:02x} where a plane, the end code 00 00 01 b1 or a new object "

@@ -24,7 +24,7 @@ _FRAMES = 4096
 
 @dataclass(frozen=True)
 class Verification:
-    """What a check of a stream found.
+    """The result of a check of a stream.
 
     size: bytes. frames: those decoded. duration: seconds. ended: an end code closes the stream. damage: what
     was lost. doubtful: number of planes that may be wrong, because damage came soon after them, or because
@@ -48,7 +48,7 @@ class Verification:
 
     @property
     def frames_lost(self) -> int | None:
-        """Frames lost in all, in part estimated; None if it is not known of all damage."""
+        """Total of lost frames, partly estimated; None if it is unknown for any damage."""
         known = [damage.frames_lost for damage in self.damage if damage.frames_lost is not None]
         return sum(known) if len(known) == len(self.damage) else None
 
@@ -72,7 +72,7 @@ class Verification:
 def verify_stream(
     data: bytes | bytearray | memoryview, *, bap_steps: str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> Verification:
-    """Check an FBA stream: decode all that can be decoded, and return what was found.
+    """Check an FBA stream: decode all that can be decoded, and return the findings.
 
     bap_steps: as for `fba.decode`; it changes the digest of a stream with a body. Raises BitstreamError if no
     plane can be decoded, LimitError beyond `limits`.

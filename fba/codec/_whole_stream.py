@@ -27,7 +27,7 @@ def decode(
 ) -> Animation:
     """Return the animation of a complete FBA stream.
 
-    bap_steps: "iso" or "visage", the table of BAP steps with which it was made; None: the one that its mark
+    bap_steps: "iso" or "visage", the stream's table of BAP steps; None: the table that its mark
     names (see `fba.codec.write_mark`), "iso" without a mark. on_error: see `Decoder`; with "salvage",
     FbaWarnings say what was lost. Times come from frame rate, skips and time codes. A stream that changes
     its rate is returned at the lowest rate at which all its times are exact. An FbaWarning says if the end

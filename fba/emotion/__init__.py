@@ -1,7 +1,8 @@
 """Emotions as FAPs: named expressions, measured profiles, mixtures by rules, the plane of emotions.
 
-After chapter 8 of the thesis in docs/emotion.md. `expression` gives one by name, `combine` mixes them,
-`expression_at` finds one for an activation and an evaluation, `perform` makes an `Animation` of them.
+After chapter 8 of the thesis in docs/emotion.md. `expression` returns an expression by name, `combine` mixes
+several, `expression_at` returns the expression at an activation and evaluation, and `perform` makes an
+`Animation`.
 """
 
 from fba.emotion._modification import Damping, emote, modify

@@ -1,4 +1,4 @@
-"""What expressions are read from: means and differences of FAPs, such as how high the mouth's corners are."""
+"""Features for reading expressions: means and differences of FAPs, such as the height of the lip corners."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.parameters import FAP_COUNT, fap_numbers
 
-LID_PER_GAZE = (0.0089, -0.0054)
-"""By how much an upper and a lower lid follow the gaze, IRISD steps per 1e-5 rad of pitch."""
+UPPER_LID_PER_GAZE = 0.0089
+"""Motion of an upper lid that follows the gaze, IRISD per 1e-5 rad of pitch."""
+LOWER_LID_PER_GAZE = -0.0054
 
 
 @dataclass(frozen=True, eq=False)
 class Features:
     """The table of features.
 
-    names: of each. weights: float64 (F, 68), of the FAPs. folded: bool (F,), whether the sign of a feature is
-    dropped, as for differences between left and right. noise: float64 (F,), how much a face moves without
-    expressing anything, speech apart. spread: float64 (F,), how much it moves altogether. speech: float64
-    (F,), how much it moves in speech, beyond what visemes explain.
+    weights: float64 (F, 68), of the FAPs. folded: bool (F,), whether the absolute value is used, as for
+    differences between left and right. noise, spread, speech: float64 (F,), standard deviation of a face that
+    expresses nothing and is silent, of all faces, and of speech beyond the visemes.
     """
 
     names: tuple[str, ...]
@@ -47,29 +47,25 @@ def features() -> Features:
     folded = np.array([row["kind"] == "difference" for row in rows])
     weights[~folded] /= np.abs(weights[~folded]).sum(axis=1, keepdims=True)
     return Features(
-        tuple(row["feature"] for row in rows),
-        weights,
-        folded,
-        np.array([float(row["noise"]) for row in rows]),
-        np.array([float(row["spread"]) for row in rows]),
-        np.array([float(row["speech"]) for row in rows]),
-    )
+        tuple(row["feature"] for row in rows), weights, folded,
+        *(np.array([float(row[name]) for row in rows]) for name in ("noise", "spread", "speech")),
+    )  # fmt: skip
 
 
 def measure(faps: Float64, known: Bool) -> Float64:
-    """Return the features of FAPs (..., 68): float64 (..., F). What lids do to follow the gaze is left out.
+    """Return the features of FAPs (..., 68): float64 (..., F), less the motion of lids that follow the gaze.
 
-    Lids follow it in captures of blendshapes; from action units and in many streams they do not.
+    Lids follow the gaze in captures of blendshapes, but not in action units and many streams.
 
-    known: bool (68,), the FAPs that say something; a mean is that of these. Where none is known it is 0.
+    known: bool (68,), the FAPs that are sent. A mean is taken over these; without any it is 0.
     """
     table = features()
     values = np.where(known, faps, 0.0).astype(np.float64)
     for side in range(2):
         pitch = values[..., _PITCH + side]
-        for lid, follows in zip((_UPPER, _LOWER), LID_PER_GAZE, strict=True):
+        for lid, per_gaze in ((_UPPER, UPPER_LID_PER_GAZE), (_LOWER, LOWER_LID_PER_GAZE)):
             if known[lid + side]:
-                gaze = follows * pitch
+                gaze = per_gaze * pitch
                 lids = values[..., lid + side]
                 values[..., lid + side] = lids - np.clip(lids, np.minimum(gaze, 0), np.maximum(gaze, 0))
     size = np.abs(table.weights)
@@ -81,10 +77,7 @@ def measure(faps: Float64, known: Bool) -> Float64:
 
 
 def known_features(known: Bool) -> Bool:
-    """Return which features follow from FAPs that are known, bool (68,): bool (F,).
-
-    A mean needs one of its FAPs, a difference both.
-    """
+    """Return which features follow from known FAPs, bool (68,): bool (F,). A difference needs both FAPs."""
     table = features()
     used = table.weights != 0
     count = used.astype(np.int64) @ known.astype(np.int64)
@@ -92,6 +85,7 @@ def known_features(known: Bool) -> Bool:
     return result
 
 
-_UPPER, _LOWER = 18, 20
+# Columns of the left lids and of the left eyeball's pitch; the right column follows each.
+_UPPER = 18
+_LOWER = 20
 _PITCH = 24
-"""Columns of the left lids and of the left eyeball's pitch; the right ones follow."""

@@ -1,8 +1,8 @@
 """`emote`: a performance played in a mood. Section 3.6 of the second thesis in docs/emotion.md.
 
-A mood moves the rest shape of the face, and the performance is added. Where the mood has brought a feature
-near its limit already, the performance moves it less. Eyes that the performer shuts are shut, and lips that
-touch do so in every mood.
+A mood moves the rest shape of the face, and the performance is added. Where the mood has already moved a
+feature near its limit, the performance moves it less. In every mood, eyes that the performer shuts are shut,
+and lips that touch do so.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from fba.parameters import FAP_COUNT, fap_numbers
 from fba.tracks import FaceTrack
 
 LIDS_APART = 1024.0
-"""How far the lids of a neutral face are apart, in the units of FAPs 19 to 22."""
-STEP = 0.5
-"""Intensities of several moods at once are rounded to this, so that few mixtures are computed."""
+"""Distance of the lids in a neutral face, in the units of FAPs 19 to 22."""
+INTENSITY_STEP = 0.5
+"""Step to which intensities of simultaneous moods are rounded, so that few mixtures are computed."""
 BLOCK = 8192
-"""Frames computed at once."""
+"""Number of frames computed at once."""
 
 Mixtures = dict[tuple[tuple[str, float], ...], Float64]
 """FAPs (68,) of expressions with their intensities."""
@@ -50,22 +50,20 @@ LIPS = (
 )
 """Columns of upper and lower lip, each of the inner and the outer contour: middle, left, right."""
 (JAW,) = _columns("open_jaw")
-
-
 CORNERS = _columns("raise_l_cornerlip", "raise_r_cornerlip", "raise_l_cornerlip_o", "raise_r_cornerlip_o")
 DRAWING_JAW = 300.0
-"""FAP 3 of a mood from which the corners of the mouth are drawn down by the jaw, not by their own muscles."""
+"""FAP 3 of a mood at which the jaw alone, not their muscles, pulls the corners of the mouth down."""
 
 
 @dataclass(frozen=True)
 class Damping:
-    """How a mood and a performance add up.
+    """Parameters of the sum of a mood and a performance.
 
-    reach: a feature's limit, as a multiple of the farthest that any named expression or viseme takes it. At
-    that limit the performance moves it no further. speaking: how far lips are apart (MNS units, 1024 a
-    mouth-nose distance) when a mood opens the mouth as far as it would at rest; less while they are closer.
+    reach: limit of a FAP, relative to its largest value in all named expressions and visemes. There the
+    performance moves it no further. speaking: distance of the performer's lips (MNS, 1024 a mouth-nose
+    distance) from which a mood opens the mouth fully; it opens it less while they are closer.
 
-    Raises OptionError where one is no number, reach is below 1 or speaking is not above 0.
+    Raises OptionError for values that are not finite, reach below 1, or speaking not above 0.
     """
 
     reach: float = 1.2
@@ -73,7 +71,7 @@ class Damping:
 
     def __post_init__(self) -> None:
         if not self.reach >= 1 or not np.isfinite(self.reach):
-            raise OptionError(f"reach must be a number from 1 on, not {self.reach!r}")
+            raise OptionError(f"reach must be a number of at least 1, not {self.reach!r}")
         if not self.speaking > 0 or not np.isfinite(self.speaking):
             raise OptionError(f"speaking must be a number above 0, not {self.speaking!r}")
 
@@ -86,13 +84,13 @@ def emote(
     damping: Damping | None = None,
     model: FaceSettings | None = None,
 ) -> Animation:
-    """Return a performance in one or several moods; its body stays as it is.
+    """Return a performance in one or several moods, with the same body.
 
-    What the face shows (`fba.face.resolve`, with a model's definitions of visemes and expressions) is sent as
-    low-level FAPs, all within the standard's limits. Frames without any mood keep their values.
+    The face is resolved to low-level FAPs (`fba.face.resolve`, with the model's definitions of visemes and
+    expressions), within the standard's limits. Frames without a mood keep their values.
 
-    Raises OptionError for an animation without a face, or without moods, for moods that contradict each
-    other, and for a mood that begins after the performance ends or ends before it begins.
+    Raises OptionError for an animation without a face, no moods, moods that contradict each other, and a mood
+    outside the time of the performance.
     """
     if animation.face is None or not len(animation):
         raise OptionError("there is no face to put into a mood")
@@ -115,13 +113,13 @@ def emote(
 
 
 def modify(shown: Float64, offsets: Float64, damping: Damping | None = None) -> Float64:
-    """Return FAPs (T, 68) of a performance whose rest shape is moved by `offsets` (T, 68); both in FAPU.
+    """Return FAPs (T, 68) of a performance whose rest shape is moved by `offsets` (T, 68).
 
-    Frames whose offsets are all 0 stay as they are.
+    Frames whose offsets are all 0 do not change.
     """
     damping = damping or Damping()
     apart = [_apart(shown, inner) for inner, _ in LIPS]
-    share = [smoothstep(np.maximum(one, 0.0) / damping.speaking) for one in apart]
+    share = [smoothstep(np.maximum(distance, 0.0) / damping.speaking) for distance in apart]
     offsets = offsets.copy()
     _close_mouth(offsets, share[0])
     result = _add_damped(shown, offsets, damping.reach)
@@ -133,8 +131,7 @@ def modify(shown: Float64, offsets: Float64, damping: Damping | None = None) -> 
 
 
 def _close_mouth(offsets: Float64, spoken: Float64) -> None:
-    """Take back what a mood opens, as far as the performer's lips touch: the jaw, and corners that it draws
-    down. spoken: (T,), 0 where lips touch."""
+    """Reduce the opening of jaw and corners by a mood, in place. spoken: (T,), 0 where the lips touch."""
     drawn = np.clip(offsets[:, JAW] / DRAWING_JAW, 0.0, 1.0) * (1 - spoken)
     for corner in CORNERS:
         offsets[:, corner] *= np.where(offsets[:, corner] < 0, 1 - drawn, 1.0)
@@ -142,7 +139,7 @@ def _close_mouth(offsets: Float64, spoken: Float64) -> None:
 
 
 def _add_damped(shown: Float64, offsets: Float64, reach: float) -> Float64:
-    """Add the performance to the moved rest shape: in the same direction, less the nearer the limit is."""
+    """Return the performance added to the moved rest shape; less of it in a direction whose limit is near."""
     low, high = (limit * reach for limit in _extremes())
     limit = np.maximum(np.where(offsets > 0, high, -low), np.abs(offsets))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -155,10 +152,10 @@ def _add_damped(shown: Float64, offsets: Float64, reach: float) -> Float64:
 def _keep_contact(
     offsets: Float64, result: Float64, lips: tuple[tuple[int, ...], ...], before: Float64, spoken: Float64
 ) -> None:
-    """Bring lips that the mood parts together again where the performer's touch, each by what it was moved.
+    """Close lips that the mood parts where the performer's touch, in place, each by its share of the motion.
 
-    lips: columns of the inner and the outer contour, upper lip first. before: (T,), how far the performer's
-    are apart. spoken: (T,), 0 where they touch, 1 where the mood may open them fully.
+    lips: columns of the inner and the outer contour, upper lip first. before: (T,), distance of the
+    performer's lips. spoken: (T,), 0 where they touch, 1 where the mood may open them fully.
     """
     inner, outer = lips
     widened = np.maximum(_apart(result, inner) - np.maximum(before, 0.0), 0.0) * (1 - spoken)
@@ -170,7 +167,7 @@ def _keep_contact(
 
 
 def _keep_lids(shown: Float64, offsets: Float64, result: Float64, lids: tuple[int, ...]) -> None:
-    """Set the lids of one eye: as open as the performer's and the mood's opening together, never crossed."""
+    """Set the lids of an eye, in place, to the product of the performer's and the mood's opening."""
     top, bottom = lids
     performed = 1 - (shown[:, top] + shown[:, bottom]) / LIDS_APART
     mood = 1 - (offsets[:, top] + offsets[:, bottom]) / LIDS_APART
@@ -180,37 +177,36 @@ def _keep_lids(shown: Float64, offsets: Float64, result: Float64, lids: tuple[in
 
 
 def _apart(values: Float64, lips: tuple[int, ...]) -> Float64:
-    """How far upper and lower lip are apart, (T,), in MNS units; below 0 where they are pressed together."""
+    """Return the distance of upper and lower lip, (T,), MNS; negative where they are pressed together."""
     apart: Float64 = -(values[:, lips[0]] + values[:, lips[1]])
     return apart
 
 
 def _beyond(values: Float64) -> Bool:
-    """Values that are beyond the standard's limits already: a stream may hold them, and they stay."""
+    """Return which values exceed the standard's limits: streams may have them, and they do not change."""
     beyond: Bool = limited(values).astype(np.float64) != values
     return beyond
 
 
 @cache
 def _extremes() -> tuple[Float64, Float64]:
-    """The extremes of each FAP in all named expressions and visemes, float64 (68,) each."""
+    """Return lowest and highest value of each FAP in all expressions and visemes, float64 (68,) each."""
     definitions = Definitions.default()
     poses = np.concatenate(
-        [np.array([one.faps for one in expressions()]), definitions.visemes, definitions.expressions]
+        [np.array([each.faps for each in expressions()]), definitions.visemes, definitions.expressions]
     )
     return poses.min(axis=0).astype(np.float64), poses.max(axis=0).astype(np.float64)
 
 
 def _offsets(curves: Mapping[str, Float64], rules: Rules | None, mixtures: Mixtures) -> Float64:
-    """The rest shape's FAPs (T, 68) for intensities (T,) by name. mixtures: those computed so far, by
-    intensities."""
+    """Return the rest shape's FAPs (T, 68) for intensities (T,) by name. mixtures: a cache."""
     names = sorted(curves)
     weights = np.array([curves[name] for name in names]).T
     if (np.count_nonzero(weights, axis=1) <= 1).all():  # one at a time needs no rules
         full = np.array([_mixture({name: 100.0}, rules, mixtures) for name in names])
         alone: Float64 = weights / 100 @ full
         return alone
-    rounded = np.round(weights / STEP) * STEP
+    rounded = np.round(weights / INTENSITY_STEP) * INTENSITY_STEP
     distinct, which = np.unique(rounded, axis=0, return_inverse=True)
     poses = [_mixture(dict(zip(names, row.tolist(), strict=True)), rules, mixtures) for row in distinct]
     return np.array(poses)[which.ravel()]
@@ -224,7 +220,7 @@ def _mixture(weights: dict[str, float], rules: Rules | None, mixtures: Mixtures)
 
 
 def _face(face: FaceTrack, values: Int32, moved: Bool) -> FaceTrack:
-    """A track that sends, in every frame, what the source sends, what moods move, and what copies it."""
+    """Return a track that sends, in every frame, the FAPs of the source, those of moods, and their mates."""
     sent = face.mask.any(axis=0) | moved | (values != 0).any(axis=0)
     sent[:2] = False
     copies = fill(values[0], sent)[1]

@@ -11,20 +11,20 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.easing import smoothstep
-from fba.emotion.blending import FULL, NEUTRAL
+from fba.emotion.blending import MAX_INTENSITY, NEUTRAL
 from fba.emotion.expressions import expression
 from fba.errors import OptionError
 
 
 @dataclass(frozen=True)
 class Mood:
-    """An expression at an intensity for a while.
+    """An expression at an intensity for a time.
 
     name: of an expression, or an alias. intensity: 0 to 100. start, end: seconds; None for the beginning and
-    the end of the performance, where it is not eased. ease: seconds from none to full after `start`, and from
-    full to none before `end`; shorter moods take half their length each.
+    the end of the performance, without easing. ease: seconds from 0 to full intensity after `start`, and back
+    before `end`; at most half the mood's length each.
 
-    Raises OptionError for an unknown name, which suggests the nearest, and for numbers that make no sense.
+    Raises OptionError for an unknown name, with the nearest, and for invalid numbers.
     """
 
     name: str
@@ -36,20 +36,20 @@ class Mood:
     def __post_init__(self) -> None:
         known = self.name if self.name == NEUTRAL else expression(self.name).name
         object.__setattr__(self, "name", known)
-        if not math.isfinite(self.intensity) or not 0 <= self.intensity <= FULL:
+        if not math.isfinite(self.intensity) or not 0 <= self.intensity <= MAX_INTENSITY:
             raise OptionError(f"the intensity of {known!r} must be from 0 to 100, not {self.intensity:g}")
         for what, value in (("start", self.start), ("end", self.end)):
             if value is not None and not math.isfinite(value):
                 raise OptionError(f"the {what} of {known!r} must be a number of seconds, not {value:g}")
         if not math.isfinite(self.ease) or self.ease < 0:
-            raise OptionError(f"easing takes some seconds or none, not {self.ease:g}")
+            raise OptionError(f"ease must be 0 or more seconds, not {self.ease:g}")
         if self.start is not None and self.end is not None and self.start >= self.end:
             raise OptionError(
                 f"{known!r} ends at {self.end:g} s, but begins at {self.start:g} s: give an end after that"
             )
 
     def curve(self, times: Float64) -> Float64:
-        """Return the intensity at some times (T,), seconds: float64 (T,), 0 to 100."""
+        """Return the intensity at times (T,), seconds: float64 (T,), 0 to 100."""
         start = -math.inf if self.start is None else self.start
         end = math.inf if self.end is None else self.end
         inside = (times >= start) & (times <= end)
@@ -64,8 +64,8 @@ class Mood:
 class MoodCurve:
     """An expression whose intensity follows keys.
 
-    times: float64 (K,), rising, seconds. intensities: float64 (K,), 0 to 100; between two keys it goes
-    smoothly from one to the other, before the first and after the last it stays.
+    times: float64 (K,), increasing, seconds. intensities: float64 (K,), 0 to 100; smooth between keys,
+    constant before the first and after the last.
 
     Raises OptionError for an unknown name, and for keys that contradict each other.
     """
@@ -83,14 +83,14 @@ class MoodCurve:
             raise OptionError(f"the keys of {self.name!r} must be numbers")
         if (np.diff(times) <= 0).any():
             at = times[int(np.argmax(np.diff(times) <= 0)) + 1]
-            raise OptionError(f"{self.name!r} has two keys at {at:g} s, or keys out of order: give one")
-        if (intensities < 0).any() or (intensities > FULL).any():
+            raise OptionError(f"the keys of {self.name!r} are not in increasing order at {at:g} s")
+        if (intensities < 0).any() or (intensities > MAX_INTENSITY).any():
             raise OptionError(f"the intensities of {self.name!r} must be from 0 to 100")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "intensities", intensities)
 
     def curve(self, times: Float64) -> Float64:
-        """Return the intensity at some times (T,), seconds: float64 (T,), 0 to 100."""
+        """Return the intensity at times (T,), seconds: float64 (T,), 0 to 100."""
         after = np.searchsorted(self.times, times, side="right")
         first, second = np.maximum(after - 1, 0), np.minimum(after, len(self.times) - 1)
         length = np.maximum(self.times[second] - self.times[first], 1e-12)
@@ -100,7 +100,7 @@ class MoodCurve:
 
 
 def check_spans(moods: Sequence[Mood | MoodCurve], length: float) -> None:
-    """Raise OptionError for a mood that a performance of `length` seconds does not reach."""
+    """Raise OptionError for a mood outside a performance of `length` seconds."""
     for mood in moods:
         if isinstance(mood, MoodCurve):
             if mood.times[0] > length or mood.times[-1] < 0:
@@ -119,11 +119,11 @@ def check_spans(moods: Sequence[Mood | MoodCurve], length: float) -> None:
 
 
 def intensity_curves(moods: Sequence[Mood | MoodCurve], times: Float64) -> dict[str, Float64]:
-    """Return the intensity of every expression at some times (T,), seconds: float64 (T,) by name.
+    """Return the intensity of each expression at times (T,), seconds: float64 (T,) by name.
 
-    Moods of one expression may follow each other; while one fades the next may rise, and the larger counts.
+    Where two moods of an expression ease into each other, the larger intensity counts.
 
-    Raises OptionError where two of one expression hold different intensities at the same time.
+    Raises OptionError where two moods of an expression have different intensities at the same time.
     """
     curves: dict[str, list[tuple[Mood | MoodCurve, Float64]]] = defaultdict(list)
     for mood in moods:
@@ -137,7 +137,7 @@ def intensity_curves(moods: Sequence[Mood | MoodCurve], times: Float64) -> dict[
 
 
 def _check_apart(name: str, one: Mood | MoodCurve, other: Mood | MoodCurve) -> None:
-    """Raise OptionError unless two moods of one expression have times of their own, or say the same."""
+    """Raise OptionError unless two moods of an expression differ in time or have the same intensity."""
     if not isinstance(one, Mood) or not isinstance(other, Mood):
         raise OptionError(f"{name!r} has keys and another intensity as well: give one of them")
     begin = max(-math.inf if m.start is None else m.start for m in (one, other))

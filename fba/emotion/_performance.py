@@ -1,4 +1,4 @@
-"""Expressions over time: an animation that shows one, eased in and out."""
+"""`perform`: an animation that shows an expression, eased in and out."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from fba.parameters import FIRST_LOW_LEVEL_FAP
 from fba.tracks import FaceTrack
 
 SENDING = ("auto", "expression", "faps")
-"""How an expression is sent: by FAP 2 where that can say it, by FAP 2, by low-level FAPs."""
-MOST_FRAMES = 10_000_000
+"""How an expression is sent: by FAP 2 where possible, by FAP 2, by low-level FAPs."""
+MAX_FRAMES = 10_000_000
 
 
 def perform(
@@ -27,25 +27,25 @@ def perform(
     """Return an animation that shows an expression: eased in, held, eased out.
 
     seconds: its length; 0 for one frame at full intensity. ease: seconds from neutral to the expression, and
-    from there back; at most half the length. rate: frames/s. send: one of `SENDING`; of FAP 2 a face shows
-    its own definitions, and of two expressions their sum.
+    back; at most half the length. rate: frames/s. send: one of `SENDING`; for FAP 2, a face shows its own
+    definitions, and adds up two expressions.
 
-    Raises OptionError where these contradict each other, or FAP 2 cannot say it.
+    Raises OptionError where these contradict each other, or FAP 2 cannot show the expression.
     """
     for name, value in (("seconds", seconds), ("ease", ease)):
         if not math.isfinite(value) or value < 0:
-            raise OptionError(f"{name} must be a number that is not negative, not {value:g}")
+            raise OptionError(f"{name} must be a number of at least 0, not {value:g}")
     if 2 * ease > seconds:
         raise OptionError(f"easing in and out takes {2 * ease:g} s, but the animation has only {seconds:g} s")
     if send not in SENDING:
         raise OptionError(f"send must be one of {', '.join(SENDING)}, not {send!r}")
-    count = max(1, round(seconds * Fraction(rate))) if seconds * float(rate) <= MOST_FRAMES else 0
-    if not count:
-        raise OptionError(f"{seconds:g} s at {float(rate):g} frames/s are more than {MOST_FRAMES} frames")
+    if seconds * float(rate) > MAX_FRAMES:
+        raise OptionError(f"{seconds:g} s at {float(rate):g} frames/s are more than {MAX_FRAMES} frames")
+    count = max(1, round(seconds * Fraction(rate)))
     strength = intensity_curve(count, rate, ease)
     fields = blend.fields
     if fields is None and send == "expression":
-        raise OptionError(f"FAP 2 cannot say {blend}: it shows one or two of its six expressions")
+        raise OptionError(f"FAP 2 cannot show {blend}, but only one or two of its six expressions")
     if fields is not None and send != "faps":
         face = _by_expression(fields, strength)
     else:
@@ -54,10 +54,7 @@ def perform(
 
 
 def intensity_curve(count: int, rate: Fraction | int, ease: float) -> Float64:
-    """Return the share of the expression in each frame: float64 (count,), 0 to 1, smooth at both ends.
-
-    The first frame is neutral if there is easing, and so is the last.
-    """
+    """Return the share of the expression in each frame: float64 (count,), 0 to 1, smooth at both ends."""
     if not ease:
         return np.ones(count)
     times = np.arange(count) / float(rate)
@@ -75,7 +72,7 @@ def _by_expression(fields: Int16, strength: Float64) -> FaceTrack:
 
 
 def _by_faps(blend: Blend, strength: Float64) -> FaceTrack:
-    """Send the FAPs that move, and those that would else copy one that does."""
+    """Return a track of the FAPs that move, and those that would otherwise copy one of them."""
     values = np.rint(strength[:, None].astype(np.float32) * blend.faps).astype(np.int32)
     moving = blend.faps != 0
     copies = fill(blend.faps, moving)[1]

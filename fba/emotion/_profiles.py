@@ -1,7 +1,7 @@
-"""What moves in each of the six families, and how far it was measured to move.
+"""The FAPs of each of the six families, and their measured values.
 
 Tables 8-3 (`vocabulary.csv`) and 8-4 (`measured.csv`) of the thesis that docs/emotion.md names. The measured
-values are changes of distances on a face, in FAPU; `sign` turns them into FAPs.
+values are changes of distances on a face, in FAPU; `sign` converts them to FAPs.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from fba.errors import OptionError, did_you_mean
 from fba.parameters import FAP_COUNT, fap_numbers
 
 UPPER_LID_SHARE = 0.7
-"""Share of the upper lid in a change of the eye's opening. The source measured the opening alone."""
+"""Share of the upper lid in a change of the eye's opening; the source measured only the opening."""
 
 
 @dataclass(frozen=True)
 class Movement:
     """A FAP that takes part in a family, by Table 8-3.
 
-    fap: its number. sign: +1 or -1. alternative: FAPs of one number exclude those of another; 0: it always
-    takes part. note: where the table as printed is wrong, what it says.
+    fap: its number. sign: +1 or -1. alternative: FAPs of alternative 1 exclude those of 2; FAPs of 0 always
+    take part. note: the text of the printed table where it is wrong.
     """
 
     fap: int
@@ -40,9 +40,8 @@ class Movement:
 class Measurement:
     """A measured change, by Table 8-4.
 
-    feature: number of the row, 1..15; not a FAP's. faps: numbers of the FAPs that make up the change
-    together: one, or two that share it. mean, deviation: as printed, in FAPU. sign: what mean is multiplied
-    by to get FAPs.
+    feature: number of the row, 1..15; not a FAP's. faps: numbers of the FAPs of the change: one, or two that
+    share it. mean, deviation: as printed, in FAPU. sign: factor from the mean to FAPs.
     """
 
     feature: int
@@ -50,11 +49,6 @@ class Measurement:
     mean: float
     deviation: float
     sign: int
-
-    @property
-    def fap_mean(self) -> float:
-        """The mean as a FAP, or as the sum of two."""
-        return self.sign * self.mean
 
 
 @cache
@@ -70,7 +64,7 @@ def vocabulary(family: str) -> tuple[Movement, ...]:
 
 @cache
 def measurements(family: str) -> tuple[Measurement, ...]:
-    """Return what was measured of a family; OptionError for an unknown family."""
+    """Return the measurements of a family; OptionError for an unknown family."""
     _check(family)
     return tuple(
         Measurement(
@@ -88,19 +82,18 @@ def measurements(family: str) -> tuple[Measurement, ...]:
 def measured_faps(family: str, deviations: dict[int, float] | None = None) -> Float32:
     """Return the measured profile of a family as FAPs: float32 (68,).
 
-    deviations: how many standard deviations each feature lies above its mean, by the feature's number;
-    default: none does. Of the opening of an eye the upper lid takes `UPPER_LID_SHARE`, the widening of the
-    mouth and the distance of the brows are shared equally. Where both brows and their distance were measured,
-    the brows' own values hold.
+    deviations: standard deviations above the mean by number of the feature, 0 for others. The upper lid takes
+    `UPPER_LID_SHARE` of an eye's opening; the widening of the mouth and the distance of the brows are shared
+    equally. Where both brows and their distance were measured, the brows' values count.
     """
     values = np.zeros(FAP_COUNT, dtype=np.float32)
     listed = measurements(family)
     single = {m.faps[0] for m in listed if len(m.faps) == 1}
-    for one in listed:
-        amount = one.sign * (one.mean + (deviations or {}).get(one.feature, 0.0) * one.deviation)
-        if len(one.faps) == 2 and single.issuperset(one.faps):
+    for m in listed:
+        amount = m.sign * (m.mean + (deviations or {}).get(m.feature, 0.0) * m.deviation)
+        if len(m.faps) == 2 and single.issuperset(m.faps):
             continue
-        for fap, share in zip(one.faps, _shares(one.faps), strict=True):
+        for fap, share in zip(m.faps, _shares(m.faps), strict=True):
             values[fap - 1] += amount * share
     return values
 
@@ -108,7 +101,7 @@ def measured_faps(family: str, deviations: dict[int, float] | None = None) -> Fl
 def _shares(numbers: tuple[int, ...]) -> tuple[float, ...]:
     if len(numbers) == 1:
         return (1.0,)
-    lids = numbers[0] == fap_numbers()["close_t_l_eyelid"] or numbers[0] == fap_numbers()["close_t_r_eyelid"]
+    lids = numbers[0] in (fap_numbers()["close_t_l_eyelid"], fap_numbers()["close_t_r_eyelid"])
     return (UPPER_LID_SHARE, 1 - UPPER_LID_SHARE) if lids else (0.5, 0.5)
 
 

@@ -1,4 +1,4 @@
-"""Reads the expressions of whole animations, and sums them up."""
+"""Reading of the expressions of whole animations, with a summary."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from fba.parameters import faps
 from fba.tracks import FaceTrack
 
 BASELINES = ("none", "start", "median")
-"""What is taken for the face at rest: as the standard has it, the first moments, the middle of each FAP."""
+"""The face at rest: that of the standard, the mean of the start, the median of each FAP."""
 START_SECONDS = 0.5
-"""Longest duration of the first moments of a recording, in seconds."""
+"""Longest duration of the start of a recording, seconds."""
 START_SHARE = 0.1
-"""Largest share of a recording that its first moments take."""
-SILENT = 1.0
-"""Seconds for which a FAP must be 0 throughout to be taken for one that is not sent."""
+"""Largest share of a recording that is its start."""
+SILENT_SECONDS = 1.0
+"""Length of a recording from which a FAP that is 0 throughout counts as not sent."""
 CHUNK = 4096
-"""Frames that are read at once."""
+"""Number of frames that are read at once."""
 MOUTH_GROUPS = (2, 8)
 
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """What a face shows in each frame of an animation.
+    """The expressions in each frame of an animation.
 
-    times: float64 (T,), seconds. readings: T. baseline: one of `BASELINES`. unsent: names of FAPs that the
-    file never sends, or that are 0 throughout a second or more; they say nothing.
+    times: float64 (T,), seconds. readings: T. baseline: one of `BASELINES`. unsent: names of FAPs that are
+    never sent, or are 0 throughout a second or more; they are ignored.
     """
 
     times: Float64
@@ -47,23 +47,23 @@ class Readings:
         return len(self.readings)
 
     def summary(self) -> dict[str, Any]:
-        """Return shares of frames by label with mean intensities, most frequent first, and the main family.
+        """Return shares of frames by label with mean intensities, most frequent first, and the main label.
 
-        "main" is the label that is shown most, frames times intensity; None if none is.
+        "main" is the label with the largest sum of intensities; None without any but neutral and unknown.
         """
-        counts = Counter(one.label for one in self.readings)
+        counts = Counter(reading.label for reading in self.readings)
         shares = [
             {
                 "label": label,
                 "share": count / len(self.readings),
-                "intensity": float(np.mean([one.intensity for one in self.readings if one.label == label])),
+                "intensity": float(np.mean([r.intensity for r in self.readings if r.label == label])),
             }
             for label, count in counts.most_common()
         ]
         amounts: dict[str, float] = defaultdict(float)
-        for one in self.readings:
-            if one.label not in (NEUTRAL, UNKNOWN):
-                amounts[one.label] += one.intensity
+        for reading in self.readings:
+            if reading.label not in (NEUTRAL, UNKNOWN):
+                amounts[reading.label] += reading.intensity
         main = max(amounts, key=lambda label: amounts[label], default=None)
         changes = sum(a.label != b.label for a, b in zip(self.readings, self.readings[1:], strict=False))
         return {"main": main, "shares": shares, "changes": changes}
@@ -72,13 +72,12 @@ class Readings:
 def read_expressions(
     animation: Animation, model: FaceSettings | None = None, *, baseline: str = "none"
 ) -> Readings:
-    """Return what the face of an animation shows in each frame.
+    """Return the expressions in each frame of an animation.
 
-    Works on what a face shows (`fba.face.resolve`), so that visemes, FAP 2 and mates take part. model: as
-    for `resolve`. baseline: what is taken for the face at rest and subtracted: "none", nothing, as FAPs
-    count from the neutral face; "start", the mean of the first half second, or of a tenth of a short
-    recording; "median", of each FAP, for a recording in which a face is mostly at rest. The head's angles are
-    never read.
+    FAPs are resolved (`fba.face.resolve`), so that visemes, FAP 2 and mates count. model: as for `resolve`.
+    baseline: the face at rest, which is subtracted: "none", the neutral face of the standard; "start", the
+    mean of the first half second, or of a tenth of a short recording; "median", of each FAP, for a recording
+    in which the face is mostly at rest. The head's angles are ignored.
 
     Raises OptionError for an animation without a face or without frames, and for another baseline.
     """
@@ -89,27 +88,24 @@ def read_expressions(
     times = (animation.index - animation.index[0]) / float(animation.rate)
     shown = resolve(animation.face, model)
     known = find_known_faps(animation.face)
-    if len(shown) >= SILENT * animation.rate:
+    if len(shown) >= SILENT_SECONDS * animation.rate:
         known &= shown.any(axis=0)
     at_rest = _find_rest(shown, times, baseline)
     recogniser = Recogniser(animation.rate, known=known, baseline=at_rest)
     readings: list[Reading] = []
     for start in range(0, len(shown), CHUNK):
         readings += recogniser.push_frames(shown[start : start + CHUNK])
-    unsent = tuple(one.name for one, there in zip(faps(), known.tolist(), strict=True) if not there)
+    unsent = tuple(fap.name for fap, sent in zip(faps(), known.tolist(), strict=True) if not sent)
     return Readings(times, tuple(readings), baseline, unsent[2:])
 
 
 def find_known_faps(track: FaceTrack) -> Bool:
-    """Return which FAPs a track says something about: bool (68,).
-
-    Those sent, their mates, all if FAP 2 is sent, and those of the mouth if visemes are.
-    """
+    """Return which FAPs a track determines, bool (68,): sent, mates, all by FAP 2, the mouth by FAP 1."""
     known: Bool = np.asarray(known_faps(track)[1].any(axis=0))
     if track.mask[:, 1].any():
         known[2:] = True
     if track.mask[:, 0].any():
-        known |= np.array([one.group in MOUTH_GROUPS for one in faps()])
+        known |= np.array([fap.group in MOUTH_GROUPS for fap in faps()])
     known[:2] = False
     return known
 

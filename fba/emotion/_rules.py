@@ -1,6 +1,6 @@
-"""The two rules by which expressions mix: of one family, and of two.
+"""The two rules for mixing expressions: within a family, and of different families.
 
-Section 8.4 of the thesis in docs/emotion.md, which gives no numbers; those here are named parameters.
+Section 8.4 of the thesis in docs/emotion.md, which gives no numbers; here they are parameters.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from fba.errors import OptionError
 from fba.face import Definitions
 from fba.parameters import FAP_COUNT, faps
 
-LEAST_ACTIVATION = 2.0
-"""The activation of an expression that has none, nor a family: the smallest in the table."""
+MIN_ACTIVATION = 2.0
+"""Activation of an expression without one and without a family: the smallest in the table."""
 
 
 @dataclass(frozen=True)
 class Rules:
-    """Parameters of the rules.
+    """Parameters of the rules, 0 to 1.
 
-    interpolation: share of the second of two expressions of one family in the FAPs that both move, 0 to 1;
-    None: by their intensities. reduction: what remains of a FAP that only one of them moves, 0 to 1.
-    nearness: within one family, how far such a FAP may be from the family's own value, as a share of that, to
-    be kept at all. presence: an expression moves a FAP if Table 8-3 or 8-4 lists it for the family, or if its
-    value is at least this share of the largest among the six. crossover: the rules take hold gradually, so
-    that nothing jumps while intensities change: in one family, until the lesser expression has this share; of
-    two, until their activations differ by this share of their sum. 0: at once.
+    interpolation: share of the second of two expressions of a family in the FAPs that both move; by default
+    by their intensities. reduction: factor of a FAP that only one of them moves. nearness: within a family,
+    largest distance of such a FAP from the family's own value, relative to that value; beyond, it is dropped.
+    presence: an expression moves a FAP if Table 8-3 or 8-4 lists it for the family, or if its value is at
+    least this share of the largest among the six. crossover: the rules are blended in, so that nothing jumps
+    while intensities change: within a family, until the weaker expression has this share; of two families,
+    until their activations differ by this share of their sum. 0: at once.
 
-    Raises OptionError where one is no number of 0 to 1.
+    Raises OptionError for other values.
     """
 
     interpolation: float | None = None
@@ -56,10 +56,10 @@ class Rules:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """An expression at an intensity, on its way into a mix.
+    """An expression at an intensity, as part of a mixture.
 
     faps: float64 (68,), at full intensity. moved: float64 (68,), 1 for the FAPs that it moves, 0 for others;
-    a mix moves some in part. activation: at full intensity. intensity: 0 to 1. family: "" for none.
+    in between for mixtures. activation: at full intensity. intensity: 0 to 1. family: "" for none.
     """
 
     faps: Float64
@@ -75,7 +75,7 @@ class Part:
 
     @property
     def shown_activation(self) -> float:
-        """The activation at the intensity, which decides what dominates."""
+        """The activation at the intensity, which decides the dominant part."""
         return self.activation * self.intensity
 
 
@@ -87,14 +87,14 @@ def part(expression: Expression, intensity: float, activation: float | None, pre
     return Part(
         expression.faps.astype(np.float64),
         moved_faps(expression, presence).astype(np.float64),
-        LEAST_ACTIVATION if activation is None else activation,
+        MIN_ACTIVATION if activation is None else activation,
         intensity,
         expression.family,
     )
 
 
 def moved_faps(expression: Expression, presence: float) -> Bool:
-    """Return which FAPs an expression moves, bool (68,): see `Rules.presence`."""
+    """Return which FAPs an expression moves, bool (68,); see `Rules`."""
     largest = np.abs(Definitions.default().expressions).max(axis=0)
     size = np.abs(expression.faps)
     listed = _listed_faps(expression.family) if expression.family else np.zeros(FAP_COUNT, dtype=bool)
@@ -105,27 +105,27 @@ def moved_faps(expression: Expression, presence: float) -> Bool:
 @cache
 def _listed_faps(family: str) -> Bool:
     listed = np.zeros(FAP_COUNT, dtype=bool)
-    listed[[one.fap - 1 for one in vocabulary(family)]] = True
-    listed[[fap - 1 for one in measurements(family) for fap in one.faps]] = True
+    listed[[movement.fap - 1 for movement in vocabulary(family)]] = True
+    listed[[fap - 1 for measurement in measurements(family) for fap in measurement.faps]] = True
     return listed
 
 
 def mix_within_family(first: Part, second: Part, centre: Float64, rules: Rules) -> Part:
-    """Return two expressions of one family as one, with the larger of their intensities.
+    """Return the mixture of two expressions of a family, with the larger of their intensities.
 
-    A FAP that both move, or neither, is interpolated. One that only one of them moves is kept, reduced, if it
-    is near the family's own value, else dropped.
+    A FAP that both move, or neither, is interpolated. A FAP that only one moves is reduced if it is near the
+    family's own value, and otherwise dropped.
 
-    centre: float64 (68,), the family's own expression at full intensity.
+    centre: float64 (68,), the expression with the family's name, at full intensity.
     """
     total = first.intensity + second.intensity
     share = second.intensity / total if rules.interpolation is None else rules.interpolation
     interpolated = (1 - share) * first.faps + share * second.faps
     ruled = interpolated
-    for own, other in ((first, second), (second, first)):
-        near = np.abs(own.faps - centre) <= rules.nearness * np.abs(centre)
-        kept = np.where(near, rules.reduction * own.faps, 0.0)
-        alone = own.moved * (1 - other.moved)
+    for this, other in ((first, second), (second, first)):
+        near = np.abs(this.faps - centre) <= rules.nearness * np.abs(centre)
+        kept = np.where(near, rules.reduction * this.faps, 0.0)
+        alone = this.moved * (1 - other.moved)
         ruled = ruled + alone * (kept - interpolated)
     hold = _grow(min(share, 1 - share), rules.crossover)
     return Part(
@@ -140,44 +140,44 @@ def mix_within_family(first: Part, second: Part, centre: Float64, rules: Rules) 
 def mix_families(parts: Sequence[Part], rules: Rules) -> Float64:
     """Return the FAPs of expressions of different families: float64 (68,).
 
-    The one with the largest activation, as shown, dominates: its FAPs stay, and to those that it does not
-    move the others' are added, reduced. The others are mixed in the same way before.
+    The expression with the largest activation at its intensity dominates: its FAPs stay. The others, mixed by
+    the same rule, are reduced and added to the FAPs that it does not move.
     """
     return _mix(tuple(parts), rules, {})[0]
 
 
 def _mix(
-    parts: tuple[Part, ...], rules: Rules, known: dict[tuple[Part, ...], tuple[Float64, Float64]]
+    parts: tuple[Part, ...], rules: Rules, mixed: dict[tuple[Part, ...], tuple[Float64, Float64]]
 ) -> tuple[Float64, Float64]:
-    """Return FAPs (68,), and how far each is moved, 0 to 1. known: mixtures that were made before."""
+    """Return FAPs (68,), and how far each is moved, 0 to 1. mixed: a cache of mixtures."""
     if len(parts) == 1:
         return parts[0].shown, parts[0].moved
-    if parts in known:
-        return known[parts]
+    if parts in mixed:
+        return mixed[parts]
     values, moved = np.zeros(FAP_COUNT), np.zeros(FAP_COUNT)
-    for number, weight in enumerate(_dominance([one.shown_activation for one in parts], rules)):
+    for number, weight in enumerate(_dominance([part.shown_activation for part in parts], rules)):
         if not weight:
             continue
         leader, others = parts[number], parts[:number] + parts[number + 1 :]
-        added, added_moved = _mix(others, rules, known)
+        added, added_moved = _mix(others, rules, mixed)
         free = added_moved * (1 - leader.moved)
-        activation = max(one.shown_activation for one in others)
+        activation = max(part.shown_activation for part in others)
         part_of = _grow(activation / (activation + leader.shown_activation or 1.0), rules.crossover)
         values += weight * (leader.shown + rules.reduction * free * added)
         moved += weight * (leader.moved + free * part_of)
-    known[parts] = values, moved
+    mixed[parts] = values, moved
     return values, moved
 
 
 def _dominance(activations: list[float], rules: Rules) -> list[float]:
-    """Return the share of each in the lead: 1 for the largest activation, less where others are near it."""
+    """Return the share of dominance of each: 1 for the largest activation, less where others are near it."""
     largest = max(activations) or 1.0
-    near = [1 - _grow((largest - one) / (largest + one), rules.crossover) for one in activations]
-    return [one / sum(near) for one in near]
+    near = [1 - _grow((largest - value) / (largest + value), rules.crossover) for value in activations]
+    return [value / sum(near) for value in near]
 
 
 def _grow(value: float, crossover: float) -> float:
-    """Return 0 at 0, rising to 1 at the crossover; if that is 0, 1 for all that is more than 0."""
+    """Return a smooth step from 0 at 0 to 1 at the crossover."""
     if value <= 0:
         return 0.0
     return 1.0 if value >= crossover else float(smoothstep(value / crossover))
@@ -192,6 +192,7 @@ def limited(values: Floating) -> Float32:
 @cache
 def fap_limits() -> tuple[Float64, Float64]:
     """Return the smallest and the largest value of each FAP, float64 (68,) each; zeros for FAP 1 and 2."""
-    pairs = [one.i_limits or (0, 0) for one in faps()]
-    scale = np.array([one.step for one in faps()], dtype=np.float64)
-    return np.array([p[0] for p in pairs]) * scale, np.array([p[1] for p in pairs]) * scale
+    limits = np.array([fap.i_limits or (0, 0) for fap in faps()]) * np.array(
+        [[float(fap.step)] for fap in faps()]
+    )
+    return limits[:, 0], limits[:, 1]

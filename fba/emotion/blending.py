@@ -1,4 +1,4 @@
-"""Intermediate expressions: several named ones, each with an intensity, mixed by the rules."""
+"""Intermediate expressions: named expressions, each with an intensity, mixed by the rules."""
 
 from __future__ import annotations
 
@@ -17,17 +17,16 @@ from fba.errors import OptionError
 from fba.parameters import INTENSITY_MAX
 
 NEUTRAL = "neutral"
-FULL = 100.0
-"""The largest intensity."""
+MAX_INTENSITY = 100.0
 
 
 @dataclass(frozen=True, eq=False)
 class Blend:
-    """An expression that is made of named ones.
+    """A mixture of named expressions.
 
-    parts: each with its intensity, more than 0 and up to 100; none for a neutral face. faps: float32 (68,),
-    by the rules. activation, evaluation: between those of the parts and `NEUTRAL_POINT`; a part without them
-    counts as its family.
+    parts: each with its intensity, above 0 and up to 100; empty for a neutral face. faps: float32 (68,), by
+    the rules. activation, evaluation: between those of the parts and `NEUTRAL_POINT`; a part without them
+    has those of its family.
     """
 
     parts: tuple[tuple[Expression, float], ...]
@@ -37,48 +36,50 @@ class Blend:
 
     @property
     def fields(self) -> Int16 | None:
-        """The fields of FAP 2, int16 (6,), if one or two of its expressions are all that there is; else None.
+        """The fields of FAP 2, int16 (6,), or None if FAP 2 cannot show this mixture.
 
-        FAP 2 adds up two expressions, so that a face may show others FAPs than `faps` for two.
+        FAP 2 shows one or two of its own expressions, and adds two up, not by the rules.
         """
-        if len(self.parts) > 2 or not all(one.select for one, _ in self.parts):
+        if len(self.parts) > 2 or not all(part.select for part, _ in self.parts):
             return None
         fields = np.zeros(6, dtype=np.int16)
-        for number, (one, intensity) in enumerate(self.parts):
-            fields[2 * number : 2 * number + 2] = one.select, round(intensity / FULL * INTENSITY_MAX)
+        for number, (part, intensity) in enumerate(self.parts):
+            amount = round(intensity / MAX_INTENSITY * INTENSITY_MAX)
+            fields[2 * number : 2 * number + 2] = part.select, amount
         return fields
 
     def __str__(self) -> str:
-        return " ".join(f"{_word(one.name)}={intensity:.3g}" for one, intensity in self.parts) or NEUTRAL
+        words = (f"{part.name.replace(' ', '_')}={intensity:.3g}" for part, intensity in self.parts)
+        return " ".join(words) or NEUTRAL
 
 
 def combine(weights: Mapping[str, float], rules: Rules | None = None) -> Blend:
-    """Return expressions mixed by the rules of `fba.emotion._rules`.
+    """Return a mixture by the rules of `fba.emotion._rules`.
 
     weights: intensities, 0 to 100, by name or alias; "neutral" adds nothing. rules: their parameters.
 
-    Raises OptionError for an unknown name, which suggests the nearest; for an intensity out of range; where
-    two names mean one expression.
+    Raises OptionError for an unknown name, with the nearest; for an intensity out of range; where two names
+    mean the same expression.
     """
     parts: dict[str, tuple[Expression, float]] = {}
     for name, intensity in weights.items():
         _check_intensity(name, intensity)
         if name == NEUTRAL:
             continue
-        one = expression(name)
-        if one.name in parts:
-            raise OptionError(f"{name!r} means {one.name!r}, which is given already: give one of them")
-        parts[one.name] = one, float(intensity)
-    chosen = tuple((one, intensity) for one, intensity in parts.values() if intensity > 0)
+        part = expression(name)
+        if part.name in parts:
+            raise OptionError(f"{name!r} means {part.name!r}, which is given already: give one of them")
+        parts[part.name] = part, float(intensity)
+    chosen = tuple((part, intensity) for part, intensity in parts.values() if intensity > 0)
     return Blend(chosen, mix(chosen, rules or Rules()), *_point(chosen))
 
 
 def parse_weights(text: str) -> dict[str, float]:
-    """Return intensities by name from text such as "fear=60 joy=30"; a name alone has 100.
+    """Return intensities by name from text such as "fear=60 joy=30"; a name without a number has 100.
 
-    Commas or spaces separate; names of several words are written with underscores, hyphens or spaces.
+    Entries are separated by commas or spaces; words of a name by underscores, hyphens or spaces.
 
-    Raises OptionError where a number is missing or none, or a name is given twice.
+    Raises OptionError where a number is missing or invalid, or a name is given twice.
     """
     weights: dict[str, float] = {}
     words: list[str] = []
@@ -113,19 +114,16 @@ def parse_weights(text: str) -> dict[str, float]:
 def _check_intensity(name: str, intensity: float) -> None:
     if isinstance(intensity, bool) or not isinstance(intensity, int | float | np.number):
         raise OptionError(f"the intensity of {name!r} must be a number, not {intensity!r}")
-    if not math.isfinite(intensity) or not 0 <= intensity <= FULL:
+    if not math.isfinite(intensity) or not 0 <= intensity <= MAX_INTENSITY:
         raise OptionError(f"the intensity of {name!r} must be from 0 to 100, not {intensity:g}")
 
 
 def _point(parts: tuple[tuple[Expression, float], ...]) -> tuple[float, float]:
-    placed = [(point_of(one), intensity / FULL) for one, intensity in parts]
+    """Return activation and evaluation of a mixture."""
+    placed = [(point_of(part), intensity / MAX_INTENSITY) for part, intensity in parts]
     total = max(sum(weight for _, weight in placed), 1.0)
     offset = [
         sum(weight * (point[axis] - NEUTRAL_POINT[axis]) for point, weight in placed) / total
         for axis in (0, 1)
     ]
     return NEUTRAL_POINT[0] + offset[0], NEUTRAL_POINT[1] + offset[1]
-
-
-def _word(name: str) -> str:
-    return name.replace(" ", "_")

@@ -1,8 +1,14 @@
-"""A named expression: its family, its FAPs at full intensity, its place on the plane of emotions."""
+"""A named expression: its family, its FAPs at full intensity, its point on the plane of emotions.
+
+`whissel.csv` has Whissel's activation and evaluation of words, Table 8-1 of the source (docs/emotion.md).
+"""
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 
 import numpy as np
 
@@ -10,20 +16,19 @@ from fba.arrays import Float32
 from fba.parameters import EXPRESSIONS, FAP_COUNT
 
 FAMILIES = EXPRESSIONS[1:]
-"""Names of the six families, which are those of FAP 2: joy, sadness, anger, fear, disgust, surprise."""
+"""Names of the six families, which FAP 2 can show: joy, sadness, anger, fear, disgust, surprise."""
 NEUTRAL_POINT = (4.0, 4.0)
-"""Activation and evaluation of a face that shows nothing: the middle of Whissel's scales, 1 to 7."""
+"""Activation and evaluation of a neutral face: the middle of Whissel's scales, 1 to 7."""
 
 
 @dataclass(frozen=True, eq=False)
 class Expression:
-    """An expression that has a name.
+    """A named expression.
 
-    name: such as "fear". family: one of `FAMILIES`, "" for one that belongs to none. about: what is seen, in
-    a few words. faps: float32 (68,), at full intensity; columns 0 and 1 are zero. activation, evaluation:
-    Whissel's, None where they are not known. select: of FAP 2, 0 if FAP 2 cannot show it. aliases: other
-    names. recipe: intensities of the expressions that it is made from by the rules; empty if it is drawn
-    by hand.
+    name: such as "fear". family: one of `FAMILIES`, or "". about: a description in a few words. faps: float32
+    (68,), at full intensity; columns 0 and 1 are zero. activation, evaluation: Whissel's, or None. select:
+    of FAP 2, 0 if FAP 2 cannot show it. aliases: other names. recipe: intensities of the expressions from
+    which it is mixed by the rules; empty if it is drawn by hand.
     """
 
     name: str
@@ -48,10 +53,18 @@ class Expression:
 
     @property
     def point(self) -> tuple[float, float] | None:
-        """Activation and evaluation; None where they are not known."""
+        """Activation and evaluation, or None."""
         if self.activation is None or self.evaluation is None:
             return None
         return self.activation, self.evaluation
 
     def __repr__(self) -> str:
         return f"Expression({self.name!r}, family={self.family!r})"
+
+
+@cache
+def whissel_points() -> dict[str, tuple[float, float]]:
+    """Return (activation, evaluation) of each word in `whissel.csv`."""
+    with (files(__package__) / "whissel.csv").open(encoding="utf-8") as file:
+        rows = csv.DictReader(file)
+        return {row["word"]: (float(row["activation"]), float(row["evaluation"])) for row in rows}

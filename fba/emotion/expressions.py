@@ -1,7 +1,7 @@
 """The table of named expressions: `expressions.csv`, with the FAPs in `expression_faps.csv`.
 
-The six universal expressions are FAP 2's own (`fba.face._expressions`). An expression with a recipe is made
-from others by the rules; its FAPs in the table are added.
+The six universal expressions are those of FAP 2 (`fba.face._expressions`). An expression with a recipe is
+mixed from others by the rules; its FAPs in the table are added.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ import numpy as np
 from fba.arrays import Bool, Float32
 from fba.emotion._mixing import mix
 from fba.emotion._rules import Rules, limited
-from fba.emotion._whissel import whissel_points
-from fba.emotion.expression import FAMILIES, Expression
+from fba.emotion.expression import FAMILIES, Expression, whissel_points
 from fba.errors import OptionError, did_you_mean
 from fba.face import Definitions
 from fba.face.mates import fill
@@ -31,16 +30,16 @@ def expressions() -> tuple[Expression, ...]:
 def expression(name: str) -> Expression:
     """Return the expression with this name or alias.
 
-    Case does not matter, and an underscore or a hyphen stands for a space. Raises OptionError, which suggests
-    the nearest name, if it does not exist.
+    Case does not matter; underscores and hyphens stand for spaces. Raises OptionError, with the nearest name,
+    for an unknown one.
     """
     word = " ".join(name.lower().replace("_", " ").replace("-", " ").split())
-    known = _by_any_name()
-    if word not in known:
+    table = _by_any_name()
+    if word not in table:
         raise OptionError(
-            f"there is no expression {name!r}{did_you_mean(word, known)}; they are {', '.join(_by_name())}"
+            f"there is no expression {name!r}{did_you_mean(word, table)}; they are {', '.join(_by_name())}"
         )
-    return known[word]
+    return table[word]
 
 
 @cache
@@ -49,21 +48,21 @@ def _by_name() -> dict[str, Expression]:
         rows = {row["name"]: row for row in csv.DictReader(file)}
     drawn = _drawn_faps()
     result: dict[str, Expression] = {}
-    for made in (False, True):  # recipes need what is drawn
+    for mixed in (False, True):  # recipes name expressions that are drawn
         for name, row in rows.items():
-            if bool(row["recipe"]) == made:
+            if bool(row["recipe"]) == mixed:
                 result[name] = _build(row, drawn.get(name, np.zeros(FAP_COUNT, dtype=np.float32)), result)
     return {name: result[name] for name in rows}
 
 
-def _build(row: dict[str, str], faps: Float32, known: dict[str, Expression]) -> Expression:
-    """Return the expression of a row. faps: those listed for it. known: what a recipe may name."""
+def _build(row: dict[str, str], faps: Float32, drawn: dict[str, Expression]) -> Expression:
+    """Return the expression of a row. faps: those in the table. drawn: expressions that a recipe may name."""
     name, recipe = row["name"], _recipe(row["recipe"])
     select = EXPRESSIONS.index(name) if name in FAMILIES else 0
     if select:
         faps = Definitions.default().expressions[select]
     elif recipe:
-        faps = limited(mix([(known[word], intensity) for word, intensity in recipe], Rules()) + faps)
+        faps = limited(mix([(drawn[word], intensity) for word, intensity in recipe], Rules()) + faps)
     activation, evaluation = whissel_points().get(name, (None, None))
     aliases = tuple(row["aliases"].split(", ")) if row["aliases"] else ()
     return Expression(
@@ -73,10 +72,7 @@ def _build(row: dict[str, str], faps: Float32, known: dict[str, Expression]) -> 
 
 @cache
 def _by_any_name() -> dict[str, Expression]:
-    known: dict[str, Expression] = {}
-    for one in expressions():
-        known |= dict.fromkeys((one.name, *one.aliases), one)
-    return known
+    return {name: each for each in expressions() for name in (each.name, *each.aliases)}
 
 
 def _drawn_faps() -> dict[str, Float32]:
@@ -91,6 +87,6 @@ def _drawn_faps() -> dict[str, Float32]:
 
 
 def _recipe(text: str) -> tuple[tuple[str, float], ...]:
-    """Return "fear=50 joy=40" as pairs."""
+    """Return the pairs in "fear=50, joy=40"."""
     pairs = (word.rpartition("=") for word in text.split(", ") if word)
     return tuple((name, float(amount)) for name, _, amount in pairs)

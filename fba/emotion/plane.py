@@ -1,4 +1,4 @@
-"""The plane of activation and evaluation: which expressions lie near a point of it."""
+"""The plane of activation and evaluation, and the expressions near a point on it."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from fba.emotion.expression import NEUTRAL_POINT
 from fba.emotion.expressions import expressions
 from fba.errors import OptionError
 
-LOWEST, HIGHEST = 1.0, 7.0
-"""Ends of both of Whissel's scales."""
+SCALE_MIN = 1.0
+"""Lowest value of both of Whissel's scales."""
+SCALE_MAX = 7.0
 
 
 def known_points() -> dict[str, tuple[float, float]]:
     """Return (activation, evaluation) of the expressions that have them, by name."""
-    return {one.name: one.point for one in expressions() if one.point is not None}
+    return {each.name: each.point for each in expressions() if each.point is not None}
 
 
 def expression_at(activation: float, evaluation: float, rules: Rules | None = None) -> Blend:
-    """Return the expression for a point of the plane: up to three named ones around it, mixed by the rules.
+    """Return the expression at a point of the plane: up to three named expressions, mixed by the rules.
 
-    The named ones and `NEUTRAL_POINT` span triangles (Delaunay); a point's intensities are its barycentric
-    coordinates, so that they are 100 at the point of a named expression, low near neutral, and change without
-    a jump along any path. A point outside all triangles has the expression of the nearest on their outline.
+    The named expressions and `NEUTRAL_POINT` span triangles (Delaunay). Intensities are barycentric
+    coordinates: 100 at the point of a named expression, low near neutral, continuous along any path. Outside
+    all triangles, the nearest point on their outline counts.
 
-    activation, evaluation: 1 to 7 each. Raises OptionError beyond that.
+    activation, evaluation: 1 to 7 each; OptionError for others.
     """
     for name, value in (("activation", activation), ("evaluation", evaluation)):
-        if not math.isfinite(value) or not LOWEST <= value <= HIGHEST:
-            raise OptionError(f"the {name} must be from {LOWEST:g} to {HIGHEST:g}, not {value:g}")
+        if not math.isfinite(value) or not SCALE_MIN <= value <= SCALE_MAX:
+            raise OptionError(f"the {name} must be from {SCALE_MIN:g} to {SCALE_MAX:g}, not {value:g}")
     names, points, triangles, outline = _triangulation()
     point = np.array([activation, evaluation])
     shares = _in_triangle(point, points, triangles)
@@ -48,17 +49,17 @@ def expression_at(activation: float, evaluation: float, rules: Rules | None = No
 
 @cache
 def _triangulation() -> tuple[tuple[str, ...], Float64, Intp, Intp]:
-    """Names ("" for neutral), points (N, 2), triangles (T, 3) and edges of the outline (E, 2)."""
+    """Return names ("" for neutral), points (N, 2), triangles (T, 3) and edges of the outline (E, 2)."""
     from scipy.spatial import Delaunay
 
-    known = known_points()
-    points = np.array([NEUTRAL_POINT, *known.values()], dtype=np.float64)
-    made = Delaunay(points)
-    return ("", *known), points, made.simplices.astype(np.intp), made.convex_hull.astype(np.intp)
+    named = known_points()
+    points = np.array([NEUTRAL_POINT, *named.values()], dtype=np.float64)
+    mesh = Delaunay(points)
+    return ("", *named), points, mesh.simplices.astype(np.intp), mesh.convex_hull.astype(np.intp)
 
 
 def _in_triangle(point: Float64, points: Float64, triangles: Intp) -> list[tuple[int, float]] | None:
-    """Return corners and barycentric coordinates of the triangle around a point; None outside all."""
+    """Return corners and barycentric coordinates of the triangle around a point; None outside them."""
     corners = points[triangles]
     edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
     second_third = np.linalg.solve(edges, (point - corners[:, 0])[..., None])[..., 0]
@@ -70,7 +71,7 @@ def _in_triangle(point: Float64, points: Float64, triangles: Intp) -> list[tuple
 
 
 def _on_outline(point: Float64, points: Float64, outline: Intp) -> list[tuple[int, float]]:
-    """Return the ends of the nearest edge of the outline, and the shares of its point nearest to this one."""
+    """Return the ends of the nearest edge of the outline, and their shares in its nearest point."""
     start, end = points[outline[:, 0]], points[outline[:, 1]]
     along = end - start
     share = np.clip(((point - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)

@@ -1,8 +1,8 @@
-"""Reads expressions from FAPs, frame by frame, without flicker: live, or a whole animation.
+"""Recognition of expressions from FAPs, frame by frame and without flicker, live or for a whole animation.
 
-The likelihoods of single frames (`likelihood`) are joined over time by a hidden Markov model of what a face
-shows: neutral, unknown, the six families and the expressions without a family. A state lasts `LASTING`
-seconds on average, so that another needs evidence, not a moment's noise, to take over: the hysteresis.
+A hidden Markov model combines the likelihoods of single frames (`likelihood`) over time. Its states are
+neutral, unknown, the six families and the expressions without a family. A state lasts 1.5 seconds on average,
+so that a change needs evidence, not a moment's noise.
 """
 
 from __future__ import annotations
@@ -17,36 +17,38 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from fba.arrays import Bool, Float64, Intp
-from fba.emotion._likelihood import INTENSITIES, NEUTRAL_PRIOR, UNKNOWN_PRIOR, candidates, model
+from fba.emotion._likelihood import INTENSITIES, PRIORS, candidates, model
 from fba.emotion._mixing import point_of
 from fba.emotion.expression import FAMILIES, NEUTRAL_POINT
 from fba.emotion.expressions import expression
 from fba.errors import OptionError
 from fba.parameters import FAP_COUNT, fap_numbers
 
-NEUTRAL, UNKNOWN = "neutral", "unknown"
-LASTING = 1.5
-"""Seconds that a face shows the same, on average."""
-INDEPENDENT = 6.0
-"""Frames a second that say something new; more of them are alike."""
-BLINK = 0.5
-"""Seconds after which lids that are shut are no blink any more, and count."""
-SHUT = 400
-"""An upper lid that is this far down, in IRISD, may belong to a blink."""
-STRESS_SECONDS = 2.0
-"""Seconds in which brows that were lower may stress a word; those that are held show something."""
-STRESS_SHARE = 0.5
-"""Share of their height below which brows were lower at any time in these seconds."""
-NEAREST = 3
-"""Expressions that a reading lists."""
-MIN_PROBABILITY = 0.02
-"""Smallest probability of an expression in a reading's list."""
+NEUTRAL = "neutral"
+UNKNOWN = "unknown"
 TINY = 1e-12
 
 
 @dataclass(frozen=True)
+class Tuning:
+    """Constants of the recogniser."""
+
+    state_seconds: float = 1.5  # mean duration of an expression
+    independent_rate: float = 6.0  # independent frames a second; at higher rates, frames repeat each other
+    blink_seconds: float = 0.5  # longest time for which shut lids are a blink, and ignored
+    shut_lid: float = 400  # IRISD by which an upper lid is down in a blink
+    accent_seconds: float = 2.0  # longest time for which raised brows stress a word
+    accent_share: float = 0.5  # share of their height below which the brows must have been in that time
+    listed: int = 3  # most expressions that a reading lists
+    min_probability: float = 0.02  # of a listed expression
+
+
+TUNING = Tuning()
+
+
+@dataclass(frozen=True)
 class Nearest:
-    """A named expression that a face may show. intensity: 0 to 100. probability: 0 to 1."""
+    """A named expression that a face may show: intensity, 0 to 100, and probability, 0 to 1."""
 
     name: str
     intensity: float
@@ -55,12 +57,11 @@ class Nearest:
 
 @dataclass(frozen=True)
 class Reading:
-    """What a face shows in a frame.
+    """The expression in a frame.
 
     label: a family, an expression without a family, "neutral" or "unknown". probability: of the label.
     intensity: 0 to 100, of the label; 0 for neutral and unknown. nearest: named expressions, likeliest first;
-    none where nothing is shown, or what is shown is like none. activation, evaluation: between the points of
-    what may be shown; None for unknown.
+    empty for neutral and unknown. activation, evaluation: means over all expressions; None for unknown.
     """
 
     label: str
@@ -74,16 +75,15 @@ class Reading:
 @cache
 def labels() -> tuple[str, ...]:
     """Return all labels: "neutral", "unknown", the six families, expressions without a family."""
-    loners = {one.name: None for one in candidates() if one.family >= len(FAMILIES)}
+    loners = {each.name: None for each in candidates() if each.family >= len(FAMILIES)}
     return (NEUTRAL, UNKNOWN, *FAMILIES, *loners)
 
 
 class Recogniser:
-    """Reads expressions from frames as they come.
+    """Recognises expressions in frames as they come.
 
-    rate: frames a second. known: bool (68,), the FAPs that the source sends; a FAP that it never sends says
-    nothing. None: all. baseline: float (68,), what the face shows at rest, which is subtracted; None: zeros,
-    as the standard defines FAPs.
+    rate: frames a second. known: bool (68,), the FAPs that the source sends, all by default; others are
+    ignored. baseline: float (68,), FAPs of the face at rest, which are subtracted; 0 by default.
 
     Raises OptionError for a rate that is not positive, or arrays of another shape.
     """
@@ -100,27 +100,27 @@ class Recogniser:
         self._known = np.ones(FAP_COUNT, dtype=bool) if known is None else _row(known, "known").astype(bool)
         self._baseline = None if baseline is None else _row(baseline, "baseline").astype(np.float64)
         self._seconds = 1 / float(rate)
-        self._shut_for = math.inf  # lids that are shut from the start are shut
-        self._heights = np.zeros(0)  # of the brows in the last frames; held before the first
+        self._shut_for = math.inf  # seconds; lids that are shut from the start are no blink
+        self._heights = np.zeros(0)  # of the brows in the last frames
         self._state: Float64 | None = None  # of each label
         self._within: Float64 | None = None  # of each name and intensity, within its label
 
     def prepare(self) -> None:
-        """Compute what frames are compared with, so that not even the first waits for it."""
+        """Compute the models, so that the first frame does not wait for them."""
         for known in (self._known, self._known & ~_lids()):
             for accents in (False, True):
                 model(known, accents)
         _states()
 
     def push(self, faps: npt.ArrayLike) -> Reading:
-        """Return what the next frame shows. faps: (68,), as `fba.face.resolve` gives them.
+        """Return the expression in the next frame. faps: (68,), as `fba.face.resolve` returns them.
 
-        A frame with a number that is not finite says nothing: it is read as the one before.
+        A frame with numbers that are not finite repeats the reading before it.
         """
         return self.push_frames(_row(faps, "faps")[None])[0]
 
     def push_frames(self, faps: npt.ArrayLike) -> list[Reading]:
-        """Return what each of the next frames shows. faps: (T, 68)."""
+        """Return the expression in each of the next frames. faps: (T, 68)."""
         values = np.asarray(faps, dtype=np.float64)
         if values.ndim != 2 or values.shape[1] != FAP_COUNT:
             raise OptionError(f"FAPs must have shape (T, {FAP_COUNT}), not {values.shape}")
@@ -136,7 +136,7 @@ class Recogniser:
         return readings
 
     def _log_probabilities(self, values: Float64) -> Float64:
-        """Return logs for (T, 68) frames: those in a blink without the lids, those in an accent with it."""
+        """Return log probabilities of frames (T, 68): in a blink without lids, with accents of brows."""
         blinking, accented = self._find_blinks(values), self._find_accents(values)
         logs = np.empty((len(values), 2 + len(candidates()) * len(INTENSITIES)))
         for lids, known in ((True, self._known & ~_lids()), (False, self._known)):
@@ -147,42 +147,42 @@ class Recogniser:
         return logs
 
     def _find_blinks(self, values: Float64) -> Bool:
-        """Return which frames have lids that were shut a moment ago: bool (T,)."""
+        """Return which frames are in a blink: bool (T,)."""
         upper = [column for column in _UPPER_LIDS if self._known[column]]
         blinking = np.zeros(len(values), dtype=bool)
         if not upper:
             return blinking
-        shut_lids: list[bool] = np.asarray(values[:, upper].mean(axis=1) > SHUT).tolist()
+        shut_lids: list[bool] = np.asarray(values[:, upper].mean(axis=1) > TUNING.shut_lid).tolist()
         for frame, shut in enumerate(shut_lids):
             self._shut_for = self._shut_for + self._seconds if shut else 0.0
-            blinking[frame] = shut and self._shut_for <= BLINK
+            blinking[frame] = shut and self._shut_for <= TUNING.blink_seconds
         return blinking
 
     def _find_accents(self, values: Float64) -> Bool:
-        """Return which frames have brows that were raised a moment ago: bool (T,)."""
+        """Return which frames have brows that were raised recently: bool (T,)."""
         sides = [[column for column in side if self._known[column]] for side in _BROWS]
         heights = [values[:, side].mean(axis=1) for side in sides if side]
         if not heights or not len(values):
             return np.zeros(len(values), dtype=bool)
         height = np.max(heights, axis=0)
-        before = max(1, round(STRESS_SECONDS / self._seconds))
+        before = max(1, round(TUNING.accent_seconds / self._seconds))
         missing = np.full(before - len(self._heights), height[0])
         every = np.concatenate([missing, self._heights, height])
         self._heights = every[-before:]
         lowest = sliding_window_view(every, before + 1).min(axis=1)
-        accented: Bool = (height > 0) & (lowest < STRESS_SHARE * height)
+        accented: Bool = (height > 0) & (lowest < TUNING.accent_share * height)
         return accented
 
     def _advance(self, logs: Float64 | None) -> None:
-        """Take in the logs of a frame, (2 + 7 N,); None for one that says nothing."""
+        """Advance the state by a frame. logs: (2 + 7 N,); None for a frame without information."""
         if self._state is None or self._within is None:
             if logs is not None:
                 self._state, self._within = _weigh(logs)
             return
-        stay = math.exp(-self._seconds / LASTING)
+        stay = math.exp(-self._seconds / TUNING.state_seconds)
         state = stay * self._state + (1 - stay) * _states().priors
         if logs is not None:
-            weight = min(1.0, self._seconds * INDEPENDENT)
+            weight = min(1.0, self._seconds * TUNING.independent_rate)
             seen, within = _weigh(logs)
             state = state * (np.maximum(seen, TINY) / _states().priors) ** weight
             self._within = (1 - weight) * self._within + weight * within
@@ -197,32 +197,33 @@ class Recogniser:
         joint = self._within * self._state[table.label_of, None]  # of each name at each intensity
         shown = joint.sum(axis=1)
         strength = joint @ _STRENGTHS
-        own = table.label_of == number
-        intensity = float(strength[own].sum() / shown[own].sum()) if own.any() and shown[own].any() else 0.0
+        names = table.label_of == number  # those with the label
+        total = float(shown[names].sum())
+        intensity = float(strength[names].sum()) / total if total else 0.0
         nearest: tuple[Nearest, ...] = ()
         point: tuple[float, float] | tuple[None, None] = (None, None)
         if label != UNKNOWN:
             offset = strength @ table.offsets / max(1 - float(self._state[1]), TINY)
             point = (NEUTRAL_POINT[0] + float(offset[0]), NEUTRAL_POINT[1] + float(offset[1]))
         if number >= len((NEUTRAL, UNKNOWN)):
-            order = np.argsort(-shown)[:NEAREST]
+            order = np.argsort(-shown)[: TUNING.listed]
             nearest = tuple(
                 Nearest(
                     table.names[row], 100 * min(float(strength[row] / shown[row]), 1.0), float(shown[row])
                 )
                 for row in order.tolist()
-                if shown[row] >= MIN_PROBABILITY
+                if shown[row] >= TUNING.min_probability
             )
         return Reading(label, float(self._state[number]), 100 * min(intensity, 1.0), nearest, *point)
 
 
 @dataclass(frozen=True, eq=False)
 class _States:
-    """How candidates, names and labels belong together.
+    """The names of candidates and their labels.
 
     names: K, of expressions. name_of: float64 (K, N), 1 where a candidate has a name. label_of: int (K,), the
     label of each name. of_label: float64 (L, K), 1 where a name has a label. priors: float64 (L,). offsets:
-    float64 (K, 2), from `NEUTRAL_POINT`.
+    float64 (K, 2), of the names' points from `NEUTRAL_POINT`.
     """
 
     names: tuple[str, ...]
@@ -236,13 +237,13 @@ class _States:
 @cache
 def _states() -> _States:
     listed = candidates()
-    names = tuple(dict.fromkeys(one.name for one in listed))
-    label = {one.name: 2 + one.family for one in listed}
+    names = tuple(dict.fromkeys(each.name for each in listed))
+    label = {each.name: 2 + each.family for each in listed}
     label_of = np.array([label[name] for name in names], dtype=np.intp)
-    name_of = np.array([[one.name == name for one in listed] for name in names], dtype=np.float64)
+    name_of = np.array([[each.name == name for each in listed] for name in names], dtype=np.float64)
     of_label = (np.arange(len(labels()))[:, None] == label_of).astype(np.float64)
-    priors = of_label @ name_of @ np.array([one.prior for one in listed])
-    priors[:2] = NEUTRAL_PRIOR, UNKNOWN_PRIOR
+    priors = of_label @ name_of @ np.array([each.prior for each in listed])
+    priors[:2] = PRIORS.neutral, PRIORS.unknown
     offsets = np.array([point_of(expression(name)) for name in names]) - NEUTRAL_POINT
     return _States(names, name_of, label_of, of_label, priors, offsets)
 
@@ -250,7 +251,7 @@ def _states() -> _States:
 def _weigh(logs: Float64) -> tuple[Float64, Float64]:
     """Return the probability of each label, (L,), and of names at each intensity within it, (K, 7).
 
-    logs: (2 + 7 N,), as `Model.log_probabilities` gives them, with their priors.
+    logs: (2 + 7 N,), of `Model.log_probabilities`.
     """
     table = _states()
     joint = np.exp(logs - logs.max())

@@ -11,9 +11,8 @@ import os
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError, OptionError, Remedy, UnsupportedError, did_you_mean
@@ -22,7 +21,7 @@ from fba.recognition import recognition_hint
 from fba.source import Path, read_head
 
 if TYPE_CHECKING:
-    from fba.capture import SkeletonMotion
+    from fba.capture import Captured, FaceCapture, SkeletonMotion
     from fba.codec import StreamInfo
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
@@ -33,23 +32,6 @@ UNKNOWN = Remedy("format", "if it is one of them, name it with {}", "'bvh'")
 
 COMMON_SUFFIXES = (".csv", ".json", ".txt")
 """Suffixes that say nothing of the content."""
-
-
-class FaceCapture(Protocol):
-    """A captured face as it is in a file: blendshapes, action units, markers or points."""
-
-    @property
-    def start(self) -> float | None:
-        """Time of day of its first row, in seconds; None where the file does not say."""
-
-    @property
-    def rate(self) -> Fraction:
-        """Rows in a second, as the file counts them."""
-
-    def __len__(self) -> int: ...
-
-    def describe(self) -> dict[str, Any]:
-        """Return what is in it: plain numbers, texts and lists of them; `kind` says which it is."""
 
 
 class Lazy:
@@ -79,27 +61,57 @@ class Format:
     """A file format.
 
     name: as in `format=`. suffixes: lower case, with the dot; the first is the usual one. sniff: whether a
-    file with this beginning (up to 64 KiB) and this lower-case suffix has this format. read, write: file to
-    Animation and back; write is None if there is no writer. carries: the parts that a file can hold.
-    read_motion: reads the motion of a skeleton, for formats of motion capture; `read` retargets it.
-    read_face: reads a captured face as it is, markers and points among them; `read` makes FAPs of it.
+    file with this beginning (up to 64 KiB) and this lower-case suffix has this format. write: Animation to
+    file; None if there is no writer. carries: the parts that a file can hold. written: description of a
+    written file, if `description` says more than the writer can do.
+
+    A file is read by one of these: read_animation: FAPs and BAPs, or what decodes to them. read_motion: the
+    motion of a skeleton. read_face: a captured face as it is, markers and points among them. Of motions and
+    faces, `read` makes an animation. read_person: a file that may hold any of these.
+    kind: of the capture, see `fba.capture.capture_options`; "" for files of FAPs and BAPs.
+
     list_clips: describes the animations of a file, for formats that hold several; `read` takes one as `clip`.
-    describe_person: describes the person in a file without an animation. written: description of a written
-    file, if `description` says more than the writer can do.
+    describe_person: describes the person in a file without an animation.
     """
 
     name: str
     suffixes: tuple[str, ...]
     description: str
     sniff: Callable[[bytes, str], bool]
-    read: Callable[..., Animation]
-    write: Callable[..., None] | None
+    write: Callable[..., None] | None = None
     carries: tuple[str, ...] = ("face", "body")
+    read_animation: Callable[..., Animation] | None = None
     read_motion: Callable[..., SkeletonMotion] | None = None
     read_face: Callable[..., FaceCapture] | None = None
+    read_person: Callable[..., Captured] | None = None
+    kind: str = ""
     list_clips: Callable[..., tuple[ClipInfo, ...]] | None = None
     describe_person: Callable[..., PersonInfo | None] | None = None
     written: str = ""
+
+    def read(self, path: Path, **options: Any) -> Animation:
+        """Return the animation of a file. options: of `read_options`."""
+        if self.read_animation is not None:
+            return self.read_animation(path, **options)
+        return self.read_captured(path, **options).animation
+
+    def read_captured(self, path: Path, **options: Any) -> Captured:
+        """Return the animation of a capture, and what it was made of. options: of `read_options`."""
+        from fba.capture import SkeletonOptions, make_animation
+
+        given = {name: options[name] for name in options if name in self.capture_options}
+        asked = {name: options[name] for name in options if name in _option_names(self._reader)}
+        if self.read_person is not None:
+            given.pop("rate", None)
+            return self.read_person(path, SkeletonOptions(**given), **asked)
+        capture = self._reader(path, **asked)
+        return make_animation(capture, path=path, limits=options.get("limits", DEFAULT_LIMITS), **given)
+
+    @property
+    def _reader(self) -> Callable[..., Any]:
+        reader = self.read_animation or self.read_person or self.read_motion or self.read_face
+        assert reader is not None
+        return reader
 
     @property
     def is_capture(self) -> bool:
@@ -109,12 +121,21 @@ class Format:
     @property
     def has_markers(self) -> bool:
         """Whether files hold markers or points, whose places on the face a map can give."""
-        return "markers" in self.read_options
+        return self.kind in ("markers", "points")
+
+    @property
+    def capture_options(self) -> tuple[str, ...]:
+        """Names of the options that say how a capture becomes an animation."""
+        if not self.kind:
+            return ()
+        from fba.capture import capture_options
+
+        return capture_options(self.kind)
 
     @property
     def read_options(self) -> tuple[str, ...]:
-        """Names of the keyword options of `read`."""
-        return _option_names(self.read)
+        """Names of the options of `read`."""
+        return tuple(dict.fromkeys([*self.capture_options, *_option_names(self._reader)]))
 
     @property
     def face_options(self) -> tuple[str, ...]:
@@ -131,117 +152,91 @@ def _lazy(module: str, name: str) -> Lazy:
     return Lazy(f"fba.formats.{module}:{name}")
 
 
+def _face(name: str, suffix: str, description: str, module: str, **more: Any) -> Format:
+    """Return a format of tables of faces: blendshapes or action units."""
+    place = f"face_tables.{module}"
+    return Format(
+        name, (suffix,), description, _lazy(place, "sniff"), carries=("face",),
+        read_face=_lazy(place, "read_face"), kind="shapes", **more,
+    )  # fmt: skip
+
+
+def _markers(name: str, suffixes: tuple[str, ...], description: str, module: str) -> Format:
+    """Return a format of markers."""
+    return Format(
+        name, suffixes, description, _lazy(module, "sniff"), read_face=_lazy(module, "read_markers"),
+        kind="markers",
+    )  # fmt: skip
+
+
 _FORMATS = (
     Format(
         "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
-        _lazy("_fba", "sniff_fba"), _lazy("_fba", "read_fba"), _lazy("_fba", "write_fba"),
+        _lazy("_fba", "sniff_fba"), _lazy("_fba", "write_fba"), read_animation=_lazy("_fba", "read_fba"),
     ),
     Format(
         "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
-        _lazy("text.fap", "sniff_fap"), _lazy("text.fap", "read_fap"), _lazy("text.fap", "write_fap"),
-        ("face",),
+        _lazy("text.fap", "sniff_fap"), _lazy("text.fap", "write_fap"), ("face",),
+        read_animation=_lazy("text.fap", "read_fap"),
         written="ASCII face animation parameters, version 2.2",
     ),
     Format(
         "bap", (".bap",), "ASCII body animation parameters, versions 3.1 and 3.2",
-        _lazy("text.bap", "sniff_bap"), _lazy("text.bap", "read_bap"), _lazy("text.bap", "write_bap"),
-        ("body",),
+        _lazy("text.bap", "sniff_bap"), _lazy("text.bap", "write_bap"), ("body",),
+        read_animation=_lazy("text.bap", "read_bap"),
         written="ASCII body animation parameters, version 3.2",
     ),
     Format(
         "epf", (".epf",), "encoder parameter file: how to encode an animation; contains none itself",
-        _lazy("epf.epf", "sniff_epf"), _lazy("epf.epf", "read_animation"), None, (),
+        _lazy("epf.epf", "sniff_epf"), None, (), read_animation=_lazy("epf.epf", "read_animation"),
     ),
     Format(
         "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
-        _lazy("bvh._reader", "sniff"), _lazy("bvh._reader", "read"), _lazy("bvh._writer", "write"), ("body",),
-        read_motion=_lazy("bvh._reader", "read_motion"),
+        _lazy("bvh._reader", "sniff"), _lazy("bvh._writer", "write"), ("body",),
+        read_motion=_lazy("bvh._reader", "read_motion"), kind="skeleton",
     ),
     Format(
         "vrma", (".vrma",), "VRM animation: read as glTF; written, the expressions of a face",
-        _lazy("gltf._vrma", "sniff"), _lazy("gltf._reader", "read"), _lazy("gltf._vrma", "write"), ("face",),
+        _lazy("gltf._vrma", "sniff"), _lazy("gltf._vrma", "write"), ("face",),
+        read_person=_lazy("gltf._reader", "read_person"), kind="skeleton",
         written="VRM animation, the expressions of a face",
     ),
     Format(
         "gltf", (".glb", ".gltf", ".vrma"),
         "glTF 2.0: read, an animated skeleton; written, a skinned person",
-        _lazy("gltf._reader", "sniff"), _lazy("gltf._reader", "read"), _lazy("gltf._writer", "write"),
-        read_motion=_lazy("gltf._reader", "read_motion"), list_clips=_lazy("gltf.clips", "list_clips"),
+        _lazy("gltf._reader", "sniff"), _lazy("gltf._writer", "write"),
+        read_person=_lazy("gltf._reader", "read_person"), read_motion=_lazy("gltf._reader", "read_motion"),
+        kind="skeleton", list_clips=_lazy("gltf.clips", "list_clips"),
         describe_person=_lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
     ),
     Format(
         "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
-        _lazy("smpl._reader", "sniff"), _lazy("smpl._reader", "read"), None,
-        read_motion=_lazy("smpl._reader", "read_motion"),
+        _lazy("smpl._reader", "sniff"), read_motion=_lazy("smpl._reader", "read_motion"), kind="skeleton",
     ),
-    Format(
-        "openface", (".csv",), "action units, pose and gaze of OpenFace",
-        _lazy("face_tables._openface", "sniff"), _lazy("face_tables._openface", "read"), None, ("face",),
-        read_face=_lazy("face_tables._openface", "read_face"),
-    ),
-    Format(
-        "pyfeat", (".csv",), "blendshapes or action units of py-feat",
-        _lazy("face_tables._pyfeat", "sniff"), _lazy("face_tables._pyfeat", "read"), None, ("face",),
-        read_face=_lazy("face_tables._pyfeat", "read_face"),
-    ),
-    Format(
-        "livelink", (".csv",), "table of blendshapes: Live Link Face's, or with ARKit's names",
-        _lazy("face_tables._livelink_csv", "sniff"), _lazy("face_tables._livelink_csv", "read"),
-        _lazy("face_tables._livelink_writer", "write"), ("face",),
+    _face("openface", ".csv", "action units, pose and gaze of OpenFace", "_openface"),
+    _face("pyfeat", ".csv", "blendshapes or action units of py-feat", "_pyfeat"),
+    _face(
+        "livelink", ".csv", "table of blendshapes: Live Link Face's, or with ARKit's names", "_livelink_csv",
+        write=_lazy("face_tables._livelink_writer", "write"),
         written="table of blendshapes as Live Link Face's",
-        read_face=_lazy("face_tables._livelink_csv", "read_face"),
     ),
-    Format(
-        "livelink-udp", (".udp",), "recorded datagrams of Live Link Face",
-        _lazy("face_tables.livelink_udp", "sniff"), _lazy("face_tables.livelink_udp", "read"), None,
-        ("face",), read_face=_lazy("face_tables.livelink_udp", "read_face"),
-    ),
-    Format(
-        "ifacialmocap", (".txt",), "records of iFacialMocap and Facemotion3d",
-        _lazy("face_tables.ifacialmocap", "sniff"), _lazy("face_tables.ifacialmocap", "read"), None,
-        ("face",), read_face=_lazy("face_tables.ifacialmocap", "read_face"),
-    ),
-    Format(
-        "shapes-json", (".json",), "blendshapes in JSON: MediaPipe's scores, BEAT",
-        _lazy("face_tables._shapes_json", "sniff"), _lazy("face_tables._shapes_json", "read"), None,
-        ("face",), read_face=_lazy("face_tables._shapes_json", "read_face"),
-    ),
+    _face("livelink-udp", ".udp", "recorded datagrams of Live Link Face", "livelink_udp"),
+    _face("ifacialmocap", ".txt", "records of iFacialMocap and Facemotion3d", "ifacialmocap"),
+    _face("shapes-json", ".json", "blendshapes in JSON: MediaPipe's scores, BEAT", "_shapes_json"),
     Format(
         "points", (".csv", ".json", ".npz", ".npy", ".jsonl"),
         "points of a tracked face: MediaPipe's 478, iBUG's 68; tables, JSON, NumPy's arrays",
-        _lazy("face_tables._tracked_points", "sniff"), _lazy("face_tables._tracked_points", "read"), None,
-        read_face=_lazy("face_tables._tracked_points", "read_points"),
+        _lazy("face_tables._tracked_points", "sniff"),
+        read_face=_lazy("face_tables._tracked_points", "read_points"), kind="points",
     ),
-    Format(
-        "c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face",
-        _lazy("c3d._reader", "sniff"), _lazy("c3d._reader", "read"), None,
-        read_face=_lazy("c3d._reader", "read_markers"),
+    _markers("c3d", (".c3d",), "C3D optical motion capture: markers, here those of a face", "c3d._reader"),
+    _markers("trc", (".trc",), "TRC (track row column): markers of a face", "markers._trc"),
+    _markers("motive", (".csv",), "OptiTrack Motive's CSV export: markers of a face", "markers._motive"),
+    _markers("nexus", (".csv",), "Vicon Nexus' CSV export: markers of a face", "markers._nexus"),
+    _markers(
+        "qualisys", (".tsv",), "Qualisys Track Manager's TSV export: markers of a face", "markers._qualisys"
     ),
-    Format(
-        "trc", (".trc",), "TRC (track row column): markers of a face",
-        _lazy("markers._trc", "sniff"), _lazy("markers._trc", "read"), None,
-        read_face=_lazy("markers._trc", "read_markers"),
-    ),
-    Format(
-        "motive", (".csv",), "OptiTrack Motive's CSV export: markers of a face",
-        _lazy("markers._motive", "sniff"), _lazy("markers._motive", "read"), None,
-        read_face=_lazy("markers._motive", "read_markers"),
-    ),
-    Format(
-        "nexus", (".csv",), "Vicon Nexus' CSV export: markers of a face",
-        _lazy("markers._nexus", "sniff"), _lazy("markers._nexus", "read"), None,
-        read_face=_lazy("markers._nexus", "read_markers"),
-    ),
-    Format(
-        "qualisys", (".tsv",), "Qualisys Track Manager's TSV export: markers of a face",
-        _lazy("markers._qualisys", "sniff"), _lazy("markers._qualisys", "read"), None,
-        read_face=_lazy("markers._qualisys", "read_markers"),
-    ),
-    Format(
-        "markers", (".csv", ".tsv"), "table of a face's markers, wide or long",
-        _lazy("markers._table", "sniff"), _lazy("markers._table", "read"), None,
-        read_face=_lazy("markers._table", "read_markers"),
-    ),
+    _markers("markers", (".csv", ".tsv"), "table of a face's markers, wide or long", "markers._table"),
 )  # fmt: skip
 """In the order in which they are tried on a content: those quick to import first."""
 
@@ -282,8 +277,9 @@ def format_of(path: Path, format: str | None = None) -> Format:
 def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
     """Read an animation from a file of any known format.
 
-    format: its name; otherwise the content decides. options: those of the format's reader, see
-    `formats()` and e.g. `fba.formats.text.fap.read_fap`. Raises FormatError, BitstreamError,
+    format: its name; otherwise the content decides. options: those of the format, see `formats()`: of its
+    reader, e.g. `fba.formats.text.fap.read_fap`; of captures also how they become animations, see
+    `fba.capture.SkeletonOptions`, `from_markers` and `from_points`. Raises FormatError, BitstreamError,
     UnsupportedError or OptionError.
     """
     reader = format_of(path, format)

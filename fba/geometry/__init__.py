@@ -1,4 +1,4 @@
-"""Fits of points to points, used by every room that lays one face or body onto another.
+"""Fits of points to points, for all rooms that align faces or bodies.
 
 May use: arrays alone.
 """

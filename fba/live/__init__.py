@@ -1,11 +1,11 @@
-"""Live captures: datagrams from telephones and programs to a stream that grows.
+"""Live captures: datagrams from phones and programs to a growing stream.
 
     capture = Capture(find_kind("livelink"), StreamRecorder([StreamFile("face.fba")]).push)
     with Receiver(capture) as receiver:
         receiver.run(seconds=10)
     print(capture.finish())
 
-May use: capture, codec and formats. Knows no window and no command line.
+May use: capture, codec and formats. Independent of windows and the command line.
 """
 
 from fba.live._capture import Capture

@@ -1,4 +1,4 @@
-"""`Capture`: datagrams as they come to frames as they are complete, with all that is wrong counted."""
+"""`Capture`: datagrams as they arrive to frames as they are complete, with a count of all faults."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from fba.live._summary import Summary
 from fba.live.recording import stream_rate
 from fba.tracks import BodyTrack, FaceTrack
 
-LEAST_RATE = Fraction(10)
-"""Frames a second that a sender sends at least, of which nothing is known yet."""
-MOST_HOSTS = 32
-"""Addresses whose datagrams are read."""
+MIN_RATE = Fraction(10)
+"""Assumed frame rate of a sender until its rate is known."""
+MAX_HOSTS = 32
+"""Largest number of addresses whose datagrams are read."""
 
 
 class Sender(NamedTuple):
-    """Who sends: an address, a device, and the name of who is shown."""
+    """A sender: its address, its device, and the name of the person it shows."""
 
     host: str
     device: bytes
@@ -32,16 +32,16 @@ class Sender(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Its name for people; the device's id, which names somebody's telephone, is no part of it."""
+        """Name and address, without the device's id, which would identify somebody's phone."""
         return f"{self.subject!r} ({self.host})" if self.subject else self.host
 
 
 class Capture:
     """Turns the datagrams of one sender into frames.
 
-    kind: the protocol. push: takes frames as they are complete. sender: the subject's name or the address of
-    whom to use; None for the first that sends a sample. rate: frames per second of the stream; None for the
-    sender's own. swap, neutral: see `FaceConversion`. say: takes a line about something new.
+    kind: the protocol. push: called with complete frames. sender: subject's name or address of the sender to
+    use; by default the first that sends a sample. rate: frames per second of the stream; by default the
+    sender's. swap, neutral: see `FaceConversion`. say: called with a line of text about each event.
 
     `receive` and `newest` may be called from different threads.
     """
@@ -72,9 +72,9 @@ class Capture:
         self._conversion: FaceConversion | PersonConversion | None = None
 
     def receive(self, data: bytes, host: str, now: float) -> None:
-        """Take a datagram from an address. now: when it came, seconds of a clock that never goes back.
+        """Process a datagram from an address. now: arrival time in seconds of a monotonic clock.
 
-        Raises what `push` raises, and nothing else.
+        Raises only what `push` raises.
         """
         with self._lock:
             self.summary.received += 1
@@ -86,16 +86,16 @@ class Capture:
                 self.summary.refuse(str(error))
 
     def settle(self) -> None:
-        """Pass on the frames that are complete, after all datagrams that have come have been received.
+        """Pass on the complete frames of bodies, once all datagrams at hand have been received.
 
-        Bodies need that: a few frames at once take hardly longer than one.
+        Several frames together take hardly longer than one.
         """
         with self._lock:
             if self._conversion is not None:
                 self._pass_on(self._conversion.settle())
 
     def finish(self) -> Summary:
-        """Pass on the frames that are left; return what happened."""
+        """Pass on the remaining frames, and return the summary."""
         with self._lock:
             if self._order is not None and self._conversion is not None:
                 self._convert(self._order.finish())
@@ -105,7 +105,7 @@ class Capture:
             return self.summary
 
     def newest(self) -> tuple[FaceTrack | None, BodyTrack | None]:
-        """Return what the newest datagram shows, tracks of one frame; None for what it does not show."""
+        """Return face and body in the newest datagram, tracks of one frame; None where absent."""
         with self._lock:
             if self._sender is None or self._conversion is None:
                 return None, None
@@ -116,8 +116,8 @@ class Capture:
         if len(data) > self.kind.longest:
             raise DatagramError(f"longer than {self.kind.longest} bytes")
         if host not in self._readers:
-            if len(self._readers) >= MOST_HOSTS:
-                raise DatagramError(f"of more than {MOST_HOSTS} addresses")
+            if len(self._readers) >= MAX_HOSTS:
+                raise DatagramError(f"of more than {MAX_HOSTS} addresses")
             self._readers[host] = self.kind.reader()
         return self._readers[host].read(data, now)
 
@@ -127,13 +127,13 @@ class Capture:
             self._begin(sender, sample)
         if sender != self._sender or self._order is None:
             if self.summary.leave_out(sender.label):
-                self._say(f"{sender.label} sends, too, and is left out")
+                self._say(f"{sender.label} also sends, and is left out")
             return
         self._convert(self._order.push(sample, now))
 
     def _begin(self, sender: Sender, sample: Sample) -> None:
         """Begin with the first sample of the sender that is used."""
-        sent_rate = sample.rate or self.kind.rate or LEAST_RATE
+        sent_rate = sample.rate or self.kind.rate or MIN_RATE
         self._sender = sender
         self.summary.sender = sender.label
         self._order = SampleOrder(sent_rate)

@@ -1,4 +1,4 @@
-"""`FaceConversion`: the samples of one sender, in order, to frames of a face."""
+"""`FaceConversion`: ordered samples of a sender to frames of a face."""
 
 from __future__ import annotations
 
@@ -21,16 +21,15 @@ SWAPPED = {
 }  # fmt: skip
 
 Row = tuple[Float64, Float64, Float64]
-"""Weights (N,), angles of the head (3,) and of the eyes (4,); 0 for angles that a source does not have."""
+"""Weights (N,), angles of the head (3,) and of the eyes (4,); angles that a sender lacks are 0."""
 
 
 class FaceConversion:
-    """Turns samples with weights into frames.
+    """Converts samples with weights to frames.
 
-    rate: frames per second; sent_rate: those that the sender counts. swap: mouthLeft and mouthRight, jawLeft
-    and jawRight change places. neutral: seconds from the first face on whose median is the neutral face, and
-    is subtracted; nothing comes out before they are over. None: weights count as they are sent. summary: what
-    happens is counted there.
+    rate: frames per second. sent_rate: the sender's. swap: exchanges mouthLeft and mouthRight, jawLeft and
+    jawRight. neutral: seconds from the first face; their median is the neutral face, which is subtracted, and
+    no frame comes out before they are over. By default nothing is subtracted. summary: counts events.
     """
 
     def __init__(
@@ -66,24 +65,24 @@ class FaceConversion:
             yield from self._find_neutral(frames)
 
     def settle(self) -> Iterator[Animation]:
-        """Yield nothing: all frames that are complete have come out of `push`."""
+        """Yield nothing: `push` has already yielded all complete frames."""
         yield from ()
 
     def finish(self) -> Iterator[Animation]:
-        """Yield the frames that are left."""
+        """Yield the remaining frames."""
         if self._frames is not None:
             if self._waiting:
                 yield from self._find_neutral(self._frames)
             yield from self._frames.finish()
 
     def show(self, sample: Sample) -> tuple[FaceTrack | None, None]:
-        """Return the FAPs of a sample as it is, a track of one frame; None without a face."""
+        """Return the FAPs of a sample, a track of one frame; None without a face."""
         if sample.weights is None or self._frames is None or self._waiting:
             return None, None
         return self._frames.show(*self._without_neutral(self._row(sample))), None
 
     def _begun(self, sample: Sample) -> LiveBlendshapes:
-        """Return what makes frames, begun with the names of the first sample."""
+        """Return the converter, made for the names in the first sample."""
         if self._frames is None:
             names = [SWAPPED.get(name, name) for name in sample.names] if self._swap else list(sample.names)
             if self._swap:
@@ -102,7 +101,7 @@ class FaceConversion:
         )
 
     def _find_neutral(self, frames: LiveBlendshapes) -> Iterator[Animation]:
-        """Take the median of what waited as the neutral face; yield the frames since."""
+        """Set the neutral face to the median of the waiting samples, and yield their frames."""
         waiting, self._waiting = self._waiting, []
         weights, head, eyes = (
             np.median(parts, axis=0) for parts in zip(*(row for _, row in waiting), strict=True)

@@ -1,4 +1,4 @@
-"""`PersonConversion`: bones and expressions of one sender, in order, to frames of a body and a face."""
+"""`PersonConversion`: ordered bones and expressions of a sender to frames of a body and a face."""
 
 from __future__ import annotations
 
@@ -26,30 +26,30 @@ from fba.live._summary import Summary
 from fba.live.recording import stream_rate
 from fba.tracks import BodyTrack, FaceTrack
 
-BEGINNING = 1.0
-"""Seconds in which the bones, the expressions and the frame rate are determined."""
+START_SECONDS = 1.0
+"""Seconds at the start in which the bones, the expressions and the frame rate are determined."""
 CHUNK_FRAMES = 256
-"""Number of frames that are made at once."""
+"""Number of frames that are computed at once."""
 MIN_SHAPES = 5
-"""Smallest number of shapes with ARKit's names for which others are left out, which show the same again."""
+"""Number of shapes with ARKit's names from which other expressions, which repeat them, are left out."""
 OLD_NAMES = {
     "a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed",
     "blink_l": "blinkLeft", "blink_r": "blinkRight",
 }  # fmt: skip
-"""VRM 1's names of VRM 0's expressions, in small letters."""
+"""VRM 1's names of VRM 0's expressions, in lower case."""
 MIN_OFFSET = 1e-3
-"""Smallest length of a bone, in metres."""
+"""Smallest length of a bone, metres."""
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 EYES = ("LeftEye", "RightEye")
 
 
 class PersonConversion:
-    """Turns samples with bones, expressions or both into frames.
+    """Converts samples with bones, expressions or both to frames.
 
-    rate: frames per second; None for that of the first second. t_pose: whether the person stands in a T-pose
-    in the first sample; otherwise bones without a turn do. summary: what happens is counted there.
+    rate: frames per second; by default that of the first second. t_pose: whether the person stands in a
+    T-pose in the first sample; otherwise unturned bones form a T-pose. summary: counts events.
 
-    Nothing comes out before the first second is over.
+    No frame comes out before the first second is over.
     """
 
     def __init__(self, rate: Fraction | None, *, t_pose: bool, summary: Summary) -> None:
@@ -68,12 +68,12 @@ class PersonConversion:
         """Add a sample; frames come out of `settle`."""
         self._summary.used += 1
         (self._pending if self._beginning is None else self._beginning).append(timed)
-        if self._beginning is not None and timed[0] - self._beginning[0][0] >= BEGINNING:
+        if self._beginning is not None and timed[0] - self._beginning[0][0] >= START_SECONDS:
             self._begin(self._beginning)
         yield from ()
 
     def settle(self) -> Iterator[Animation]:
-        """Yield the frames that are complete with all samples so far: a few at once take as long as one."""
+        """Yield the frames that are complete with all samples so far."""
         pending, self._pending = self._pending, []
         if self._rate is None or self._beginning is not None:
             return
@@ -90,7 +90,7 @@ class PersonConversion:
             self._before = rows[-1]
 
     def finish(self) -> Iterator[Animation]:
-        """Yield the frames that are left."""
+        """Yield the remaining frames."""
         if self._beginning:
             self._begin(self._beginning)
         yield from self.settle()
@@ -101,7 +101,7 @@ class PersonConversion:
         return face, self._newest[1]
 
     def _begin(self, samples: list[Timed]) -> None:
-        """Find out what the sender sends, from the samples of the first second."""
+        """Determine rate, bones and expressions from the samples of the first second."""
         self._beginning, self._pending = None, samples
         if self._rate is None:
             try:
@@ -141,7 +141,7 @@ class PersonConversion:
 
 
 class _Face:
-    """The expressions of samples, and the turns of eyes, and of the head where there is no body, as FAPs."""
+    """Conversion of expressions and eyes, and of the head where there is no body, to FAPs."""
 
     def __init__(self, names: dict[str, str], rate: Fraction, *, with_head: bool) -> None:
         self._names = names  # the sender's name of each shape
@@ -152,7 +152,7 @@ class _Face:
     def of(
         cls, sent: list[str], bones: dict[str, BoneTurn], rate: Fraction, *, with_head: bool, summary: Summary
     ) -> _Face | None:
-        """Return what converts expressions with these names, or a turned head; None without either."""
+        """Return the conversion for these expressions and bones; None without expressions or a head."""
         expressions = {*OLD_NAMES, *(name.lower() for name in OLD_NAMES.values())}  # "aa" opens a jaw, too
         shapes = {
             shape: name
@@ -177,8 +177,8 @@ class _Face:
     def convert(self, samples: list[Sample], before: Intp, after: Intp, weight: Float64) -> FaceTrack:
         """Return FAPs of frames between samples."""
         rows = [np.stack(parts) for parts in zip(*map(self._row, samples), strict=True)]
-        mixed = [one[before] * (1 - weight[:, None]) + one[after] * weight[:, None] for one in rows]
-        return self._frames.convert(*mixed)
+        weight = weight[:, None]
+        return self._frames.convert(*(row[before] * (1 - weight) + row[after] * weight for row in rows))
 
     def show(self, sample: Sample) -> FaceTrack:
         """Return the FAPs of a sample."""
@@ -199,7 +199,7 @@ class _Face:
 
 
 def _world(sample: Sample, bones: tuple[str, ...]) -> Float64:
-    """Return the quaternion (4,) of several turns, one in the other; bones that are not sent do not turn."""
+    """Return the quaternion (4,) of a chain of bones; bones that are not sent do not turn."""
     result = IDENTITY
     for bone in bones:
         if bone in sample.bones:
@@ -208,7 +208,7 @@ def _world(sample: Sample, bones: tuple[str, ...]) -> Float64:
 
 
 def _angles(turn: Float64) -> tuple[float, float, float]:
-    """Return pitch (down), yaw (left) and roll (right) of a turn (3, 3) of what looks along z, left +x."""
+    """Return pitch (down), yaw (left) and roll (right) of a rotation (3, 3); ahead is +z, left is +x."""
     pitch = float(np.arctan2(-turn[1, 2], np.hypot(turn[0, 2], turn[2, 2])))
     yaw = float(np.arctan2(turn[0, 2], turn[2, 2]))
     roll = float(np.arctan2(turn[1, 0], turn[1, 1]))
@@ -216,7 +216,7 @@ def _angles(turn: Float64) -> tuple[float, float, float]:
 
 
 class _Body:
-    """The bones of samples as BAPs."""
+    """Conversion of bones to BAPs."""
 
     def __init__(self, bones: dict[str, BoneTurn], first: Sample, *, t_pose: bool, summary: Summary) -> None:
         self._names = [name for name in unity_bones.parents() if name in bones and unity_bones.joint_of(name)]
@@ -227,7 +227,7 @@ class _Body:
         offsets[0] = 0.0
         if (np.linalg.norm(offsets[1:], axis=1) < MIN_OFFSET).sum() * 2 > len(offsets):
             offsets = standard_offsets(self._names, parents)
-            summary.notes.append("the bones come without lengths; those of a usual body are taken")
+            summary.notes.append("the bones come without lengths; those of the standard's body are used")
         turns, root = self._pose(first)
         joints = {name: unity_bones.joint_of(name) or "" for name in self._names}
         motion = SkeletonMotion(
@@ -237,7 +237,7 @@ class _Body:
         self._skeleton = LiveSkeleton(motion, t_pose=t_pose)
 
     def _above(self, name: str) -> int:
-        """Return the number of the next bone above that is there; -1 for the hips."""
+        """Return the number of the nearest bone above that is sent; -1 for the hips."""
         above = unity_bones.parents()[name]
         while above and above not in self._names:
             above = unity_bones.parents()[above]
@@ -253,7 +253,7 @@ class _Body:
         return self._skeleton.convert(rotations.interpolate(turns, before, after, weight), positions, rate)
 
     def _pose(self, sample: Sample) -> tuple[Float64, Float64]:
-        """Return turns (J, 4) of the bones, the first in the world, and the position (3,) of the hips."""
+        """Return rotations (J, 4) of the bones, the first in the world, and the position (3,) of the hips."""
         still = BoneTurn(np.zeros(3), IDENTITY)
         turns = np.stack([sample.bones.get(name, still).rotation for name in self._names])
         root, hips = sample.bones.get("", still), sample.bones.get("Hips", still)
@@ -262,24 +262,23 @@ class _Body:
 
 
 def standard_offsets(names: Sequence[str], parents: Sequence[int]) -> Float64:
-    """Return offsets (J, 3) of bones from the bones above them, metres, y up, in a T-pose.
+    """Return offsets (J, 3) of bones from their parents in the standard skeleton, metres, in a T-pose, y up.
 
-    They are those of the standard's own skeleton, for senders that give no lengths.
-    names: of Unity's bones, the hips first. parents: number of the bone above each, -1 for the hips.
+    names: of Unity's bones, the hips first. parents: numbers of the bones above, -1 for the hips.
     """
     skeleton = Skeleton.default()
 
     def centre(bone: str) -> Float64:
         joint = unity_bones.joint_of(bone)
-        assert joint is not None  # the caller takes bones of a body only
+        assert joint is not None  # the caller passes bones of a body only
         result: Float64 = skeleton.centres[skeleton.number(joint)]
         return result
 
     raised = {
         side: rotations.between(
-            centre(f"{side}LowerArm") - centre(f"{side}UpperArm"), np.array([way, 0.0, 0.0])
+            centre(f"{side}LowerArm") - centre(f"{side}UpperArm"), np.array([outwards, 0.0, 0.0])
         )
-        for side, way in (("Left", 1.0), ("Right", -1.0))
+        for side, outwards in (("Left", 1.0), ("Right", -1.0))
     }
     offsets = np.zeros((len(names), 3))
     for number, (name, parent) in enumerate(zip(names, parents, strict=True)):
@@ -293,7 +292,7 @@ def standard_offsets(names: Sequence[str], parents: Sequence[int]) -> Float64:
 
 
 def _below_arm(bone: str, side: str) -> bool:
-    """Whether a bone turns with the upper arm of a side, or is it."""
+    """Return whether a bone is the upper arm of a side or below it."""
     while bone:
         if bone == f"{side}UpperArm":
             return True

@@ -1,4 +1,4 @@
-"""`Summary`: what a live capture received, used and left out."""
+"""`Summary`: counts of what a live capture received, used and left out."""
 
 from __future__ import annotations
 
@@ -6,22 +6,21 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-MOST_NAMES = 20
-"""Names of senders, and reasons, that are counted apart; all others together."""
+MAX_NAMES = 20
+"""Largest number of senders, and of reasons, that are counted separately; others are counted together."""
 OTHERS = "others"
 
 
 @dataclass
 class Summary:
-    """Counts of datagrams, and what was done with them.
+    """Counts of datagrams, and of what was done with them.
 
-    sender: whose datagrams were used; "" for nobody's. received, bytes: of all senders. dropped: by the
-    system, because they came faster than they were taken; None where it does not say (only Linux does).
-    unread: what had come when the capture ended, but had not been taken yet. used: with a face or
-    a body, in order. unseen: without a face. refused: by what was wrong with them. other_senders: by name.
-    doubled, late, reordered, strayed, jumps: see `SampleOrder`. gaps: how many, and seconds of the longest.
-    seconds: from the first sample to the last, on the sender's clock. frames: of the stream. notes: how the
-    capture was understood, a sentence each.
+    sender: the sender that was used, or "". received, bytes: of all senders. dropped: by the system, because
+    they came too fast; None where it does not say (only Linux does). unread: arrived, but not read when the
+    capture ended. used: with a face or a body, in order. unseen: without a face. refused: by fault.
+    other_senders: by name. doubled, late, reordered, strayed, jumps: see `SampleOrder`. gaps, longest_gap:
+    number, and seconds. seconds: from the first sample to the last, on the sender's clock. frames: of the
+    stream. notes: sentences on how the capture was interpreted.
     """
 
     sender: str = ""
@@ -49,11 +48,11 @@ class Summary:
         _count(self.refused, reason)
 
     def leave_out(self, sender: str) -> bool:
-        """Count a datagram of another sender; return whether it is the first of this one."""
+        """Count a datagram of another sender; return whether it is this sender's first."""
         return _count(self.other_senders, sender)
 
     def lines(self) -> list[str]:
-        """Return what happened, for people."""
+        """Return the summary as lines of text."""
         who = f" from {self.sender}" if self.sender else ""
         parts = [f"{self.used} used", f"{self.unseen} without a face" * (self.unseen > 0)]
         lines = [f"{self.received} datagrams{who}: {', '.join(filter(None, parts))}"]
@@ -64,7 +63,7 @@ class Summary:
         if any((self.doubled, self.late, self.reordered, self.strayed)):
             counts = (
                 (self.reordered, "out of order, put in order"), (self.doubled, "doubled"),
-                (self.late, "too late"), (self.strayed, "with a time of their own"),
+                (self.late, "too late"), (self.strayed, "with a time that no other confirms"),
             )  # fmt: skip
             lines.append(", ".join(f"{count} {what}" for count, what in counts if count))
         if self.gaps:
@@ -73,7 +72,7 @@ class Summary:
             lines.append(several if self.gaps > 1 else f"a gap of {longest} is bridged")
         if self.jumps:
             times = "once" if self.jumps == 1 else f"{self.jumps} times"
-            lines.append(f"the sender's clock was set {times}; the stream goes on by ours")
+            lines.append(f"the sender's clock was set {times}; the stream continues by ours")
         if self.refused:
             lines.append(
                 "left out: " + ", ".join(f"{count} {why}" for why, count in self.refused.most_common())
@@ -84,7 +83,7 @@ class Summary:
         return lines + self.notes
 
     def values(self) -> dict[str, Any]:
-        """Return the same for programs: plain numbers, texts, lists and dictionaries."""
+        """Return the summary as plain numbers, texts, lists and dictionaries, for JSON."""
         plain = {name: value for name, value in vars(self).items() if not isinstance(value, Counter)}
         plain["seconds"], plain["longest_gap"] = round(self.seconds, 6), round(self.longest_gap, 6)
         return plain | {"refused": dict(self.refused), "other_senders": dict(self.other_senders)}
@@ -92,6 +91,6 @@ class Summary:
 
 def _count(counter: Counter[str], name: str) -> bool:
     """Count a name, or `OTHERS` where there are too many; return whether it is new."""
-    known = name if name in counter or len(counter) < MOST_NAMES else OTHERS
-    counter[known] += 1
-    return counter[known] == 1
+    counted = name if name in counter or len(counter) < MAX_NAMES else OTHERS
+    counter[counted] += 1
+    return counter[counted] == 1

@@ -1,4 +1,4 @@
-"""`Receiver`: a UDP port whose datagrams a `Capture` takes."""
+"""`Receiver`: a UDP port whose datagrams go to a `Capture`."""
 
 from __future__ import annotations
 
@@ -18,27 +18,26 @@ from fba.errors import FbaError
 from fba.live._capture import Capture
 
 MAX_DATAGRAM = 65_536
-"""Bytes of the longest possible datagram."""
+"""Size of the longest possible datagram, bytes."""
 BUFFER = 4 << 20
-"""Bytes that the system is asked to keep while we are busy."""
+"""Size of the receive buffer that is requested, bytes."""
 WAIT = 0.1
-"""Seconds after which it is checked whether to stop."""
-AT_ONCE = 256
-"""Datagrams that are taken before that is checked again."""
+"""Longest wait for a datagram before `stop` is checked, seconds."""
+BATCH = 256
+"""Number of datagrams that are processed before `stop` is checked."""
 MAX_UNREAD = 1 << 16
-"""Largest number of datagrams counted at the end: more than a buffer holds, fewer than a flood sends."""
+"""Largest number of datagrams counted at the end: more than a buffer has room for."""
 SO_MEMINFO = 55
-"""Linux's option for a socket's counts, 32 bits each."""
+"""Linux's socket option for counts of 32 bits each."""
 DROPS = 8
-"""Index, in these counts, of that of dropped datagrams."""
+"""Index of the count of dropped datagrams."""
 
 
 class Receiver:
-    """Receives datagrams and asks the sender for them; a context manager.
+    """Receives datagrams and requests them from the sender; a context manager.
 
-    host: address of ours to listen on; "" for all. port: None for the kind's own, 0 for any that is free.
-    ask: address of a telephone that only sends to whom asks, with or without ":port". clock: seconds from
-    any origin, never going back.
+    host: local address to listen on; "" for all. port: by default that of the kind; 0 for any free port. ask:
+    address, with or without ":port", of a phone that sends only on request. clock: monotonic, in seconds.
 
     Raises FbaError, on entering, where the port cannot be opened.
     """
@@ -91,7 +90,7 @@ class Receiver:
             self._socket = None
 
     def run(self, seconds: float | None = None) -> None:
-        """Receive until `stop` is called, or this number of seconds has passed."""
+        """Receive until `stop` is called or the given time has passed."""
         begun = self._clock()
         while not self._stop.is_set():
             left = WAIT if seconds is None else min(WAIT, begun + seconds - self._clock())
@@ -107,12 +106,12 @@ class Receiver:
         self.capture.summary.unread += sum(1 for _ in self._arrived(MAX_UNREAD))
 
     def drain(self) -> None:
-        """Take what has arrived, without waiting; the player does so before each picture."""
+        """Process the datagrams that have arrived, without waiting."""
         self._take_all()
         self.capture.settle()
 
     def _take_all(self) -> None:
-        for data, address in self._arrived(AT_ONCE):
+        for data, address in self._arrived(BATCH):
             self.capture.receive(data, str(address[0]), self._clock())
         if self._socket is not None:
             dropped = _dropped(self._socket)
@@ -120,24 +119,24 @@ class Receiver:
                 self.capture.summary.dropped = dropped
 
     def _arrived(self, most: int) -> Iterator[tuple[bytes, tuple[Any, ...]]]:
-        """Read at most `most` datagrams, with their senders' addresses, as far as there are any."""
+        """Yield at most `most` datagrams that have arrived, with their senders' addresses."""
         for _ in range(most):
             opened = self._socket
             if opened is None:
                 return
             try:
                 yield opened.recvfrom(MAX_DATAGRAM)
-            except ConnectionError:  # what we asked is not there: Windows says so here
+            except ConnectionError:  # on Windows: nobody listens at the address we asked
                 continue
             except OSError:
                 return
 
     def stop(self) -> None:
-        """End `run`; from any thread, or a signal."""
+        """End `run`, from any thread or a signal handler."""
         self._stop.set()
 
     def _ask_sender(self) -> None:
-        """Ask the sender for data, where it wants to be asked, now and then."""
+        """Request data from the sender, if it needs requests and the next is due."""
         kind, now = self.capture.kind, self._clock()
         if self._ask is None or not kind.asked_port or now < self._next_ask or self._socket is None:
             return
@@ -153,7 +152,7 @@ class Receiver:
 
 
 def _dropped(opened: socket.socket) -> int | None:
-    """Return how many datagrams the system dropped because we were too slow; None where it does not say."""
+    """Return the number of datagrams that the system dropped; None where it does not say."""
     if sys.platform != "linux":
         return None
     try:
@@ -169,5 +168,5 @@ def split_address(text: str, port: int) -> tuple[str, int]:
     if not mark or ":" in host:
         return text, port
     if not number.isdecimal() or not 0 < int(number) < 65_536:
-        raise FbaError(f"{text}: {number!r} is no port; expected 1 to 65535")
+        raise FbaError(f"{text}: {number!r} is not a port; expected 1 to 65535")
     return host, int(number)

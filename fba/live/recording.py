@@ -1,4 +1,4 @@
-"""Record a live stream: a file that is complete at any moment, whatever happens to the program."""
+"""Recording of a live stream to a file that is a complete stream at any moment."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from fba.errors import OptionError
 from fba.planning import LiveEncoder
 from fba.planning.rate import RateEncoder
 
-RATES = Fraction(1), Fraction(240)
-"""Smallest and largest frame rate of a live stream."""
+MIN_RATE = Fraction(1)
+MAX_RATE = Fraction(240)
 
 
 class Target(Protocol):
-    """Where a stream goes."""
+    """The destination of a stream."""
 
     def begin(self, opening: bytes) -> None:
-        """Begin the stream. opening: what goes before it where it is read while it comes."""
+        """Begin the stream. opening: bytes before it, for readers that read it as it grows."""
 
     def write(self, data: bytes, ending: bytes) -> None:
-        """Add bytes. ending: what ends the stream behind them, for now; more bytes take its place."""
+        """Add bytes. ending: bytes that end the stream for now; the next bytes replace them."""
 
     def close(self) -> None:
-        """Write what is left, and close it."""
+        """Close the target."""
 
 
 class StreamFile:
-    """A file that always ends as a stream should: each write puts new frames in the place of the old end.
+    """A file that is always a complete stream: each write replaces the end by new frames and a new end.
 
-    The file is made, or overwritten, with the first bytes. A pipe or a device is written once it ends.
+    The file is created, or overwritten, by the first write. Pipes and devices get the frames without ends.
 
     Raises FormatError where it cannot be written.
     """
@@ -47,7 +47,7 @@ class StreamFile:
         self._opening = self._ending = b""
 
     def begin(self, opening: bytes) -> None:
-        """Keep what goes before the stream, for a pipe or a device; see `Target`."""
+        """Keep the opening for a pipe or a device; see `Target`."""
         self._opening = b"" if self._in_place else opening
 
     def write(self, data: bytes, ending: bytes) -> None:
@@ -77,14 +77,14 @@ class StreamFile:
 
 
 class StreamPipe:
-    """A stream for a program that reads it while it comes: an open binary file, flushed with every frame."""
+    """A stream for a program that reads it as it grows: an open binary file, flushed with every frame."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
         self._opening = b""
 
     def begin(self, opening: bytes) -> None:
-        """Keep what goes before the stream; see `Target`."""
+        """Keep the opening; see `Target`."""
         self._opening = opening
 
     def write(self, data: bytes, ending: bytes) -> None:
@@ -95,20 +95,18 @@ class StreamPipe:
             self._file.flush()
 
     def close(self) -> None:
-        """Leave the file open: it belongs to somebody else."""
+        """Leave the file open, as its owner will close it."""
 
 
 class StreamRecorder:
-    """Encodes frames as they come and writes them to targets at once.
+    """Encodes frames as they come and writes them to targets immediately.
 
-    targets: where it goes. frames, size: written so far. rate: frames per second; 0 before the first.
-    options: by default those of captures: values that no plane carries are brought as near as can be, and a
-    body's steps are the finer ones, named behind the end, and before the object in pipes. bit_rate: bits a
-    second that are held, as far as `buffer` seconds of them; None for all that is sent. See
-    `fba.planning.rate.RateEncoder`. compact: whether only those parameters are sent that players do not
-    derive from others; see `fba.planning.LiveEncoder`.
+    options: by default those of captures: clamp, and the finer BAP steps, named after the end and, in pipes,
+    before the object. bit_rate: limit, bits a second, with a buffer of `buffer` seconds; see
+    `fba.planning.rate.RateEncoder`. compact: whether parameters are left out that players derive from others;
+    see `fba.planning.LiveEncoder`. frames, size: written so far. rate: frames per second; 0 before the first.
 
-    Raises OptionError for both at once.
+    Raises OptionError for compact with bit_rate.
     """
 
     def __init__(
@@ -127,10 +125,10 @@ class StreamRecorder:
         self.rate = Fraction(0)
         self.encoder: Encoder | RateEncoder | LiveEncoder
         if compact:
-            self.encoder = LiveEncoder(self.options)  # it finds its ranges itself
+            self.encoder = LiveEncoder(self.options)  # it chooses its ranges itself
         else:
-            own = None if bit_rate is None else RateEncoder(bit_rate, buffer, self.options)
-            self.encoder = own or Encoder(self.options)
+            rated = None if bit_rate is None else RateEncoder(bit_rate, buffer, self.options)
+            self.encoder = rated or Encoder(self.options)
             self.encoder.expect(widest_faces())
         self.targets = tuple(targets)
 
@@ -157,22 +155,22 @@ class StreamRecorder:
 
 
 def stream_rate(rate: Fraction) -> Fraction:
-    """Return the frame rate that a stream can have and that is nearest to a sender's, 1 to 240."""
-    near = min(max(rate, RATES[0]), RATES[1])
+    """Return the frame rate, 1 to 240, that a stream can have and that is nearest to a sender's."""
+    near = min(max(rate, MIN_RATE), MAX_RATE)
     return near if FrameRate.from_fraction(near) is not None else Fraction(round(16 * near), 16)
 
 
 def _write_all(file: BinaryIO, data: bytes) -> None:
-    """Write bytes to an unbuffered file, which may take them in parts."""
+    """Write bytes to an unbuffered file, which may accept them in parts."""
     view = memoryview(data)
     while view:
         view = view[file.write(view) :]
 
 
 def warm_up(*, bodies: bool = False, rated: bool = False, compact: bool = False) -> None:
-    """Compile what encodes faces, and bodies, before datagrams come, which would be lost meanwhile.
+    """Compile the encoder of faces, and of bodies, before datagrams come, which would be lost meanwhile.
 
-    rated: at a bit rate. compact: as `StreamRecorder` takes it.
+    rated: for a bit rate. compact: as of `StreamRecorder`.
     """
     import numpy as np
 

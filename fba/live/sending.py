@@ -1,4 +1,4 @@
-"""Send a face as Live Link Face does, at its own pace, to whatever receives that."""
+"""Sending of a face in the protocol of Live Link Face, in real time."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from fba.formats.face_tables.livelink_udp import join_values, write_packet
 from fba.formats.time_codes import DAY
 
 DEVICE = "00000000-0000-0000-0000-000000000000"
-"""In place of the id of a telephone."""
+"""Used in place of a phone's id."""
 
 
 def make_datagrams(animation: Animation, subject: str, start: float = 0.0) -> Iterator[tuple[float, bytes]]:
-    """Yield a datagram for each frame, and when it is due: seconds from the first one.
+    """Yield a datagram for each frame, with its time: seconds from the first.
 
-    subject: the name under which the receiver shows the face. start: time of day of the first frame, seconds.
-    Raises ModelError for an animation without a face.
+    subject: name of the face for the receiver. start: time of day of the first frame, seconds. Raises
+    ModelError for an animation without a face.
     """
     motion = to_blendshapes(animation)
     for at, values in zip(motion.times.tolist(), join_values(motion), strict=True):
@@ -37,10 +37,10 @@ def send(
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> int:
-    """Send a face to an address, a datagram for each frame when it is due; return how many there were.
+    """Send a face to an address, a datagram for each frame at its time; return the number of datagrams.
 
-    loop: again and again. seconds: after which it ends. Raises ModelError for an animation without a face,
-    FbaError for an address that nothing can be sent to.
+    loop: repeat until `seconds` have passed. Raises ModelError for an animation without a face, FbaError for
+    an address that cannot be reached.
     """
     begun, passed, count = clock(), 0.0, 0
     with socket.socket(socket.AF_INET6 if ":" in address[0] else socket.AF_INET, socket.SOCK_DGRAM) as opened:
@@ -53,8 +53,8 @@ def send(
                     opened.sendto(data, address)
                 except OSError as error:
                     raise FbaError(
-                        f"{address[0]}: nothing can be sent there: {error.strerror or error}; give the "
-                        "address of a computer, such as 192.168.0.20"
+                        f"{address[0]}: cannot be sent to: {error.strerror or error}; give the address of a "
+                        "computer, such as 192.168.0.20"
                     ) from error
                 count += 1
             passed += float(animation.duration)

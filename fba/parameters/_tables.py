@@ -25,10 +25,10 @@ FAP_GROUP_COUNT = 10
 BAP_GROUP_COUNT = 24
 
 BAP_STEP_TABLES = ("iso", "visage")
-"""`iso`: the standard's quantiser steps; `visage`: those of one vendor's tools. No bit tells them apart."""
+"""`iso`: the standard's quantiser steps; `visage`: those of a vendor's tools. Streams do not say which."""
 BAP_STEPS_DEFAULT = BAP_STEP_TABLES[0]
 BAP_STEPS_AUTO = "auto"
-"""In place of a table's name: the one that a stream's mark names, else the one that its motion shows."""
+"""In place of a table's name: the table that the stream's mark names, or else that its motion shows."""
 
 VISEME_FIELDS = ("viseme_select1", "viseme_select2", "viseme_blend", "viseme_def")
 EXPRESSION_FIELDS = (

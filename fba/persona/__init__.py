@@ -1,9 +1,9 @@
-"""Persona: how an actor moves the face, learnt from tracked points, and played with another person's
-performance.
+"""Persona: an actor's way of moving the face, learnt from tracked points, for another person's performance.
 
-persona = fba.persona.learn([actor]) # actor: a TrackedFace, from `from_point_motion` or of its own
-animation = fba.persona.play(user, persona) # FAPs, which move any face May use: points and recognition of a
-Persona, formats, and the modules of `fba` itself.
+    persona = fba.persona.learn([actor])  # actor: a TrackedFace, for example from `from_point_motion`
+    animation = fba.persona.play(user, persona)  # FAPs, which move any face
+
+May use: points and recognition of a Persona, formats, and the modules of `fba` itself.
 """
 
 from fba.persona._learning import learn

@@ -1,8 +1,7 @@
-"""How strongly and in which way a face shows each class: from its slightest to its strongest.
+"""Curves: how a face shows each class of expression, from the slightest to the strongest.
 
-Nobody has the same performance of an actor and of another person. But both show the same classes, so they
-are paired by class and by rank: the strongest smile of one with the strongest smile of the other, and so on
-down.
+There is no recording of two people who perform alike. But both show the same classes, so they are paired by
+class and rank: the strongest smile of the first with the strongest smile of the second, and so on.
 """
 
 from __future__ import annotations
@@ -16,16 +15,33 @@ from fba.arrays import Bool, Float64
 from fba.persona.points.layout import PARTS
 from fba.persona.recognition import Labels, Recogniser
 
-FEWEST = 4
-"""Frames of a class that tell how a face shows it."""
+MIN_FRAMES = 4
+"""Number of frames of a class that its curve needs."""
 RANKS = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
-"""Ranks, by how far vertices move, at which a class is described."""
-SPAN = 0.1
-"""Ranks around each, within which frames are averaged."""
-STRAIGHT, NEAR, REACH = 0.02, 4.0, 6.0
-"""Shares of a curve map that are straight, and that fade with the distance: millimetres of a whole part."""
-NOISE = 3.0
-"""Square millimetres by which pairs are taken to be off."""
+"""Ranks, by displacement, at which a class is described."""
+RANK_SPAN = 0.1
+"""Difference of rank up to which frames are averaged."""
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """k(a, b) = linear a . b + radial exp(-|a - b|^2 / (2 reach^2)), as in a Gaussian process."""
+
+    linear: float = 0.02
+    radial: float = 4.0
+    reach: float = 6.0  # mm, of all vertices of a part together
+    noise: float = 3.0  # mm^2, variance of the pairs
+
+    def __call__(self, moved: Float64, others: Float64) -> Float64:
+        """Return k for displacements (S, 2V) and others (N, 2V): (S, N)."""
+        both = moved @ others.T
+        square = (moved**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2 * both
+        return np.asarray(
+            self.linear * both + self.radial * np.exp(-np.maximum(square, 0) / (2 * self.reach**2))
+        )
+
+
+KERNEL = Kernel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +49,7 @@ class Curves:
     """How a part moves for each class.
 
     moved: float64 (C, 5, 2V), displacements of its vertices, all x and then all y, at each of `RANKS`; 0
-    where unknown. known: bool (C,), classes of which there are enough frames.
+    where unknown. known: bool (C,), classes with at least `MIN_FRAMES` frames.
     """
 
     moved: Float64
@@ -41,13 +57,12 @@ class Curves:
 
 
 def measure_curves(moved: Float64, labels: Labels, count: int) -> Curves:
-    """Return how a part moves for each of `count` classes. moved: (S, 2V), with these labels; those of two
-    do not count."""
+    """Return the curves of `count` classes from displacements (S, 2V). Frames of two classes are ignored."""
     curves, known = np.zeros((count, len(RANKS), moved.shape[1])), np.zeros(count, dtype=bool)
     single = (labels.first >= 0) & (labels.second < 0)
     for number in range(count):
         frames = np.flatnonzero(single & (labels.first == number))
-        if len(frames) >= FEWEST:
+        if len(frames) >= MIN_FRAMES:
             curves[number], known[number] = _measure(moved[frames]), True
     return Curves(curves, known)
 
@@ -56,8 +71,8 @@ def _measure(moved: Float64) -> Float64:
     """Return the means (5, 2V) of displacements (S, 2V) around each rank."""
     ordered = moved[np.argsort(np.linalg.norm(moved, axis=1))]
     count = len(ordered)
-    starts = np.floor((RANKS - SPAN) * count).astype(int)
-    stops = np.maximum(np.ceil((RANKS + SPAN) * count).astype(int), starts + 1)
+    starts = np.floor((RANKS - RANK_SPAN) * count).astype(int)
+    stops = np.maximum(np.ceil((RANKS + RANK_SPAN) * count).astype(int), starts + 1)
     return np.stack(
         [ordered[max(start, 0) : stop].mean(axis=0) for start, stop in zip(starts, stops, strict=True)]
     )
@@ -65,7 +80,7 @@ def _measure(moved: Float64) -> Float64:
 
 @lru_cache(maxsize=4)
 def general_curves(recogniser: Recogniser) -> dict[str, Curves]:
-    """Return how faces move in general, part by part: from the examples of a recogniser."""
+    """Return the curves of people in general by part, from a recogniser's examples."""
     result = {}
     for part in PARTS:
         labels = recogniser.example_labels[part]
@@ -77,37 +92,27 @@ def general_curves(recogniser: Recogniser) -> dict[str, Curves]:
 
 @dataclass(frozen=True, eq=False)
 class CurveMap:
-    """y = x + k(x, centres) . weights: what is paired with curves that are near, and little where none are.
-
-    k(a, b) = `STRAIGHT` a . b + `NEAR` exp(-|a - b|^2 / (2 `REACH`^2)), as in a Gaussian process.
-    """
+    """A map of displacements: y = x + k(x, centres) . weights. Far from all centres it changes little."""
 
     centres: Float64
     weights: Float64
 
     def __call__(self, moved: Float64) -> Float64:
         """Return displacements (S, 2V) of one face as those of another."""
-        return np.asarray(moved + _alike(moved, self.centres) @ self.weights)
+        return np.asarray(moved + KERNEL(moved, self.centres) @ self.weights)
 
 
 def fit_curves(here: Curves, there: Curves) -> CurveMap:
-    """Return the smooth map that brings one face's curves to another's, and rest to rest."""
+    """Return the smooth map that takes one face's curves to another's, and rest to rest."""
     inputs, outputs = pair_curves(here, there)
     rest = np.zeros((1, inputs.shape[1]))
     centres, change = np.concatenate([inputs, rest]), np.concatenate([outputs - inputs, rest])
-    normal = _alike(centres, centres) + NOISE * np.eye(len(centres))
+    normal = KERNEL(centres, centres) + KERNEL.noise * np.eye(len(centres))
     return CurveMap(centres, np.asarray(np.linalg.solve(normal, change)))
 
 
-def _alike(moved: Float64, others: Float64) -> Float64:
-    """Return how alike displacements (S, 2V) and others (N, 2V) are: (S, N)."""
-    both = moved @ others.T
-    square = (moved**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2 * both
-    return np.asarray(STRAIGHT * both + NEAR * np.exp(-np.maximum(square, 0) / (2 * REACH**2)))
-
-
 def pair_curves(here: Curves, there: Curves) -> tuple[Float64, Float64]:
-    """Return displacements of two faces that go together: (N, 2V) each."""
+    """Return paired displacements of two faces: (N, 2V) each."""
     both = here.known & there.known
     width = here.moved.shape[2]
     return here.moved[both].reshape(-1, width), there.moved[both].reshape(-1, width)

@@ -1,4 +1,4 @@
-"""`LivePersona`: a user's face in an actor's way, frame by frame as a tracker finds it."""
+"""`LivePersona`: a user's face in an actor's style, frame by frame."""
 
 from __future__ import annotations
 
@@ -13,22 +13,21 @@ from fba.persona._persona import Persona
 from fba.persona._rest import NEUTRAL_FRAMES
 from fba.persona._restyle import Follower, keep_shut
 from fba.persona.motion import flatten, unflatten
-from fba.persona.points._registration import MISFIT, MOST_TURNED, register_points
+from fba.persona.points._registration import MAX_MISFIT, MAX_TURN, register_points
 from fba.persona.points.layout import PARTS, TRACKED, VERTICES, flat_mask, part_vertices
 from fba.persona.recognition import Recogniser, decide
-from fba.persona.recognition._displacements import displacements
+from fba.persona.recognition._component import displacements
 from fba.persona.recognition._faps import face_scale, mask_faps, measure_fapu
 
 
 class LivePersona:
-    """Gives the FAPs of an actor for each frame of a user.
+    """Converts each frame of a user to FAPs in an actor's style.
 
     rate: frames per second. Other options as for `perform`. With "motion", the actor's amplitude and sides
-    come as it becomes known how the user moves, at once where `user` says so; speeds stay the user's.
+    are applied as the user's habits become known, or from the start with `user`; speeds stay the user's.
 
-    The first second of frames that can be used, 30 of them, is the user's neutral face. A frame without a
-    face, with a head turned too far, or of no class that the actor has, changes nothing: what was shown
-    stays.
+    The first 30 usable frames give the user's neutral face. A frame without a face, with a head turned too
+    far, or of a class that the actor lacks, repeats the frame before it.
     """
 
     def __init__(
@@ -41,8 +40,8 @@ class LivePersona:
         recogniser: Recogniser | None = None,
     ) -> None:
         self._persona, self._means = persona, usable_means(persona, means)
-        self._known = Recogniser.default() if recogniser is None else recogniser
-        self._maps = user_maps(persona, self._known, user) if self._means in MAPPED else {}
+        self._recogniser = Recogniser.default() if recogniser is None else recogniser
+        self._maps = user_maps(persona, self._recogniser, user) if self._means in MAPPED else {}
         self._followers: dict[str, Follower] = {}
         if self._means == "motion":
             usual = None if user is None else user.motions
@@ -62,7 +61,7 @@ class LivePersona:
         return self._neutral is not None
 
     def push(self, points: npt.ArrayLike, angles: npt.ArrayLike, tracked: bool = True) -> Float64 | None:
-        """Return the FAPs (68,) to show now; None until the user's neutral face is known.
+        """Return the FAPs (68,) of this frame; None until the user's neutral face is known.
 
         points: (64, 2), as in `TrackedFace`. angles: (3,), radians. Raises ModelError for other shapes.
         """
@@ -73,10 +72,10 @@ class LivePersona:
                 f"a frame has points (64, 2) and angles (3,), not {seen.shape} and {turns.shape}"
             )
         usable = tracked and bool(np.isfinite(seen).all() and np.isfinite(turns).all())
-        if usable and bool((np.abs(turns[:2]) <= MOST_TURNED).all()):
-            laid, misfit = register_points(seen[None], turns[1:2])
-            if misfit[0] <= MISFIT:
-                self._take(laid, turns)
+        if usable and bool((np.abs(turns[:2]) <= MAX_TURN).all()):
+            registered, misfit = register_points(seen[None], turns[1:2])
+            if misfit[0] <= MAX_MISFIT:
+                self._take(registered, turns)
         return self._faps.copy() if self.ready else None
 
     def _take(self, points: Float64, angles: Float64) -> None:
@@ -89,11 +88,11 @@ class LivePersona:
             return
         own = flat_mask(points) - flat_mask(self._neutral)
         for part in PARTS:
-            component = self._known.components[part]
+            component = self._recogniser.components[part]
             scores = component.scores(displacements(points, self._neutral, part))
             labels = decide(component.network(scores))
             if part == "mouth":
-                own[..., 2] = self._known.find_depth(scores, labels.first)
+                own[..., 2] = self._recogniser.find_depth(scores, labels.first)
             rows = part_vertices(part)
             there = face_scale(self._persona.fapu, part)
             even = own / np.append(face_scale(self._fapu, part), 1.0)
@@ -101,9 +100,8 @@ class LivePersona:
                 flat = flatten(even[:, rows, :2])
                 moved = self._maps[part](flat)
                 if part in self._followers:
-                    moved[0] = self._followers[part].push(
-                        flat[0], moved[0], int(labels.first[0]), self._frame
-                    )
+                    label = int(labels.first[0])
+                    moved[0] = self._followers[part].push(flat[0], moved[0], label, self._frame)
                 self._moved[rows, :2] = there * unflatten(moved)[0]
                 continue
             style = self._persona.parts[part]
@@ -114,5 +112,5 @@ class LivePersona:
             self._moved[:, 2] = own[0, :, 2]
         if self._followers:
             keep_shut(self._moved[None], own, self._persona.neutral, self._neutral)
-        self._faps = mask_faps(self._moved[None], self._persona.fapu, self._known.jaw)[0]
+        self._faps = mask_faps(self._moved[None], self._persona.fapu, self._recogniser.jaw)[0]
         self._faps[[fap - 1 for fap in HEAD]] = angles / 1e-5

@@ -1,4 +1,4 @@
-"""What is seen of a face in each frame: registered points, how far parts have moved, classes."""
+"""Observation of a face in each frame: registered points, displacements of parts, classes."""
 
 from __future__ import annotations
 
@@ -9,24 +9,23 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
 from fba.errors import FbaWarning, ModelError, OptionError, Remedy
-from fba.persona._rest import FEWEST, eye_opening, find_rest
+from fba.persona._rest import MIN_FRAMES, eye_opening, find_rest
 from fba.persona.points import Registered, TrackedFace, register
 from fba.persona.points.layout import PARTS, flat_mask
-from fba.persona.recognition import Labels, Recogniser, decide
-from fba.persona.recognition._displacements import displacements
+from fba.persona.recognition import Labels, Recogniser, decide, displacements
 
 Neutral = int | tuple[float, float] | None
-WIDER = 1.35
-"""Ratio of the usual opening of eyes to that of the neutral face above which that face is not neutral."""
+MAX_EYE_RATIO = 1.35
+"""Largest ratio of the usual opening of the eyes to that of the neutral face."""
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
     """A face in the frames that are used: S of T.
 
-    rows: int (S,), which frames these are. points: float64 (S, 64, 2), on the standard mask. neutral: (64,
-    2). moved: part -> float64 (S, 2K). scores: part -> (S, D), principal components. labels: part ->
-    classes. registered: of all frames.
+    rows: int (S,), numbers of these frames. points: float64 (S, 64, 2), on the standard mask. neutral: (64,
+    2). moved: part -> float64 (S, 2K), displacements. scores: part -> (S, D), principal components. labels:
+    part -> classes. registered: of all frames.
     """
 
     rows: Intp
@@ -38,9 +37,9 @@ class Observation:
     registered: Registered
 
     def mask_motion(self, recogniser: Recogniser) -> Float64:
-        """Return how far the vertices of the face's own mask have moved: float64 (S, 86, 3), millimetres.
+        """Return the displacements of the face's mask: float64 (S, 86, 3), millimetres.
 
-        Depth, which no picture shows, is that of the nearest example of the mouth's class.
+        Depth, which pictures lack, is taken from the nearest examples of the mouth's class.
         """
         moved = flat_mask(self.points) - flat_mask(self.neutral)
         moved[..., 2] = recogniser.find_depth(self.scores["mouth"], self.labels["mouth"].first)
@@ -50,14 +49,14 @@ class Observation:
 def observe(
     face: TrackedFace, recogniser: Recogniser, neutral: Neutral = None, *, warm_up: int = 0
 ) -> Observation:
-    """Return what is seen of a face.
+    """Return the observation of a face.
 
-    neutral: frames of the neutral face: None for the first second that is used, or, where the face does not
-    rest then, the frames that `find_rest` finds; a frame; or (from, to) in seconds. warm_up: frames at the
-    start that are left out, as trackers need some until they follow a face.
+    neutral: frames of the neutral face: one number, or (from, to) in seconds; by default the first second
+    that is used, or, where the face does not rest then, the frames that `find_rest` returns. warm_up: number
+    of frames left out at the start, until the tracker follows the face.
 
-    Raises ModelError where no frame can be used, saying why; OptionError for frames of the neutral face
-    that cannot.
+    Raises ModelError, with the reasons, where no frame can be used; OptionError where the frames of the
+    neutral face cannot.
     """
     registered = register(face)
     usable = registered.kept.copy()
@@ -70,8 +69,8 @@ def observe(
         if neutral is None
         else _neutral_rows(face, usable, neutral)
     )
-    if len(rest) < FEWEST and neutral is None and len(rows) >= FEWEST:
-        raise ModelError(f"{len(rest)} frames tell the neutral face; at least {FEWEST} are needed")
+    if len(rest) < MIN_FRAMES and neutral is None and len(rows) >= MIN_FRAMES:
+        raise ModelError(f"only {len(rest)} frames show the neutral face; at least {MIN_FRAMES} are needed")
     still = np.asarray(np.median(registered.points[rest], axis=0))
     points = registered.points[rows]
     _check_eyes(points, still)
@@ -82,8 +81,8 @@ def observe(
 
 
 def _check_eyes(points: Float64, still: Float64) -> None:
-    """Warn where eyes are mostly wider than in the neutral face, which then is not neutral."""
-    if np.median(eye_opening(points)) > WIDER * float(eye_opening(still)):
+    """Warn where the eyes are usually wider than in the neutral face, which then is not neutral."""
+    if np.median(eye_opening(points)) > MAX_EYE_RATIO * float(eye_opening(still)):
         warnings.warn(
             FbaWarning(
                 "the eyes are half closed in the frames of the neutral face, and wider in most others"
@@ -96,7 +95,7 @@ def _neutral_rows(face: TrackedFace, usable: Bool, neutral: int | tuple[float, f
     """Return the frames of the neutral face."""
     if isinstance(neutral, int):
         if not 0 <= neutral < len(face) or not usable[neutral]:
-            raise OptionError(f"neutral: frame {neutral} has no face that looks into the camera")
+            raise OptionError(f"neutral: frame {neutral} shows no face that looks into the camera")
         return np.array([neutral])
     start, end = neutral
     times = face.times - face.times[0]
@@ -111,16 +110,16 @@ def _why_none(face: TrackedFace, registered: Registered, warm_up: int) -> str:
     count = len(face)
     if not count:
         return "the recording has no frames"
-    turned, alien, lost = (int(one.sum()) for one in (registered.turned, registered.alien, ~face.tracked))
+    turned, alien, lost = (int(mask.sum()) for mask in (registered.turned, registered.alien, ~face.tracked))
     reasons = [
         text
         for number, text in (
             (lost, f"{lost} without a face"),
             (turned, f"{turned} with a head turned by more than 30 degrees"),
-            (alien, f"{alien} whose points do not lie as on a face"),
+            (alien, f"{alien} whose points are not arranged as in a face"),
         )
         if number
     ]
     if warm_up:
-        reasons.append(f"the first {warm_up} for the tracker to find the face")
+        reasons.append(f"the first {warm_up} while the tracker warms up")
     return f"none of the {count} frames can be used: {', '.join(reasons)}"

@@ -1,5 +1,4 @@
-"""A user's performance in an actor's way: which mask each part shows in each frame, and the FAPs that this
-gives."""
+"""A user's performance in an actor's style: the mask of each part in each frame, and the resulting FAPs."""
 
 from __future__ import annotations
 
@@ -17,33 +16,31 @@ from fba.persona._observation import Neutral, Observation, observe
 from fba.persona._persona import MEANS, PartStyle, Persona
 from fba.persona._restyle import keep_shut, restyle
 from fba.persona.motion import flatten, unflatten
-from fba.persona.points import TrackedFace
-from fba.persona.points._distances import mask_distance
+from fba.persona.points import TrackedFace, mask_distance
 from fba.persona.points.layout import PARTS, part_points, part_vertices, standard_mask
 from fba.persona.recognition import Labels, Recogniser
-from fba.persona.recognition._faps import face_scale, mask_faps, measure_fapu, told_numbers
+from fba.persona.recognition._faps import face_scale, mask_faps, measure_fapu, shown_numbers
 from fba.tracks import FaceTrack
 
 HEAD = (48, 49, 50)
-"""FAPs of the head's turns: the user's own."""
-EASE = 2
-"""Frames before the end and after the start of a mask, at which it is a key: between keys, masks flow into
-each other."""
+"""FAPs of the head's turns, which stay the user's."""
+KEY_INSET = 2
+"""Frames from the start and from the end of a run of one mask to its keys; between keys, masks blend."""
 BLOCK = 256
-"""Frames whose distances from masks are computed at once."""
+"""Number of frames whose distances from masks are computed at once."""
 DEFAULT_MEANS = "motion"
 MAPPED = ("motion", "curves")
-"""Means that need no masks: every frame is a key."""
+"""Means without masks: every frame is a key."""
 
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """A user's performance in an actor's way.
+    """A user's performance in an actor's style.
 
-    rows: int (S,), the frames in which the user is seen. own, acted: float64 (S, 86, 3), millimetres that
-    vertices move from the neutral mask, of the user's own and of the actor's. labels: part -> what the user
-    does. used: part -> the label of the mask that is shown, "" without one. chosen: part -> int
-    (S,), its number, -1 for none. keys: part -> bool (S,), frames that give values; those between are
+    rows: int (S,), numbers of the frames in which the user is seen. own, acted: float64 (S, 86, 3),
+    displacements from the neutral mask, millimetres, of the user and in the actor's style. labels: part ->
+    the user's classes. used: part -> label of the mask that is shown, "" without one. chosen: part -> int
+    (S,), number of that mask, -1 for none. keys: part -> bool (S,), the frames between which masks are
     interpolated.
     """
 
@@ -56,8 +53,7 @@ class Performance:
     keys: dict[str, Bool]
 
     def key_frames(self) -> list[tuple[int, dict[str, int]]]:
-        """Return (frame, part -> number of the mask) for frames in which a part has a key; frames may be
-        missing."""
+        """Return (frame, part -> number of the mask) for the frames in which any part has a key."""
         result = []
         for n, row in enumerate(self.rows.tolist()):
             given = {part: int(self.chosen[part][n]) for part in PARTS if self.keys[part][n]}
@@ -75,25 +71,24 @@ def perform(
     user: Persona | None = None,
     recogniser: Recogniser | None = None,
 ) -> Performance:
-    """Return a user's performance in an actor's way.
+    """Return a user's performance in an actor's style.
 
-    means: "motion" (the default), "curves", or "masks" (of the user's class, the nearest one: the source's
-    way). neutral: the user's neutral frames, see `observe`. user: the user's own Persona, by which the user's
-    usual way is known; None: it is that of people in general, and amplitude and speed are those of this
-    performance. Raises ModelError, OptionError. Warns where a Persona has no statistics of motion: "curves"
-    then take the place of "motion".
+    means: "motion", "curves", or "masks" (the nearest mask of the user's class, as in the source). neutral:
+    the user's neutral frames, see `observe`. user: the user's Persona, which gives the user's usual style; by
+    default that of people in general, with amplitude and speed of this performance. Raises ModelError,
+    OptionError. Warns where a Persona has no statistics of motion: "curves" then replace "motion".
     """
     means = usable_means(persona, means)
-    known = Recogniser.default() if recogniser is None else recogniser
-    seen = observe(face, known, neutral)
-    own, here = seen.mask_motion(known), measure_fapu(seen.neutral)
+    recogniser = Recogniser.default() if recogniser is None else recogniser
+    seen = observe(face, recogniser, neutral)
+    own, here = seen.mask_motion(recogniser), measure_fapu(seen.neutral)
     acted = np.zeros_like(own)
     acted[..., 2] = own[..., 2]
-    maps = user_maps(persona, known, user) if means in MAPPED else {}
+    maps = user_maps(persona, recogniser, user) if means in MAPPED else {}
     labels, used, chosen, keys = {}, {}, {}, {}
     for part in PARTS:
         even, there = own / np.append(face_scale(here, part), 1.0), face_scale(persona.fapu, part)
-        classes, style = known.components[part].classes, persona.parts[part]
+        classes, style = recogniser.components[part].classes, persona.parts[part]
         labels[part] = seen.labels[part].names(classes)
         if means in MAPPED:
             chosen[part] = np.full(len(seen.rows), -1)
@@ -110,7 +105,7 @@ def perform(
             acted[:, part_vertices(part), :2] = there * unflatten(moved)
             continue
         chosen[part] = choose_masks(style, part, even, there, seen.labels[part], classes)
-        used[part] = [style.labels[one] if one >= 0 else "" for one in chosen[part].tolist()]
+        used[part] = [style.labels[mask] if mask >= 0 else "" for mask in chosen[part].tolist()]
         keys[part] = find_keys(chosen[part])
         acted[:, part_vertices(part)] = bridge(style, chosen[part], keys[part], seen.rows)
     if means == "motion":
@@ -119,9 +114,9 @@ def perform(
 
 
 def usable_means(persona: Persona, means: str) -> str:
-    """Return the means that a Persona has what it takes for, and warn where they are others than asked for.
+    """Return these means, or "curves", with a warning, where the Persona lacks statistics of motion.
 
-    Raises OptionError for means that do not exist.
+    Raises OptionError for unknown means.
     """
     if means not in MEANS:
         raise OptionError(
@@ -138,34 +133,23 @@ def usable_means(persona: Persona, means: str) -> str:
 
 
 def user_maps(persona: Persona, recogniser: Recogniser, user: Persona | None = None) -> dict[str, CurveMap]:
-    """Return what makes the actor's displacements of each part of a user's.
+    """Return the maps from a user's displacements to the actor's, by part.
 
-    user: the user's own Persona; None for somebody who moves as people do in general.
+    user: the user's Persona; None for people in general.
     """
     general = general_curves(recogniser)
-    return {
-        part: fit_curves(
-            general[part] if user is None else user.parts[part].curves, persona.parts[part].curves
-        )
-        for part in PARTS
-    }
+    curves = general if user is None else {part: user.parts[part].curves for part in PARTS}
+    return {part: fit_curves(curves[part], persona.parts[part].curves) for part in PARTS}
 
 
 def choose_masks(
-    style: PartStyle,
-    part: str,
-    own: Float64,
-    scale: Float64,
-    labels: Labels,
-    classes: tuple[str, ...],
+    style: PartStyle, part: str, own: Float64, scale: Float64, labels: Labels, classes: tuple[str, ...]
 ) -> Intp:
     """Return the number of the mask that each frame shows, -1 for none: int (S,).
 
-    own: (S, 86, 3), how far the user's vertices have moved, for a standard face; scale: (2,), the actor's
-    `face_scale`. Of the masks of the user's class, that with the
-    smallest distance from the user's points (both moved from the standard mask, so that faces do not count,
-    only how they move). Where the actor has none of a class of two, those of the first one; where none of
-    this, no mask.
+    It is the nearest mask of the user's class. own: (S, 86, 3), the user's displacements, for a standard
+    face. scale: (2,), the actor's `face_scale`. Distances are between displaced standard masks, so that the
+    shapes of the faces have no effect. Where the actor has no mask of a class of two, the first class counts.
     """
     rows = part_points(part)
     standard = standard_mask()[rows, :2]
@@ -174,43 +158,40 @@ def choose_masks(
     chosen = np.full(len(own), -1, dtype=np.intp)
     names = np.array(labels.names(classes), dtype=object)
     for name in set(names.tolist()) - {""}:
-        known = style.rows.get(name)
-        if known is None:
-            known = style.rows.get(name.partition("/")[0])
-        if known is not None:
+        candidates = style.rows.get(name)
+        if candidates is None:
+            candidates = style.rows.get(name.partition("/")[0])
+        if candidates is not None:
             frames = np.flatnonzero(names == name)
-            chosen[frames] = _nearest(users[frames], masks, known)
+            chosen[frames] = _nearest(users[frames], masks, candidates)
     return chosen
 
 
-def _nearest(users: Float64, masks: Float64, known: Intp) -> Intp:
-    """Return the number of the nearest of some masks (M, K, 2) for each of the user's points (S, K, 2)."""
+def _nearest(users: Float64, masks: Float64, candidates: Intp) -> Intp:
+    """Return the number of the nearest candidate among masks (M, K, 2) for each of (S, K, 2)."""
     result = np.zeros(len(users), dtype=np.intp)
     for first in range(0, len(users), BLOCK):
-        some = users[first : first + BLOCK]
-        result[first : first + BLOCK] = known[mask_distance(some[:, None], masks[known][None]).argmin(axis=1)]
+        distances = mask_distance(users[first : first + BLOCK, None], masks[candidates][None])
+        result[first : first + BLOCK] = candidates[distances.argmin(axis=1)]
     return result
 
 
 def find_keys(chosen: Intp) -> Bool:
-    """Return the frames (S,) that are keys: near both ends of each run of one mask, so that runs flow
-    together."""
+    """Return which frames (S,) are keys: near both ends of each run of a mask, so that runs blend."""
     keys = np.zeros(len(chosen), dtype=bool)
     edges = np.flatnonzero(np.diff(chosen)) + 1
     for start, stop in zip([0, *edges.tolist()], [*edges.tolist(), len(chosen)], strict=True):
         if start < stop and chosen[start] >= 0:
-            inset = min(EASE, (stop - start - 1) // 2)
+            inset = min(KEY_INSET, (stop - start - 1) // 2)
             keys[[start + inset, stop - 1 - inset]] = True
-    if len(chosen):
-        known = np.flatnonzero(chosen >= 0)
-        if len(known):
-            keys[[known[0], known[-1]]] = True
+    shown = np.flatnonzero(chosen >= 0)
+    if len(shown):
+        keys[[shown[0], shown[-1]]] = True
     return keys
 
 
 def bridge(style: PartStyle, chosen: Intp, keys: Bool, frames: Intp) -> Float64:
-    """Return displacements (S, V, 3) of a part: those of masks at keys, linear in between, at rest without
-    any."""
+    """Return displacements (S, V, 3) of a part: linear between the masks at keys; 0 without keys."""
     width = style.moved.shape[1:]
     at = np.flatnonzero(keys)
     if not len(at):
@@ -233,33 +214,33 @@ def play(
     head: bool = True,
     recogniser: Recogniser | None = None,
 ) -> Animation:
-    """Return a user's performance in an actor's way, as FAPs that move any face.
+    """Return a user's performance in an actor's style, as FAPs that move any face.
 
-    persona: None for the user's own way. head: whether the user's head turns, too. Other options and errors
-    as for `perform`. Frames in which the user is not seen are interpolated; before and after, the face
-    keeps still.
+    persona: None for the user's own style. head: whether the user's head turns, too. Other options and errors
+    as for `perform`. Frames in which the user is not seen are interpolated; before the first and after the
+    last that is seen, the face stays still.
     """
-    known = Recogniser.default() if recogniser is None else recogniser
+    recogniser = Recogniser.default() if recogniser is None else recogniser
     if persona is None:
-        seen = observe(face, known, neutral)
-        rows, values = seen.rows, own_faps(seen, known)
+        seen = observe(face, recogniser, neutral)
+        rows, values = seen.rows, own_faps(seen, recogniser)
     else:
-        performance = perform(face, persona, means=means, neutral=neutral, user=user, recogniser=known)
-        rows, values = performance.rows, mask_faps(performance.acted, persona.fapu, known.jaw)
+        performance = perform(face, persona, means=means, neutral=neutral, user=user, recogniser=recogniser)
+        rows, values = performance.rows, mask_faps(performance.acted, persona.fapu, recogniser.jaw)
     return make_animation(face, rows, values, head=head, name=face.name)
 
 
 def own_faps(seen: Observation, recogniser: Recogniser) -> Float64:
-    """Return the FAPs (S, 68) of a face that nobody's way is given to."""
+    """Return the FAPs (S, 68) of a face in its own style."""
     return mask_faps(seen.mask_motion(recogniser), measure_fapu(seen.neutral), recogniser.jaw)
 
 
 def make_animation(face: TrackedFace, rows: Intp, values: Float64, *, head: bool, name: str) -> Animation:
-    """Return FAPs (S, 68) of some frames as an animation of all, at the recording's rate."""
-    numbers = [*told_numbers(), *(HEAD if head else ())]
+    """Return the animation of all frames of a recording from the FAPs (S, 68) of the frames `rows`."""
+    numbers = [*shown_numbers(), *(HEAD if head else ())]
     values = values.copy()
     if head:
-        values[:, [one - 1 for one in HEAD]] = face.angles[rows] / 1e-5
+        values[:, [fap - 1 for fap in HEAD]] = face.angles[rows] / 1e-5
     times = face.times - face.times[0]
     count = int(times[-1] * float(face.rate) + 1e-6) + 1
     at = np.arange(count) / float(face.rate)

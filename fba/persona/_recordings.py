@@ -1,5 +1,4 @@
-"""Files of tracked points: those of any tracker that is known, and a tracker's own 64 points in NumPy's
-archives."""
+"""Files of tracked points: those that `fba.read` reads, and NumPy archives of a Persona's 64 points."""
 
 from __future__ import annotations
 
@@ -18,10 +17,13 @@ from fba.persona.points import TrackedFace, from_point_motion
 from fba.persona.points.layout import TRACKED
 from fba.source import Path, naming_file, read_head
 
-POINTS, ANGLES, SEEN, RATE = "points", "angles", "tracked", "fps"
-"""Arrays of an archive: (T, 64, 2), (T, 3), (T,), and one number. The last three may be missing."""
-USUAL_RATE = 30
-MOST_RATE = 10_000
+# Arrays of an archive; all but the points may be missing.
+POINTS = "points"  # (T, 64, 2)
+ANGLES = "angles"  # (T, 3)
+SEEN = "tracked"  # (T,)
+RATE = "fps"  # a number
+DEFAULT_RATE = 30
+MAX_RATE = 10_000
 
 
 def read_recording(
@@ -32,11 +34,11 @@ def read_recording(
     aspect: float | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> TrackedFace:
-    """Return what a tracker saw, from a file of points.
+    """Return the tracked face in a file of points.
 
-    Any file of 68, 70, 468 or 478 points that `fba.read` reads, or an archive of NumPy (.npz) with
-    `points`, 64 of them, and perhaps `angles`, radians, `tracked` and `fps`. fps: for files that do not say
-    it. face: which, where there are several. Raises FormatError, LimitError.
+    It is any file of 68, 70, 468 or 478 points that `fba.read` reads, or a NumPy archive (.npz) with 64
+    `points` and optionally `angles` (radians), `tracked` and `fps`. fps: for files without a rate. face:
+    which of several faces. Raises FormatError, LimitError.
     """
     if read_head(path).startswith(ZIP):
         arrays = read_arrays(path, limits, single=POINTS)
@@ -45,22 +47,22 @@ def read_recording(
             return _tracked(arrays, path, fps)
     reader = format_of(path)
     if reader.read_face is None:
-        raise FormatError(f"is no file of tracked points, but {reader.description}", path=path)
+        raise FormatError(f"is not a file of tracked points, but {reader.description}", path=path)
     given = {"fps": fps, "face": face}
-    known = {
+    options = {
         name: value for name, value in given.items() if value is not None and name in reader.face_options
     }
-    motion = reader.read_face(path, limits=limits, **known)
+    motion = reader.read_face(path, limits=limits, **options)
     if not isinstance(motion, PointMotion):
         raise FormatError(
-            "is no file of tracked points: a Persona is learnt from points of a film", path=path
+            "is not a file of tracked points: a Persona is learnt from points of a film", path=path
         )
     with naming_file(path):
         return from_point_motion(motion, aspect=aspect)
 
 
 def write_recording(face: TrackedFace, path: Path) -> None:
-    """Write 64 points as an archive of NumPy, atomically. Frames are taken to be evenly spaced."""
+    """Write the 64 points as a NumPy archive, atomically, with the rate in place of times."""
     arrays: dict[str, Array] = {
         POINTS: face.points.astype(np.float32),
         ANGLES: face.angles.astype(np.float32),
@@ -75,10 +77,10 @@ def _tracked(arrays: dict[str, Float64], path: Path, fps: Fraction | None) -> Tr
     count = len(arrays[POINTS])
     rate = fps
     if rate is None:
-        told = arrays.get(RATE, np.array(float(USUAL_RATE)))
-        if told.size != 1 or not 0 < float(told.reshape(())) <= MOST_RATE:
+        given = arrays.get(RATE, np.array(float(DEFAULT_RATE)))
+        if given.size != 1 or not 0 < float(given.reshape(())) <= MAX_RATE:
             raise FormatError(f"{RATE} must be one number of frames in a second", path=path)
-        rate = Fraction(float(told.reshape(()))).limit_denominator(1001)
+        rate = Fraction(float(given.reshape(()))).limit_denominator(1001)
     angles = arrays.get(ANGLES, np.zeros((count, 3)))
     seen = arrays.get(SEEN, np.ones(count))
     try:

@@ -1,10 +1,11 @@
-"""A user's motion with an actor's amplitude, speed and sides: what `perform` and `LivePersona` do with the
-statistics of a Persona.
+"""A user's motion with an actor's amplitude, speed and sides, for `perform` and `LivePersona`.
 
 Expressions keep their moments: nothing is moved in time. A lip or lid that the user shuts stays shut.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,31 +13,44 @@ from fba.arrays import Float64, Intp
 from fba.persona.motion import Motion, Tally, find_gains, find_pace, measure_motion, shift_reference
 from fba.persona.points.layout import standard_points
 
-EASE = 0.15
-"""Seconds (deviation of a Gaussian) over which gains pass from one class to the next."""
 RETIMED = ("mouth", "left_brow", "right_brow")
-"""Parts that become slower or faster. Lids do not: a blink that is drawn out does not shut."""
-MOST_PACE = float(np.log(2.0))
-"""Natural logarithm of the greatest change of a speed."""
-SLOWEST, SHARPEST, STEPS = 0.4, 3.0, 7
-"""Seconds (deviation) of the broadest smoothing, strength of the greatest sharpening, halvings that find
-either."""
-SHARP, WIDE, REACH = 0.17, 0.1, 0.17
-"""Seconds: deviations of the smoothings by which motion is sharpened, and how far away the values are that
-it does not pass."""
-BEYOND, BEND = 1.15, 0.8
-"""Share of the actor's own reach that is the limit, and share of the limit where motion begins to yield."""
+"""Parts whose speed changes. The lids' does not: a blink that is drawn out would not shut."""
 LIDS = ((14, 11), (18, 16), (20, 12), (23, 13), (25, 24), (26, 22))
 """Points of upper and lower lids that meet."""
 LIPS = ((29, 32), (30, 33), (31, 34))
 """Points of the inner edges of the lips that meet."""
-UPPER, LOWER = (29, 30, 31, 43, 44, 46, 47, 48, 49, 50, 51), (32, 33, 34, *range(35, 42), 52, 53)
-"""Points of the upper and the lower lip."""
-LID_SHUT, LIP_SHUT = (0.15, 0.4), (0.4, 1.6)
-"""Openings at which lids and lips count as shut, and above which as open: shares of the lids' at rest;
-millimetres between the lips."""
-UPPER_LID = 0.8
-"""Share of a lid's closing that the upper one does."""
+UPPER_LIP = (29, 30, 31, 43, 44, 46, 47, 48, 49, 50, 51)
+LOWER_LIP = (32, 33, 34, *range(35, 42), 52, 53)
+
+
+@dataclass(frozen=True)
+class Opening:
+    """Openings at which lids or lips count as shut, and above which as open; in between, in part."""
+
+    shut: float
+    open: float
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of restyling. Smoothing is by Gaussians, whose deviation is given in seconds."""
+
+    gain_smoothing: float = 0.15  # s, over which gains pass from one class to the next
+    max_pace: float = float(np.log(2.0))  # natural logarithm of the largest change of a speed
+    max_smoothing: float = 0.4  # s, where motion becomes slower
+    max_sharpening: float = 3.0  # factor of the difference that sharpening adds, where it becomes faster
+    halvings: int = 7  # steps of the search for either
+    sharpening: float = 0.17  # s, smoothing whose difference from the motion is added
+    limit_smoothing: float = 0.1  # s, smoothing of the curve that sharpened motion must not pass
+    limit_reach: float = 0.17  # s, before and after a frame, from which that limit is taken
+    reach: float = 1.15  # limit of a displacement, relative to the actor's largest
+    bend: float = 0.8  # share of that limit from which displacements are compressed
+    lids: Opening = Opening(0.15, 0.4)  # shares of the opening at rest
+    lips: Opening = Opening(0.4, 1.6)  # mm
+    upper_lid: float = 0.8  # share of the upper lid in a closing of the eye
+
+
+TUNING = Tuning()
 
 
 def restyle(
@@ -52,21 +66,21 @@ def restyle(
 ) -> Float64:
     """Return displacements (S, 2V) of a part, on the standard face, that move as the actor does.
 
-    own: the user's. mapped: what the actor's curves make of them. classes: (S,), -1 for none. frames: (S,),
-    their numbers. rate: frames per second. reach: (2V,), of the actor, see `PartStyle.reach`. user: how the
-    user moves as a rule; None: as in this take.
+    own: the user's displacements. mapped: the same, mapped by the actor's curves. classes: (S,), -1 for none.
+    frames: (S,), their numbers. rate: frames per second. reach: (2V,), of the actor, see `PartStyle.reach`.
+    user: how the user usually moves; by default, as in this take.
     """
     count = len(actor.seconds) - 1
     moved = mix(own, mapped)
     shown = measure_motion(moved, classes, frames, rate, count)
-    known = shown
+    usual = shown
     if user is not None:
-        known = shift_reference(user, measure_motion(own, classes, frames, rate, count), shown)
-    gains = fill_gaps(find_gains(actor, known)[classes], frames)
-    moved = moved * np.exp(smooth(gains, EASE * rate)[frames - frames[0]])
+        usual = shift_reference(user, measure_motion(own, classes, frames, rate, count), shown)
+    gains = fill_gaps(find_gains(actor, usual)[classes], frames)
+    moved = moved * np.exp(smooth(gains, TUNING.gain_smoothing * rate)[frames - frames[0]])
     if part in RETIMED:
         before = measure_motion(moved, classes, frames, rate, count)
-        goal = shown.speed[-1] + np.clip(find_pace(actor, known), -MOST_PACE, MOST_PACE)
+        goal = shown.speed[-1] + np.clip(find_pace(actor, usual), -TUNING.max_pace, TUNING.max_pace)
         every = fill_gaps(moved, frames)
         moved = retime(every, rate, float(goal - before.speed[-1]))[frames - frames[0]]
         after = measure_motion(moved, classes, frames, rate, count)
@@ -75,16 +89,16 @@ def restyle(
 
 
 def mix(own: Float64, mapped: Float64) -> Float64:
-    """Return the mean of a user's displacements and of what the actor's curves make of them.
+    """Return the mean of a user's displacements and of the same, mapped by the actor's curves.
 
-    The curves have what the actor adds (a brow that goes with the smile), the user's own what is lively and
-    exact; each alone comes less near to the actor.
+    The curves have what the actor adds (a brow that goes with the smile), the user's displacements have life
+    and detail; each alone comes less near to the actor.
     """
     return (own + mapped) / 2
 
 
 def fill_gaps(values: Float64, frames: Intp) -> Float64:
-    """Return values (S, N) of some frames (S,) for every frame from the first to the last one."""
+    """Return values (S, N) of frames (S,) interpolated for every frame from the first to the last."""
     every = np.arange(frames[0], frames[-1] + 1)
     if len(every) == len(frames):
         return values
@@ -92,37 +106,43 @@ def fill_gaps(values: Float64, frames: Intp) -> Float64:
 
 
 def smooth(values: Float64, deviation: float) -> Float64:
-    """Return values (S, N) smoothed in time by a Gaussian, with its deviation in frames; ends are held."""
+    """Return values (S, N) smoothed in time by a Gaussian; deviation: in frames. The ends are extended."""
     half = int(np.ceil(3 * deviation))
     if half < 1 or not len(values):
         return values
     weights = np.exp(-0.5 * (np.arange(-half, half + 1) / max(deviation, 1e-6)) ** 2)
     weights /= weights.sum()
-    held = np.pad(values, ((half, half), (0, 0)), mode="edge")
-    return np.asarray(np.lib.stride_tricks.sliding_window_view(held, 2 * half + 1, axis=0) @ weights)
+    return np.asarray(_windows(values, half) @ weights)
 
 
 def sharpen(values: Float64, rate: float, strength: float) -> Float64:
-    """Return values (S, N) whose changes are steeper, at the same moments; they go no further than values
-    near them do, so that nothing rings."""
-    base, half = smooth(values, WIDE * rate), max(1, round(REACH * rate))
-    held = np.pad(base, ((half, half), (0, 0)), mode="edge")
-    near = np.lib.stride_tricks.sliding_window_view(held, 2 * half + 1, axis=0)
-    steep = values + strength * (base - smooth(values, SHARP * rate))
+    """Return values (S, N) whose changes are steeper, at the same moments.
+
+    They stay within the values near them, so that nothing overshoots.
+    """
+    base = smooth(values, TUNING.limit_smoothing * rate)
+    near = _windows(base, max(1, round(TUNING.limit_reach * rate)))
+    steep = values + strength * (base - smooth(values, TUNING.sharpening * rate))
     return np.clip(steep, np.minimum(near.min(axis=2), values), np.maximum(near.max(axis=2), values))
 
 
-def retime(moved: Float64, rate: float, pace: float) -> Float64:
-    """Return displacements (S, N) that are faster, or slower, by exp(pace) for their amplitude.
+def _windows(values: Float64, half: int) -> Float64:
+    """Return the values (S, N, 2 half + 1) around each of (S, N), the ends extended."""
+    extended = np.pad(values, ((half, half), (0, 0)), mode="edge")
+    return np.lib.stride_tricks.sliding_window_view(extended, 2 * half + 1, axis=0)
 
-    Slower: smoothed, evenly before and after, so that each expression is at its strongest when it was.
-    Faster: sharpened. How much, is found by halving.
+
+def retime(moved: Float64, rate: float, pace: float) -> Float64:
+    """Return displacements (S, N) that are exp(pace) times as fast for their amplitude.
+
+    Slower motion is smoothed, symmetrically, so that each expression keeps the moment of its peak; faster
+    motion is sharpened. The strength is determined by bisection.
     """
     if abs(pace) < 1e-3:
         return moved
     start = _pace(moved, rate)
-    low, high = 0.0, SLOWEST if pace < 0 else SHARPEST
-    for _ in range(STEPS):
+    low, high = 0.0, TUNING.max_smoothing if pace < 0 else TUNING.max_sharpening
+    for _ in range(TUNING.halvings):
         middle = (low + high) / 2
         changed = smooth(moved, middle * rate) if pace < 0 else sharpen(moved, rate, middle)
         if abs(_pace(changed, rate) - start) < abs(pace):
@@ -139,41 +159,43 @@ def _pace(moved: Float64, rate: float) -> float:
 
 
 def limit_reach(moved: Float64, own: Float64, reach: Float64) -> Float64:
-    """Return displacements (S, 2V) that go no further than the actor's masks and curves do, and a little:
-    they yield as they come near. What the user does is no limit to less than it is."""
-    return moved * yielding(np.abs(moved), np.maximum(BEYOND * reach, np.abs(own)))
+    """Return displacements (S, 2V) that stay a little above the actor's reach (2V,), compressed near it.
+
+    own: the user's displacements, which are never cut.
+    """
+    return moved * compression(np.abs(moved), np.maximum(TUNING.reach * reach, np.abs(own)))
 
 
-def yielding(size: Float64, most: Float64) -> Float64:
-    """Return by what sizes are multiplied so that they stay below `most`: 1 up to `BEND` of it."""
-    start, room = BEND * most, (1 - BEND) * most + 1e-9
+def compression(size: Float64, limit: Float64) -> Float64:
+    """Return the factors that keep sizes below the limit: 1 up to `Tuning.bend` of it."""
+    start, room = TUNING.bend * limit, (1 - TUNING.bend) * limit + 1e-9
     over = np.maximum(size - start, 0.0)
     return np.where(over > 0, (start + room * np.tanh(over / room)) / np.maximum(size, 1e-9), 1.0)
 
 
-def keep_shut(moved: Float64, own: Float64, face: Float64, users: Float64) -> None:
-    """Shut lids and lips of masks (S, 86, 3), in place, in frames in which the user's are.
+def keep_shut(moved: Float64, own: Float64, face: Float64, user_face: Float64) -> None:
+    """Shut lids and lips of masks (S, 86, 3), in place, in the frames in which the user's are shut.
 
-    own: (S, 86, 3), what the user does. face, users: (64, 2), both at rest. Millimetres. Lids and lips that
-    would pass each other are brought back, too.
+    own: (S, 86, 3), the user's displacements. face, user_face: (64, 2), both at rest. Millimetres. Lids and
+    lips that would cross are separated.
     """
     for upper, lower in LIDS:
-        rest, theirs = _gap(face, upper, lower), _gap(users, upper, lower)
-        if min(rest, theirs) <= 0:
+        rest, user_rest = _gap(face, upper, lower), _gap(user_face, upper, lower)
+        if min(rest, user_rest) <= 0:
             continue
-        share = 1 + (own[:, upper - 1, 1] - own[:, lower - 1, 1]) / theirs
+        share = 1 + (own[:, upper - 1, 1] - own[:, lower - 1, 1]) / user_rest
         now = 1 + (moved[:, upper - 1, 1] - moved[:, lower - 1, 1]) / rest
-        more = rest * _too_open(now, share, LID_SHUT)
-        moved[:, upper - 1, 1] -= UPPER_LID * more
-        moved[:, lower - 1, 1] += (1 - UPPER_LID) * more
+        more = rest * _too_open(now, share, TUNING.lids)
+        moved[:, upper - 1, 1] -= TUNING.upper_lid * more
+        moved[:, lower - 1, 1] += (1 - TUNING.upper_lid) * more
     closing = np.zeros((len(moved), len(LIPS)))
     for n, (upper, lower) in enumerate(LIPS):
-        rest, theirs = max(_gap(face, upper, lower), 0.0), max(_gap(users, upper, lower), 0.0)
-        apart = theirs + own[:, upper - 1, 1] - own[:, lower - 1, 1]
+        rest, user_rest = (max(_gap(points, upper, lower), 0.0) for points in (face, user_face))
+        apart = user_rest + own[:, upper - 1, 1] - own[:, lower - 1, 1]
         now = rest + moved[:, upper - 1, 1] - moved[:, lower - 1, 1]
-        closing[:, n] = _too_open(now, apart, LIP_SHUT)
+        closing[:, n] = _too_open(now, apart, TUNING.lips)
     middles = standard_points()[[upper - 1 for upper, _ in LIPS], 0]
-    for points, sign in ((UPPER, -0.5), (LOWER, 0.5)):
+    for points, sign in ((UPPER_LIP, -0.5), (LOWER_LIP, 0.5)):
         rows = [point - 1 for point in points]
         nearest = np.abs(standard_points()[rows, 0][:, None] - middles).argmin(axis=1)
         moved[:, rows, 1] += sign * closing[:, nearest]
@@ -183,19 +205,18 @@ def _gap(points: Float64, upper: int, lower: int) -> float:
     return float(points[upper - 1, 1] - points[lower - 1, 1])
 
 
-def _too_open(now: Float64, users: Float64, shut: tuple[float, float]) -> Float64:
-    """Return by how much openings (S,) are to be less, for those of the user; negative where they are less
-    than shut."""
-    closed = np.clip((shut[1] - users) / (shut[1] - shut[0]), 0.0, 1.0)
-    more = closed * np.maximum(now - np.maximum(users, 0.0), 0.0)
-    return np.asarray(more + np.minimum(now - np.minimum(users, 0.0), 0.0))
+def _too_open(now: Float64, user: Float64, bounds: Opening) -> Float64:
+    """Return how much openings (S,) must shrink, given the user's; negative where they cross."""
+    closed = np.clip((bounds.open - user) / (bounds.open - bounds.shut), 0.0, 1.0)
+    more = closed * np.maximum(now - np.maximum(user, 0.0), 0.0)
+    return np.asarray(more + np.minimum(now - np.minimum(user, 0.0), 0.0))
 
 
 class Follower:
-    """Amplitude and sides of an actor for a part of a face that is seen frame by frame.
+    """Amplitude and sides of an actor for a part of a face, frame by frame.
 
-    What the user's way is, is learnt as frames come, and taken into account once a second. Speeds stay the
-    user's: to smooth or to sharpen evenly, later frames would have to be known.
+    The user's habits are measured as frames come, and applied once a second. Speeds stay the user's:
+    symmetric smoothing and sharpening need later frames.
     """
 
     def __init__(self, actor: Motion, reach: Float64, user: Motion | None, rate: float) -> None:
@@ -207,15 +228,13 @@ class Follower:
         self._now = np.zeros(width)
 
     def push(self, own: Float64, mapped: Float64, label: int, frame: int) -> Float64:
-        """Return displacements (2V,) for those of the user and what curves make of them, as in `restyle`.
-
-        label: the class, -1 for none. frame: its number.
-        """
+        """Return displacements (2V,) as `restyle` does. label: the class, -1 for none. frame: its number."""
         moved = mix(own, mapped)
         self._frames.append((own, moved, label, frame))
         if len(self._frames) >= self._rate:
             self._learn()
-        self._now += (self._gains[label] - self._now) * (1 - np.exp(-1 / (EASE * self._rate)))
+        share = 1 - np.exp(-1 / (TUNING.gain_smoothing * self._rate))
+        self._now += (self._gains[label] - self._now) * share
         return limit_reach(moved * np.exp(self._now), own, self._reach)
 
     def _learn(self) -> None:
@@ -223,7 +242,7 @@ class Follower:
         self._frames.clear()
         self._own.add(own, labels, frames, self._rate)
         self._shown.add(moved, labels, frames, self._rate)
-        known = self._shown.motion()
+        usual = self._shown.motion()
         if self._user is not None:
-            known = shift_reference(self._user, self._own.motion(), known)
-        self._gains = find_gains(self._actor, known)
+            usual = shift_reference(self._user, self._own.motion(), usual)
+        self._gains = find_gains(self._actor, usual)

@@ -1,4 +1,4 @@
-"""Reads and writes Personas: `.persona` files, described in docs/persona.md."""
+"""Personas in `.persona` files, described in docs/persona.md."""
 
 from __future__ import annotations
 
@@ -18,22 +18,24 @@ from fba.persona.recognition import Recogniser
 from fba.persona.recognition._archive import Fields, pack_archive, read_archive
 from fba.source import Path
 
-KIND, VERSION, OLDEST = "persona", 2, 1
-"""Version 1 has no statistics of motion."""
+KIND = "persona"
+VERSION = 2
+OLDEST = 1
+"""Oldest version that is read; it has no statistics of motion."""
 MOTION = ("seconds", "spread", "speed")
 COUNTS = ("frames", "kept", "turned", "untracked")
-LARGEST = 500.0
-"""Millimetres: vertices of faces move less."""
-MOST_FRAMES = 1 << 40
-MOST_SECONDS = 1e9
-MOST_LOG = 10.0
-"""Natural logarithm: deviations in millimetres, and speeds for them per second, are within e^10 of 1."""
+MAX_DISPLACEMENT = 500.0
+"""Largest displacement of a vertex, millimetres."""
+MAX_FRAMES = 1 << 40
+MAX_SECONDS = 1e9
+MAX_LOG = 10.0
+"""Largest magnitude of a logarithm in the statistics of motion."""
 
 
 def save_persona(persona: Persona, path: Path, recogniser: Recogniser | None = None) -> None:
-    """Write a Persona, atomically. recogniser: what it was learnt with; None for the default.
+    """Write a Persona, atomically. recogniser: the one it was learnt with; None for the default.
 
-    One that has no statistics of motion is written as version 1, in which they are not.
+    A Persona without statistics of motion is written as version 1.
     """
     known = Recogniser.default() if recogniser is None else recogniser
     header: dict[str, Any] = {"name": persona.name, **{name: getattr(persona, name) for name in COUNTS}}
@@ -58,10 +60,10 @@ def save_persona(persona: Persona, path: Path, recogniser: Recogniser | None = N
 def load_persona(
     path: Path, recogniser: Recogniser | None = None, *, limits: Limits = DEFAULT_LIMITS
 ) -> Persona:
-    """Return a Persona from a file. recogniser: what is used with it; None for the default.
+    """Return a Persona from a file. recogniser: the one to use with it; None for the default.
 
-    A file of version 1 gives one without statistics of motion. Raises FormatError for damage, or a Persona
-    that was learnt with other classes; UnsupportedError for another version; LimitError.
+    A file of version 1 has no statistics of motion. Raises FormatError for damage, or a Persona learnt with
+    other classes; UnsupportedError for another version; LimitError.
     """
     known = Recogniser.default() if recogniser is None else recogniser
     header, arrays = read_archive(path, KIND, VERSION, limits, oldest=OLDEST)
@@ -69,7 +71,7 @@ def load_persona(
     moves = header["version"] > OLDEST
     parts = {part: _read_part(fields, path, part, known, moves=moves) for part in PARTS}
     counts = [fields.number(name) for name in COUNTS]
-    if any(count < 0 or count > MOST_FRAMES or count != int(count) for count in counts):
+    if any(count < 0 or count > MAX_FRAMES or count != int(count) for count in counts):
         raise FormatError(f"{', '.join(COUNTS)} must be whole numbers, not {counts}", path=path)
     neutral = fields.array("neutral", TRACKED, 2)
     persona = Persona(fields.text("name"), neutral, parts, *map(int, counts))
@@ -85,19 +87,19 @@ def _read_part(fields: Fields, path: Path, part: str, known: Recogniser, *, move
     classes = known.components[part].classes
     if fields.texts(f"{part}.classes") != classes:
         raise FormatError(
-            f"{part}: it was learnt with other classes than are recognised here; learn it again", path=path
+            f"{part}: it was learnt with other classes than the recogniser has; learn it again", path=path
         )
     labels = fields.texts(f"{part}.labels")
-    odd = [label for label in labels if not set(label.split("/")) <= set(classes)]
-    if odd:
-        raise FormatError(f"{part}: there is no class {odd[0]!r}"[:200], path=path)
+    unknown = [label for label in labels if not set(label.split("/")) <= set(classes)]
+    if unknown:
+        raise FormatError(f"{part}: there is no class {unknown[0]!r}"[:200], path=path)
     vertices = len(part_vertices(part))
     moved = fields.array(f"{part}.moved", len(labels), vertices, 3)
     curves = fields.array(f"{part}.curves", len(classes), len(RANKS), 2 * vertices)
-    if max(float(np.abs(array).max(initial=0.0)) for array in (moved, curves)) > LARGEST:
-        raise FormatError(f"{part}: vertices move by more than {LARGEST:g} mm", path=path)
+    if max(float(np.abs(array).max(initial=0.0)) for array in (moved, curves)) > MAX_DISPLACEMENT:
+        raise FormatError(f"{part}: vertices move by more than {MAX_DISPLACEMENT:g} mm", path=path)
     source, frame = (
-        fields.indices(f"{part}.{name}", MOST_FRAMES, len(labels)) for name in ("source", "frame")
+        fields.indices(f"{part}.{name}", MAX_FRAMES, len(labels)) for name in ("source", "frame")
     )
     shown = fields.array(f"{part}.known", len(classes)) > 0
     motion = _read_motion(fields, path, part, len(classes) + 1, 2 * vertices) if moves else None
@@ -105,11 +107,11 @@ def _read_part(fields: Fields, path: Path, part: str, known: Recogniser, *, move
 
 
 def _read_motion(fields: Fields, path: Path, part: str, rows: int, width: int) -> Motion:
-    """Return how a part moves. Raises FormatError."""
+    """Return the statistics of a part's motion. Raises FormatError."""
     seconds = fields.array(f"{part}.seconds", rows)
     spread, speed = fields.array(f"{part}.spread", rows, width), fields.array(f"{part}.speed", rows)
-    if seconds.min() < 0 or seconds.max() > MOST_SECONDS:
-        raise FormatError(f"{part}: seconds must be from 0 to {MOST_SECONDS:g}", path=path)
-    if max(np.abs(spread).max(), np.abs(speed).max()) > MOST_LOG:
-        raise FormatError(f"{part}: spread and speed must be from -{MOST_LOG:g} to {MOST_LOG:g}", path=path)
+    if seconds.min() < 0 or seconds.max() > MAX_SECONDS:
+        raise FormatError(f"{part}: seconds must be from 0 to {MAX_SECONDS:g}", path=path)
+    if max(np.abs(spread).max(), np.abs(speed).max()) > MAX_LOG:
+        raise FormatError(f"{part}: spread and speed must be from -{MAX_LOG:g} to {MAX_LOG:g}", path=path)
     return Motion(seconds, spread, speed)

@@ -1,4 +1,4 @@
-"""A page about a Persona: classes and masks, variance of components, frames among the examples."""
+"""An HTML page about a Persona: classes and masks, motion, components, frames among the examples."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from fba.persona.points import TrackedFace
 from fba.persona.points.layout import PARTS, standard_mask, triangles
 from fba.persona.recognition import Recogniser
 
-MASK, PLOT = (150, 170), (360, 260)
-"""Width and height of pictures, pixels."""
-SHOWN = 4
-"""Masks of a class that are drawn."""
-DOTS = 400
-"""Most frames or examples in a plot."""
+MASK_SIZE = (150, 170)
+"""Width and height of the picture of a mask, pixels."""
+PLOT_SIZE = (360, 260)
+"""Width and height of a plot, pixels."""
+DRAWN_MASKS = 4
+"""Number of masks of a class that are drawn."""
+MAX_DOTS = 400
+"""Largest number of frames or examples in a plot."""
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
 STYLE = (
     "body{font:15px sans-serif;max-width:75em;margin:2em auto;padding:0 1em;color:#222}"
@@ -38,7 +40,7 @@ def make_report(
     warm_up: int = 0,
     recogniser: Recogniser | None = None,
 ) -> str:
-    """Return a page (HTML) about a Persona that was learnt from these recordings; options as for `learn`."""
+    """Return an HTML page about a Persona learnt from these recordings; options as for `learn`."""
     known = Recogniser.default() if recogniser is None else recogniser
     seen = [observe(face, known, neutral, warm_up=warm_up) for face in faces]
     name = html.escape(persona.name or "actor")
@@ -48,8 +50,8 @@ def make_report(
     body += ["<h2>Motion</h2>", _motion(persona), "<h2>Components</h2>", _variance(known)]
     body.append("<h2>Frames among the examples</h2>")
     body.append(
-        "<p>Grey: examples by which expressions are recognised. Coloured: the actor's frames by "
-        "their class, the commonest ones; the line joins them in time.</p>"
+        "<p>Grey: examples from which expressions are recognised. Coloured: the actor's frames of the most "
+        "frequent classes; the line joins them in time.</p>"
     )
     for part in PARTS:
         body += [_scatter(part, seen, known, axes) for axes in ((0, 1), (1, 2))]
@@ -70,16 +72,16 @@ def _counts(persona: Persona) -> str:
 def _motion(persona: Persona) -> str:
     motion = describe_motion(persona.motions)
     if motion is None:
-        return "<p>The file of this Persona is older than statistics of motion.</p>"
+        return "<p>The file of this Persona has no statistics of motion.</p>"
     rows = [
-        f"<tr><td>{part.replace('_', ' ')}</td><td>{one['millimetres']:.2f}</td>"
-        f"<td>{one['speed']:.1f}</td></tr>"
-        for part, one in motion["parts"].items()
+        f"<tr><td>{part.replace('_', ' ')}</td><td>{values['millimetres']:.2f}</td>"
+        f"<td>{values['speed']:.1f}</td></tr>"
+        for part, values in motion["parts"].items()
     ]
     sides = ", ".join(f"{name} {times:.2f}" for name, times in motion["left_over_right"].items())
     return (
-        "<p>How far each part moves about its mean, on the standard face, and how fast for that. How many "
-        f"times as far the left side moves as the right: {sides}.</p>"
+        "<p>Amplitude of each part about its mean, on the standard face, and its speed relative to that. "
+        f"Amplitude of the left side relative to the right: {sides}.</p>"
         f"<table><tr><th></th><th>mm</th><th>1/s</th></tr>{''.join(rows)}</table>"
     )
 
@@ -90,9 +92,10 @@ def _part_masks(persona: Persona, part: str, known: Recogniser) -> list[str]:
     result = [f"<h3>{part.replace('_', ' ')}: {len(style.rows)} classes, {len(style.labels)} masks</h3>"]
     if missing:
         result.append(f"<p>Missing: {html.escape(', '.join(missing))}</p>")
-    for name, rows in sorted(style.rows.items(), key=lambda one: -len(one[1])):
+    for name, rows in sorted(style.rows.items(), key=lambda item: -len(item[1])):
         sizes = np.linalg.norm(style.moved[rows], axis=(1, 2))
-        chosen = rows[np.argsort(sizes)[np.linspace(0, len(rows) - 1, min(SHOWN, len(rows))).astype(int)]]
+        places = np.linspace(0, len(rows) - 1, min(DRAWN_MASKS, len(rows))).astype(int)
+        chosen = rows[np.argsort(sizes)[places]]
         pictures = "".join(draw_mask(persona.mask(part, int(row)), persona.neutral_mask) for row in chosen)
         frames = ", ".join(f"{style.source[row]}:{style.frame[row]}" for row in chosen)
         result.append(
@@ -103,13 +106,13 @@ def _part_masks(persona: Persona, part: str, known: Recogniser) -> list[str]:
 
 
 def draw_mask(mask: Float64, behind: Float64 | None = None) -> str:
-    """Return a picture (SVG) of a mask (86, 3), black, before another, grey."""
+    """Return an SVG picture of a mask (86, 3), black, in front of another, grey."""
     size = np.ptp(standard_mask()[:, :2], axis=0)
     middle = standard_mask()[:, :2].min(axis=0) + size / 2
-    scale = min(MASK[0] / size[0], MASK[1] / size[1]) * 0.92
+    scale = min(MASK_SIZE[0] / size[0], MASK_SIZE[1] / size[1]) * 0.92
 
     def path(points: Float64) -> str:
-        at = (points[:, :2] - middle) * (scale, -scale) + np.array(MASK) / 2
+        at = (points[:, :2] - middle) * (scale, -scale) + np.array(MASK_SIZE) / 2
         corners = np.round(at[triangles()], 1).tolist()
         return "".join(f"M{a[0]} {a[1]}L{b[0]} {b[1]}L{c[0]} {c[1]}Z" for a, b, c in corners)
 
@@ -117,7 +120,7 @@ def draw_mask(mask: Float64, behind: Float64 | None = None) -> str:
         "" if behind is None else f'<path d="{path(behind)}" fill="none" stroke="#ccc" stroke-width=".5"/>'
     )
     lines += f'<path d="{path(mask)}" fill="none" stroke="#222" stroke-width=".7"/>'
-    return f'<svg width="{MASK[0]}" height="{MASK[1]}">{lines}</svg>'
+    return f'<svg width="{MASK_SIZE[0]}" height="{MASK_SIZE[1]}">{lines}</svg>'
 
 
 def _variance(known: Recogniser) -> str:
@@ -136,32 +139,32 @@ def _variance(known: Recogniser) -> str:
 
 
 def _scatter(part: str, seen: Sequence[Observation], known: Recogniser, axes: tuple[int, int]) -> str:
-    """Return a plot (SVG) of two components of a part: examples, frames by class, and their way."""
+    """Return an SVG plot of two components of a part: examples, frames by class, and their path."""
     examples = known.scores[part][:, axes]
-    frames = np.concatenate([one.scores[part] for one in seen])[:, axes]
-    names = [name for one in seen for name in one.labels[part].names(known.components[part].classes)]
+    frames = np.concatenate([take.scores[part] for take in seen])[:, axes]
+    names = [name for take in seen for name in take.labels[part].names(known.components[part].classes)]
     low = np.minimum(np.percentile(examples, 0.5, axis=0), np.percentile(frames, 0.5, axis=0))
     high = np.maximum(np.percentile(examples, 99.5, axis=0), np.percentile(frames, 99.5, axis=0))
-    scale = (np.array(PLOT) - 20) / np.maximum(high - low, 1e-9)
+    scale = (np.array(PLOT_SIZE) - 20) / np.maximum(high - low, 1e-9)
 
     def place(points: Float64) -> list[list[float]]:
-        at = np.clip((points - low) * scale + 10, 0, PLOT)
-        return np.round(np.stack([at[:, 0], PLOT[1] - at[:, 1]], axis=1), 1).tolist()  # type: ignore[no-any-return]
+        at = np.clip((points - low) * scale + 10, 0, PLOT_SIZE)
+        return np.round(np.stack([at[:, 0], PLOT_SIZE[1] - at[:, 1]], axis=1), 1).tolist()  # type: ignore[no-any-return]
 
     dots = [f'<circle cx="{x}" cy="{y}" r="1.2" fill="#ccc"/>' for x, y in place(_thin(examples))]
-    way = " ".join(f"{x},{y}" for x, y in place(_thin(frames)))
-    dots.append(f'<polyline points="{way}" fill="none" stroke="#888" stroke-width=".3"/>')
+    path = " ".join(f"{x},{y}" for x, y in place(_thin(frames)))
+    dots.append(f'<polyline points="{path}" fill="none" stroke="#888" stroke-width=".3"/>')
     common = sorted(set(names) - {""}, key=names.count, reverse=True)[: len(COLOURS)]
     legend = []
     for colour, name in zip(COLOURS, common, strict=False):
-        own = frames[[n for n, one in enumerate(names) if one == name]]
-        dots += [f'<circle cx="{x}" cy="{y}" r="2" fill="{colour}"/>' for x, y in place(_thin(own))]
+        members = frames[[n for n, other in enumerate(names) if other == name]]
+        dots += [f'<circle cx="{x}" cy="{y}" r="2" fill="{colour}"/>' for x, y in place(_thin(members))]
         legend.append(f'<span style="color:{colour}">{html.escape(name)}</span>')
     caption = f"{part.replace('_', ' ')}, components {axes[0] + 1} and {axes[1] + 1}: {' '.join(legend)}"
-    picture = f'<svg width="{PLOT[0]}" height="{PLOT[1]}">{"".join(dots)}</svg>'
+    picture = f'<svg width="{PLOT_SIZE[0]}" height="{PLOT_SIZE[1]}">{"".join(dots)}</svg>'
     return f"<figure>{picture}<figcaption>{caption}</figcaption></figure>"
 
 
 def _thin(points: Float64) -> Float64:
-    """Return at most `DOTS` of some points, evenly chosen."""
-    return points[:: max(1, -(-len(points) // DOTS))]
+    """Return at most `MAX_DOTS` of the points, evenly chosen."""
+    return points[:: max(1, -(-len(points) // MAX_DOTS))]

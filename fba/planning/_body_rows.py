@@ -12,13 +12,14 @@ What a loop makes itself is as long as the rows that it goes through.
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
-from fba.body import BapSolver, Skeleton
+from fba.body import SIDES, BapSolver, Skeleton
 from fba.body.displacement import REACH
-from fba.body.stance import SIDES, find_stance, sole_points
+from fba.body.stance import find_stance, sole_points
 from fba.compiled import compiled
 from fba.planning._tolerance import Tolerance
 
@@ -125,39 +126,25 @@ def _place_points(matrices: Float64, joints: Int64, offsets: Float64, result: Fl
                 )
 
 
-@compiled
-def _find_longest(apart: Float64, joints: Int64, offsets: Float64, weights: Float32, result: Float64) -> None:
-    """Set result (T,) to the largest weighted error of the points of `_place_points`.
+class MovedPoints(NamedTuple):
+    """The points that a BAP moves.
 
-    apart: (T, J, 4, 4), differences of joint matrices. weights: (T, R).
+    points: (T, R, 3). weights: (T, R), see `BodyTarget.weights`. rows: (K,), the points below its joint.
+    centre, axis: (T, 3), see `BapMotion`; the centre does not matter unless it turns.
     """
-    for frame in range(len(result)):
-        largest = 0.0
-        for row in range(len(joints)):
-            own = apart[frame, joints[row]]
-            total = 0.0
-            for axis in range(3):
-                off = (
-                    own[axis, 3]
-                    + own[axis, 0] * offsets[row, 0]
-                    + own[axis, 1] * offsets[row, 1]
-                    + own[axis, 2] * offsets[row, 2]
-                )
-                total += off * off
-            largest = max(largest, total * float(weights[frame, row]) ** 2)
-        result[frame] = np.sqrt(largest)
+
+    points: Float32
+    weights: Float32
+    rows: Int64
+    centre: Float32
+    axis: Float32
+    turns: bool
 
 
 @compiled
-def add_error(
-    errors: Float32, points: Float32, weights: Float32, rows: Int64, centre: Float32, axis: Float32,
-    turns: bool, change: Float64,
-) -> None:  # fmt: skip
-    """Add to errors (T, R, 3), shares of the tolerance, what a change (T,) of one BAP moves.
-
-    points: (T, R, 3). weights: (T, R), see `BodyTarget.weights`. rows: int64 (K,), below its joint. centre,
-    axis: (T, 3), see `BapMotion`; the centre does not matter unless it turns.
-    """
+def add_error(errors: Float32, moved: MovedPoints, change: Float64) -> None:
+    """Add to errors (T, R, 3), shares of the tolerance, what a change (T,) of a BAP moves."""
+    points, weights, rows, centre, axis, turns = moved
     for frame in range(len(change)):
         if change[frame] == 0.0:
             continue
@@ -181,15 +168,13 @@ def add_error(
 
 
 @compiled
-def free_room(
-    errors: Float32, points: Float32, weights: Float32, rows: Int64, centre: Float32, axis: Float32,
-    turns: bool, limit: Float64,
-) -> Float64:  # fmt: skip
-    """Return how far one BAP may move down and up at each frame, and its longest slope: float64 (3, T).
+def free_room(errors: Float32, moved: MovedPoints, limit: Float64) -> Float64:
+    """Return how far a BAP may move down and up at each frame, and its longest slope: float64 (3, T).
 
     So far no error (T, R, 3) below its joint becomes longer than limit (T,). Where there is no such way, both
-    are the one that makes the longest error shortest. Arguments: as in `add_error`.
+    are the one that makes the longest error shortest.
     """
+    points, weights, rows, centre, axis, turns = moved
     count = len(rows)
     room = np.zeros((3, len(errors)))
     steep, along, length = np.zeros(count), np.zeros(count), np.zeros(count)

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Bool, Float64, Int32
+from fba.arrays import Bool, Float64, Int32, Int64
 from fba.body import Skeleton
 from fba.body.displacement import displacements
 from fba.body.solve.conventions import NO_BAP
-from fba.codec import EncoderOptions, EncoderStatistics, decode, encode_with_statistics, step_scale
+from fba.codec import EncoderOptions, decode, encode_with_statistics, step_scale
 from fba.codec.settings import QUANT_MAX
 from fba.errors import RangeError
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_steps, baps
 from fba.planning._body_rows import BodyTarget, all_rows, blocks
-from fba.planning._body_search import HOPELESS, BodyEffort, FoundBaps, search_baps
+from fba.planning._body_search import HOPELESS, search_baps
 from fba.planning._plan import encode_planned
-from fba.planning._tolerance import Tolerance
+from fba.planning._search import Effort
+from fba.planning._tolerance import BodyErrors, NearLossless, Tolerance
 from fba.tracks import BodyTrack, hold
 
 FULL_TURN = 628319
@@ -29,7 +30,9 @@ ARM = 0.9
 REDUCED = (0.5, 0.3)
 """Shares of the tolerance that joints which are no longer turned may take."""
 EFFORTS = ((0.5, 0.8), (0.7, 0.7), (0.5, 0.6))
-"""Share of a BAP and share of gaps, see `BodyEffort`, of the searches that are tried for each of those."""
+"""Share of a BAP and share of gaps, see `Effort`, of the searches that are tried for each of those."""
+MOST_LEFT_OUT = 16
+"""Most frames left out in a row."""
 MARGINS = (0.99, 0.93, 0.86, 0.78)
 """Shares of the tolerance that searches fill: the next where the one before left frames beyond it."""
 GIVEN_UP = 2
@@ -44,62 +47,17 @@ REDUCTION_FRAMES = 160
 """Number of frames by which the joints to turn are chosen; the choice is then checked at all frames."""
 
 
-@dataclass(frozen=True)
-class BodyErrors:
-    """How far a decoded body is from its source, at all frames of the source.
-
-    largest, percentile_99: metres, of a point 3 cm off a joint, in the world; joint, frame: where it is
-    largest. share: of all joints in all frames, within the tolerance. foot: metres, of a sole that stands.
-    """
-
-    largest: float
-    percentile_99: float
-    share: float
-    joint: str
-    frame: int
-    foot: float
-
-    def is_within(self, tolerance: Tolerance) -> bool:
-        """Whether joints and feet are within a tolerance."""
-        return self.largest <= tolerance.joint and self.foot <= tolerance.foot
-
-
-@dataclass(frozen=True, eq=False)
-class CodedBody:
-    """What encoding a body within a tolerance came to.
-
-    statistics: of the encoder. bap_quant: quantiser of BAPs. left_out: frames that are not sent. errors: of
-    the decoded stream.
-    """
-
-    statistics: EncoderStatistics
-    bap_quant: int
-    left_out: int
-    errors: BodyErrors
-
-
 def encode_body_within_tolerance(
-    animation: Animation,
-    tolerance: Tolerance | None = None,
-    options: EncoderOptions | None = None,
-    *,
-    every_frame: bool = False,
-) -> tuple[bytes, CodedBody]:
-    """Return a stream whose body stays within a tolerance of an animation's, and what it came to.
+    animation: Animation, tolerance: Tolerance, options: EncoderOptions, *, every_frame: bool
+) -> tuple[bytes, NearLossless]:
+    """Return a stream of a body without a face that stays within a tolerance, and what it came to.
 
     Errors are measured where the source has frames, on the decoded stream: a frame that was left out is
-    interpolated, as `fba.player` does it. options: the quantiser of BAPs is ignored; angles beyond half a
-    turn are sent as they go on. every_frame: leave no frame out.
-
-    ValueError for an animation with a face, without a body or without frames, RangeError where not even the
-    finest quantiser keeps within the tolerance.
+    interpolated, as `fba.player` does it. Angles beyond half a turn are sent as they go on. RangeError where
+    not even the finest quantiser keeps within the tolerance.
     """
-    tolerance, options = tolerance or Tolerance(), replace(options or EncoderOptions(), clamp=True)
-    if animation.face is not None or animation.body is None:
-        raise ValueError("an animation with a body and no face is needed")
-    if not len(animation):
-        raise ValueError("there is no frame to encode")
-    smallest: tuple[bytes, CodedBody] | None = None
+    options = replace(options, clamp=True)
+    smallest: tuple[bytes, NearLossless] | None = None
     nearest: BodyErrors | None = None
     for sent, chosen in body_candidates(animation, tolerance, options, gaps=not every_frame):
         streams = [encode_with_statistics(sent, chosen), encode_planned(sent, chosen)]
@@ -109,7 +67,8 @@ def encode_body_within_tolerance(
             errors = body_errors(animation, decode(data, bap_steps=options.bap_steps), tolerance)
             if errors.is_within(tolerance):
                 left_out = len(animation) - len(sent)
-                smallest = data, CodedBody(statistics, chosen.bap_quant, left_out, errors)
+                near = NearLossless(statistics, left_out=left_out, bap_quant=chosen.bap_quant, body=errors)
+                smallest = data, near
                 break
             if nearest is None or errors.largest < nearest.largest:
                 nearest = errors
@@ -156,8 +115,7 @@ def body_candidates(
         chosen = replace(options, bap_quant=quant)
         steps = bap_steps(options.bap_steps) * step_scale(chosen, body=True)
         rounded: Float64 = np.rint(values / steps) * steps
-        keys = np.arange(count)
-        sent = _to_send(animation, FoundBaps(keys, rounded.astype(np.int32), 0.0, 0.0))
+        sent = _to_send(animation, np.arange(count), rounded.astype(np.int32))
         off = displacements(values, rounded, float(animation.rate))
         kept = np.array_equal(rounded[:, BAP_STANDARD_COUNT:], values[:, BAP_STANDARD_COUNT:])
         within = off.joints.max() <= tolerance.joint and off.feet.max() <= tolerance.foot
@@ -181,14 +139,14 @@ def _searched(
         within, hopeless = False, 0
         for share, gap_share, base in efforts:
             for margin in MARGINS:
-                effort = BodyEffort(steps, scale, share, min(gap_share, margin - SPARE), margin)
+                effort = Effort(steps, scale, share, min(gap_share, margin - SPARE), margin, MOST_LEFT_OUT)
                 found = search_baps(target, base, gaps, effort)
-                if found.longest <= 1 or found.longest > HOPELESS:
+                if found.within or found.longest > HOPELESS:
                     break
-            if found.longest <= 1 or (quant == 1 and not hopeless):
-                within |= found.longest <= 1
-                yield _to_send(animation, found), chosen
-            hopeless += found.longest > 1 and (quant == 1 or found.longest > HOPELESS)
+            if found.within or (quant == 1 and not hopeless):
+                within |= found.within
+                yield _to_send(animation, found.keys, found.values), chosen
+            hopeless += not found.within and (quant == 1 or found.longest > HOPELESS)
             if (within and searches == 1) or hopeless == GIVEN_UP:
                 break
         if within:  # finer ones take more
@@ -252,12 +210,10 @@ def _unwrapped(values: Float64) -> Float64:
     return result
 
 
-def _to_send(animation: Animation, found: FoundBaps) -> Animation:
-    """Return the frames that are sent, with the BAPs that were found and are not 0 throughout."""
-    mask = np.broadcast_to(found.values.any(axis=0), found.values.shape)
-    return Animation(
-        animation.rate, animation.index[found.keys], None, BodyTrack(found.values, mask), animation.name
-    )
+def _to_send(animation: Animation, keys: Int64, values: Int32) -> Animation:
+    """Return the frames at keys (K,) with the BAPs (K, 296) that are not 0 throughout."""
+    mask = np.broadcast_to(values.any(axis=0), values.shape)
+    return replace(animation, index=animation.index[keys], face=None, body=BodyTrack(values, mask))
 
 
 def beyond_body(nearest: BodyErrors, tolerance: Tolerance) -> RangeError:

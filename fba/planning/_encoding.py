@@ -11,9 +11,9 @@ from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.codec import EncoderOptions, EncoderStatistics, encode_with_statistics, warn_of_clamped
 from fba.errors import OptionError, did_you_mean
 from fba.face import FaceModel
-from fba.planning._near_lossless import NearLossless, encode_within_tolerance
+from fba.planning._near_lossless import encode_within_tolerance
 from fba.planning._plan import encode_planned
-from fba.planning._tolerance import Tolerance
+from fba.planning._tolerance import NearLossless, Tolerance
 from fba.presets import PRESETS, REFERENCE, Preset
 
 if TYPE_CHECKING:

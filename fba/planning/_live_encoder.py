@@ -17,7 +17,6 @@ from fba.face import Resolver
 from fba.face.mates import fill
 from fba.parameters import BAP_COUNT, FAP_COUNT, baps
 from fba.planning._derived_faps import derive_others, interpolated_faps, related_faps, subsets
-from fba.planning._frame_order import check_order
 from fba.tracks import BodyTrack, FaceTrack
 
 FACE, BODY = "face", "body"
@@ -115,6 +114,14 @@ class LiveEncoder:
         if following is not None:
             data += self._encoder.settle(int(following.animation.index[0]))
         return data
+
+
+def check_order(before: Animation, frame: Animation) -> None:
+    """Raise ValueError for a frame that cannot come after another: of another rate, or no later."""
+    if frame.rate != before.rate:
+        raise ValueError(f"the stream has {before.rate} frames/s, this frame {frame.rate}; resample it first")
+    if frame.index[0] <= before.index[0]:
+        raise ValueError(f"frame index {frame.index[0]} comes after {before.index[0]}; they must increase")
 
 
 class _Part(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,22 +13,17 @@ from fba.arrays import Bool, Float64
 from fba.codec import EncoderOptions, EncoderStatistics, decode
 from fba.errors import FbaWarning, RangeError
 from fba.face import FaceModel, resolve
-from fba.face.deform.displacements import DisplacementMeter, Displacements
+from fba.face.deform.displacements import DisplacementMeter
 from fba.face.mates import donors
 from fba.face.resolve import known_faps
 from fba.parameters import fap_steps
-from fba.planning._body_tolerance import (
-    BodyErrors,
-    beyond_body,
-    body_errors,
-    encode_body_within_tolerance,
-    fit_bodies,
-)
+from fba.planning._body_tolerance import beyond_body, body_errors, encode_body_within_tolerance, fit_bodies
 from fba.planning._derived_faps import interpolated_faps, related_faps
-from fba.planning._face_search import Effort, FoundFaps, Segment, search_faps
+from fba.planning._face_search import Segment, search_faps
 from fba.planning._mesh_error import ErrorBasis
 from fba.planning._plan import Plan, encode_planned, plan_compact, plan_exact
-from fba.planning._tolerance import Tolerance
+from fba.planning._search import Effort, Found
+from fba.planning._tolerance import BodyErrors, FaceErrors, NearLossless, Tolerance
 from fba.tracks import FaceTrack
 
 QUANTS = (1, 2, 3, 4, 5, 6, 8, 10, 12)
@@ -37,6 +32,8 @@ TRIED = 3
 """Number of them that are tried: the coarsest that each FAP by itself could take, and the next finer ones."""
 EFFORTS = ((0.9, 1.1, 4), (1.1, 0.9, 4), (0.7, 1.1, 4), (0.9, 0.9, 10), (0.9, 1.1, 10), (1.1, 0.7, 4))
 """Share, share of gaps, and most frames left out, of the searches that are tried; the best of all first."""
+MARGIN = 0.998
+"""Share of the tolerance that searches fill: slopes are not quite what the mesh does."""
 FAILURES = 3
 """Searches without a result after which a quantiser is given up."""
 WORSE = 1.1
@@ -47,45 +44,6 @@ INTRA_BITS = 2000
 """What an I plane counts: differences take less than half of what they do if all is kept."""
 MAX_SEGMENT_FRAMES = 3000
 """Frames of the longest segment, which bounds the memory of a search."""
-
-
-@dataclass(frozen=True)
-class FaceErrors:
-    """How far a decoded face is from its source, at all frames of the source.
-
-    largest, percentile_99: metres, of a vertex, in the frame of the head; frame, vertex: where it is
-    largest. head, gaze: degrees, the most that one of the head's three angles, or of an eye's, is off.
-    """
-
-    largest: float
-    percentile_99: float
-    frame: int
-    vertex: int
-    head: float
-    gaze: float
-
-    def is_within(self, tolerance: Tolerance) -> bool:
-        """Whether all are within a tolerance."""
-        pairs = ((self.largest, tolerance.face), (self.head, tolerance.head), (self.gaze, tolerance.gaze))
-        return all(off <= allowed for off, allowed in pairs)
-
-
-@dataclass(frozen=True, eq=False)
-class NearLossless:
-    """What encoding within a tolerance came to.
-
-    statistics: of the encoder. fap_quant, bap_quant: quantisers. left_out: frames that are not sent. face,
-    body: errors, None for a part that there is not, or that does not move. compact: whether nothing was
-    smaller than what keeps all that is shown.
-    """
-
-    statistics: EncoderStatistics
-    fap_quant: int
-    left_out: int
-    face: FaceErrors | None
-    compact: bool
-    bap_quant: int = 1
-    body: BodyErrors | None = None
 
 
 def encode_within_tolerance(
@@ -116,10 +74,7 @@ def encode_within_tolerance(
     if animation.body is None or not animation.body.values.any():
         return _encode_face(animation, tolerance, options, model, every_frame)
     if animation.face is None:
-        data, coded = encode_body_within_tolerance(animation, tolerance, options, every_frame=every_frame)
-        return data, NearLossless(
-            coded.statistics, 1, coded.left_out, None, False, coded.bap_quant, coded.errors
-        )
+        return encode_body_within_tolerance(animation, tolerance, options, every_frame=every_frame)
     nearest: BodyErrors | None = None
     for body, quant in fit_bodies(animation, tolerance, options):
         chosen = replace(options, bap_quant=quant, clamp=True)
@@ -224,14 +179,15 @@ def _search(source: _Source, tolerance: Tolerance) -> Iterator[Plan]:
 
 def _best(
     segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, quant: int, efforts: int
-) -> FoundFaps | None:
+) -> Found | None:
     """Return the cheapest of several searches; None where the quantiser is too coarse."""
     best = None
     for number, (share, gap_share, most) in enumerate(EFFORTS[:efforts]):
         if best is None and number >= FAILURES:
             break
         below = best.bits if best is not None else np.inf
-        found = search_faps(segment, basis, meter, Effort(quant, share, gap_share, most), below)
+        effort = Effort(fap_steps() * quant, quant, share, gap_share, MARGIN, most)
+        found = search_faps(segment, basis, meter, effort, below)
         best = found if found.within else best
     return best
 
@@ -285,11 +241,11 @@ def _assemble(
     source: _Source,
     plan: Plan,
     segments: list[tuple[slice, Segment]],
-    found: list[tuple[slice, FoundFaps]],
+    found: list[tuple[slice, Found]],
     quant: int,
 ) -> Plan:
     """Return the plan that sends what was found."""
-    animation, track = source.animation, plan.animation.face
+    animation, track, body = source.animation, plan.animation.face, source.animation.body
     assert track is not None
     moving = np.zeros(track.mask.shape[1], dtype=np.bool_)
     for _, one in found:
@@ -304,7 +260,6 @@ def _assemble(
     values = np.where(mask, np.concatenate([one.values for _, one in found]), 0).astype(np.int32)
     asked = interpolated_faps(mask, known_faps(track)[1][keys] & moving)
     face = FaceTrack(values, mask, track.viseme[keys], track.expression[keys], asked)
-    body = None if animation.body is None else animation.body
     if body is not None:
         body = replace(body, values=body.values[keys], mask=body.mask[keys])
     sent = Animation(animation.rate, animation.index[keys], face, body, animation.name)
@@ -335,14 +290,13 @@ def _measured(
         if len(sent) < len(index):
             shown = np.stack([np.interp(index, sent, column) for column in shown.T], axis=1)
         off = source.meter.measure(source.shown, shown)
-        errors = _errors(off, *source.meter.angles(source.shown, shown))
+        frame = int(off.largest.argmax())
+        errors = FaceErrors(
+            float(off.largest[frame]), off.percentile(99), frame, int(off.worst[frame]),
+            *source.meter.angles(source.shown, shown),
+        )  # fmt: skip
     left_out = len(source.animation) - len(decoded)
     return NearLossless(statistics, options.fap_quant, left_out, errors, compact)
-
-
-def _errors(off: Displacements, head: float, gaze: float) -> FaceErrors:
-    frame = int(off.largest.argmax())
-    return FaceErrors(float(off.largest[frame]), off.percentile(99), frame, int(off.worst[frame]), head, gaze)
 
 
 def _is_within(result: NearLossless, tolerance: Tolerance) -> bool:

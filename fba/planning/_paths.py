@@ -134,8 +134,7 @@ def _search(bounds: Bounds, band: tuple[Int64, Int64], before: Int64, narrower: 
     choices = np.zeros((len(first), int((last - first).max()) + 1), dtype=np.int32)
     lowest, highest = _calm_changes(bounds)
     return _shortest(
-        bounds.lower / bounds.step,
-        bounds.upper / bounds.step,
+        (bounds.lower / bounds.step, bounds.upper / bounds.step),
         bounds.keys,
         (first, last),
         (lowest, highest),
@@ -166,8 +165,7 @@ def _hold(lowest: Int64, highest: Int64) -> Int64:
 
 @compiled
 def _shortest(
-    lower: Float64,
-    upper: Float64,
+    within: tuple[Float64, Float64],
     keys: Int64,
     band: tuple[Int64, Int64],
     calm: tuple[Float64, Float64],
@@ -177,14 +175,15 @@ def _shortest(
 ) -> Int64:
     """Return the levels (K,) whose changes cost least together.
 
-    lower, upper: (T,), in levels, for the frames between keys, where values are interpolated. band: lowest
-    and highest levels (K,). calm: least and largest changes (K - 1,) that are no jerk. cost: of changes from
-    -low on. choices: int32 (K, most levels), working array.
+    within: lower and upper bounds (T,), in levels, for the frames between keys, too, where values are
+    interpolated. band: lowest and highest levels (K,). calm: least and largest changes (K - 1,) that are no
+    jerk. cost: of changes from -low on. choices: int32 (K, most levels), working array.
 
     Bounds: j and i are levels within the band, of which choices has a column each (`_search` makes it for the
-    widest). j_first and j_last keep changes within -low..len(cost) - 1 - low. Keys are places in lower and
-    upper, those between two keys as well.
+    widest). j_first and j_last keep changes within -low..len(cost) - 1 - low. Keys are places in both
+    bounds, those between two keys as well.
     """
+    lower, upper = within
     first, last = band
     width = choices.shape[1]
     sums, new_sums = np.zeros(width), np.zeros(width)

@@ -39,7 +39,8 @@ from fba.planning._segments import Cuts, cheapest_segments, find_cuts
 from fba.presets import PLANNED, REFERENCE, PlannedPreset
 from fba.tracks import BodyTrack, FaceTrack
 
-_NO_LIMITS = Limits(frames=1 << 62, bytes=1 << 62)
+NO_LIMITS = Limits(frames=1 << 62, bytes=1 << 62)
+"""For streams that were made here."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,7 @@ def _as_coded(
         return animation
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        coded = decode(data, bap_steps=options.bap_steps, limits=_NO_LIMITS)
+        coded = decode(data, bap_steps=options.bap_steps, limits=NO_LIMITS)
     face, body = animation.face, animation.body
     if face is not None and coded.face is not None:
         one = coded.face

@@ -14,9 +14,10 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.body import BapSolver
+from fba.body import SIDES, BapSolver
+from fba.body.footing import foot_frames
 from fba.body.solve.motions import BapMotion, bap_motions
-from fba.body.stance import SIDES, find_stance, sole_points
+from fba.body.stance import find_stance, heel_and_ball, sole_points
 from fba.codec import EncoderOptions, step_scale
 from fba.compiled import compiled
 from fba.parameters import BAP_COUNT, bap_steps
@@ -112,16 +113,10 @@ class _Block:
     def _place_soles(self, solver: BapSolver) -> None:
         """Find where the soles are, when they rest, and what moves them."""
         skeleton = solver.skeleton
-        places = [place for side in SIDES for place in (sole_points(skeleton, side) or {}).items()]
-        joints = [skeleton.number(name) for name, _ in places]
+        joints = [skeleton.number(name) for side in SIDES for name in sole_points(skeleton, side) or {}]
         matrices = solver.pose(self.wanted)
-        soles = np.stack(
-            [
-                matrices[:, joint, :3, 3] + matrices[:, joint, :3, :3] @ (point - skeleton.centres[joint])
-                for joint, (_, point) in zip(joints, places, strict=True)
-            ],
-            axis=1,
-        )
+        ends = [heel_and_ball(skeleton, foot_frames(skeleton, matrices, side), side) for side in SIDES]
+        soles = np.stack([end for foot in ends for end in foot or ()], axis=1)
         stands = np.repeat(find_stance(skeleton, matrices, self.rate).T, 2, axis=1)
         self.rests = stands & _find_rest(soles, self.rate)
         self.errors = soles - _smoothed(soles, self.rests, round(SMOOTHED * self.rate / 2))

@@ -1,9 +1,11 @@
-"""`Tolerance`: how far what a stream shows may be from its source."""
+"""`Tolerance`: how far what a stream shows may be from its source, and how far streams are."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+
+from fba.codec import EncoderStatistics
 
 
 @dataclass(frozen=True)
@@ -29,3 +31,62 @@ class Tolerance:
             value = getattr(self, field.name)
             if not (value > 0 and math.isfinite(value)):
                 raise ValueError(f"a tolerance is a positive number; {field.name} is {value!r}")
+
+
+@dataclass(frozen=True)
+class FaceErrors:
+    """How far a decoded face is from its source, at all frames of the source.
+
+    largest, percentile_99: metres, of a vertex, in the frame of the head; frame, vertex: where it is
+    largest. head, gaze: degrees, the most that one of the head's three angles, or of an eye's, is off.
+    """
+
+    largest: float
+    percentile_99: float
+    frame: int
+    vertex: int
+    head: float
+    gaze: float
+
+    def is_within(self, tolerance: Tolerance) -> bool:
+        """Whether all are within a tolerance."""
+        pairs = ((self.largest, tolerance.face), (self.head, tolerance.head), (self.gaze, tolerance.gaze))
+        return all(off <= allowed for off, allowed in pairs)
+
+
+@dataclass(frozen=True)
+class BodyErrors:
+    """How far a decoded body is from its source, at all frames of the source.
+
+    largest, percentile_99: metres, of a point 3 cm off a joint, in the world; joint, frame: where it is
+    largest. share: of all joints in all frames, within the tolerance. foot: metres, of a sole that stands.
+    """
+
+    largest: float
+    percentile_99: float
+    share: float
+    joint: str
+    frame: int
+    foot: float
+
+    def is_within(self, tolerance: Tolerance) -> bool:
+        """Whether joints and feet are within a tolerance."""
+        return self.largest <= tolerance.joint and self.foot <= tolerance.foot
+
+
+@dataclass(frozen=True, eq=False)
+class NearLossless:
+    """What encoding within a tolerance came to.
+
+    statistics: of the encoder. fap_quant, bap_quant: quantisers. left_out: frames that are not sent. face,
+    body: errors, None for a part that there is not, or that does not move. compact: whether nothing was
+    smaller than what keeps all that is shown.
+    """
+
+    statistics: EncoderStatistics
+    fap_quant: int = 1
+    left_out: int = 0
+    face: FaceErrors | None = None
+    compact: bool = False
+    bap_quant: int = 1
+    body: BodyErrors | None = None

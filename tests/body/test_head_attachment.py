@@ -193,8 +193,3 @@ def test_four_joints_of_many_fade_in_without_a_step() -> None:
         np.add.at(found, (np.arange(61), joints[:, slot]), weights[:, slot])
     np.testing.assert_allclose(found.sum(axis=1), 1, atol=1e-6)
     assert np.abs(np.diff(found, axis=0)).max() < 0.01
-
-
-def test_the_old_name_names_the_new_one() -> None:
-    with pytest.raises(ImportError, match="now attach_head"):
-        from fba.body.head_attachment import HeadOnBody  # noqa: F401

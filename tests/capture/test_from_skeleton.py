@@ -285,6 +285,8 @@ def test_contradictory_motion() -> None:
 def test_forward_kinematics_against_scipy() -> None:
     turns = {name: Rotation.random(4, rng=np.random.default_rng(2)) for name in ("Hips", "Spine", "LeftArm")}
     captured = motion("A", 4, turns=turns)
+    assert captured.world() is captured.world()
+    assert not captured.world()[0].flags.writeable
     np.testing.assert_allclose(captured.world()[1], source_places(captured), atol=1e-12)
     hand, elbow = (captured.world()[1][0, captured.names.index(n)] for n in ("LeftHand", "LeftForeArm"))
     assert np.linalg.norm(hand - elbow) == pytest.approx(ARM, abs=1e-4)

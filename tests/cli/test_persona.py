@@ -125,7 +125,7 @@ def test_what_is_no_recording(persona: Path, run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.fap").write_text("2.1 a 25 1\n" + "0 " * 67 + "0\n0\n")
     code, _, err = run("persona", "learn", tmp_path / "a.fap", "-o", tmp_path / "a.persona")
     assert code == 1
-    assert "is no file of tracked points" in err
+    assert "is not a file of tracked points" in err
     np.savez(tmp_path / "short.npz", points=np.zeros((9, 64, 2)), angles=np.zeros((4, 3)))
     with pytest.raises(FormatError, match=r"9 frames of points, but angles \(4, 3\)"):
         read_recording(tmp_path / "short.npz")
@@ -169,7 +169,7 @@ def repacked(path: Path, target: Path, **changed: object) -> Path:
 @pytest.mark.parametrize(
     ("changed", "error", "said"),
     [
-        ({"kind": "other"}, FormatError, "is no persona file"),
+        ({"kind": "other"}, FormatError, "is not a persona file"),
         ({"version": 3}, UnsupportedError, "version 3; this is 2: make it again"),
         ({"version": 0}, UnsupportedError, "version 0; this is 2: make it again"),
         ({"version": True}, UnsupportedError, "version True"),
@@ -208,7 +208,7 @@ def test_damaged_personas(persona: Path, run: Run, tmp_path: Path) -> None:
         with pytest.raises(FormatError, match=r"a\.persona: "):
             load_persona(path)
     code, _, err = run("persona", "info", path)
-    assert (code, err) == (1, f"fba: error: {path}: is no persona file\n")
+    assert (code, err) == (1, f"fba: error: {path}: is not a persona file\n")
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("header.json", json.dumps({"kind": "persona", "version": 1}))
         archive.writestr("neutral.npy", b"0" * 300_000_000)

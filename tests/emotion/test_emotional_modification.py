@@ -230,7 +230,7 @@ class TestMistakes:
             ({"name": "anger", "intensity": float("nan")}, "0 to 100, not nan"),
             ({"name": "anger", "intensity": 50, "start": 3, "end": 2}, "ends at 2 s, but begins at 3 s"),
             ({"name": "anger", "intensity": 50, "start": float("inf")}, "number of seconds"),
-            ({"name": "anger", "intensity": 50, "ease": -1}, "easing takes"),
+            ({"name": "anger", "intensity": 50, "ease": -1}, "ease must be"),
         ],
     )
     def test_moods_that_make_no_sense(self, settings: dict[str, object], said: str) -> None:
@@ -240,8 +240,8 @@ class TestMistakes:
     @pytest.mark.parametrize(
         ("times", "intensities", "said"),
         [
-            ([0, 1, 1], [0, 5, 9], "two keys at 1 s"),
-            ([1, 0], [0, 5], "out of order"),
+            ([0, 1, 1], [0, 5, 9], "not in increasing order at 1 s"),
+            ([1, 0], [0, 5], "not in increasing order"),
             ([0], [120], "0 to 100"),
             ([], [], "at least one"),
             ([0, float("nan")], [1, 2], "must be numbers"),

@@ -13,9 +13,9 @@ from fba.persona import LivePersona, Persona, Recogniser, learn, perform, play
 from fba.persona._learning import prune
 from fba.persona._performance import bridge, find_keys
 from fba.persona._persona import part_width
-from fba.persona.points._distances import mask_distance
+from fba.persona.points import mask_distance
 from fba.persona.points.layout import PARTS, part_points
-from fba.persona.recognition._faps import measure_fapu, told_numbers
+from fba.persona.recognition._faps import measure_fapu, shown_numbers
 from fba.persona.report import make_report
 from tools.persona.actors import Act, Style, act
 from tools.persona.evaluation import evaluate, mean_reduction
@@ -61,7 +61,7 @@ def test_play_shows_the_actors_way(user: Act, persona: Persona) -> None:
     assert len(acted) == len(own) == len(user.face)
     assert acted.face is not None
     assert own.face is not None
-    assert set(np.flatnonzero(acted.face.mask[0]) + 1) == {*told_numbers(), 48, 49, 50}
+    assert set(np.flatnonzero(acted.face.mask[0]) + 1) == {*shown_numbers(), 48, 49, 50}
     mine, his = (at_apex(user, one.face.values, "E_HAPPY") for one in (own, acted))
     assert his[11] - his[12] > mine[11] - mine[12] + 60
     for values in (mine, his):
@@ -192,6 +192,6 @@ def test_the_report_draws_masks_and_plots(actor: Act, persona: Persona) -> None:
     assert page.count("<svg") > 10 + len(PARTS) * 2
     assert "E_HAPPY" in page
     assert "Missing" in page
-    told = re.search(r"times as far the left side moves as the right: mouth ([\d.]+), ", page)
+    told = re.search(r"of the left side relative to the right: mouth ([\d.]+), ", page)
     assert told is not None
     assert float(told.group(1)) > 1.3  # the actor's left side moves more

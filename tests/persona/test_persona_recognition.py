@@ -10,12 +10,19 @@ from scipy.optimize import approx_fprime
 
 from fba.persona import Recogniser
 from fba.persona.points.layout import PARTS
-from fba.persona.recognition import decide, train
-from fba.persona.recognition._component import DIMENSIONS, UNITS, WANTED_ACCURACY, find_axes, train_component
-from fba.persona.recognition._network import _loss
+from fba.persona.recognition import decide
 from tools.persona.training import __main__ as training
 from tools.persona.training.classes import class_faps, face_classes, part_classes
 from tools.persona.training.examples import Examples, make_examples
+from tools.persona.training.networks import (
+    DIMENSIONS,
+    UNITS,
+    WANTED_ACCURACY,
+    _loss,
+    find_axes,
+    train,
+    train_component,
+)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from fba.codec import EncoderOptions, decode
 from fba.errors import RangeError
 from fba.parameters import BAP_COUNT, baps
 from fba.planning import NearLossless, Tolerance, encode_within_tolerance
-from fba.planning._body_rows import BodyRows, BodyTarget, add_error, free_room
+from fba.planning._body_rows import BodyRows, BodyTarget, MovedPoints, add_error, free_room
 from fba.planning._body_tolerance import reduce_joints
 
 VISAGE = EncoderOptions(bap_steps="visage")
@@ -166,15 +166,15 @@ def test_room_of_a_bap_reaches_to_the_tolerance_and_no_further() -> None:
     errors = np.zeros_like(points)
     axis, centre = np.array([[0, 0, 0.001]], dtype=np.float32), np.zeros((1, 3), dtype=np.float32)
     weights = np.full((1, 2), 100, dtype=np.float32)  # tolerances of 1 cm
-    place = (points, weights, np.arange(2), centre, axis, True)
-    low, high, steepest = free_room(errors, *place, np.ones(1))[:, 0]
+    moved = MovedPoints(points, weights, np.arange(2), centre, axis, True)
+    low, high, steepest = free_room(errors, moved, np.ones(1))[:, 0]
     assert (low, high) == pytest.approx((-5.0, 5.0))
     assert steepest == pytest.approx(0.2)
-    add_error(errors, *place, np.array([3.0]))
+    add_error(errors, moved, np.array([3.0]))
     assert errors[0, :, 1] == pytest.approx([0.3, 0.6])
-    assert free_room(errors, *place, np.ones(1))[:2, 0] == pytest.approx([-8.0, 2.0])
+    assert free_room(errors, moved, np.ones(1))[:2, 0] == pytest.approx([-8.0, 2.0])
     errors[0, 0, 0] = 1.5  # too far off across, whatever this BAP does: it makes the longest shortest
-    low, high, _ = free_room(errors, *place, np.ones(1))[:, 0]
+    low, high, _ = free_room(errors, moved, np.ones(1))[:, 0]
     assert low == high == pytest.approx(-3.0, abs=1e-3)
 
 

@@ -209,7 +209,7 @@ def test_presets_of_options_are_those_of_plans() -> None:
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[2] < sizes[0]
     assert fba.encode(animation) == encode(animation)
-    with pytest.raises(OptionError, match=r"the preset 'compact' plans with all frames.*fba\.encode"):
+    with pytest.raises(OptionError, match=r"the preset 'compact' needs all frames.*fba\.encode"):
         Encoder(EncoderOptions(preset="compact"))
 
 

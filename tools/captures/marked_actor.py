@@ -79,7 +79,7 @@ def record(model: FaceModel, faps: Float64, rate: int = 100, seed: int = 2) -> T
 
 
 def as_animation(take: Take) -> Animation:
-    """Return what is performed in a take: its FAPs, and the path of the head as BAPs 181 to 183."""
+    """Return the performance of a take: its FAPs, and the path of the head as BAPs 181 to 183."""
     face = as_face(take.faps, take.motion.rate)
     baps = np.zeros((len(face), BAP_COUNT), dtype=np.int32)
     sent = np.zeros(baps.shape, dtype=bool)

@@ -11,8 +11,6 @@ import numpy as np
 from fba.capture import MarkerMotion
 
 BLOCK = 512
-TRC_HEADER = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate",
-              "OrigDataStartFrame", "OrigNumFrames")  # fmt: skip
 PROCESSORS = {"intel": 84, "dec": 85, "mips": 86}
 
 

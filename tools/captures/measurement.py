@@ -36,14 +36,14 @@ NOISE = 0.3e-3
 PICTURE = FOCAL / FAR
 """Widths of a picture in which a face is a metre wide."""
 Errors = Mapping[int, float]
-"""Root mean square error of each FAP that a capture tells: percent of its FAPU, or degrees."""
+"""Root mean square error of each FAP that a capture shows: percent of its FAPU, or degrees."""
 
 
-def root_mean_squares(found: Float64, truth: Float64, told: tuple[int, ...]) -> Errors:
-    """Return the error of each FAP in `told`; found, truth: FAPs (T, 68)."""
+def root_mean_squares(found: Float64, truth: Float64, shown: tuple[int, ...]) -> Errors:
+    """Return the error of each FAP in `shown`; found, truth: FAPs (T, 68)."""
     errors = np.sqrt(((found - truth) ** 2).mean(axis=0))
     unit = {fap.number: DEGREE if fap.unit == "AU" else PER_CENT for fap in faps()}
-    return {fap: float(errors[fap - 1]) / unit[fap] for fap in told}
+    return {fap: float(errors[fap - 1]) / unit[fap] for fap in shown}
 
 
 def ways_to_spoil(motion: MarkerMotion) -> dict[str, MarkerMotion]:
@@ -69,8 +69,8 @@ def measure_take(take: Take, motion: MarkerMotion, model: FaceModel | None = Non
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
         face = find_face(motion, neutral="first", model=model)
-    told = [fap for fap in face.sent if fap not in _lip_mates(face.sent)]
-    return root_mean_squares(face.faps, take.faps, tuple(told))
+    shown = [fap for fap in face.sent if fap not in _lip_mates(face.sent)]
+    return root_mean_squares(face.faps, take.faps, tuple(shown))
 
 
 WATCHED: Mapping[str, Mapping[str, Any]] = {
@@ -106,9 +106,9 @@ def measure_animation(found: Animation, truth: Animation) -> Errors:
     assert found.face is not None
     assert truth.face is not None
     count = min(len(found), len(truth))
-    told = tuple((np.flatnonzero(found.face.mask.any(axis=0)) + 1).tolist())
+    shown = tuple((np.flatnonzero(found.face.mask.any(axis=0)) + 1).tolist())
     return root_mean_squares(
-        found.face.values[:count].astype(float), truth.face.values[:count].astype(float), told
+        found.face.values[:count].astype(float), truth.face.values[:count].astype(float), shown
     )
 
 
@@ -123,11 +123,11 @@ def measure_marker_file(folder: Path, name: str, take: Take) -> tuple[Errors, fl
         animation = fba.read(path, neutral="first")
     assert animation.face is not None
     assert animation.body is not None
-    told = tuple((np.flatnonzero(animation.face.mask[0]) + 1).tolist())
-    told = tuple(fap for fap in told if fap not in _lip_mates(told))
+    shown = tuple((np.flatnonzero(animation.face.mask[0]) + 1).tolist())
+    shown = tuple(fap for fap in shown if fap not in _lip_mates(shown))
     moved = animation.body.values[:, [181, 180, 182]]  # left, up, front, from their BAPs
     off = float(np.sqrt(((moved - 1000 * take.path) ** 2).sum(axis=1).mean()))
-    return root_mean_squares(animation.face.values.astype(float), take.faps, told), off
+    return root_mean_squares(animation.face.values.astype(float), take.faps, shown), off
 
 
 def measure_shapes(performed: Float64, rate: int) -> dict[int, float | None]:
@@ -154,6 +154,6 @@ def worst(errors: Errors, *, turns: bool) -> float:
     return max((error for fap, error in errors.items() if (fap in angles) == turns), default=0.0)
 
 
-def _lip_mates(told: tuple[int, ...]) -> set[int]:
-    """Return FAPs of the inner lips that are only told to do as the outer ones."""
-    return {fap.number for fap in faps() if fap.lip_mate in told and fap.number < 20}
+def _lip_mates(shown: tuple[int, ...]) -> set[int]:
+    """Return FAPs of the inner lips that copy the outer lips."""
+    return {fap.number for fap in faps() if fap.lip_mate in shown and fap.number < 20}

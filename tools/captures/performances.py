@@ -1,4 +1,4 @@
-"""What an actor does: FAPs over time, made up or taken from a file, and how the head moves."""
+"""Performances of an actor: FAPs over time, synthetic or from a file, and the motion of the head."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ STILL = 1e-6
 def faps_table(errors: Mapping[str, Mapping[int, float | None]]) -> str:
     """Return a row for each FAP and a column for each kind of capture, whose errors are given by FAP.
 
-    Left and right share a row, with the larger error. None is a FAP that is told, without a number.
+    Left and right share a row, with the larger error. None: a FAP that is shown, without a number.
     """
     rows = [["FAP", *errors]]
     for fap in faps()[2:]:

@@ -82,7 +82,7 @@ def columns_at(times: Float64) -> dict[str, Float64]:
 
 
 def shapes_at(times: Float64, *, turned: bool = True) -> ShapeMotion:
-    """Return what is performed, as `fba.capture` has it. turned: with the turns of head and eyes."""
+    """Return the performance in the form of `fba.capture`. turned: with the turns of head and eyes."""
     weights = weights_at(times)
     head, eyes = _head_and_eyes(times) if turned else (None, None)
     names = tuple(face_files.camel(name) for name in weights)
@@ -181,7 +181,7 @@ def _as_seen(times: Float64) -> tuple[Float64, Float64]:
 class FaceFile:
     """A kind of file.
 
-    write: its content for what is performed at given times. step: seconds between its rows. options: of
+    write: returns its content for the performance at given times. step: seconds between its rows. options: of
     `fba.read`. units: the action units in it; none where it has shapes. turned: it has the turns.
     """
 

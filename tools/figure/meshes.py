@@ -1,4 +1,4 @@
-"""Meshes as tuples, and what is done with their polygons: tubes, mirror images, edges, averages."""
+"""Meshes as tuples, and operations on their polygons: tubes, mirror images, edges, averages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs targets in processes of their own, side by side, and saves what they find.
+"""Runs targets in parallel processes, and saves their findings.
 
 A process that crashes or hangs is a finding as well: the next one goes on behind that input.
 """
@@ -60,7 +60,7 @@ class Campaign:
 
 
 def run_campaign(campaign: Campaign, say: Callable[[str], None]) -> list[Report]:
-    """Run all targets; return their reports. Findings are saved and told as soon as their target is done."""
+    """Run all targets; return their reports. Findings are saved and printed when their target ends."""
     total = sum(target.share for target in campaign.targets)
 
     def one(target: Target) -> Report:

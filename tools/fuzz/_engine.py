@@ -18,12 +18,16 @@ from tools.fuzz._mutation import mutate
 from tools.fuzz._outcome import ContractError, Outcome
 from tools.fuzz.targets import Target
 
-MOST_SECONDS, MOST_SECONDS_PER_BYTE = 3.0, 0.002
-"""Processor time that one input may take, and more for each of its bytes: generous, as machines differ."""
+MOST_SECONDS = 3.0
+"""Processor time of an input, seconds: generous, as machines differ."""
+MOST_SECONDS_PER_BYTE = 0.002
+"""Further processor time for each byte of an input, seconds."""
 SEED_SECONDS = 60.0
-"""Processor time that a seed may take, whose length says nothing: a search on head and body takes seconds."""
-MOST_MEMORY, MOST_MEMORY_PER_BYTE = 200_000_000, 20
-"""Memory that one input may take beyond what the process had before it, in bytes."""
+"""Processor time of a seed of any length, seconds: a search on head and body takes several."""
+MOST_MEMORY = 200_000_000
+"""Memory of an input beyond that of the process before it, bytes."""
+MOST_MEMORY_PER_BYTE = 20
+"""Further memory for each byte of an input, bytes."""
 MINIMISED_SECONDS = 15.0
 RANDOM_BYTES = 8
 """Size of the inputs of targets whose inputs are random."""
@@ -108,7 +112,7 @@ def run(
     """Check the mutations first..first + count of a seed, or as many as the seconds allow.
 
     corpus: the files that are mutated; they are checked themselves, too, before (with numbers below 0), which
-    compiles what is not compiled yet. progress: called with the number of each input before it runs.
+    compiles functions that are not compiled yet. progress: called with each input's number before it runs.
     """
     report = Report(target.name)
     with tempfile.TemporaryDirectory(prefix="fba-fuzz-") as folder:
@@ -161,7 +165,7 @@ def _record(
     number: int,
     minimising: bool = True,
 ) -> None:
-    """Check one input and add what it comes to."""
+    """Check an input and add its outcome."""
     report.count += 1
     try:
         outcome = check(data)
@@ -203,7 +207,7 @@ class Check:
         self._limited = False
 
     def limit(self) -> None:
-        """From now on, limit memory: what was compiled up to now does not count."""
+        """Limit memory from now on, not counting functions that are already compiled."""
         self._limited = True
 
     def __call__(self, data: bytes) -> Outcome:

@@ -23,6 +23,7 @@ from fba.cache import load_or_make
 from fba.capture.virtual_markers import read_mapping, write_mapping
 from fba.errors import FbaError, FbaWarning
 from fba.face import FaceModel
+from fba.face.gltf._storage import build
 from fba.face.importers import import_model
 from fba.face.importers.points.points_file import read_points
 from fba.formats.bvh import _reader as bvh
@@ -74,7 +75,7 @@ def _check_written(
     read_again: Callable[[Path], Any],
     content: Callable[[Any], object],
 ) -> Outcome:
-    """Read a file, write what it holds, and read that again. content: what must then be the same."""
+    """Read a file, write its content, and read it again. content: returns the part that must be equal."""
 
     def copy(path: Path) -> None:
         found = read(path)
@@ -87,9 +88,14 @@ def _check_written(
 
 
 def check_bvh(data: bytes, folder: Path) -> Outcome:
-    """Read the motion of a BVH file; of every fourth one, make BAPs."""
+    """Read the motion of a BVH file, which must be finite; of every fourth one, make BAPs."""
+
+    def read_finite(path: Path) -> None:
+        if not np.isfinite(bvh.read_motion(path).rotations).all():
+            raise ContractError("a rotation is no number")
+
     retarget = crc32(data) % 4 == 0
-    return _check_file(data, folder / "input.bvh", fba.read if retarget else bvh.read_motion)
+    return _check_file(data, folder / "input.bvh", fba.read if retarget else read_finite)
 
 
 def check_gltf(data: bytes, folder: Path) -> Outcome:
@@ -175,13 +181,26 @@ def check_live(data: bytes, folder: Path) -> Outcome:
 
 
 def check_face(data: bytes, folder: Path) -> Outcome:
-    """Load a face model."""
-    return _check_file(data, folder / "input.glb", FaceModel.load)
+    """Load a face model; what was loaded is saved, and loaded as the same."""
+
+    def load_twice(path: Path) -> None:
+        saved = build(FaceModel.load(path)).glb()
+        again = path.with_stem("again")
+        again.write_bytes(saved)
+        if build(FaceModel.load(again)).glb() != saved:
+            raise ContractError("the face that was saved is loaded as another")
+
+    return _check_file(data, folder / "input.glb", load_twice)
 
 
 def check_body(data: bytes, folder: Path) -> Outcome:
-    """Load a body model."""
-    return _check_file(data, folder / "input.glb", BodyModel.load)
+    """Load a body model, and pose it as it was modelled."""
+
+    def load_and_skin(path: Path) -> None:
+        body = BodyModel.load(path)
+        body.skin(body.bind)
+
+    return _check_file(data, folder / "input.glb", load_and_skin)
 
 
 def check_obj(data: bytes, folder: Path) -> Outcome:
@@ -195,7 +214,7 @@ def check_mtl(data: bytes, folder: Path) -> Outcome:
 
 
 def check_mapping(data: bytes, folder: Path) -> Outcome:
-    """Read a mapping of virtual markers; what was read is written, and read as the same."""
+    """Read a mapping of virtual markers, write it, and read the same again."""
 
     def read_twice(path: Path) -> None:
         mapping = read_mapping(path)
@@ -235,7 +254,7 @@ def check_import(data: bytes, folder: Path) -> Outcome:
     (folder / "head.wrl").write_bytes(small_head_vrml())
     (folder / "input.points.csv").write_bytes(small_head_points())
     (folder / "input.obj").write_bytes(small_head_obj())
-    suffix = ".wfm" if data.startswith(b"# VERTEX") else ""  # nothing else tells wire frames
+    suffix = ".wfm" if data.startswith(b"# VERTEX") else ""  # wire frames are recognised by it alone
     return _check_file(data, folder / f"input{suffix}", import_model)
 
 

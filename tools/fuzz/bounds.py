@@ -117,7 +117,7 @@ def _counts(performances: int, mutants: int) -> dict[str, int]:
 
 @contextmanager
 def _caches() -> Iterator[None]:
-    """Give all processes that are started caches of their own, kept for the next run, and checked code."""
+    """Give all child processes checked code and separate caches, kept for the next run."""
     folder = Path(os.environ.get("FBA_BOUNDS_CACHE") or Path.home() / ".cache" / "fba-bounds")
     own = {CHECKED: "1", "NUMBA_CACHE_DIR": str(folder / "code"), "FBA_CACHE": str(folder / "results")}
     before = {name: os.environ.get(name) for name in own}
@@ -133,7 +133,7 @@ def _caches() -> Iterator[None]:
 
 
 def _run_tests(paths: Sequence[str], jobs: int) -> int:
-    """Run tests in processes of their own; return pytest's status."""
+    """Run tests in child processes; return pytest's status."""
     with tempfile.TemporaryDirectory(prefix="fba-bounds-") as folder:
         command = [sys.executable, "-m", "pytest", "-q", "-n", str(jobs), "--dist", "worksteal"]
         command += ["-o", f"cache_dir={folder}", *paths]

@@ -1,4 +1,4 @@
-"""The targets of fuzzing: what is fed with bytes, and what words its files are made of."""
+"""The targets of fuzzing: readers of bytes, and the words of their files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tools.fuzz._outcome import Outcome
 class Target:
     """A target.
 
-    name: as on the command line. description: what is fed with the bytes.
+    name: as on the command line. description: the reader of the bytes.
     check: "module:function"; the function takes the bytes and a folder for files, raises for a finding, and
     returns an `Outcome` otherwise. words: what a mutation inserts. share: of the time, relative to others.
     environment: variables that the process needs. corpus: its folder in the corpus, if that is not `name`.

@@ -1,4 +1,4 @@
-"""Training of what recognises expressions, and how near a Persona brings a user to an actor.
+"""Training of the recogniser of expressions, and evaluation of Personas.
 
 May use: all of a Persona. `python -m tools.persona.training`, `.evaluation` and `.blind_test` are commands.
 """

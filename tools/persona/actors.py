@@ -1,4 +1,4 @@
-"""Made-up actors and users: faces of their own that perform a script, each in a known style."""
+"""Synthetic actors and users: different faces that perform a script, each in a given style."""
 
 from __future__ import annotations
 
@@ -149,8 +149,8 @@ def _film(
         [np.sin(2 * np.pi * (random.uniform(0.1, 0.4) * times + random.uniform())) for _ in range(3)], axis=1
     )
     angles = TURN * waves * _ease((times - REST) / 0.5)[:, None]
-    picture, told = photograph(features, angles, random, noise=noise)
-    return TrackedFace(picture, told, np.ones(len(times), dtype=bool), times, rate, name)
+    picture, turns = photograph(features, angles, random, noise=noise)
+    return TrackedFace(picture, turns, np.ones(len(times), dtype=bool), times, rate, name)
 
 
 def _ease(share: Float64) -> Float64:

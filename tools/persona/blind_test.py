@@ -5,7 +5,7 @@ blindly, with the mean of each take removed: by masks alone, and by the statisti
 stores. Then other persons, who have none of these moods, are played with each Persona, filmed anew on a face
 that belongs to nobody else, and told in the same way. Chance is a third.
 
-Without options, the performances are made up: three styles of one actor. With --real, they are FAPs of a
+Without options, the performances are synthetic: three styles of one actor. With --real, they are FAPs of a
 folder, by name: angry_*, genial_* (gnial_*) and thinking_*, of which one take at a time is held out, and
 yes_*, four of which follow one another, for the persons without a mood. They are filmed on made-up faces.
 """
@@ -166,12 +166,12 @@ class Found:
 
 
 def count(name: str, films: Sequence[tuple[str, TrackedFace]], personas: dict[str, Persona]) -> Row:
-    """Return a row: how many films there are, and the shares that are told by masks and by motion."""
+    """Return a row: number of films, and the shares recognised by masks and by motion."""
     return share(name, [compare(mood, face, personas) for mood, face in films])
 
 
 def share(name: str, found: Sequence[Found]) -> Row:
-    """Return a row of what was found of each film.
+    """Return a row of the results for each film.
 
     A Persona with more masks is nearer to every film. So a distance from masks counts against its mean over
     all films (geometric), which favours masks: of one film alone this mean is not known.
@@ -194,7 +194,7 @@ def compare(mood: str, face: TrackedFace, personas: dict[str, Persona]) -> Found
 
 
 def look(face: TrackedFace) -> tuple[Observation, dict[str, Float64]]:
-    """Return what is seen of a face, and displacements (S, V, 2) of each part on the standard face."""
+    """Return the observation of a face, and displacements (S, V, 2) of each part on the standard face."""
     seen = observe(face, Recogniser.default())
     moved, fapu = seen.mask_motion(Recogniser.default()), measure_fapu(seen.neutral)
     return seen, {part: moved[:, part_vertices(part), :2] / face_scale(fapu, part) for part in PARTS}

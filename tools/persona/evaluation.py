@@ -23,8 +23,7 @@ from fba.persona._observation import observe
 from fba.persona._persona import MEANS
 from fba.persona.points import mask_distance
 from fba.persona.points.layout import PARTS, SAME, flat_mask, standard_mask
-from fba.persona.recognition import decide
-from fba.persona.recognition._displacements import displacements
+from fba.persona.recognition import decide, displacements
 from tools.persona.actors import Act, Style, act, all_contents, contents, named_styles
 
 TAUGHT = 2
@@ -38,7 +37,7 @@ OWN, FACE = "own", "face only"
 KNOWN_USER = "motion, user known"
 """As "motion", with a Persona of the user, too."""
 IN_STYLE = "user in that style"
-"""The user who performs in the actor's style: as near as another person comes, with a body of his own."""
+"""The user who performs in the actor's style: as near as another person comes."""
 WAYS = (FACE, IN_STYLE, KNOWN_USER, *MEANS)
 ALIKE = (
     frozenset({"LFAU_26", "LFAU_27", "E_SURPRISE", "CAU_A26A12Lw"}),
@@ -236,7 +235,7 @@ def _agreement(acted: Float64, persona: Persona, labels: dict[str, list[str]], k
 
 
 def _same(one: str, other: str) -> bool:
-    """Whether two labels have a class in common, or one that is hardly told apart."""
+    """Return whether two labels have a class in common, or a class that is hardly distinguishable."""
     here, there = set(one.split("/")), set(other.split("/"))
     return bool(here & there) or any(here & group and there & group for group in ALIKE)
 

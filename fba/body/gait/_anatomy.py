@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Float64
+from fba.animation import Animation
+from fba.arrays import Float64, Int32
 from fba.body.gait._limb import ELBOW, KNEE, Limb
 from fba.body.skeleton import ROOT, Skeleton
 from fba.body.solve.conventions import convention
@@ -19,7 +20,7 @@ TOES_AHEAD = 0.062
 HIP_HEIGHT = 0.9364
 """Height of the default body's hips, metres; a body's scale is the height of its hips divided by this."""
 PALMS = ("middle0", "middle1", "index0", "wrist")
-"""Joints that can stand for the palm: the first that a skeleton has."""
+"""Joints that may represent the palm; the first that the skeleton has is used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +99,15 @@ class Anatomy:
         return cls(skeleton, sides, scale, centre["sacroiliac"] - centre[ROOT])
 
 
+def body_values(animation: Animation) -> Int32:
+    """Return the BAPs (T, 296) of an animation; ValueError without a body track."""
+    if animation.body is None:
+        raise ValueError("gait: the animation has no body track")
+    return animation.body.values
+
+
 class Writer:
-    """Collects angles and positions as BAPs, in one convention."""
+    """Collects angles and positions as BAPs of a convention."""
 
     def __init__(self, frames: int, axes: str = "iso") -> None:
         from fba.parameters import BAP_COUNT

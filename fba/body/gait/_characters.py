@@ -1,7 +1,7 @@
 """Characters of walkers: four characteristic poses and a posture each, from poses.csv and characters.json.
 
-corrections.csv has what is added to the curves through the poses; `tools/fit_gait.py` fits that of `normal`
-to measured people.
+corrections.csv has corrections of the curves through the poses; `tools/fit_gait.py` fits those of `normal` to
+measured people.
 
 Table 5-2 of the source (see `fba.body.gait`). The poses describe half a cycle: `stance` is the leg that
 carries the body, `swing` the other one (in the extended pose the rear one, which swings next). In the other
@@ -115,18 +115,18 @@ class Arms:
 
 
 Corrections = Mapping[str, tuple[tuple[float, float], ...]]
-"""What is added to the curves through the poses, by `CORRECTED`: (phase, degrees), while the leg swings."""
+"""Corrections of the curves through the poses, by `CORRECTED`: (phase, degrees), while the leg swings."""
 CORRECTED = ("thigh", "knee", "foot")
 """Degrees of a swinging thigh, of its knee, and of the pitch of its foot, at phases of that leg's cycle."""
 
 
 @dataclass(frozen=True)
 class Character:
-    """A way to walk.
+    """A character of walk.
 
     seconds: of a cycle. stride: metres from one contact of a foot to its next; width: metres between the
     lines of the two feet; both for the default body, whose hips are 0.936 m high. toes_out: degrees.
-    poses: by (pose, leg), all eight. corrections: what is added to the curves through them, mostly nothing.
+    poses: by (pose, leg), all eight. corrections: of the curves through them, usually empty.
 
     ModelError where a pose is missing, or a number is not finite or too large.
     """
@@ -178,17 +178,17 @@ class Character:
     @staticmethod
     def named(name: str) -> Character:
         """Return a built-in character by name; ModelError, which lists the names, for an unknown one."""
-        known = _characters()
-        if not isinstance(name, str) or name not in known:
-            close = difflib.get_close_matches(str(name), known, 1)
+        table = _characters()
+        if not isinstance(name, str) or name not in table:
+            close = difflib.get_close_matches(str(name), table, 1)
             hint = f"did you mean {close[0]!r}? " if close else ""
-            raise ModelError(f"no gait character {name!r}; {hint}there are {', '.join(known)}")
-        return known[name]
+            raise ModelError(f"no gait character {name!r}; {hint}there are {', '.join(table)}")
+        return table[name]
 
     def edited(self, pose: str, leg: str, **changes: float) -> Character:
         """Return the character with changed values in one pose: `edited("passing", "swing", knee=80)`.
 
-        Corrections of these curves are left out: they were fitted to the poses as they were.
+        Corrections of these curves are left out: they were fitted to the unchanged poses.
         """
         if (pose, leg) not in self.poses:
             raise ModelError(
@@ -227,9 +227,9 @@ def _characters() -> dict[str, Character]:
         curves[row["curve"]] = (*curves.get(row["curve"], ()), (float(row["phase"]), float(row["value"])))
     result = {}
     normal = table["normal"]
-    for name, own in table.items():
-        parts = {key: {**normal[key], **own.get(key, {})} for key in ("feet", "pelvis", "spine", "arms")}
-        values = {**normal, **own}
+    for name, row in table.items():
+        parts = {key: {**normal[key], **row.get(key, {})} for key in ("feet", "pelvis", "spine", "arms")}
+        values = {**normal, **row}
         result[name] = Character(
             name,
             values["about"],

@@ -1,4 +1,4 @@
-"""Curves through a few values of a cycle or of a part of it. Phases are fractions of the cycle."""
+"""Curves through values in a cycle or a part of it. Phases are fractions of the cycle."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def cosine_wave(knots: npt.ArrayLike, phase: Float64, interpolation: Interpolati
 def periodic_curve(
     knots: npt.ArrayLike, values: npt.ArrayLike, phase: npt.ArrayLike, interpolation: Interpolation = "smooth"
 ) -> Float64:
-    """Return the values at phases of a periodic curve through given ones, monotone between neighbours.
+    """Return the values at phases of a periodic curve, monotone between neighbouring knots.
 
-    knots: increasing phases in 0..1. values: one at each. The pieces are cubic; their tangents are those of
+    knots: increasing phases in 0..1. values: at the knots. The pieces are cubic; their tangents are those of
     Fritsch and Butland (1984).
     """
     x, y = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
@@ -42,10 +42,10 @@ def periodic_curve(
     step = np.diff(np.append(x, x[0] + 1.0))
     slope = np.diff(np.append(y, y[0])) / step
     before, step_before = np.roll(slope, 1), np.roll(step, 1)
-    one, two = step_before + 2.0 * step, 2.0 * step_before + step
+    weight_before, weight = step_before + 2.0 * step, 2.0 * step_before + step
     extreme = before * slope <= 0.0  # flat at maxima, at minima, and between equal values
     divisors = [np.where(extreme, 1.0, s) for s in (before, slope)]
-    mean = (one + two) / (two / divisors[0] + one / divisors[1])
+    mean = (weight_before + weight) / (weight / divisors[0] + weight_before / divisors[1])
     tangent: Float64 = np.where(extreme, 0.0, mean)
     u = np.mod(u - x[0], 1.0) + x[0]
     k = np.clip(np.searchsorted(x, u, side="right") - 1, 0, len(x) - 1)

@@ -3,7 +3,7 @@
 The poses are those of the source (see `fba.body.gait`). A foot touches the ground where its heel is furthest
 ahead of the pelvis, and leaves it where its toes are furthest behind (Zeni, Richards, Higginson 2008).
 "Ahead" is where the pelvis faces, so this holds on any ground, on a treadmill, and on curves. Recoil, passing
-and anticipation are extrema of the knees and of the swinging thigh: `Curves` are what is searched for them.
+and anticipation are extrema of the knees and of the swinging thigh, which are found in `Curves`.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.body.gait._anatomy import Anatomy
+from fba.body.gait._anatomy import Anatomy, body_values
 from fba.body.gait._characters import POSES
 from fba.body.gait._measure import sole_points
 from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
 
-UNEVEN = 2.2
-"""Largest ratio of the times that the two steps of a cycle take."""
 _NAMES = {"l": "left", "r": "right"}
-STEP_SECONDS = (0.2, 1.8)
-"""Shortest and longest time from the contact of one foot to that of the other."""
-SHORTEST_SWING = 0.12
-"""Share of the leg's length by which a foot must come forward, relative to the pelvis, to make a step."""
-SHORTEST_STEP = 0.08
-"""Share of the leg's length by which a foot must be ahead of the other one when it meets the ground."""
-SINKING = 0.06
-"""Seconds after a foot's foremost position in which it may meet the ground; its height decides when."""
-LEAVING = 0.08
-"""Seconds before a foot's hindmost position, and half as many after it, in which it may leave the ground; its
-height decides when."""
-TOUCH = 0.008
-"""Share of the leg's length that a foot on the ground may be above its lowest height."""
-SMOOTH = 0.02
-"""Seconds over which curves are smoothed before their extrema are located."""
-FACING = 0.2
-"""Seconds over which the direction of the pelvis is smoothed."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the detection; lengths are shares of the leg's."""
+
+    max_step_ratio: float = 2.2  # of the durations of the two steps of a cycle
+    min_step_seconds: float = 0.2  # from the contact of a foot to that of the other
+    max_step_seconds: float = 1.8
+    min_swing: float = 0.12  # by which a foot comes forward, relative to the pelvis, in a step
+    min_step: float = 0.08  # by which a foot is ahead of the other when it meets the ground
+    landing_seconds: float = 0.06  # after its foremost position, in which a foot meets the ground
+    leaving_seconds: float = 0.08  # before its hindmost position, and a half of it after, in which it leaves
+    touching: float = 0.008  # height of a foot on the ground above its lowest height
+    smoothing: float = 0.02  # s, of curves before their extrema are located
+    heading_smoothing: float = 0.2  # s, of the direction of the pelvis
+
+
+TUNING = Tuning()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class Curves:
         number = anatomy.skeleton.number
         rate = (len(times) - 1) / max(float(times[-1] - times[0]), 1e-9)
         pelvis = matrices[:, number("sacroiliac")]
-        facing = _smooth(pelvis[:, :3, 2], FACING * rate)
+        facing = _smooth(pelvis[:, :3, 2], TUNING.heading_smoothing * rate)
         facing[:, 1] = 0.0
         facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9)
         points = sole_points(anatomy, matrices).points
@@ -82,15 +82,15 @@ class Curves:
             )
 
             def ahead(point: Float64) -> Float64:
-                return _smooth(np.sum((point - pelvis[:, :3, 3]) * facing, axis=1), SMOOTH * rate)
+                return _smooth(np.sum((point - pelvis[:, :3, 3]) * facing, axis=1), TUNING.smoothing * rate)
 
             upper, lower = knee_joint - hip, ankle - knee_joint
             cosine = np.sum(upper * lower, axis=1)
             cosine /= np.linalg.norm(upper, axis=1) * np.linalg.norm(lower, axis=1)
             heel[letter], toes[letter] = ahead(points[row, 0]), ahead(points[row, 1])
-            knee[letter] = _smooth(np.arccos(np.clip(cosine, -1.0, 1.0)), SMOOTH * rate)
+            knee[letter] = _smooth(np.arccos(np.clip(cosine, -1.0, 1.0)), TUNING.smoothing * rate)
             raised = np.arctan2(np.sum(upper * facing, axis=1), -upper[:, 1])
-            thigh[letter] = _smooth(raised, SMOOTH * rate)
+            thigh[letter] = _smooth(raised, TUNING.smoothing * rate)
             heel_position[letter] = points[row, 0]
             lowest[letter] = points[row, ..., 1].min(axis=0)
         heading = np.unwrap(np.arctan2(facing[:, 0], facing[:, 2]))
@@ -103,25 +103,24 @@ class Curves:
         height, other = self.lowest[letter], self.heel["l" if letter == "r" else "r"]
         frames = []
         for peak in self._peaks(self.heel[letter]):
-            if self.heel[letter][peak] - other[peak] < SHORTEST_STEP * self.reach:
+            if self.heel[letter][peak] - other[peak] < TUNING.min_step * self.reach:
                 continue
-            heights = height[peak : peak + self._frames(SINKING) + 1]
-            frames.append(peak + int(np.argmax(heights <= heights.min() + TOUCH * self.reach)))
+            heights = height[peak : peak + self._frames(TUNING.landing_seconds) + 1]
+            frames.append(peak + int(np.argmax(heights <= heights.min() + TUNING.touching * self.reach)))
         return frames
 
     def departures(self, letter: str) -> list[int]:
         """Return the frames in which a foot has just left the ground.
 
-        A foot that is dragged along stays low while it swings, so little of the time after it was furthest
-        behind counts.
+        Little of the time after its hindmost position counts, because a dragged foot stays low in its swing.
         """
         height = self.lowest[letter]
         frames = []
         for peak in self._peaks(-self.toes[letter]):
-            near = self._frames(LEAVING)
+            near = self._frames(TUNING.leaving_seconds)
             first = max(0, peak - near)
             low = height[max(0, first - near) : peak + 1].min()
-            down = np.flatnonzero(height[first : peak + near // 4 + 1] <= low + TOUCH * self.reach)
+            down = np.flatnonzero(height[first : peak + near // 4 + 1] <= low + TUNING.touching * self.reach)
             frames.append(first + int(down[-1]) + 1 if len(down) else peak)
         return frames
 
@@ -130,13 +129,13 @@ class Curves:
         return max(1, round(seconds / max(float(np.median(np.diff(self.times))), 1e-9)))
 
     def _peaks(self, curve: Float64) -> list[int]:
-        """Return the frames of prominent maxima, also of one at either end, as in loops."""
+        """Return the frames of prominent maxima, including those at the ends, as in loops."""
         from scipy.signal import find_peaks
 
         edge = [float(curve.min()) - 1.0]
         padded = np.concatenate([edge, curve, edge])
         peaks, _ = find_peaks(
-            padded, prominence=SHORTEST_SWING * self.reach, distance=self._frames(STEP_SECONDS[0])
+            padded, prominence=TUNING.min_swing * self.reach, distance=self._frames(TUNING.min_step_seconds)
         )
         return [int(frame) - 1 for frame in peaks]
 
@@ -272,18 +271,17 @@ class Gait:
 def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Gait:
     """Return the steps, cycles and characteristic poses in which a body walks forward.
 
-    skeleton: the one whose joints the BAPs turn, the default body where None. axes: a convention's name. Not
-    detected are feet that never swing past each other, sideways and backward steps, and steps that the motion
-    shows only in part. ValueError where there is no body track.
+    skeleton: the one whose joints the BAPs turn, the default body where None. axes: a convention's name. Feet
+    that never swing past each other, sideways and backward steps, and incomplete steps are not detected.
+    ValueError without a body track.
     """
-    if animation.body is None:
-        raise ValueError("gait: the animation has no body track")
+    values = body_values(animation)
     skeleton = Skeleton.default() if skeleton is None else skeleton
     anatomy = Anatomy.measure(skeleton)
     count = len(animation)
     if count < 4:
         return Gait(animation.rate, count, (), ())
-    curves = Curves.measure(anatomy, BapSolver(skeleton, axes).pose(animation.body.values), animation.times)
+    curves = Curves.measure(anatomy, BapSolver(skeleton, axes).pose(values), animation.times)
     contacts = {letter: curves.contacts(letter) for letter in "lr"}
     offs = {letter: curves.departures(letter) for letter in "lr"}
     order = sorted((frame, letter) for letter, frames in contacts.items() for frame in frames)
@@ -294,8 +292,8 @@ def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "
     ]
     cycles = [
         cycle
-        for one, two in pairwise(steps)
-        if one.end == two.start and (cycle := _cycle(curves, one, two)) is not None
+        for first, second in pairwise(steps)
+        if first.end == second.start and (cycle := _cycle(curves, first, second)) is not None
     ]
     return Gait(animation.rate, count, tuple(steps), tuple(cycles))
 
@@ -303,10 +301,10 @@ def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "
 def _step(curves: Curves, side: str, start: int, end: int, offs: list[int]) -> Step | None:
     other = "l" if side == "r" else "r"
     seconds = float(curves.times[end] - curves.times[start])
-    if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or end - start < 4:
+    if not TUNING.min_step_seconds <= seconds <= TUNING.max_step_seconds or end - start < 4:
         return None
     swing = curves.heel[other]
-    if swing[end] - swing[start : end + 1].min() < SHORTEST_SWING * curves.reach:
+    if swing[end] - swing[start : end + 1].min() < TUNING.min_swing * curves.reach:
         return None
     length = end - start
     first, last = start + max(1, round(0.2 * length)), end - max(1, round(0.2 * length))
@@ -327,18 +325,18 @@ def _step(curves: Curves, side: str, start: int, end: int, offs: list[int]) -> S
     return Step(_NAMES[side], (start, recoil, passing, anticipation), end, before[-1] if before else None)
 
 
-def _cycle(curves: Curves, one: Step, two: Step) -> Cycle | None:
-    lengths = sorted((one.end - one.start, two.end - two.start))
-    if lengths[1] > UNEVEN * lengths[0]:
+def _cycle(curves: Curves, first: Step, second: Step) -> Cycle | None:
+    lengths = sorted((first.end - first.start, second.end - second.start))
+    if lengths[1] > TUNING.max_step_ratio * lengths[0]:
         return None
-    start, end = one.start, two.end
-    heel = curves.heel_position[one.side[0]]
+    start, end = first.start, second.end
+    heel = curves.heel_position[first.side[0]]
     gap = heel[end] - heel[start]
     # the standing foot of the first step leaves the ground in the second
-    stance = (two.off - start) / (end - start) if two.off is not None else float("nan")
-    running = any(step.off is not None and step.off < step.start for step in (one, two))
+    stance = (second.off - start) / (end - start) if second.off is not None else float("nan")
+    running = any(step.off is not None and step.off < step.start for step in (first, second))
     return Cycle(
-        (one, two),
+        (first, second),
         float(curves.times[end] - curves.times[start]),
         float(np.hypot(gap[0], gap[2])),
         stance,

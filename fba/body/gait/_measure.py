@@ -8,7 +8,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.body.gait._anatomy import Anatomy
+from fba.body.gait._anatomy import Anatomy, body_values
 from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import convention
 from fba.body.solve.solver import BapSolver
@@ -62,12 +62,11 @@ class Soles:
 
 
 def soles(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Soles:
-    """Return the soles of an animation's body in every frame. Raises ValueError without a body track."""
-    if animation.body is None:
-        raise ValueError("gait: the animation has no body track")
+    """Return the soles of an animation's body in every frame; ValueError without a body track."""
+    values = body_values(animation)
     skeleton = Skeleton.default() if skeleton is None else skeleton
     anatomy = Anatomy.measure(skeleton)
-    return sole_points(anatomy, BapSolver(skeleton, axes).pose(animation.body.values))
+    return sole_points(anatomy, BapSolver(skeleton, axes).pose(values))
 
 
 def sole_points(anatomy: Anatomy, matrices: Float64) -> Soles:
@@ -87,8 +86,7 @@ def sole_points(anatomy: Anatomy, matrices: Float64) -> Soles:
 
 def advance(animation: Animation, axes: str = "iso") -> float:
     """Return the straight distance of the root over the ground from first frame to last, millimetres."""
-    if animation.body is None:
-        raise ValueError("gait: the animation has no body track")
+    values = body_values(animation)
     columns = convention(axes).translation
-    gap = animation.body.values[-1, columns].astype(float) - animation.body.values[0, columns]
+    gap = values[-1, columns].astype(float) - values[0, columns]
     return float(np.hypot(gap[0], gap[2]))

@@ -22,17 +22,16 @@ from fba.errors import ModelError
 from fba.rotations import axis_matrices
 
 KNOTS = np.array([*PHASES, *(phase + 0.5 for phase in PHASES)])
-SHORTEST_STRIDE = 0.1
-"""Metres that a stride must have at least, of a body of standard size."""
+MIN_STRIDE = 0.1
+"""Shortest stride of a body of standard size, metres."""
 _STRAIGHT = 0.9993
 """Share of its length to which a leg may stretch: a knee is never locked."""
 _STRAIN = 0.03
-"""Largest lowering of the body, as a share of the legs' length, by a stride that is long for them."""
+"""Largest lowering of the body by a long stride, as a share of the legs' length."""
 _RELEASE_RATE = 4.0
 """Metres per cycle at which the height limit of a leg rises once it has left the ground."""
 _SOFT = 0.85
-"""How far a leg takes on, before its foot lands, the speed that it has once the foot stands: 1 is a landing
-without a jolt, 0 one at the speed of the swing."""
+"""Softness of a landing: at 1 the leg has the speed of the standing leg already, at 0 that of the swing."""
 _CLEAR = 0.012
 """Smallest height of a swinging foot above the ground, metres."""
 _PHASE_STEP = 1e-4
@@ -50,7 +49,7 @@ class Plan:
 
     @cached_property
     def stride_ratio(self) -> float:
-        """The stride divided by the character's own."""
+        """The stride divided by the character's usual one, at this scale."""
         return self.stride / (self.character.stride * self.anatomy.scale)
 
     @cached_property
@@ -83,7 +82,7 @@ class Plan:
     def pitch(self, phase: Float64) -> Float64:
         """Return (T,) pitch of a foot at phases of its own leg, radians."""
         phase = np.mod(phase, 1.0)
-        # from its contact until it lies flat, a foot falls freely; the other poses lead up to the contact
+        # from its contact until it lies flat, a foot falls freely
         flat = min(self._foot[0], self._foot[1])
         landing = (
             flat + (self._foot[0] - flat) * np.maximum(1.0 - phase / self.character.feet.flat, 0.0) ** 1.5
@@ -97,10 +96,7 @@ class Plan:
         return pitch + np.radians(self._correction("foot", phase))
 
     def _correction(self, part: str, phase: Float64) -> Float64:
-        """Return degrees (T,) added to a curve at phases of a leg, see `CORRECTED`; less in short strides.
-
-        None while the foot stands.
-        """
+        """Return degrees (T,) added to a curve at phases of a leg: see `CORRECTED`; 0 for a standing foot."""
         points = self.character.corrections.get(part, ())
         if not points:
             return np.zeros_like(phase)
@@ -142,17 +138,17 @@ class Plan:
 
     def footprint(self, side: Side, phase: Float64) -> Float64:
         """Return (T, 3) footprint, metres, on which a foot stands or stood last."""
-        own = self.side_phase(side, phase)
+        leg_phase = self.side_phase(side, phase)
         result = np.zeros((*phase.shape, 3))
         result[..., 0] = side.sign * self.character.width / 2.0 * self.anatomy.scale
-        result[..., 2] = self.stride * (np.floor(own + 1e-9) + (0.0 if side.letter == "r" else 0.5))
+        result[..., 2] = self.stride * (np.floor(leg_phase + 1e-9) + (0.0 if side.letter == "r" else 0.5))
         return result
 
     def footing(self, side: Side, phase: Float64) -> Footing:
         """Return the poses of the standing foot; meaningless while it swings."""
-        own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
+        leg_phase = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
         return ground.place_standing_foot(
-            side, self.footprint(side, phase), self.pitch(own), side.sign * self._yaw
+            side, self.footprint(side, phase), self.pitch(leg_phase), side.sign * self._yaw
         )
 
     def _root_along(self, phase: Float64) -> Float64:
@@ -170,10 +166,10 @@ class Plan:
 
     def _root_height(self, side: Side, root: Float64, phase: Float64, bend: Float64 | None = None) -> Float64:
         """Return (T,) height of the root at which a standing leg bends as in the poses, or by `bend`."""
-        own = self.side_phase(side, phase)
+        leg_phase = self.side_phase(side, phase)
         hip = self.hip(side, root, phase)
         ankle = ground.ankle_position(side, self.footing(side, phase))
-        bend = self.knee(own) if bend is None else bend
+        bend = self.knee(leg_phase) if bend is None else bend
         return ground.hip_height(side, hip, ankle, bend) - (hip[..., 1] - root[..., 1])
 
     @cached_property
@@ -228,9 +224,9 @@ class Plan:
         for letter, side in self.anatomy.sides.items():
             heights[letter] = self._root_height(side, root, phase)
             limit = self._root_height(side, root, phase, side.leg.bend(_STRAIGHT * side.leg.reach))
-            own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0)
-            released = np.maximum(own - self._toe_off, 0.0) * _RELEASE_RATE * self.anatomy.scale
-            limits.append(np.where(own < KNOTS[6], limit + released, np.inf))
+            leg_phase = np.mod(self.side_phase(side, phase) + 1e-9, 1.0)
+            released = np.maximum(leg_phase - self._toe_off, 0.0) * _RELEASE_RATE * self.anatomy.scale
+            limits.append(np.where(leg_phase < KNOTS[6], limit + released, np.inf))
         front = np.where(right_leads, heights["r"], heights["l"])
         rear = np.where(right_leads, heights["l"], heights["r"])
         return root, share * front + (1.0 - share) * rear, np.minimum(*limits)
@@ -293,11 +289,11 @@ class Plan:
 
     def leg(self, side: Side, phase: Float64, root: Float64) -> Leg:
         """Return the leg at any phase, standing or swinging, for positions (T, 3) of the root."""
-        own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
-        stands = own <= self._toe_off
+        leg_phase = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
+        stands = leg_phase <= self._toe_off
         yaw = side.sign * self._yaw
         knots, values, off, on = self._swings[side.letter]
-        swing = np.clip(own, self._toe_off, 1.0)
+        swing = np.clip(leg_phase, self._toe_off, 1.0)
         if self.interpolation == "linear":
             x, z, bend = (np.interp(swing, knots, column) for column in values.T)
         else:
@@ -306,10 +302,11 @@ class Plan:
         bend = bend + np.radians(self._correction("knee", swing))
         thigh = axis_matrices(0, x) @ axis_matrices(2, z) @ axis_matrices(1, np.full(x.shape, yaw))
         hip = self.hip(side, root, phase)
-        swinging = ground.place_swinging_foot(side, hip, thigh, bend, ground.foot_turn(self.pitch(own), yaw))
-        rise = np.minimum((own - self._toe_off) / 0.03, (1.0 - own) / 0.06)
+        foot = ground.foot_turn(self.pitch(leg_phase), yaw)
+        swinging = ground.place_swinging_foot(side, hip, thigh, bend, foot)
+        rise = np.minimum((leg_phase - self._toe_off) / 0.03, (1.0 - leg_phase) / 0.06)
         room = _CLEAR * self.anatomy.scale * np.clip(rise, 0.0, 1.0)
-        lift = np.maximum(room - ground.lowest_height(side, swinging, self.toes(own)), 0.0)
+        lift = np.maximum(room - ground.lowest_height(side, swinging, self.toes(leg_phase)), 0.0)
         swinging.subtalar[..., 1] += lift
         standing = self.footing(side, phase)
         footing = Footing(
@@ -325,6 +322,3 @@ def make_plan(anatomy: Anatomy, character: Character, stride: float, interpolati
     if plan.largest_lowering() > _STRAIN * anatomy.sides["r"].leg.reach:
         raise plan.too_long()
     return plan
-
-
-__all__ = ["CYCLE", "KNOTS", "SHORTEST_STRIDE", "Plan", "make_plan"]

@@ -11,6 +11,7 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Float64, Int32
+from fba.body.gait._anatomy import body_values
 from fba.body.gait._curves import Interpolation
 from fba.body.gait._detection import Gait, detect
 from fba.body.skeleton import Skeleton
@@ -18,16 +19,15 @@ from fba.body.solve.solver import BapSolver, wrapped
 from fba.parameters import baps
 
 _STILL_CHANGE = 1e-6
-"""Change of the entries of its rotation matrix up to which a joint counts as still."""
+"""Change of the entries of a joint's rotation matrix up to which it is still."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
     """A motion reduced to key frames.
 
-    keys: an `Animation` of the poses alone, at their own times, and of the frames between them that belong to
-    no step. frames: number of frames from the first key to the last. walking: number of these that belong to
-    steps. poses: number of keys that stand for these.
+    keys: an `Animation` of the poses, at their times, and of the frames outside all steps. frames: number of
+    frames from the first key to the last. walking: number of these in steps. poses: number of poses.
     """
 
     keys: Animation
@@ -43,10 +43,10 @@ class Reduced:
     def restore(self, interpolation: Interpolation = "smooth") -> Animation:
         """Return every frame from the first key to the last, interpolated between the keys.
 
-        interpolation: "linear", as in the source, or "smooth": cubic curves that rise and fall only where the
-        keys do. ValueError for another.
+        interpolation: "linear", as in the source, or "smooth": cubic curves, monotone where the keys are.
+        ValueError for another.
         """
-        index, values = self.keys.index, _unwrap(_values(self.keys))
+        index, values = self.keys.index, _unwrap(body_values(self.keys))
         frames = np.arange(int(index[0]), int(index[-1]) + 1)
         if interpolation == "linear":
             between = np.stack([np.interp(frames, index, column) for column in values.T], axis=1)
@@ -80,9 +80,9 @@ class Errors:
 
 
 def reduce(animation: Animation, gait: Gait | None = None, skeleton: Skeleton | None = None) -> Reduced:
-    """Return a motion reduced to the poses of its gait; ValueError where that has no step.
+    """Return a motion reduced to the poses of its gait; ValueError without steps.
 
-    gait: what `detect` returns for the animation, detected here where None. skeleton: as of `detect`.
+    gait: of the animation; by default what `detect` returns. skeleton: as of `detect`.
     """
     gait = detect(animation, skeleton) if gait is None else gait
     keys = gait.keys
@@ -99,19 +99,19 @@ def reduce(animation: Animation, gait: Gait | None = None, skeleton: Skeleton | 
     return Reduced(keyed, int(span.sum()), int((span & gait.walking).sum()), len(keys))
 
 
-def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) -> Errors:
-    """Return the differences of two bodies in the frames that both have, over the joints that turn in `one`.
+def compare(animation: Animation, other: Animation, skeleton: Skeleton | None = None) -> Errors:
+    """Return the differences of two bodies in their common frames, over the joints that turn in the first.
 
     ValueError where the rates differ, or they have no frame in common.
     """
-    if one.rate != other.rate:
-        raise ValueError(f"compare: frame rates differ: {one.rate} and {other.rate}")
+    if animation.rate != other.rate:
+        raise ValueError(f"compare: frame rates differ: {animation.rate} and {other.rate}")
     skeleton = Skeleton.default() if skeleton is None else skeleton
-    _, first, second = np.intersect1d(one.index, other.index, return_indices=True)
+    _, first, second = np.intersect1d(animation.index, other.index, return_indices=True)
     if not len(first):
         raise ValueError("compare: the animations have no frame in common")
     solver = BapSolver(skeleton)
-    a, b = solver.pose(_values(one)[first]), solver.pose(_values(other)[second])
+    a, b = solver.pose(body_values(animation)[first]), solver.pose(body_values(other)[second])
     offsets = a[:, :, :3, 3] - b[:, :, :3, 3]
     local = offsets - offsets[:, :1]
     turns = _local_rotations(a, skeleton)
@@ -124,12 +124,6 @@ def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) 
         float(angles.mean()), float(angles.max()), skeleton.names[moved[int(angles.max(axis=0).argmax())]],
         float(far.mean()), float(far.max()), float(near.mean()), float(near.max()),
     )  # fmt: skip
-
-
-def _values(animation: Animation) -> Int32:
-    if animation.body is None:
-        raise ValueError("gait: the animation has no body track")
-    return animation.body.values
 
 
 def _unwrap(values: Int32) -> Float64:

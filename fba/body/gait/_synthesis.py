@@ -16,15 +16,15 @@ from fba.body.gait._anatomy import Anatomy, Side, Writer
 from fba.body.gait._characters import Character
 from fba.body.gait._curves import Interpolation, check_interpolation, cosine_wave, periodic_curve
 from fba.body.gait._limb import limb_angles
-from fba.body.gait._plan import KNOTS, SHORTEST_STRIDE, Plan, make_plan
+from fba.body.gait._plan import KNOTS, MIN_STRIDE, Plan, make_plan
 from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
 from fba.errors import ModelError
 
 MIN_CYCLE_FRAMES = 8
-"""Frames that a cycle must have at least: one for each of its poses."""
+"""Smallest number of frames of a cycle: one for each of its poses."""
 MAX_FRAMES = 100_000
-"""Frames that a walk may have at most: over half an hour of them."""
+"""Largest number of frames of a walk."""
 LUMBAR = tuple(f"vl{n}" for n in (5, 4, 3, 2, 1))
 THORAX = tuple(f"vt{n}" for n in range(12, 0, -1))
 NECK = tuple(f"vc{n}" for n in range(7, 0, -1))
@@ -55,8 +55,8 @@ def walk(
         character, scaled to the skeleton. The character sets the time of a cycle, so the stride sets the
         speed.
     character: a name of `characters()`, or a `Character`.
-    cycles: how many, 4 where seconds is None, too; the last frame is the first pose again, one stride on.
-    seconds: how long, in place of cycles, and without that last frame.
+    cycles: their number, 4 by default; the last frame is the first pose again, one stride further.
+    seconds: duration, in place of cycles, without that last frame.
     rate: frames a second; a cycle has a whole number of frames, 32 of the normal character at 30.
     interpolation: between the poses "smooth", by cubic curves, or "linear", as in the source.
     in_place: walk on the spot, as on a treadmill.
@@ -139,9 +139,9 @@ def _check_stride(stride: float | None, character: Character, anatomy: Anatomy) 
         metres = float(stride)
     except (TypeError, ValueError) as error:
         raise ValueError(f"walk: the stride must be a number of metres, not {stride!r}") from error
-    if not (np.isfinite(metres) and metres >= SHORTEST_STRIDE * anatomy.scale):
+    if not (np.isfinite(metres) and metres >= MIN_STRIDE * anatomy.scale):
         raise ModelError(
-            f"gait: the stride must be at least {SHORTEST_STRIDE * anatomy.scale:.2g} m, not {stride!r}; "
+            f"gait: the stride must be at least {MIN_STRIDE * anatomy.scale:.2g} m, not {stride!r}; "
             "it is the distance from one contact of a foot to its next, two steps: 1.4 m in an even walk"
         )
     if metres > 4.0 * anatomy.sides["r"].leg.reach:

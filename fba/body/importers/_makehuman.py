@@ -1,6 +1,6 @@
 """MakeHuman's base mesh with its default rig, as a body that BAPs move.
 
-Users point it at a copy of their own (the files are CC0): the base mesh "hm08" (`base.obj`), its rig
+Users provide a copy (the files are CC0): the base mesh "hm08" (`base.obj`), its rig
 (`default.mhskel`) and the weights (`default_weights.mhw`) in one folder. `makehuman.csv` gives the positions
 and bones of the rig for each joint of the standard; the vertebrae are distributed along its spine.
 `makehuman_neck.csv` lists the ring of vertices at which its head models end.
@@ -45,17 +45,15 @@ TRUNK = (
     "root",
     "pelvis.L",
     "pelvis.R",
-    "spine01",
-    "spine02",
-    "spine03",
-    "spine04",
-    "spine05",
+    *(f"spine0{number}" for number in range(1, 6)),
     "breast.L",
     "breast.R",
 )
 HEAD = "head"
-BLADE = (0.3, 0.75)
-"""Shares of the way from the breastbone to the arm over which the shoulder blade takes over."""
+BLADE_FROM = 0.3
+"""Share of the distance from breastbone to arm at which weights begin to pass to the shoulder blade."""
+BLADE_AT = 0.75
+"""Share of that distance from which the shoulder blade has all the weight."""
 SKULL_ONLY = 0.999
 """Skull weight above which a vertex belongs to the head."""
 SKIN = Material("skin", (0.71, 0.47, 0.36), 0.55)
@@ -68,8 +66,8 @@ WEIGHTS_FILE = "default_weights.mhw"
 def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -> BodyModel:
     """Return the body of MakeHuman's base mesh on the standard's joints.
 
-    path: the folder with base.obj, default.mhskel and default_weights.mhw, or that base.obj. Its own head is
-    a part of kind "head", left out where a face is put on the body. Raises FormatError where a file is
+    path: the folder with base.obj, default.mhskel and default_weights.mhw, or that base.obj. Its head is a
+    part of kind "head", left out where a face is put on the body. Raises FormatError where a file is
     missing; ModelError, with the position in it, where it is damaged or of another mesh or rig.
     """
     base = Path(path) / "base.obj" if Path(path).is_dir() else Path(path)
@@ -154,9 +152,9 @@ def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
     rows = []
     with (files(__package__) / "makehuman.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            for mine, theirs in (("l", "L"), ("r", "R")) if "?" in row["joint"] else (("", ""),):
-                words = [row[key].replace("?", theirs) for key in ("from", "to", "bones")]
-                joint = row["joint"].replace("?", mine)
+            for side, rig_side in (("l", "L"), ("r", "R")) if "?" in row["joint"] else (("", ""),):
+                words = [row[key].replace("?", rig_side) for key in ("from", "to", "bones")]
+                joint = row["joint"].replace("?", side)
                 rows.append((joint, words[0], words[1], float(row["share"]), tuple(words[2].split())))
     return tuple(rows)
 
@@ -213,9 +211,9 @@ def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, po
         inner, outer, arm = (
             default.number(f"{side}_{name}") for name in ("sternoclavicular", "acromioclavicular", "shoulder")
         )
-        way = positions[arm] - positions[inner]
-        along = (vertices - positions[inner]) @ way / max(float(way @ way), 1e-12)
-        far = smoothstep((along - BLADE[0]) / (BLADE[1] - BLADE[0]))
+        line = positions[arm] - positions[inner]
+        along = (vertices - positions[inner]) @ line / max(float(line @ line), 1e-12)
+        far = smoothstep((along - BLADE_FROM) / (BLADE_AT - BLADE_FROM))
         weights[:, outer] += weights[:, inner] * far
         weights[:, inner] -= weights[:, outer]
     skull = default.number("skullbase")
@@ -277,16 +275,9 @@ def _parts(mesh: Polygons, vertices: Float64, weights: Float64) -> tuple[BodyPar
         if not len(triangles):
             continue
         used, corners = np.unique(triangles, return_inverse=True)
-        parts.append(
-            BodyPart(
-                name,
-                kind,
-                vertices[used].astype(np.float32),
-                corners.reshape(-1, 3).astype(np.int32),
-                joints[used],
-                strong[used],
-                normals=upright[used],
-                material=material,
-            )
-        )
+        part = BodyPart(
+            name, kind, vertices[used].astype(np.float32), corners.reshape(-1, 3).astype(np.int32),
+            joints[used], strong[used], normals=upright[used], material=material,
+        )  # fmt: skip
+        parts.append(part)
     return tuple(parts)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Int64
-from fba.body.skin._girdle_loops import Girdle, straighten_armpits, turn_girdles
+from fba.body.skin._girdle import Girdle, straighten_armpits, turn_girdles
 from fba.compiled import compiled, inlined
 from fba.easing import smoothstep_of_one
 
@@ -38,40 +38,61 @@ MIN_SQUARE = np.float32(1e-30)
 """Squared length below which a sum has no direction."""
 
 
+class Skin(NamedTuple):
+    """A mesh that joints move.
+
+    vertices, normals: float32 (V, 3), as modelled. joints, weights: (V, 4), those with a weight first; counts
+    (V,): how many those are. neighbours, coefficients: see `normal_rings`. inverse: float64 (J, 4, 4), of
+    the bind matrices. scratch: float32 (J, 12).
+    """
+
+    vertices: Float32
+    normals: Float32
+    joints: Int32
+    weights: Float32
+    counts: Int32
+    neighbours: Int32
+    coefficients: Float32
+    inverse: Float64
+    scratch: Float32
+
+
+class Limbs(NamedTuple):
+    """What turns a mesh before it is skinned.
+
+    parents: int64 (J,). twists: vertices turned about bones. girdle: joints that turn with the arms.
+    twisted: float32 (V, 3), scratch, must hold the vertices.
+    """
+
+    parents: Int64
+    twists: Twisting
+    girdle: Girdle
+    twisted: Float32
+
+
 @compiled
-def dual_frames(
-    matrices: Float64, inverse: Float64, parents: Int64, vertices: Float32, rest_normals: Float32,
-    joints: Int32, weights: Float32, counts: Int32, neighbours: Int32, coefficients: Float32,
-    scratch: Float32, twists: Twisting, girdle: Girdle, twisted: Float32, out: Float32, normals: Float32,
-) -> None:  # fmt: skip
+def dual_frames(matrices: Float64, skin: Skin, limbs: Limbs, out: Float32, normals: Float32) -> None:
     """Fill `out` with T frames of a mesh skinned by dual quaternions, and `normals` with its normals.
 
-    matrices (T, J, 4, 4). inverse (J, 4, 4): of the bind matrices. vertices, rest_normals (V, 3): as
-    modelled. joints, weights (V, 4): those with a weight first. counts (V,): how many those are. neighbours,
-    coefficients: see `normal_rings`. scratch (J, 12). twists: vertices turned beforehand. girdle: joints that
-    turn with the arms. twisted (V, 3): scratch, must hold the vertices. out (T, V, 3). normals: the same, or
-    (0, V, 3) for none. Kavan and others, "Skinning with dual quaternions", 2007.
+    matrices (T, J, 4, 4). out (T, V, 3). normals: the same, or (0, V, 3) for none. Kavan and others,
+    "Skinning with dual quaternions", 2007.
     """
+    scratch, twisted = skin.scratch, limbs.twisted
     for frame in range(matrices.shape[0]):
         root = matrices[frame, 0]
-        joint_duals(matrices[frame], inverse, parents, scratch)
-        _twist_limbs(vertices, parents, scratch, twists, twisted)
-        turn_girdles(scratch, girdle)
-        frame_normals = normals[frame] if normals.shape[0] else out[frame]
-        wanted = rest_normals if normals.shape[0] else rest_normals[:0]
-        _skin_dual(twisted, joints, weights, counts, scratch, out[frame], wanted, neighbours, frame_normals)
-        straighten_armpits(twisted, joints, weights, counts, scratch, girdle, out[frame])
+        joint_duals(matrices[frame], skin.inverse, limbs.parents, scratch)
+        _twist_limbs(skin.vertices, limbs.parents, scratch, limbs.twists, twisted)
+        turn_girdles(scratch, limbs.girdle)
+        frame_normals = normals[frame] if normals.shape[0] else out[frame][:0]
+        _skin_dual(twisted, skin, out[frame], frame_normals)
+        straighten_armpits(twisted, skin.joints, skin.weights, skin.counts, scratch, limbs.girdle, out[frame])
         if normals.shape[0]:
-            _normals_from_neighbours(out[frame], neighbours, coefficients, frame_normals)
+            _normals_from_neighbours(out[frame], skin.neighbours, skin.coefficients, frame_normals)
         _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
 
 
 @compiled
-def linear_frames(
-    matrices: Float64, inverse: Float64, vertices: Float32, rest_normals: Float32,
-    joints: Int32, weights: Float32, counts: Int32, neighbours: Int32, coefficients: Float32,
-    scratch: Float32, out: Float32, normals: Float32,
-) -> None:  # fmt: skip
+def linear_frames(matrices: Float64, skin: Skin, out: Float32, normals: Float32) -> None:
     """Fill `out` and `normals` by linear blend skinning; arguments as of `dual_frames`."""
     for frame in range(matrices.shape[0]):
         root = matrices[frame, 0]
@@ -80,17 +101,14 @@ def linear_frames(
                 for column in range(4):
                     total = 0.0
                     for k in range(4):
-                        total += matrices[frame, joint, row, k] * inverse[joint, k, column]
+                        total += matrices[frame, joint, row, k] * skin.inverse[joint, k, column]
                     if column == 3:
                         total -= root[row, 3]
-                    scratch[joint, 4 * row + column] = total
-        frame_normals = normals[frame] if normals.shape[0] else out[frame]
-        wanted = rest_normals if normals.shape[0] else rest_normals[:0]
-        _skin_linear(
-            vertices, joints, weights, counts, scratch, out[frame], wanted, neighbours, frame_normals
-        )
+                    skin.scratch[joint, 4 * row + column] = total
+        frame_normals = normals[frame] if normals.shape[0] else out[frame][:0]
+        _skin_linear(skin, out[frame], frame_normals)
         if normals.shape[0]:
-            _normals_from_neighbours(out[frame], neighbours, coefficients, frame_normals)
+            _normals_from_neighbours(out[frame], skin.neighbours, skin.coefficients, frame_normals)
         _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
 
 
@@ -195,12 +213,14 @@ def _quaternion(s: Float64) -> tuple[float, float, float, float]:
 
 
 @compiled
-def _skin_dual(
-    vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
-    out: Float32, rest_normals: Float32, neighbours: Int32, normals: Float32,
-) -> None:  # fmt: skip
-    """Fill `out` with one frame, and normals of the vertices that have no neighbours to compute them from."""
-    with_normals = rest_normals.shape[0] > 0
+def _skin_dual(vertices: Float32, skin: Skin, out: Float32, normals: Float32) -> None:
+    """Fill `out` with one frame, and normals of the vertices that have no neighbours to compute them from.
+
+    vertices: (V, 3), after limbs were twisted. normals: (V, 3), or (0, 3) for none.
+    """
+    joints, weights, counts, neighbours = skin.joints, skin.weights, skin.counts, skin.neighbours
+    rest_normals, duals = skin.normals, skin.scratch
+    with_normals = normals.shape[0] > 0
     rows = np.empty((len(duals), 12), dtype=np.float32)
     _matrices(duals, rows)
     for i in range(vertices.shape[0]):
@@ -289,12 +309,11 @@ def scale_and_shift(vertices: Float32, size: float, shift: Float32, out: Float32
 
 
 @compiled
-def _skin_linear(
-    vertices: Float32, joints: Int32, weights: Float32, counts: Int32, rows: Float32,
-    out: Float32, rest_normals: Float32, neighbours: Int32, normals: Float32,
-) -> None:  # fmt: skip
+def _skin_linear(skin: Skin, out: Float32, normals: Float32) -> None:
     """Fill the same as `_skin_dual`, with the 3x4 matrices of joints, rows (J, 12)."""
-    with_normals = rest_normals.shape[0] > 0
+    vertices, joints, weights, counts = skin.vertices, skin.joints, skin.weights, skin.counts
+    rest_normals, neighbours, rows = skin.normals, skin.neighbours, skin.scratch
+    with_normals = normals.shape[0] > 0
     m = np.empty(12, dtype=np.float32)
     for i in range(vertices.shape[0]):
         m[:] = 0

@@ -11,8 +11,7 @@ import numpy.typing as npt
 from fba.arrays import Float32, Float64, Int32, Int64
 from fba.body.skeleton import Skeleton
 from fba.body.skin import _loops as loops
-from fba.body.skin._girdle import find_girdle
-from fba.body.skin._girdle_loops import Girdle
+from fba.body.skin._girdle import Girdle, find_girdle
 from fba.body.skin._loops import Twisting
 from fba.body.skin._moving_normals import normal_rings
 from fba.body.skin._twisting import find_twists
@@ -104,9 +103,9 @@ class Skinner:
             rest_normals = (
                 self._normals if rest_normals is None else _as_writable(rest_normals, self._normals)
             )
-            mesh = (
+            skin = loops.Skin(
                 vertices, rest_normals, self.joints, self.weights, self.counts, self.neighbours,
-                self.coefficients,
+                self.coefficients, self.inverse, self._scratch,
             )  # fmt: skip
             twisted = vertices
             if method == "dual" and len(self.twists.rows):
@@ -115,30 +114,13 @@ class Skinner:
                 if not (self._twisted_is_modelled and vertices is self.vertices):
                     np.copyto(twisted, vertices)
                 self._twisted_is_modelled = vertices is self.vertices
+            limbs = loops.Limbs(self.parents, self.twists, self.girdle, twisted)
             for start in range(0, len(frames), BLOCK):
                 part = slice(start, start + BLOCK)
                 if method == "dual":
-                    loops.dual_frames(
-                        frames[part],
-                        self.inverse,
-                        self.parents,
-                        *mesh,
-                        self._scratch,
-                        self.twists,
-                        self.girdle,
-                        twisted,
-                        out_frames[part],
-                        normal_frames[part],
-                    )
+                    loops.dual_frames(frames[part], skin, limbs, out_frames[part], normal_frames[part])
                 else:
-                    loops.linear_frames(
-                        frames[part],
-                        self.inverse,
-                        *mesh,
-                        self._scratch,
-                        out_frames[part],
-                        normal_frames[part],
-                    )
+                    loops.linear_frames(frames[part], skin, out_frames[part], normal_frames[part])
         return out
 
     def _frames(self, matrices: npt.ArrayLike) -> tuple[Float64, bool]:

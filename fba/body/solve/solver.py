@@ -171,12 +171,18 @@ class BapSolver:
             wanted[[self.skeleton.number(name) for name in joints]] = True
         values = np.zeros((len(frames), BAP_COUNT), dtype=np.int32)
         tables = self._tables
-        fits = solver_loops.solve(
-            frames, self.skeleton.parents, self.skeleton.centres[0], tables.counts, tables.bap, tables.axis,
-            tables.sign, self.convention.translation, tables.metres, wanted, self._angles(previous),
-            tables.limits, previous is None, VALUE_LIMIT, values,
-        )  # fmt: skip
-        if not fits:
+        joints_solved = solver_loops.Joints(
+            self.skeleton.parents,
+            solver_loops.Freedoms(tables.counts, tables.axis, tables.sign, tables.limits),
+            tables.bap,
+            self.skeleton.centres[0],
+            self.convention.translation,
+            tables.metres,
+        )
+        before = self._angles(previous)
+        if not solver_loops.solve(
+            frames, joints_solved, wanted, before, previous is None, VALUE_LIMIT, values
+        ):
             raise ModelError("BapSolver.solve: the pose does not fit BAPs of 32 bits, in mm and 1e-5 rad")
         return values if array.ndim == 4 else values[0]
 

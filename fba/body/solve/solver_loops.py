@@ -13,6 +13,7 @@ made here. `joint_angles` makes all arrays that it does not get; angles have a c
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,6 +37,34 @@ BLOCK = 16
 TURN = 2.0 * math.pi
 
 
+class Freedoms(NamedTuple):
+    """The freedoms of J joints.
+
+    counts: int64 (J,), how many each has. axis: int64 (J, 3), which they turn about, outermost first. sign:
+    float64 (J, 3). limits: float64 (J, 3, 2), lowest and highest angles.
+    """
+
+    counts: Int64
+    axis: Int64
+    sign: Float64
+    limits: Float64
+
+
+class Joints(NamedTuple):
+    """J joints. parents: int64 (J,). freedoms: theirs. bap: int64 (J, 3), their columns of BAPs.
+
+    centre: float64 (3,) of the root. translation: int64 (3,), its columns, -1 for none; metres: float64 (3,),
+    signed metres of one unit of each.
+    """
+
+    parents: Int64
+    freedoms: Freedoms
+    bap: Int64
+    centre: Float64
+    translation: Int64
+    metres: Float64
+
+
 @inlined
 def _nearest(angle: float, wanted: float) -> float:
     """Return the angle plus the number of whole turns that bring it closest to the wanted one."""
@@ -43,9 +72,9 @@ def _nearest(angle: float, wanted: float) -> float:
 
 
 @inlined
-def _excess(angle: float, low: float, high: float) -> float:
-    """Return amount by which an angle is outside a range, 0 inside."""
-    return max(0.0, low - angle, angle - high)
+def _excess(angle: float, bounds: Float64) -> float:
+    """Return the amount by which an angle is outside bounds (2,), 0 inside."""
+    return max(0.0, float(bounds[0]) - angle, angle - float(bounds[1]))
 
 
 @inlined
@@ -110,9 +139,10 @@ def _refine_two(m: Float64, f: int, a1: int, a2: int, start: Float64, work: Floa
 
 @compiled
 def _third_angle_at_lock(
-    m: Float64, f: int, a1: int, a2: int, a3: int, outer: float, middle: float, work: Float64
+    m: Float64, f: int, axes: tuple[int, int, int], outer: float, middle: float, work: Float64
 ) -> float:
     """Return the third angle at gimbal lock, where the outer one is given."""
+    a1, a2, a3 = axes
     for i in range(3):
         for k in range(3):
             work[i, k] = m[i, k, f]
@@ -125,18 +155,19 @@ def _third_angle_at_lock(
 
 @compiled
 def _angles(
-    m: Float64, frames: int, count: int, j: int, axis: Int64, sign: Float64, previous: Float64,
-    limits: Float64, bounded: bool, work: Float64, cosines: Float64, angles: Float64,
-) -> None:  # fmt: skip
+    m: Float64, frames: int, j: int, freedoms: Freedoms, previous: Float64, bounded: bool, angles: Float64
+) -> None:
     """Fill angles (3, N), outermost first, with the decomposition of rotations m (3, 3, N).
 
-    count: number of freedoms of joint j, 1 to 3; with one or two, the closest rotation that they can make.
-    First the part that depends on no other frame, vectorised; then the choice of whole turns and of one of
-    the two triples, frame after frame.
+    j: the joint, of 1 to 3 freedoms; with one or two, the closest rotation that they can make. First the part
+    that depends on no other frame, vectorised; then the choice of whole turns and of one of the two triples,
+    frame after frame.
     """
-    a1 = int(axis[j, 0])
-    a2 = int(axis[j, 1])
-    a3 = int(axis[j, 2])
+    count, sign, limits = int(freedoms.counts[j]), freedoms.sign, freedoms.limits
+    work, cosines = np.zeros((3, 3)), np.zeros(frames)
+    a1 = int(freedoms.axis[j, 0])
+    a2 = int(freedoms.axis[j, 1])
+    a3 = int(freedoms.axis[j, 2])
     e = 1.0 if (a2 - a1) % 3 == 1 else -1.0
     if count == 1:
         b = a1 + 1 if a1 < 2 else 0
@@ -171,7 +202,7 @@ def _angles(
         if count == 3:
             if cosines[f] < NEAR_LOCK:
                 x = first
-                turn = _third_angle_at_lock(m, f, a1, a2, a3, sign[j, 0] * first, angles[1, f], work)
+                turn = _third_angle_at_lock(m, f, (a1, a2, a3), sign[j, 0] * first, angles[1, f], work)
                 z = _nearest(float(sign[j, 2]) * turn, third)
             else:
                 z = _nearest(float(sign[j, 2]) * float(angles[2, f]), third)
@@ -183,23 +214,19 @@ def _angles(
                 other = (u - first) ** 2 + (v - second) ** 2 + (w - third) ** 2
                 if bounded and f == 0:
                     out = (
-                        _excess(x, limits[j, 0, 0], limits[j, 0, 1])
-                        + _excess(y, limits[j, 1, 0], limits[j, 1, 1])
-                        + _excess(z, limits[j, 2, 0], limits[j, 2, 1])
-                        - _excess(u, limits[j, 0, 0], limits[j, 0, 1])
-                        - _excess(v, limits[j, 1, 0], limits[j, 1, 1])
-                        - _excess(w, limits[j, 2, 0], limits[j, 2, 1])
+                        _excess(x, limits[j, 0])
+                        + _excess(y, limits[j, 1])
+                        + _excess(z, limits[j, 2])
+                        - _excess(u, limits[j, 0])
+                        - _excess(v, limits[j, 1])
+                        - _excess(w, limits[j, 2])
                     )
                     if abs(out) > UNIT:  # one of them leaves the limits by more
                         here = out
                         other = 0.0
                 if other < here:
-                    x = u
-                    y = v
-                    z = w
-        first = x
-        second = y
-        third = z
+                    x, y, z = u, v, w
+        first, second, third = x, y, z
         angles[0, f] = x
         angles[1, f] = y
         angles[2, f] = z
@@ -211,53 +238,44 @@ def _angles(
 @compiled
 def solve(
     matrices: Float64,
-    parents: Int64,
-    centre: Float64,
-    counts: Int64,
-    bap: Int64,
-    axis: Int64,
-    sign: Float64,
-    translation: Int64,
-    metres: Float64,
+    joints: Joints,
     wanted: Bool,
     previous: Float64,
-    limits: Float64,
     bounded: bool,
     largest: int,
     values: Int32,
 ) -> bool:
     """Fill values, int32 (T, 296) of zeros, with the BAPs of joint matrices float64 (T, J, 4, 4).
 
-    centre: (3,) of the root. counts: int64 (J,), freedoms of each joint. wanted: bool (J,), joints to
-    solve; the others stay unturned. previous: float64 (J, 3), angles before the first frame, changed. limits:
-    float64 (J, 3, 2), used in the first frame only, and only if bounded. largest: magnitude of a value.
-    Each joint is solved against the rotation that its parent really reaches, so children make up for what
-    a parent cannot do. Returns False where a value would exceed the largest.
+    wanted: bool (J,), joints to solve; the others stay unturned. previous: float64 (J, 3), angles before the
+    first frame, changed. bounded: whether limits count, in the first frame only. largest: magnitude of a
+    value. Each joint is solved against the rotation that its parent really reaches, so children make up for
+    what a parent cannot do. Returns False where a value would exceed the largest.
     """
-    joints = parents.shape[0]
-    reached = np.zeros((joints, 3, 3, BLOCK))  # frames innermost: vector code
+    axis, sign = joints.freedoms.axis, joints.freedoms.sign
+    size = joints.parents.shape[0]
+    reached = np.zeros((size, 3, 3, BLOCK))  # frames innermost: vector code
     local = np.zeros((3, 3, BLOCK))
-    work = np.zeros((3, 3))
     angles = np.zeros((3, BLOCK))
     sines = np.zeros(BLOCK)
     cosines = np.zeros(BLOCK)
     for begin in range(0, values.shape[0], BLOCK):
         frames = min(BLOCK, values.shape[0] - begin)
-        for j in range(joints):
-            p = int(parents[j])
-            count = int(counts[j]) if wanted[j] else 0
+        for j in range(size):
+            p = int(joints.parents[j])
+            count = int(joints.freedoms.counts[j]) if wanted[j] else 0
             for i in range(3):
                 for k in range(3):
                     for f in range(frames):
                         reached[j, i, k, f] = (1.0 if i == k else 0.0) if p < 0 else reached[p, i, k, f]
             if p < 0:
                 for i in range(3):
-                    column = int(translation[i])
+                    column = int(joints.translation[i])
                     if column < 0:
                         continue
                     for f in range(frames):
-                        place = matrices[begin + f, j, i, 3] - centre[i]
-                        value = math.floor(place / metres[i] + 0.5)
+                        place = matrices[begin + f, j, i, 3] - joints.centre[i]
+                        value = math.floor(place / joints.metres[i] + 0.5)
                         if not abs(value) <= largest:
                             return False
                         values[begin + f, column] = int(value)
@@ -272,10 +290,9 @@ def solve(
                         local[i, k, f] = (
                             a * reached[j, 0, i, f] + b * reached[j, 1, i, f] + c * reached[j, 2, i, f]
                         )
-            first_frame = bounded and begin == 0
-            _angles(local, frames, count, j, axis, sign, previous, limits, first_frame, work, cosines, angles)
+            _angles(local, frames, j, joints.freedoms, previous, bounded and begin == 0, angles)
             for d in range(count):
-                column = int(bap[j, d])
+                column = int(joints.bap[j, d])
                 for f in range(frames):
                     value = math.floor(angles[d, f] / UNIT + 0.5)
                     if not abs(value) <= largest:
@@ -302,11 +319,7 @@ def joint_angles(local: Float64, count: int, axis: Int64, sign: Float64, angles:
 
     count: number of freedoms, axis int64 (1, 3) and sign float64 (1, 3), see `Convention`.
     """
-    frames = local.shape[2]
-    work = np.zeros((3, 3))
-    before = np.zeros((1, 3))
-    limits = np.zeros((1, 3, 2))
-    cosines = np.zeros(frames)
     # the types that `solve` passes, so that nothing is compiled again
     axis, sign = np.array(axis, dtype=np.int64), np.array(sign)
-    _angles(local, frames, count, 0, axis, sign, before, limits, False, work, cosines, angles)
+    freedoms = Freedoms(np.array([count], dtype=np.int64), axis, sign, np.zeros((1, 3, 2)))
+    _angles(local, local.shape[2], 0, freedoms, np.zeros((1, 3)), False, angles)

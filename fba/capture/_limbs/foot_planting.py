@@ -18,9 +18,9 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 from fba.body import ground
-from fba.body.footing import OUTLINE, TIP
+from fba.body.footing import OUTLINE, TIP, lowest_edge
 from fba.capture._limbs import bone_ik, soles
-from fba.capture._limbs.soles import joint_frames, lowest_edge
+from fba.capture._limbs.soles import joint_frames
 from fba.capture._limbs.targets import Targets
 
 FOOT_ITERATIONS = 4
@@ -88,8 +88,7 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
     )
     if source is None or soles.body_soles(targets.skeleton, targets.rotations, root) is None:
         return root
-    middles = source.points.mean(axis=1)
-    level = ground.find(source.lowest, middles).under(middles)
+    level = ground.level_under(source.lowest, source.points)
     above = soles.settle(source.lowest - level, source.points, rate)
     under = np.zeros_like(level) if floor == "floor" else level
     bends = [_source_bend(targets, side) for side in "lr"]
@@ -144,12 +143,7 @@ def _move_foot(targets: Targets, side: str, root: Float64, move: Float64) -> Non
 def _leg(targets: Targets, side: str, root: Float64) -> Leg:
     """Return the world positions of a leg's joints, and the axis of its knee."""
     knee = f"{side}_knee"
-    frames = {
-        name: (position, frame)
-        for name, position, frame in soles.joint_frames(
-            targets.skeleton, targets.rotations, root, f"{side}_ankle"
-        )
-    }
+    frames = joint_frames(targets.skeleton, targets.rotations, root, f"{side}_ankle")
     axes, *_ = targets.axes(knee)
     bone = targets.bone(knee, f"{side}_ankle")
     outermost = abs(axes[0] @ bone) < abs(axes[-1] @ bone)
@@ -219,10 +213,7 @@ def _bend_toes(
     the sole. ground: (T,), height of the ground, which they are not under, unless the rest of the sole is.
     """
     joint = f"{side}_metatarsal"
-    frames = {
-        name: (position, frame)
-        for name, position, frame in joint_frames(targets.skeleton, targets.rotations, root, joint)
-    }
+    frames = joint_frames(targets.skeleton, targets.rotations, root, joint)
     axis = targets.axes(joint)[0][0]
     above_it = targets.parent_rotation(joint)
     # heights of the tips: level + still + across cos(angle) + raised sin(angle)

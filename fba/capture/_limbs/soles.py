@@ -9,16 +9,16 @@ frame by frame, so that the foot on the ground is as high above it as the source
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64
-from fba.body import BodyModel, Skeleton
-from fba.body.footing import OUTLINE, TIP
-from fba.body.stance import HEEL, SIDES, find_standing, sole_points
+from fba.body import SIDES, BodyModel, Skeleton
+from fba.body.footing import SOLE, lowest_edge
+from fba.body.stance import HEEL, find_standing, heel_and_ball
 from fba.capture._limbs._coupled_paths import chain
 from fba.capture.motion import SkeletonMotion
 
@@ -152,58 +152,28 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
     shown = BodyModel.default().skeleton if skeleton is Skeleton.default() else skeleton
     seen = []
     for side in SIDES:
-        soles, last = sole_points(skeleton, side), f"{side}_metatarsal"
-        if soles is None:
+        last = f"{side}_metatarsal"
+        if last not in skeleton:
             return None
-        centres = skeleton.centres
-        frames = {
-            name: (position, frame) for name, position, frame in joint_frames(skeleton, wanted, root, last)
-        }
-        points.append([
-            frames[name][0] + frames[name][1] @ (sole - centres[skeleton.number(name)])
-            for name, sole in soles.items()
-        ])  # fmt: skip
-        lows.append(lowest_edge(skeleton, frames, side, (*OUTLINE, *TIP)))
+        frames = joint_frames(skeleton, wanted, root, last)
+        ends = heel_and_ball(skeleton, frames, side)
+        if ends is None:
+            return None
+        points.append(ends)
+        lows.append(lowest_edge(skeleton, frames, side, SOLE))
         balls.append(points[-1][1][:, 1] - lows[-1])
         if shown is not skeleton:
-            frames = {
-                name: (position, frame) for name, position, frame in joint_frames(shown, wanted, root, last)
-            }
-            seen.append(lowest_edge(shown, frames, side, (*OUTLINE, *TIP)))
+            seen.append(lowest_edge(shown, joint_frames(shown, wanted, root, last), side, SOLE))
     lowest = np.array(lows)
     if seen:
         lowest = np.array(seen) + lowest.min(axis=0) - np.min(seen, axis=0)
     return Soles(lowest, np.array(points), np.array(balls))
 
 
-def lowest_edge(
-    skeleton: Skeleton,
-    frames: Mapping[str, tuple[Float64, Float64]],
-    side: str,
-    edge: Sequence[tuple[str, float, float, float]],
-) -> Float64:
-    """Return the height (T,) of the lowest point of a sole's edge.
-
-    frames: joint -> position (T, 3) and rotation (T, 3, 3). edge: of `fba.body.footing`.
-    """
-    outwards = 1.0 if side == "l" else -1.0
-    points: dict[str, list[Float64]] = {}
-    for joint, x, y, z in edge:
-        name = f"{side}_{joint}"
-        height = skeleton.centres[skeleton.number(name), 1]
-        points.setdefault(name, []).append(np.array([outwards * x, y - height, z]))
-    heights = []
-    for name, own in points.items():
-        position, frame = frames[name]
-        heights.append(position[:, 1] + (frame[..., 1, :] @ np.array(own).T).min(axis=-1))
-    lowest: Float64 = np.min(heights, axis=0)
-    return lowest
-
-
 def joint_frames(
     skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64, last: str
-) -> list[tuple[str, Float64, Float64]]:
-    """Return (name, position (T, 3), rotation (T, 3, 3)) of the joints from the root to `last`.
+) -> dict[str, tuple[Float64, Float64]]:
+    """Return position (T, 3) and rotation (T, 3, 3) of the joints from the root to `last`, by name.
 
     wanted, root: as for `body_soles`.
     """
@@ -211,13 +181,13 @@ def joint_frames(
     while skeleton.parents[path[-1]] >= 0:
         path.append(int(skeleton.parents[path[-1]]))
     position, frame = root, np.broadcast_to(np.eye(3), (len(root), 3, 3))
-    result = []
+    result = {}
     for number in reversed(path):
         name, parent = skeleton.names[number], int(skeleton.parents[number])
         if parent >= 0:
             position = position + frame @ (skeleton.centres[number] - skeleton.centres[parent])
         frame = wanted.get(name, frame)
-        result.append((name, position, frame))
+        result[name] = position, frame
     return result
 
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Array, Float64
-from fba.body import BapSolver
+from fba.body import SIDES, BapSolver
 from fba.body.skeleton import ROOT
 from fba.capture.motion import SkeletonMotion, read_axis
 from fba.geometry import nearest_rotation
+from fba.rotations import unit
 
-SIDES = ("l", "r")
 FINGERS = ("index", "middle", "ring", "pinky")
 LEVEL = 0.6
 """Length of the mean direction from feet to head along an axis above which a person stands along it."""
@@ -134,20 +134,6 @@ def leg_lengths(figure: Figure) -> float:
         if length > 0:
             return length
     return 0.0
-
-
-def unit(vectors: Float64) -> Float64:
-    """Return vectors (..., 3) of length 1; 0 stays 0."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    result: Float64 = vectors / np.where(length > 1e-12, length, 1.0)
-    return result
-
-
-def degrees_between(one: Float64, other: Float64) -> Float64:
-    """Return angles (T,) in degrees between vectors (T, 3)."""
-    sine = np.linalg.norm(np.cross(one, other), axis=-1)
-    result: Float64 = np.degrees(np.arctan2(sine, (one * other).sum(axis=-1)))
-    return result
 
 
 def degrees_turned(turns: Float64) -> Float64:

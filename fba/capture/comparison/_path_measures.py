@@ -10,9 +10,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.comparison._figure import SIDES, Figure, degrees_between, degrees_turned, unit
+from fba.body import SIDES
+from fba.capture.comparison._figure import Figure, degrees_turned
 from fba.capture.comparison._pose_measures import LIMBS, TURNING, WORDS, Row
 from fba.capture.comparison._standing import foot_points
+from fba.rotations import degrees_between, unit
 
 HINGED = {"shoulder": ("shoulder", "elbow", "wrist"), "hip": ("hip", "knee", "ankle")}
 """The joints of limbs whose middle one is a hinge, by the first."""

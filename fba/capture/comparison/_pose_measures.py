@@ -12,15 +12,10 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64
+from fba.body import SIDES
 from fba.body.skeleton import ROOT
-from fba.capture.comparison._figure import (
-    SIDES,
-    Figure,
-    degrees_between,
-    degrees_turned,
-    mean_rotation,
-    unit,
-)
+from fba.capture.comparison._figure import Figure, degrees_turned, mean_rotation
+from fba.rotations import degrees_between, unit
 
 MOST_PAIRS = 4
 """Pairs of joints, left and right, that show whether a pose is its own mirror image."""

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.comparison._figure import SIDES, Figure
+from fba.body import SIDES
+from fba.capture.comparison._figure import Figure
 
 MAX_STANDING_SPEED = 0.25
 """Largest speed of a standing foot, in metres per second."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.body import BapSolver, BodyModel
+from fba.body import SIDES, BapSolver, BodyModel
 from fba.capture.comparison import _figure as figure
 from fba.capture.comparison import _path_measures as path_measures
 from fba.capture.comparison import _pose_measures as pose_measures
@@ -18,6 +18,7 @@ from fba.capture.comparison import measurement
 from fba.capture.comparison._standing import find_floor, find_standing
 from fba.capture.motion import SkeletonMotion
 from fba.parameters import BAP_COUNT
+from fba.rotations import unit
 
 SOLE = (0.045, -0.03)
 """Metres from the middle of a foot to its side, and from under the ankle to the heel."""
@@ -55,7 +56,7 @@ def find_sticks(
     solver = BapSolver(BodyModel.default().skeleton)  # of the person that is drawn
     assert animation.body is not None
     motion = motion.resample(animation.rate)
-    begin = measurement.rows_of(motion, slice(0, measurement.PIECE_FRAMES))
+    begin = motion.select(slice(0, measurement.PIECE_FRAMES))
     up = figure.find_up(begin, mapped) if up is None else up
     neutral = figure.result_figure(solver, np.zeros((1, BAP_COUNT), dtype=np.int32))
     metres = measurement.source_scale(motion, mapped, neutral, up) if scale is None else scale
@@ -64,8 +65,8 @@ def find_sticks(
     standing = find_standing(usual, rate, find_floor([usual], rate).lows)
     levels = pose_measures.level_soles(usual, standing, measurement.rest_figure(motion, mapped, up, metres))
     ground = min((float(np.percentile(p[:, 1], 5)) for p in _toes(usual)), default=0.0)
-    numbers = list(frames)
-    chosen = replace(motion, rotations=motion.rotations[numbers], positions=motion.positions[numbers])
+    numbers = np.array(frames, dtype=np.intp)
+    chosen = motion.select(numbers)
     source = figure.source_figure(chosen, mapped, up, metres)
     result = figure.result_figure(solver, animation.body.values[numbers])
     own = min((float(np.median(p[:, 1])) for p in _toes(neutral)), default=0.0)
@@ -88,7 +89,7 @@ def find_sticks(
             lines.append((places[joint], places[joint] + up @ frame @ offset * metres))
             owners.append(sides[int(joint)])
         palms, soles = [], []
-        for side in figure.SIDES:
+        for side in SIDES:
             knuckles = list(source.knuckles(side).values())
             if len(knuckles) > 1 and f"{side}_wrist" in source.points:
                 wrist = source.points[f"{side}_wrist"][row]
@@ -109,13 +110,13 @@ def _sole(ankle: Float64, toe: Float64, up: Float64) -> Float64:
     ahead = toe - ankle
     ahead = ahead - up * (ahead @ up)
     under = min(float((toe - ankle) @ up), -0.02)
-    heel, ball = ankle + up * under + figure.unit(ahead) * SOLE[1], ankle + ahead + up * under
-    across = np.cross(up, figure.unit(ahead)) * SOLE[0]
+    heel, ball = ankle + up * under + unit(ahead) * SOLE[1], ankle + ahead + up * under
+    across = np.cross(up, unit(ahead)) * SOLE[0]
     return np.array([heel - across, heel + across, ball + across, ball - across])
 
 
 def _toes(one: figure.Figure) -> list[Float64]:
-    return [toe for side in figure.SIDES if (toe := one.toe(side)) is not None]
+    return [toe for side in SIDES if (toe := one.toe(side)) is not None]
 
 
 def _sides(motion: SkeletonMotion, mapped: Mapping[str, int]) -> list[str]:

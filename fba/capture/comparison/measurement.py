@@ -11,13 +11,13 @@ from scipy.ndimage import minimum_filter1d
 
 from fba.animation import Animation
 from fba.arrays import Array, Float64
-from fba.body import BapSolver, BodyModel, Skeleton
+from fba.body import SIDES, BapSolver, BodyModel, Skeleton
 from fba.body.footing import GroundedPoser
 from fba.body.model import BodyPart
 from fba.capture.comparison import _figure as figure
 from fba.capture.comparison import _path_measures as path_measures
 from fba.capture.comparison import _pose_measures as pose_measures
-from fba.capture.comparison._figure import SIDES, Figure
+from fba.capture.comparison._figure import Figure
 from fba.capture.comparison._pose_measures import Row
 from fba.capture.comparison._standing import Floor, find_floor, find_standing
 from fba.capture.comparison._verdict import Comparison, Difference, bounds, in_order
@@ -73,7 +73,7 @@ def compare(
     count = min(len(motion), len(animation))
     if not count:
         raise ModelError("the motion and the animation have no frame in common")
-    first = rows_of(motion, slice(0, min(count, PIECE_FRAMES)))
+    first = motion.select(slice(0, min(count, PIECE_FRAMES)))
     up = figure.find_up(first, mapped) if up is None else up
     neutral = figure.result_figure(solver, np.zeros((1, BAP_COUNT), dtype=np.int32))
     metres = source_scale(motion, mapped, neutral, up) if scale is None else scale
@@ -82,12 +82,12 @@ def compare(
     lost, tears = path_measures.find_tears(motion.positions[:count] * metres, rate)
     pieces = _pieces(count, most)
     floor = find_floor(
-        (figure.source_figure(rows_of(motion, piece), mapped, up, metres) for piece in pieces), rate
+        (figure.source_figure(motion.select(piece), mapped, up, metres) for piece in pieces), rate
     )
     found: dict[tuple[str, str], list[Difference]] = {}
     for piece in pieces:
         baps = animation.body.values[piece]
-        source = figure.source_figure(rows_of(motion, piece), mapped, up, metres)
+        source = figure.source_figure(motion.select(piece), mapped, up, metres)
         result = figure.result_figure(solver, baps)
         soles = sole_heights(solver, baps)
         for row in _measure(source, result, rest, neutral, soles, rate, level, floor):
@@ -118,7 +118,7 @@ def _pieces(count: int, most: int | None) -> list[slice]:
 
 def source_scale(motion: SkeletonMotion, mapped: Mapping[str, int], neutral: Figure, up: Float64) -> float:
     """Return metres of the body in one unit of the source, by the lengths of limbs; 0.01 without limbs."""
-    theirs = figure.leg_lengths(figure.source_figure(rows_of(motion, slice(0, 1)), mapped, up, 1.0))
+    theirs = figure.leg_lengths(figure.source_figure(motion.select(slice(0, 1)), mapped, up, 1.0))
     return figure.leg_lengths(neutral) / theirs if theirs > 0 else UNKNOWN_UNIT
 
 
@@ -175,12 +175,7 @@ def _unmatched(motion: SkeletonMotion, mapped: Mapping[str, int]) -> list[Differ
 def rest_figure(motion: SkeletonMotion, mapped: Mapping[str, int], up: Float64, metres: float) -> Figure:
     """Return the source in the rest pose that its file has, whatever that is."""
     unturned = np.tile([1.0, 0.0, 0.0, 0.0], (1, len(motion.names), 1))
-    return figure.source_figure(replace(rows_of(motion, slice(0, 1)), rotations=unturned), mapped, up, metres)
-
-
-def rows_of(motion: SkeletonMotion, rows: slice) -> SkeletonMotion:
-    """Return some frames of a motion."""
-    return replace(motion, rotations=motion.rotations[rows], positions=motion.positions[rows])
+    return figure.source_figure(replace(motion.select(slice(0, 1)), rotations=unturned), mapped, up, metres)
 
 
 def sole_heights(solver: BapSolver, baps: Array) -> dict[str, Float64]:

@@ -12,12 +12,12 @@ from fba.body import BapSolver
 from fba.capture import _retarget as retarget
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare, rest_on_frame
-from fba.capture.skeleton import SPINES, solve_targets
+from fba.capture.skeleton import solve_targets
 from fba.tracks import BodyTrack
 
 CONTEXT = 8
 """Frames before the new ones that are looked at again, so that joints go on as they went."""
-FOLLOWING = retarget.Retargeting(SPINES["spread"], with_anchors=True, scale=None, ground="none", plant=False)
+FOLLOWING = retarget.SkeletonOptions(ground="none", plant=False)
 """Poses that come one after the other: nothing is known of the ground."""
 
 

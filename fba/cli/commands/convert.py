@@ -22,7 +22,7 @@ from fba.cli.outputs import (
     find_writer,
     opening_for,
 )
-from fba.cli.recordings.inputs import Inputs, formats_by_part
+from fba.cli.recordings.inputs import Inputs
 from fba.errors import FormatError
 from fba.source import naming_file
 
@@ -108,8 +108,7 @@ def _write_stream(read: ReadFile, target: Path, outputs: Outputs, bap_steps: str
     from fba.codec import EncoderOptions
 
     animation = read.animation
-    tables = () if read.table is None else (read.table,)
-    taken = Inputs(animation, None, None, tables, formats_by_part([read]), animation.rate != read.rate)
+    taken = Inputs(animation, None, None, (read,), animation.rate != read.rate)
     table = step_tables.table_to_write(bap_steps, made=taken.is_captured, marked=marked, read=read.table)
     step_tables.warn_of_coarse_steps(animation, table)
     with naming_file(target):

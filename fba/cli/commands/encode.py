@@ -268,7 +268,6 @@ def _execute(plan: _Plan) -> _Encoded:
         sync=request.sync,
         fps=request.fps,
         name=request.name,
-        timed=plan.sound is not None,
     )
     spoken = None if plan.sound is None else voice.place_voice(request.sound, taken, plan.sound)
     if plan.detailed and (taken.animation.body is None or not plan.captures):
@@ -291,7 +290,7 @@ def _execute(plan: _Plan) -> _Encoded:
     outputs.write(request.output, opening + coded.data)
     if spoken is not None:
         voice.write_voice(outputs, spoken)
-    _write_map(plan)
+    _write_map(plan, taken)
     reports = _compare(plan, taken, animation, coded, table)
     return _Encoded(taken, animation, table, coded, spoken, limits, reports)
 
@@ -310,7 +309,7 @@ def _encode(request: _Request, animation: Animation, taken: Inputs, table: str) 
         return encode_stream(animation, settings, request.size, taken)
 
 
-def _write_map(plan: _Plan) -> None:
+def _write_map(plan: _Plan, taken: Inputs) -> None:
     """Write the joints or markers that were used, where `--map-out` asks for them."""
     target, reading = plan.request.capture.map_out, plan.request.reading
     if target is None:
@@ -318,9 +317,12 @@ def _write_map(plan: _Plan) -> None:
     with plan.outputs.file(target) as file:
         if plan.marked:
             places = plan.capture["markers"]
-            mapped = marker_options.write_used_places(file, places, plan.marked[0], reading)
+            mapped = marker_options.write_used_places(file, places, taken.capture_of(plan.marked[0]))
         else:
-            mapped = joint_options.write_joints(file, plan.capture["joints"], plan.captures[0], reading)
+            motion = taken.capture_of(plan.captures[0])
+            if motion is None:  # of a face alone, or of a file with BAPs, whose skeleton was not needed
+                motion = joint_options.read_capture(plan.captures[0], reading)
+            mapped = joint_options.write_joints(file, plan.capture["joints"], motion)
     what = f"markers of {plan.marked[0]}" if plan.marked else f"joints of {plan.captures[0]}"
     plan.outputs.say(f"{display_name(target)}: {mapped} {what}")
 
@@ -340,8 +342,9 @@ def _compare(
             shown = shown.resample(shown.rate)
         after, _ = taken.body_of(shown)
         body = capture_report.CodedBody(before, after, coded.clamped, lead)
+        files = [one for one in taken.files if one.path in plan.captures]
         reports = capture_report.compare_captures(
-            plan.captures, body, plan.capture, plan.request.reading, detailed=plan.detailed
+            files, body, plan.capture, plan.request.reading, detailed=plan.detailed
         )
         if plan.page is not None:
             is_page = plan.page.suffix == ".html"

@@ -29,9 +29,9 @@ from fba.errors import FbaWarning, ModelError
 from fba.parameters import BAP_STEPS_AUTO
 
 if TYPE_CHECKING:
+    from fba.capture import FaceCapture
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
-    from fba.formats.registry import FaceCapture
 
 SHOWN = 8
 """Names of markers in a line."""

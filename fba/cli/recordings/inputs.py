@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
 from fba.animation import Animation
 from fba.cli.command import STANDARD_INPUT, Decorated
-from fba.cli.inputs import ReadFile, Reading, read_face_quietly, read_file
+from fba.cli.inputs import ReadFile, Reading, read_file
 from fba.cli.printing import Progress, rate_text
 from fba.errors import FormatError, OptionError
 from fba.formats import merge
@@ -21,8 +21,8 @@ from fba.formats.synchronisation import SYNCS, Recording, Together, join
 from fba.formats.time_codes import parse_time_code, parse_time_of_day
 
 if TYPE_CHECKING:
+    from fba.capture import FaceCapture
     from fba.formats import Format
-    from fba.formats.registry import FaceCapture
 
 
 SLOWEST = 60
@@ -95,16 +95,30 @@ class Inputs:
     """What was read.
 
     animation: of all inputs. start: time of day at its index 0, in seconds; None where unknown. together: how
-    two inputs with a capture among them were put together; None for others. tables: of BAP steps, of streams.
-    formats: of the files that "face" and "body" come from. is_resampled: whether frames were interpolated.
+    two inputs with a capture among them were put together; None for others. files: the inputs. is_resampled:
+    whether frames were interpolated.
     """
 
     animation: Animation
     start: float | None
     together: Together | None
-    tables: tuple[str, ...]
-    formats: Mapping[str, Format]
+    files: tuple[ReadFile, ...]
     is_resampled: bool
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """Tables of BAP steps, of the streams among the inputs."""
+        return tuple(one.table for one in self.files if one.table is not None)
+
+    @property
+    def formats(self) -> Mapping[str, Format]:
+        """The format that "face" and "body" come from, as far as they exist."""
+        return {
+            part: file.format
+            for file in self.files
+            for part, track in (("face", file.animation.face), ("body", file.animation.body))
+            if track is not None
+        }
 
     @property
     def is_captured(self) -> bool:
@@ -130,6 +144,10 @@ class Inputs:
             one.read_motion is not None or "head_path" in one.read_options for one in self.formats.values()
         )
 
+    def capture_of(self, path: Path) -> Any:
+        """Return the motion or the face that the animation of an input was made of; None of other files."""
+        return next((one.captured.capture for one in self.files if one.path == path and one.captured), None)
+
     def body_of(self, animation: Animation) -> tuple[Animation, int]:
         """Return the frames of an animation of the same rows that a captured body covers.
 
@@ -148,11 +166,8 @@ def read_inputs(
     sync: Sync,
     fps: Fraction | None,
     name: str | None,
-    timed: bool = False,
 ) -> Inputs:
     """Return face and body of one or two files as one animation. capture, fps, name: see `read_file`.
-
-    timed: find out when a single file was recorded.
 
     Raises click.UsageError for two faces, two bodies, and rates that differ where nothing was captured.
     """
@@ -168,22 +183,19 @@ def read_inputs(
             if not len(animation):
                 raise FormatError("the file holds no frames; there is nothing to encode", path=path)
             _check_parts(path, animation, [one.animation for one in recordings])
-            again = timed or len(files) > 1
-            faces.append(read_face_quietly(path, fps, reading, capture) if again else None)
+            faces.append(_captured_face(read[-1]))
             shown = STANDARD_INPUT if str(path) == "-" else str(path)
             recordings.append(Recording(shown, animation, None if faces[-1] is None else faces[-1].start))
-    tables = tuple(one.table for one in read if one.table is not None)
     rates = [one.rate for one in read]
-    by_part = formats_by_part(read)
     if len(recordings) == 1:
         only = recordings[0]
         resampled = only.animation.rate != rates[0]
-        return Inputs(only.animation, only.start, None, tables, by_part, resampled)
+        return Inputs(only.animation, only.start, None, tuple(read), resampled)
     first, second = recordings
     offset = sync.offset
     if sync.sync is None and offset is None and not any(one.format.is_capture for one in read):
         resampled = [one.animation.rate for one in recordings] != rates
-        return Inputs(_merge(first, second), None, None, tables, by_part, resampled)
+        return Inputs(_merge(first, second), None, None, tuple(read), resampled)
     try:
         together = join(
             first,
@@ -197,17 +209,14 @@ def read_inputs(
     except OptionError as error:
         raise click.UsageError(str(error)) from error
     resampled = any(rate != together.animation.rate for rate in rates)
-    return Inputs(together.animation, together.start, together, tables, by_part, resampled)
+    return Inputs(together.animation, together.start, together, tuple(read), resampled)
 
 
-def formats_by_part(files: Iterable[ReadFile]) -> dict[str, Format]:
-    """Return the format that "face" and "body" come from, as far as they exist."""
-    return {
-        part: file.format
-        for file in files
-        for part, track in (("face", file.animation.face), ("body", file.animation.body))
-        if track is not None
-    }
+def _captured_face(file: ReadFile) -> FaceCapture | None:
+    """Return the captured face that an animation was made of; None for other files."""
+    if file.captured is None or file.format.read_face is None:
+        return None
+    return cast("FaceCapture", file.captured.capture)
 
 
 def together_lines(files: tuple[Path, ...], together: Together) -> list[str]:

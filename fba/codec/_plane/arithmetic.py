@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Int64, UInt8, UInt16
-from fba.compiled import compiled
+from fba.compiled import compiled, inlined
 
 QUARTER = 16384
 HALF = 32768
@@ -69,15 +69,25 @@ class Counts(NamedTuple):
     tree: UInt16
 
 
+@inlined
+def _symbol_at(models: Counts, slot: int, target: int) -> tuple[int, int, int]:
+    """Return the symbol whose share of the counts contains the target, the sum below it, and its count."""
+    symbol = int(models.usual[slot])
+    below = int(models.below_usual[slot])
+    share = 1 + int(models.added[slot, symbol])
+    if target < below:
+        symbol, below = _find(models.tree, slot, int(models.size[slot]), target)
+        share = 1 + int(models.added[slot, symbol])
+    elif target >= below + share:
+        symbol, below = _find(models.tree, slot, int(models.size[slot]), target - share + 1)
+        below += share - 1
+        share = 1 + int(models.added[slot, symbol])
+    return symbol, below, share
+
+
 @compiled
 def decode_segment(
-    data: UInt8,
-    bit: int,
-    end: int,
-    slots: Int64,
-    models: Counts,
-    adaptive: bool,
-    symbols: Int64,
+    data: UInt8, bit: int, end: int, slots: Int64, models: Counts, adaptive: bool, symbols: Int64
 ) -> tuple[int, int]:
     """Decode one segment that starts at `bit`: symbols[k] becomes the symbol of slot slots[k].
 
@@ -131,19 +141,7 @@ def decode_segment(
         span = high - low + 1
         total = int(models.total[slot]) if adaptive else int(models.size[slot])
         target = total - 1 - ((code - low + 1) * total - 1) // span  # counted from symbol 0 upwards
-        if adaptive:
-            symbol = int(models.usual[slot])
-            below = int(models.below_usual[slot])
-            share = 1 + int(models.added[slot, symbol])
-            if target < below:
-                symbol, below = _find(models.tree, slot, int(models.size[slot]), target)
-                share = 1 + int(models.added[slot, symbol])
-            elif target >= below + share:
-                symbol, below = _find(models.tree, slot, int(models.size[slot]), target - share + 1)
-                below += share - 1
-                share = 1 + int(models.added[slot, symbol])
-        else:
-            symbol, below, share = target, target, 1
+        symbol, below, share = _symbol_at(models, slot, target) if adaptive else (target, target, 1)
         symbols[position] = symbol
         above = total - below  # C[symbol]; C[symbol + 1] is less by the symbol's own count
         high = low - 1 + span * above // total
@@ -162,14 +160,19 @@ def decode_segment(
     return OK, after
 
 
+@inlined
+def _counts_below(models: Counts, slot: int, symbol: int) -> int:
+    """Return the sum of the counts of all symbols below one."""
+    usual = int(models.usual[slot])
+    if symbol == usual:
+        return int(models.below_usual[slot])
+    below = int(_sum_below(models.tree, slot, symbol))
+    return below + int(models.added[slot, usual]) if symbol > usual else below
+
+
 @compiled
 def encode_segment(
-    data: UInt8,
-    bit: int,
-    slots: Int64,
-    models: Counts,
-    adaptive: bool,
-    symbols: Int64,
+    data: UInt8, bit: int, slots: Int64, models: Counts, adaptive: bool, symbols: Int64
 ) -> int:
     """Encode symbols[k] for slot slots[k] into one segment that starts at `bit`; return the bit after it.
 
@@ -195,19 +198,11 @@ def encode_segment(
             if symbol < 0 or symbol >= models.size[slot]:
                 raise IndexError("a symbol beyond its model")
             span = high - low + 1
+            total, above, share = int(models.size[slot]), int(models.size[slot]) - symbol, 1
             if adaptive:
                 total = int(models.total[slot])
-                if symbol == models.usual[slot]:
-                    above = total - int(models.below_usual[slot])
-                else:
-                    above = total - _sum_below(models.tree, slot, symbol)
-                    if symbol > models.usual[slot]:
-                        above -= int(models.added[slot, models.usual[slot]])
+                above = total - _counts_below(models, slot, symbol)
                 share = 1 + int(models.added[slot, symbol])
-            else:
-                total = int(models.size[slot])
-                above = total - symbol
-                share = 1
             high = low - 1 + span * above // total
             low = low + span * (above - share) // total
         else:  # the end: two bits, and those pending, select a quarter inside the interval

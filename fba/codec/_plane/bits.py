@@ -8,7 +8,7 @@ from fba.arrays import UInt8
 
 
 class OutOfDataError(Exception):
-    """The next element goes beyond the end of the data. Never leaves the codec."""
+    """An element that extends beyond the end of the data; never raised to users of the codec."""
 
 
 class BitReader:
@@ -56,7 +56,7 @@ class BitWriter:
         self.bit += count
 
     def copy(self) -> BitWriter:
-        """Return a writer that goes on from here on its own."""
+        """Return an independent writer that continues here."""
         other = BitWriter()
         other.data, other.bit = self.data.copy(), self.bit
         return other

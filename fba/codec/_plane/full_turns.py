@@ -21,7 +21,7 @@ _LARGEST = 2**31 - 1
 
 @cache
 def angle_slots() -> Bool:
-    """Return bool (SLOTS,): True for what turns a joint or the root of the body."""
+    """Return bool (SLOTS,): True for slots that turn a joint or the root of the body."""
     result = np.zeros(slots.SLOTS, dtype=np.bool_)
     result[slots.BAPS] = [bap.unit == "1e-5 rad" for bap in baps()]
     result.flags.writeable = False
@@ -29,7 +29,7 @@ def angle_slots() -> Bool:
 
 
 def follow(column: Int32, last: int) -> bool:
-    """Turn angles (T,) in place so that they go on from the angle `last`, each the short way.
+    """Unwrap angles (T,) in place, continuing from the angle `last`.
 
     Return whether that changed the first. An angle that would not fit 32 bits stays as it is.
     """

@@ -162,13 +162,7 @@ def read_part_header(data: UInt8, bit: int, end: int, part: Groups, header: Head
 
 
 @compiled
-def begin_models(
-    span: tuple[int, int],
-    scale: int,
-    limits: Int64,
-    high_level: Int64,
-    state: State,
-) -> None:
+def begin_models(span: tuple[int, int], scale: int, limits: Int64, high_level: Int64, state: State) -> None:
     """Set the ranges of the slots in a span to limits divided by scale, and all counts of their models to 1.
 
     limits: int64 (4, slots), magnitudes of I max, I min, P max, P min. high_level: limits of the slots before

@@ -248,24 +248,28 @@ def guard_plane(data: UInt8, before: int, start: int, stop: int) -> tuple[int, i
     return insert_start_code(data, start, stop), -1
 
 
+class PlaneValues(NamedTuple):
+    """What is decoded of a plane.
+
+    symbols, values: int64, symbols[k] and values[k] of slot layout.order[k]. flags: int64 (3,), viseme_def,
+    init_face, expression_def.
+    """
+
+    symbols: Int64
+    values: Int64
+    flags: Int64
+
+
 @compiled
 def decode_values(
-    data: UInt8,
-    bit: int,
-    end: int,
-    layout: Layout,
-    coding: Coding,
-    adaptive: bool,
-    symbols: Int64,
-    values: Int64,
-    flags: Int64,
+    data: UInt8, bit: int, end: int, layout: Layout, coding: Coding, adaptive: bool, plane: PlaneValues
 ) -> tuple[int, int]:
     """Decode the segments of one plane from `bit` on; return status, and the bit after them or of the damage.
 
-    adaptive: a P plane, else an I plane. Writes symbols[k] and values[k] for slot layout.order[k], and
-    flags[0:3] (viseme_def, init_face, expression_def); changes neither models nor last values.
-    OUT_OF_RANGE returns the slot instead of a bit. IndexError for arrays that are shorter than the layout.
+    adaptive: a P plane, else an I plane. Fills `plane`; changes neither models nor last values. OUT_OF_RANGE
+    returns the slot instead of a bit. IndexError for arrays that are shorter than the layout.
     """
+    symbols, values, flags = plane
     if len(values) < len(layout.order) or len(flags) < 3:
         raise IndexError("values beyond their array")
     flags[:] = 0
@@ -305,7 +309,8 @@ def decode_intra(
 ) -> tuple[int, int]:
     """Do the same as `decode_values` for an I plane."""
     symbols = np.zeros(len(layout.order), np.int64)
-    return decode_values(data, bit, end, layout, coding_of(state, False), False, symbols, values, flags)
+    plane = PlaneValues(symbols, values, flags)
+    return decode_values(data, bit, end, layout, coding_of(state, False), False, plane)
 
 
 @compiled
@@ -318,30 +323,55 @@ def _body_layout(layouts: Layouts) -> Layout:
     return Layout(layouts.order[layouts.face_slots :], segments)
 
 
+class PlaneRows(NamedTuple):
+    """Decoded P planes.
+
+    rows: int32 (T, C), values of all slots, then flags; 0 where a plane lacks the part. parts: uint8 (T,),
+    fba_object_mask. skips: int64 (T,). borders: int64 (T + 1,), the first bit of each, the last one's end.
+    """
+
+    rows: Int32
+    parts: UInt8
+    skips: Int64
+    borders: Int64
+
+
+@compiled
+def _read_header(data: UInt8, bit: int, end: int, available: int) -> tuple[int, int, int, int]:
+    """Read the header of a P plane; return status, fba_object_mask, frames to skip, and the bit after it.
+
+    available: the parts, added up, that planes can carry. Where the status is not OK, the bit is that of the
+    fault.
+    """
+    if bit + 3 > end:
+        return OUT_OF_DATA, 0, 0, end
+    if read_bit(data, bit):
+        return INTRA, 0, 0, bit
+    mask = 2 * read_bit(data, bit + 1) + read_bit(data, bit + 2)
+    if mask == 0:
+        return BAD_MASK, 0, 0, bit + 1
+    if mask & available != mask:
+        return MISSING_PART, mask, 0, bit
+    if bit + 4 > end:
+        return OUT_OF_DATA, mask, 0, end
+    if not read_bit(data, bit + 3):
+        return OK, mask, 0, bit + 4
+    status, skip, place = read_skip(data, bit + 4, end)
+    return status, mask, skip, place
+
+
 @compiled
 def decode_run(
-    data: UInt8,
-    bit: int,
-    end: int,
-    after_code: bool,
-    layouts: Layouts,
-    state: State,
-    rows: Int32,
-    parts: UInt8,
-    skips: Int64,
-    borders: Int64,
+    data: UInt8, bit: int, end: int, after_code: bool, layouts: Layouts, state: State, planes: PlaneRows
 ) -> tuple[int, int, int, int]:
-    """Decode P planes from `bit` on until something else comes; return (planes, status, carried, place).
+    """Decode P planes from `bit` on until something else comes; return (count, status, carried, place).
 
-    after_code: a start code ends at `bit`. Fills rows[t] (columns: slots of layouts.order, then the flags; 0
-    where a plane lacks the part), parts[t] (fba_object_mask), skips[t], borders[t] (first bit) and
-    borders[t + 1].
-
-    planes: how many were decoded. status: OK if rows are full, else why the run ended. carried: the parts,
-    added up, that planes carry. place: the bit, or slot, at which the next plane failed. A plane that fails
-    does not change models and `last`. IndexError for results that are shorter than rows, or rows that are
-    narrower than a plane.
+    after_code: a start code ends at `bit`. count: planes that were decoded. status: OK if all rows are full,
+    else why the run ended. carried: the parts, added up, that planes carry. place: the bit, or slot, at which
+    the next plane failed. A plane that fails does not change models and `last`. IndexError for results that
+    are shorter than rows, or rows that are narrower than a plane.
     """
+    rows, parts, skips, borders = planes
     if min(len(parts), len(skips), len(borders) - 1) < len(rows):
         raise IndexError("results of a run beyond their arrays")
     if not len(layouts.order) <= rows.shape[1] <= len(layouts.order) + 3:
@@ -351,9 +381,7 @@ def decode_run(
     face = Layout(layouts.order[: layouts.face_slots], layouts.segments[: layouts.face_segments])
     body = _body_layout(layouts)
     width = len(both.order)
-    symbols = np.zeros(width, np.int64)
-    values = np.zeros(width, np.int64)
-    flags = np.zeros(3, np.int64)
+    plane = PlaneValues(np.zeros(width, np.int64), np.zeros(width, np.int64), np.zeros(3, np.int64))
     count = 0
     carried = 0
     borders[0] = bit
@@ -361,17 +389,9 @@ def decode_run(
         code, _ = find_start_code(data, bit, end, after_code and count == 0)
         if code != NO_START_CODE:
             return count, OUT_OF_DATA if code == UNDECIDED else START_CODE, carried, bit
-        if bit + 3 > end:
-            return count, OUT_OF_DATA, carried, end
-        if read_bit(data, bit):
-            return count, INTRA, carried, bit
-        mask = 2 * read_bit(data, bit + 1) + read_bit(data, bit + 2)
-        if mask == 0:
-            return count, BAD_MASK, carried, bit + 1
-        if mask & layouts.available != mask:
-            return count, MISSING_PART, carried, bit
-        if bit + 4 > end:
-            return count, OUT_OF_DATA, carried, end
+        status, mask, skip, place = _read_header(data, bit, end, layouts.available)
+        if status != OK:
+            return count, status, carried, place
         layout = both
         first = 0
         if mask == slots.FACE_BIT:
@@ -379,24 +399,18 @@ def decode_run(
         elif mask == slots.BODY_BIT:
             layout = body
             first = layouts.face_slots
-        place = bit + 4
-        skip = 0
-        if read_bit(data, bit + 3):
-            status, skip, place = read_skip(data, place, end)
-            if status != OK:
-                return count, status, carried, place
-        status, place = decode_values(data, place, end, layout, coding, True, symbols, values, flags)
+        status, place = decode_values(data, place, end, layout, coding, True, plane)
         if status != OK:
             return count, status, carried, place
         order = layout.order
-        learn(order, symbols, coding.models)
+        learn(order, plane.symbols, coding.models)
         if len(order) < width:
             rows[count] = 0
         for position in range(len(order)):
-            coding.last[int(order[position])] = values[position]
-            rows[count, first + position] = values[position]
+            coding.last[int(order[position])] = plane.values[position]
+            rows[count, first + position] = plane.values[position]
         for flag in range(rows.shape[1] - width):
-            rows[count, width + flag] = flags[flag]
+            rows[count, width + flag] = plane.flags[flag]
         parts[count] = mask
         carried |= mask
         skips[count] = skip
@@ -435,13 +449,7 @@ def quantise_change(value: int, last: int, step: int) -> int:
 
 @compiled
 def encode_values(
-    data: UInt8,
-    bit: int,
-    layout: Layout,
-    coding: Coding,
-    adaptive: bool,
-    symbols: Int64,
-    flags: Int64,
+    data: UInt8, bit: int, layout: Layout, coding: Coding, adaptive: bool, symbols: Int64, flags: Int64
 ) -> int:
     """Encode the segments of one plane at `bit`; return the bit after them.
 
@@ -488,24 +496,15 @@ def room_for(skip: int, layout: Layout) -> int:
 
 
 @compiled
-def _write_plane(
-    data: UInt8,
-    bit: int,
-    object_mask: int,
-    skip: int,
-    layout: Layout,
-    coding: Coding,
-    symbols: Int64,
-    flags: Int64,
-) -> int:
-    """Write one P plane; return the bit after it."""
+def _write_header(data: UInt8, bit: int, object_mask: int, skip: int) -> int:
+    """Write the header of a P plane; return the bit after it."""
     header = 2 * object_mask + (1 if skip > 0 else 0)  # is_intra 0, fba_object_mask, skip_frames
     bit = _write_nibble(data, bit, header)
     while skip >= 0 and header & 1:
         word = min(skip, 15)
         bit = _write_nibble(data, bit, word)
         skip = skip - 15 if word == 15 else -1
-    return encode_values(data, bit, layout, coding, True, symbols, flags)
+    return bit
 
 
 @compiled
@@ -548,7 +547,8 @@ def encode_run(
         for flag in range(3):
             flags[flag] = rows[count, FIRST_FLAG + flag]
         start = bit
-        bit = _write_plane(data, start, object_mask, skip, layout, coding, symbols, flags)
+        bit = _write_header(data, start, object_mask, skip)
+        bit = encode_values(data, bit, layout, coding, True, symbols, flags)
         if before == AFTER_CODE:
             before = -1
         else:
@@ -583,7 +583,8 @@ def measure_plane(
     symbols = np.zeros(len(levels), np.int64)
     for position in range(len(levels)):
         symbols[position] = levels[position] - coding.minimum[int(layout.order[position])]
-    after = _write_plane(data, bit, object_mask, skip, layout, coding, symbols, flags)
+    after = _write_header(data, bit, object_mask, skip)
+    after = encode_values(data, after, layout, coding, True, symbols, flags)
     if before != AFTER_CODE:
         after, before = guard_plane(data, before, bit, after)
     return after

@@ -70,10 +70,10 @@ def choose_levels(layout: Layout, state: State, row: Int32, weights: Float64, pr
 
 @compiled
 def _choose_level(coding: Coding, slot: int, value: int, weight: float, price: float) -> int:
-    """Return the level of one slot: the nearest one, or one on the way to it that takes fewer bits.
+    """Return the level of a slot: the nearest, or a level on the way to it that takes fewer bits.
 
-    What is still stays still, and nothing goes too far or back, even where that would take fewer bits: it
-    would be seen to tremble.
+    A still value stays still, and no value overshoots or moves back, even where that would take fewer bits:
+    it would be seen to tremble.
     """
     low = int(coding.minimum[slot])
     high = low + int(coding.models.size[slot]) - 1

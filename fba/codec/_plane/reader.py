@@ -1,4 +1,4 @@
-"""Read planes, one I plane or a run of P planes at a time: the counterpart of `writer`."""
+"""Reader of planes, an I plane or a run of P planes at a time: the counterpart of `writer`."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, TimeCode
 from fba.errors import BitstreamError, UnsupportedError
 
 _RUN = 512
-"""Most planes that one call of the compiled loop decodes."""
+"""Largest number of planes that a call of the compiled loop decodes."""
 _PARTS = ((slots.FACE_BIT, "FAPs"), (slots.BODY_BIT, "BAPs"))
 
 
 @dataclass(frozen=True)
 class Planes:
-    """An I plane, or P planes behind one; see `fba.codec.Block` for rows, columns, parts and settings.
+    """An I plane, or P planes after it; see `fba.codec.Block` for rows, columns, parts and settings.
 
     borders: int64 (T + 1,), first bit of each plane, and the bit after the last. skips: int64 (T,). doubtful:
     they depend on ranges that may have been replaced in a lost plane. complete: False if it is known that the
@@ -82,7 +82,7 @@ class _BegunIntra:
 
     @classmethod
     def read(cls, reader: BitReader, start: int) -> _BegunIntra:
-        """Read what comes before the parts; the plane begins at `start`."""
+        """Read the header before the parts; the plane begins at `start`."""
         mask = _read_object_mask(reader)
         frame_rate = _read_frame_rate(reader)
         time_code = syntax.read_time_code(reader) if reader.read(1) else None
@@ -91,7 +91,7 @@ class _BegunIntra:
 
 
 class PlaneReader:
-    """Reads the planes of an FBA object, and holds the state from one plane to the next.
+    """Reads the planes of an FBA object, and keeps the state between them.
 
     Bits in errors count from the start of the data that was passed in.
     """
@@ -143,7 +143,7 @@ class PlaneReader:
         return self._read_predicted(data, bit, end, after_code)
 
     def _read_intra(self, reader: BitReader, after_code: bool) -> Planes:
-        """Read an I plane, whose first bit has been read; one that was incomplete, from where that ended."""
+        """Read an I plane, whose first bit has been read; an incomplete plane from where it ended."""
         start = reader.bit - 1
         if self._begun is None:
             self._begun = _BegunIntra.read(reader, start)
@@ -226,10 +226,10 @@ class PlaneReader:
         if self._run is None:
             self._run = _Run.prepare(self._settings)
         run = self._run
+        planes = loops.PlaneRows(run.rows, self._parts, self._skips, self._borders)
         count, status, carried, place = loops.decode_run(
-            data, bit, end, after_code, run.layouts, self._models.state,
-            run.rows, self._parts, self._skips, self._borders,
-        )  # fmt: skip
+            data, bit, end, after_code, run.layouts, self._models.state, planes
+        )
         if count == 0:
             if status == loops.MISSING_PART:
                 mask = BitReader(data, bit + 1, end).read(2)

@@ -57,7 +57,7 @@ def part_of(slot: int) -> int:
 
 
 def label(slot: int) -> str:
-    """Return the standard's name of what a slot carries."""
+    """Return the standard's name of a slot."""
     if slot < VISEME.stop:
         return f"FAP 1 {VISEME_FIELDS[slot]}"
     if slot < EXPRESSION.stop:

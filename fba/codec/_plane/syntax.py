@@ -22,12 +22,7 @@ from fba.arrays import Bool
 from fba.codec._plane import header_loops, slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, BitWriter, OutOfDataError
-from fba.codec._plane.header_loops import (
-    MARKER_EVERY,
-    MASK_INTERPOLATE,
-    MASK_KEEP,
-    RANGE_BITS,
-)
+from fba.codec._plane.header_loops import MARKER_EVERY, MASK_INTERPOLATE, MASK_KEEP, RANGE_BITS
 from fba.codec._plane.loops import STATUS_TEXT
 from fba.codec._plane.loops import read_skip as read_skip_words
 from fba.codec.settings import FrameRate, PartSettings, RangeLists, TimeCode
@@ -36,7 +31,7 @@ from fba.parameters import bap_groups, fap_groups
 
 START_CODE_PREFIX = b"\x00\x00\x01"
 OBJECT_CODES = (0xBA, 0x01)
-"""Last bytes of fba_object_start_code: the standard's, and one of old tools, which is only read."""
+"""Last bytes of fba_object_start_code: the standard's, and that of old tools, which is only read."""
 PLANE_CODES = (0xBB, 0x03)
 """Last bytes of fba_object_plane_start_code: likewise."""
 END_CODE = 0xB1

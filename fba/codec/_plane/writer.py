@@ -76,7 +76,7 @@ class PlaneWriter:
         self._write_aligned_code(syntax.END_CODE)
 
     def ending(self) -> bytes:
-        """Return what would end the object behind the bytes taken so far; it goes on as if not asked."""
+        """Return the bytes that would end the object after those taken so far; the state does not change."""
         writer, before, count = self._writer, self._before, self.taken
         self._writer = writer.copy()
         self.end_object()
@@ -177,14 +177,7 @@ class PlaneWriter:
         done = 0
         while done < len(rows):
             count, status, writer.bit, slot, self._before = loops.encode_run(
-                writer.data,
-                writer.bit,
-                self._before,
-                mask,
-                layout,
-                models.state,
-                rows[done:],
-                skips[done:],
+                writer.data, writer.bit, self._before, mask, layout, models.state, rows[done:], skips[done:]
             )
             done += count
             self.planes += count
@@ -196,7 +189,7 @@ class PlaneWriter:
                 writer.reserve(max(need, 8 * len(writer.data)))
 
     def layout(self, mask: int) -> Layout:
-        """Return what P planes with this fba_object_mask code, by the settings in force."""
+        """Return the slots that P planes with this fba_object_mask code, by the settings in force."""
         if mask not in self._layouts:
             face = self._settings[slots.FACE_BIT].mask if mask & slots.FACE_BIT else None
             body = self._settings[slots.BODY_BIT].mask if mask & slots.BODY_BIT else None
@@ -204,7 +197,7 @@ class PlaneWriter:
         return self._layouts[mask]
 
     def bits_of(self, mask: int, levels: Int64, flags: Int64, skip: int) -> int:
-        """Return the bits that a P plane takes next, with what must stand before it; nothing is written.
+        """Return the bits of the next P plane, with those that must precede it; nothing is written.
 
         levels: of the differences of what `layout` lists, within their ranges. flags: viseme_def, init_face,
         expression_def.

@@ -38,7 +38,7 @@ class Buffer:
         return count >= _SMALLEST and 2 * count >= self.length
 
     def drop(self, count: int) -> int:
-        """Drop `count` bytes at the front, or none (see `can_drop`); return how many."""
+        """Drop `count` bytes at the front, or none (see `can_drop`); return the number dropped."""
         if not self.can_drop(count):
             return 0
         rest = self.data[count : self.length]

@@ -11,9 +11,9 @@ from fba.arrays import Int64
 from fba.codec.settings import FrameRate, TimeCode
 
 _BELIEVED_JUMP = 60
-"""Seconds of frames that may be lost without a trace of damage, but for the time code that tells."""
+"""Longest jump of a time code, seconds, that is taken for lost frames without other damage."""
 _REPEATED_RATES = 2
-"""I planes that repeat the rate, behind which another rate in a single one is taken for damage."""
+"""Number of I planes with the same rate after which a different rate in a single I plane is damage."""
 DEFAULT_RATE = Fraction(25)
 """Frames per second, assumed with a warning if the first I plane states no rate."""
 
@@ -21,7 +21,7 @@ DEFAULT_RATE = Fraction(25)
 class StreamClock:
     """Computes the times of planes: `index`, `rate` and exact `time` of the next one.
 
-    A plane follows the one before it after one frame period, and as many more as that one skips. A time code
+    A plane follows the plane before it after one frame period, and the periods that it skips. A time code
     sets the clock; between two frames, the index is that of the nearer one. A code that names the very frame
     that comes next anyway leaves the clock alone: codes are whole seconds, and at a rate such as 30000/1001
     hardly a frame lies on one.
@@ -31,7 +31,7 @@ class StreamClock:
         self.index = 0
         self.rate: Fraction | None = None
         self.jump: int | None = None
-        """Frames by which the last I plane's time code goes beyond the count of planes; None without one."""
+        """Frames by which the last I plane's time code exceeds the count of planes; None without one."""
         self.refused = ""
         """Which rate or time code of the last I plane was not believed."""
         self.agreements = 0
@@ -116,7 +116,7 @@ class StreamClock:
         return self._is_confirmed(index) or index > self._coded_index or undone
 
     def _goes_too_far(self, index: int, rate: Fraction) -> bool:
-        """Whether a time code goes ahead as no other did before."""
+        """Whether a time code jumps ahead for the first time."""
         far = self.agreements > 0 and index - self.index > _BELIEVED_JUMP * rate
         return not self._is_confirmed(index) and far
 

@@ -18,7 +18,7 @@ DOUBTFUL = 8
 class Damage:
     """Damage that a salvaging decoder skipped.
 
-    error: what was wrong. start, stop: bytes of the stream that were lost, from the first byte of the damaged
+    error: its text. start, stop: lost bytes of the stream, from the first byte of the damaged
     plane to where decoding continued (or the end). If decoding continues at a start code in an earlier plane,
     which had been returned already, start equals stop; as it does where a time code or a missing end code
     alone shows that something is missing.
@@ -52,7 +52,7 @@ class Damage:
         }
 
     def __str__(self) -> str:
-        """Return it in one line: what was lost, the error, how many frames, and which planes are in doubt."""
+        """Return a line of text: lost bytes, error, number of lost frames, and doubtful planes."""
         text = [f"bytes {self.start}..{self.stop} were lost: {self.error}"]
         if self.start == self.stop:
             text = [str(self.error)]
@@ -81,7 +81,7 @@ class DamageLog:
 
     @property
     def first_doubtful_bit(self) -> int | None:
-        """Where the first of the planes begins that would be in doubt if damage was found now."""
+        """Start of the first plane that would be doubtful if there were damage here."""
         return self._recent[0] if self._recent else None
 
     def add_planes(self, borders: Int64, skips: Int64) -> None:

@@ -56,10 +56,10 @@ class Mark:
 
 @dataclass(frozen=True)
 class MarkContent:
-    """What a mark says.
+    """The content of a mark.
 
-    table: of BAP steps; None if it names none. checks: those of the I periods, four bytes each; None if it
-    has none, or none that can be relied on. problem: what is wrong with it; "" if nothing is.
+    table: of BAP steps, or None. checks: of the I periods, four bytes each; None without any that are
+    reliable. problem: a fault of the mark, or "".
     """
 
     table: str | None = None
@@ -70,7 +70,7 @@ class MarkContent:
 def write_mark(table: str | None, checks: bytes | None = None) -> bytes:
     """Return the mark to be put behind a stream.
 
-    table: of BAP steps; None to name none. checks: those of its I periods, four bytes each; None for no list.
+    table: of BAP steps, or None. checks: of its I periods, four bytes each, or None.
     Raises ValueError for an unknown table.
     """
     if table is not None and table not in BAP_STEP_TABLES:
@@ -83,7 +83,7 @@ def write_mark(table: str | None, checks: bytes | None = None) -> bytes:
 
 
 def write_opening(table: str) -> bytes:
-    """Return what goes before an object to name its table to who reads it while it comes: 35 or 32 bytes.
+    """Return the bytes before an object that name its table to live readers: 35 or 32.
 
     The headers of a visual object sequence and of a visual object, with user data between them (ISO/IEC
     14496-2, 6.2.2). Raises ValueError for an unknown table.
@@ -92,7 +92,7 @@ def write_opening(table: str) -> bytes:
 
 
 def bytes_needed(content: bytes, most: int) -> int:
-    """Return how many bytes behind a start code of user data a mark takes, given what there is of it.
+    """Return the number of bytes of a mark after the start code of user data, given its beginning.
 
     most: I periods of the object at most; a list that claims more is not waited for.
     """
@@ -103,9 +103,9 @@ def bytes_needed(content: bytes, most: int) -> int:
 
 
 def read_mark(content: bytes) -> MarkContent | None:
-    """Return what user data say, given what follows their start code; None if they are no mark.
+    """Return the mark in user data, given the bytes after their start code; None if they are not a mark.
 
-    Gives an FbaWarning where a mark names a table that is not known here.
+    Gives an FbaWarning for a mark with an unknown table.
     """
     head = content[:MAX_MARK_BYTES].partition(_PREFIX)[0]
     if not (_NAME.startswith(head[: len(_NAME)]) or _SIMILAR.search(head)):
@@ -154,7 +154,7 @@ def _words(content: bytes) -> tuple[str | None, int, int | None]:
 
 
 def find_marks(data: bytes | bytearray | memoryview) -> tuple[Mark, ...]:
-    """Return the marks behind the objects of a complete stream, or of several one after another."""
+    """Return the marks after the objects of a complete stream, or of several joined."""
     content = bytes(data)
     marks: list[Mark] = []
     position, begin = 0, 0

@@ -1,4 +1,4 @@
-"""Where the objects of a stream begin and end, what stands around them, and what their marks say."""
+"""The borders of a stream's objects, the bytes around them, and their marks."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class ObjectBorders:
 
     @property
     def size(self) -> int:
-        """Bytes of the last object, with what ended it."""
+        """Number of bytes of the last object, with the code that ended it."""
         return max(self.end - self.begin, 0)
 
     def begin_object(self, byte: int) -> None:
@@ -61,7 +61,7 @@ class ObjectBorders:
         self._in_headers = False
 
     def end_object(self, code: int, byte: int) -> str:
-        """End the object at a start code. byte: of the stream, behind it. Returns what is wrong, or ""."""
+        """End the object at a start code; return a fault, or "". byte: of the stream, after the code."""
         self.end_code = code
         self.end = byte
         self._in_user_data = False
@@ -105,7 +105,7 @@ class ObjectBorders:
         return [f"the headers before the object name the BAP steps {self._before!r}, and then {table!r}"]
 
     def _difference(self, where: str) -> str:
-        """Return that planes with BAPs were decoded with other steps than the mark says; "" if not."""
+        """Return the fault that planes with BAPs were decoded with other steps than the mark's, or ""."""
         if self.mark in (None, self.table) or not self.has_body:
             return ""
         return (

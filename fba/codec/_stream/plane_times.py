@@ -20,8 +20,8 @@ MAX_CYCLE = 2
 class PlaneTimes:
     """Gives planes their times.
 
-    log: of the damage; None if the first damage is an error. A log also gets what the times tell: how many
-    frames were lost, and time codes and frame rates that contradict the planes before them.
+    log: of the damage; None if the first damage is an error. A log also gets the findings of the times: how
+    many frames were lost, and time codes and frame rates that contradict the planes before them.
 
     may_step_back: whether frames may have lower indices than misread ones before. If not, frames that a time
     code puts before the last one follow it at once.
@@ -104,7 +104,7 @@ class PlaneTimes:
 
 
 def _describe_jump(settings: PlaneSettings, jump: int) -> str:
-    """Return what a time code says that contradicts the count of planes, with which codes agreed before."""
+    """Return the text for a time code that contradicts the count of planes, unlike the codes before."""
     frames = f"{abs(jump)} frame{'s' if abs(jump) != 1 else ''}"
     found = (
         f"{frames} are missing before this plane" if jump > 0 else f"the planes before it are {frames} late"
@@ -140,7 +140,7 @@ class RestartPoints:
         self._intervals.clear()
 
     def nearest(self, index: int) -> int | None:
-        """Return the expected restart point, behind the last one, nearest to an index; None if irregular."""
+        """Return the expected restart point after the last, nearest to an index; None if irregular."""
         upcoming = self._upcoming(index)
         return min(upcoming, key=lambda point: abs(point - index)) if upcoming else None
 

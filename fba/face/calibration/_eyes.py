@@ -65,8 +65,7 @@ class FittedEye:
 
 def fit_eye(
     eye: Eyeball,
-    skin: Float64,
-    fitted: Float64,
+    skin: tuple[Float64, Float64],
     pupil: tuple[Float64, Float64],
     *,
     size: float,
@@ -76,7 +75,7 @@ def fit_eye(
 ) -> FittedEye:
     """Return the eyeball that fits under the fitted lids as the old one does under the old lids.
 
-    skin, fitted: (V, 3) vertices before and after. pupil: its point before and after. size: of the fitted
+    skin: (V, 3) vertices before and after. pupil: its point before and after. size: of the fitted
     face around the eye relative to the old one. pupil_given: keep the pupil exactly in place, with the
     centre straight behind it. iris: its diameter before and after, metres. given: (K, 3) points of the lids
     before, and their targets; if these are inside the eyeball it is set back, and an FbaWarning says how
@@ -84,9 +83,9 @@ def fit_eye(
     """
     from scipy.optimize import least_squares
 
-    distance = np.linalg.norm(skin - eye.centre, axis=1)
+    distance = np.linalg.norm(skin[0] - eye.centre, axis=1)
     lids = distance < LID_RADII * eye.radius
-    clearance, lid_vertices = distance[lids] / eye.radius, fitted[lids]
+    clearance, lid_vertices = distance[lids] / eye.radius, skin[1][lids]
     depth = float(np.linalg.norm(pupil[0] - eye.centre)) / eye.radius
     front = pupil[1]
 

@@ -80,8 +80,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
         around = float(fit_size(model.part(eye.part).vertices, vertices[eye.part]).scale)
         eyes[side] = fit_eye(
             eye,
-            joined,
-            moved,
+            (joined, moved),
             (pupil, wanted),
             size=around,
             pupil_given=bool(given[row[PUPIL_POINT[side]]]),

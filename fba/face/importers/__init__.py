@@ -5,11 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fba.errors import ModelError, OptionError
 from fba.face.importers._sniffing import KINDS, sniff
 from fba.face.model import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
+
+if TYPE_CHECKING:
+    from fba.face.importers.assembly.model import ImportOptions
 
 __all__ = ["KINDS", "import_model", "sniff"]
 
@@ -43,35 +47,24 @@ def import_model(
     if form not in KINDS:
         raise OptionError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
     try:
-        return _import(form, path, points=points, unit=unit, up=up, kinds=kinds, name=name, limits=limits)
+        if form == "makehuman":
+            from fba.face.importers.makehuman.makehuman import import_makehuman
+
+            turned = None if up == "y" else up
+            _refuse_options("MakeHuman's base mesh", points=points, unit=unit, kinds=kinds, up=turned)
+            return import_makehuman(path, name=name or "MakeHuman")
+        from fba.face.importers.assembly.model import ImportOptions
+
+        options = ImportOptions(path, name or Path(path).stem or "face", unit, up, kinds, limits)
+        return _import(form, options, points)
     except ModelError as error:
         if Path(path).name in error.finding:
             raise
         raise ModelError(f"{os.fspath(path)}: {error.finding}").with_remedies(*error.remedies) from error
 
 
-def _import(
-    form: str,
-    path: str | os.PathLike[str],
-    *,
-    points: object,
-    unit: float | None,
-    up: str,
-    kinds: Mapping[str, str] | None,
-    name: str | None,
-    limits: Limits,
-) -> FaceModel:
-    """Return the face of a file of a known kind; arguments as of `import_model`."""
-    if form == "makehuman":
-        from fba.face.importers.makehuman.makehuman import import_makehuman
-
-        _refuse_options(
-            "MakeHuman's base mesh", points=points, unit=unit, kinds=kinds, up=None if up == "y" else up
-        )
-        return import_makehuman(path, name=name or "MakeHuman")
-    from fba.face.importers.assembly.model import ImportOptions
-
-    options = ImportOptions(path, name or Path(path).stem or "face", unit, up, kinds, limits)
+def _import(form: str, options: ImportOptions, points: object) -> FaceModel:
+    """Return the face of a file of a known kind."""
     if form == "fdp":
         from fba.face.importers._fdp import import_fdp
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
@@ -16,14 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture import SkeletonMotion
 from fba.capture.skeleton import MAX_FRAMES, check_memory
 from fba.errors import FbaWarning, FormatError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
-from fba.source import naming_file, read_whole
+from fba.source import read_whole
 
 MAX_JOINTS = 4096
 MAX_RATE = 10_000
@@ -66,33 +64,6 @@ class _Hierarchy:
 def sniff(head: bytes, suffix: str) -> bool:
     """Whether the first bytes of a file look like BVH."""
     return re.match(rb"(?:\xef\xbb\xbf)?\s*HIERARCHY\s+ROOT\b", head, re.IGNORECASE) is not None
-
-
-def read(
-    path: str | Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    scale: float | None = None,
-    origin: str = "source",
-    ground: str = "floor",
-    plant: bool = True,
-    spine: str | int = "spread",
-    joints: Mapping[str, str] | None = None,
-    rest: str | int = "auto",
-    up: str = "auto",
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return the motion of a BVH file as BAPs; see `fba.capture.from_skeleton` for the options.
-
-    Raises FormatError for anything that is not BVH or whose skeleton is not a body, LimitError for more than
-    the limits allow; warns (FbaWarning) of irregularities.
-    """
-    motion = read_motion(path, limits=limits)
-    with naming_file(path):
-        return from_skeleton(
-            motion, rate, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine,
-            rest=rest, up=up, limits=limits,
-        )  # fmt: skip
 
 
 def read_motion(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> SkeletonMotion:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import warnings
 from fractions import Fraction
-from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -18,7 +17,6 @@ from fba.capture import MarkerMotion
 from fba.capture.markers.motion import MAX_MARKERS, METRES, regular_times
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.c3d._parameters import BLOCK, KEY, Parameters, read_parameters
-from fba.formats.markers._encoding import read_face
 from fba.formats.markers._names import unique_names, without_subject
 from fba.formats.markers._options import file_rate
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -37,7 +35,9 @@ def sniff(head: bytes, suffix: str) -> bool:
     return len(head) >= 24 and head[1] == KEY and 1 < head[0] < 128
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
+def read_markers(
+    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
     """Return the markers of a C3D file, without what programs computed from them (angles, forces).
 
     fps: the rate of a file that has none.
@@ -163,7 +163,3 @@ def _up(parameters: Parameters) -> str:
     stored = parameters.texts.get("POINT:Y_SCREEN", ("",))
     text = stored[0].lower() if stored else ""
     return text if len(text) == 2 and text[0] in "+-" and text[1] in "xyz" else ""
-
-
-read = partial(read_face, read_markers)
-"""Returns the FAPs of the face in a file; the options are those of `read_face`."""

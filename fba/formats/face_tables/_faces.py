@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int64
-from fba.capture import ActionUnitMotion, from_action_units
 from fba.capture.sampling import find_gaps, find_rate
-from fba.errors import FbaWarning, FormatError, ModelError, Remedy
+from fba.errors import FormatError, ModelError, Remedy
 from fba.formats.face_tables._tables import Table, named
 from fba.formats.face_tables._times import check_order
-from fba.limits import Limits
-from fba.source import Path, naming_file
 
 CONFIDENT = 0.5
 """Confidence below which numbers of a row mean nothing."""
@@ -33,19 +28,6 @@ PICTURES = 500
 """Rows a second above which a column does not hold times."""
 UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """From axes of a camera (x right, y down, z away) to those of a face that looks into it (left, up, ahead)."""
-
-
-def to_animation(
-    motion: ActionUnitMotion, rate: Fraction | int | str | None, path: Path, limits: Limits
-) -> Animation:
-    """Return the FAPs of tracked action units. Warns (FbaWarning) of what its reader found.
-
-    Raises FormatError where it cannot be made.
-    """
-    for finding in motion.findings:
-        warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=4)
-    with naming_file(path):
-        return from_action_units(motion, rate, limits=limits)
 
 
 def choose_rows(table: Table, ids: Sequence[str], face: str | None) -> Int64:

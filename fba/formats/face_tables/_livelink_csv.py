@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import ShapeMotion
 from fba.capture.blendshapes.shape_table import key_of
@@ -28,7 +27,6 @@ from fba.formats.face_tables._shape_rows import (
     find_lacks,
     find_swap,
     shape_of,
-    to_animation,
 )
 from fba.formats.face_tables._tables import Table, header_names, named, read_table
 from fba.formats.face_tables._times import check_order, seconds_of
@@ -56,23 +54,6 @@ def sniff(head: bytes, suffix: str) -> bool:
     if head[:1] in b"{[\x06" or b"\0" in head[:64]:
         return False
     return _are_enough(header_names(head))
-
-
-def read(
-    path: Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
-    swap: str = "auto",
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return a captured face as FAPs, at `rate` or at the rate of the table's own times.
-
-    The options are those of `read_face`, and `fba.capture.from_blendshapes` says how it is done. Warns
-    (FbaWarning) of what was repaired. Raises FormatError, LimitError, OptionError.
-    """
-    motion = read_face(path, fps=fps, swap=swap, limits=limits)
-    return to_animation(motion, rate, path, limits, warn=4)
 
 
 def read_face(

@@ -14,7 +14,6 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba import rotations
-from fba.animation import Animation
 from fba.arrays import Float64, Int64
 from fba.capture import ActionUnitMotion
 from fba.errors import FormatError
@@ -23,7 +22,6 @@ from fba.formats.face_tables._faces import (
     eye_angles,
     find_missing,
     head_angles,
-    to_animation,
     tracked_rows,
 )
 from fba.formats.face_tables._tables import Table, header_names, read_table
@@ -45,22 +43,6 @@ ANGLES = ("gaze_angle_x", "gaze_angle_y")
 def sniff(head: bytes, suffix: str) -> bool:
     """Whether the first line of a file names action units as OpenFace does."""
     return any(INTENSITY.fullmatch(name) or PRESENCE.fullmatch(name) for name in header_names(head))
-
-
-def read(
-    path: Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
-    face: str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return a tracked face as FAPs, at `rate` or at the rate of its own times.
-
-    The options are those of `read_face`, and `fba.capture.from_action_units` says how it is done. Warns
-    (FbaWarning) of what is odd. Raises FormatError, LimitError.
-    """
-    return to_animation(read_face(path, fps=fps, face=face, limits=limits), rate, path, limits)
 
 
 def read_face(

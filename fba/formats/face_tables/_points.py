@@ -1,21 +1,17 @@
-"""What readers of tracked points share: what the numbers are, and what becomes of them."""
+"""What readers of tracked points share: what the numbers are."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture import PointMotion, from_points
-from fba.errors import FbaWarning, FormatError, ModelError
-from fba.limits import Limits
-from fba.source import Path, naming_file
+from fba.capture import PointMotion
+from fba.errors import FormatError, ModelError
+from fba.source import Path
 
-Neutral = str | int | tuple[float, float]
 FLATTEST = 0.08
 """Least ratio of a face's depth to its width, or the other way round, whatever the shape of the picture."""
 SHARES = 2.0
@@ -68,25 +64,3 @@ def _is_deep(positions: Float64) -> bool:
         return True
     across, up, deep = np.median(seen.std(axis=1), axis=0).tolist()
     return bool(FLATTEST < deep / max(across, up, 1e-300) < 1 / FLATTEST)
-
-
-def points_to_animation(
-    motion: PointMotion,
-    rate: Fraction | int | str | None,
-    path: Path,
-    limits: Limits,
-    *,
-    markers: Mapping[str, str] | None,
-    neutral: Neutral,
-    gaze: str,
-    head_path: bool,
-    aspect: float | None,
-) -> Animation:
-    """Return the FAPs of tracked points. Warns (FbaWarning) of what the reader found. Raises FormatError."""
-    for finding in motion.findings:
-        warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=4)
-    with naming_file(path):
-        return from_points(
-            motion, rate, markers=markers, neutral=neutral, gaze=gaze, head_path=head_path, aspect=aspect,
-            limits=limits,
-        )  # fmt: skip

@@ -19,13 +19,12 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Float64, Int64
 from fba.capture import ActionUnitMotion, PointMotion, ShapeMotion
 from fba.capture.points import find_point_face
 from fba.errors import FbaWarning, ModelError
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW
-from fba.formats.face_tables import _faces, _shape_rows
+from fba.formats.face_tables import _shape_rows
 from fba.formats.face_tables._faces import choose_rows, find_missing, row_times
 from fba.formats.face_tables._tables import Table, header_names, read_table
 from fba.formats.face_tables._unit_rows import UnitLayout, UnitRows, number_columns, read_unit_rows
@@ -58,24 +57,6 @@ def sniff(head: bytes, suffix: str) -> bool:
         return False
     shown = (UNIT.fullmatch(name) is not None or shape_of(name) is not None for name in names)
     return sum(shown) >= MIN_UNITS
-
-
-def read(
-    path: Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
-    face: str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return a tracked face as FAPs, at `rate` or at the rate of the film.
-
-    The options are those of `read_face`. Warns (FbaWarning) of what is odd. Raises FormatError, LimitError.
-    """
-    motion = read_face(path, fps=fps, face=face, limits=limits)
-    if isinstance(motion, ShapeMotion):
-        return _shape_rows.to_animation(motion, rate, path, limits, warn=4)
-    return _faces.to_animation(motion, rate, path, limits)
 
 
 def read_face(

@@ -1,4 +1,4 @@
-"""What readers of blendshapes share: names of shapes, labels of left and right, and the way to FAPs."""
+"""What readers of blendshapes share: names of shapes, and labels of left and right."""
 
 from __future__ import annotations
 
@@ -8,18 +8,15 @@ from fractions import Fraction
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.capture import ShapeMotion, from_blendshapes
+from fba.capture import ShapeMotion
 from fba.capture.sampling import find_gaps
-from fba.errors import FbaWarning, OptionError
+from fba.errors import OptionError
 from fba.face.shape_names import arkit_names
 from fba.formats.face_tables._tables import named
 from fba.formats.face_tables.shape_weights import check_weights, shape_of
-from fba.limits import Limits
-from fba.source import Path, naming_file
 
-__all__ = ["check_weights", "find_lacks", "find_swap", "shape_of", "to_animation"]
+__all__ = ["check_weights", "find_lacks", "find_swap", "shape_of"]
 
 SWAPS = ("auto", "yes", "no")
 SWAPPED = (("mouthLeft", "mouthRight"), ("jawLeft", "jawRight"))
@@ -30,21 +27,6 @@ MOST_GAPS = 3
 """Gaps that a warning names."""
 MOVES = 0.01
 """Standard deviation above which a difference of weights is evidence."""
-
-
-def to_animation(
-    motion: ShapeMotion, rate: Fraction | int | str | None, path: Path, limits: Limits, warn: int = 3
-) -> Animation:
-    """Return the FAPs of a captured face. Warns (FbaWarning) of what its reader found.
-
-    Raises FormatError where it cannot be made. warn: callers between the user and here.
-    """
-    import warnings
-
-    for finding in motion.findings:
-        warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=warn)
-    with naming_file(path):
-        return from_blendshapes(motion, rate, limits=limits)
 
 
 def find_lacks(names: Sequence[str], weights: Float64, times: Float64, rate: Fraction) -> list[str]:

@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import ShapeMotion
 from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_rate
 from fba.errors import FormatError, ModelError, Remedy
 from fba.face.shape_names import arkit_names
-from fba.formats.face_tables._shape_rows import check_weights, find_lacks, shape_of, to_animation
+from fba.formats.face_tables._shape_rows import check_weights, find_lacks, shape_of
 from fba.formats.face_tables._tables import named
 from fba.formats.face_tables._times import seconds_of
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -51,21 +50,6 @@ def sniff(head: bytes, suffix: str) -> bool:
         return False
     small = head.lower()
     return any(f'"{name.lower()}"'.encode() in small for name in arkit_names())
-
-
-def read(
-    path: Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return a captured face as FAPs, at `rate` or at the rate of the frames' own times.
-
-    fps: frames in a second, for files without times. Warns (FbaWarning) of what is odd. Raises FormatError,
-    LimitError.
-    """
-    return to_animation(read_face(path, fps=fps, limits=limits), rate, path, limits, warn=4)
 
 
 def read_face(

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from fba.animation import Animation
 from fba.capture import PointMotion
 from fba.formats.face_tables import _points_arrays as points_arrays
 from fba.formats.face_tables import _points_csv as points_csv
 from fba.formats.face_tables import _points_json as points_json
-from fba.formats.face_tables._points import Neutral, points_to_animation
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_head
 
@@ -19,31 +17,6 @@ READERS = (points_arrays, points_json, points_csv)
 def sniff(head: bytes, suffix: str) -> bool:
     """Whether a file that begins like this holds points of a face."""
     return any(reader.sniff(head, suffix) for reader in READERS)
-
-
-def read(
-    path: Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
-    face: str | None = None,
-    markers: dict[str, str] | None = None,
-    neutral: Neutral = "auto",
-    gaze: str = "none",
-    head_path: bool = True,
-    aspect: float | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return a tracked face as FAPs, at `rate` or at the rate of its own times.
-
-    fps, face: as for `read_points`; the others: as for `fba.capture.points.from_points`. Warns (FbaWarning)
-    of what is odd. Raises FormatError, LimitError.
-    """
-    motion = read_points(path, fps=fps, face=face, limits=limits)
-    return points_to_animation(
-        motion, rate, path, limits, markers=markers, neutral=neutral, gaze=gaze, head_path=head_path,
-        aspect=aspect,
-    )  # fmt: skip
 
 
 def read_points(

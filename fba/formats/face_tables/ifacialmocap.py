@@ -13,11 +13,10 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import ShapeMotion
 from fba.errors import FormatError
-from fba.formats.face_tables._shape_rows import find_lacks, shape_of, to_animation
+from fba.formats.face_tables._shape_rows import find_lacks, shape_of
 from fba.formats.face_tables._tables import named
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_whole
@@ -42,20 +41,6 @@ def sniff(head: bytes, suffix: str) -> bool:
     words = head[:4000].decode("utf-8", errors="replace").split("|")
     found = [PAIR.fullmatch(word.strip().lstrip("=")) for word in words]
     return sum(pair is not None and shape_of(pair[1]) is not None for pair in found) >= MIN_SHAPES
-
-
-def read(
-    path: Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return a captured face as FAPs, at `rate` or at the rate of the records.
-
-    fps: records in a second. Warns (FbaWarning) of what is odd. Raises FormatError, LimitError.
-    """
-    return to_animation(read_face(path, fps=fps, limits=limits), rate, path, limits, warn=4)
 
 
 def read_face(

@@ -14,12 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fba.animation import Animation
 from fba.arrays import Float64, Int64, to_float64
 from fba.capture import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import FormatError, Remedy, UnsupportedError
-from fba.formats.face_tables._shape_rows import check_weights, find_lacks, find_swap, to_animation
+from fba.formats.face_tables._shape_rows import check_weights, find_lacks, find_swap
 from fba.formats.face_tables._tables import named
 from fba.formats.time_codes import DAY, NOON
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -50,22 +49,6 @@ class Packet(NamedTuple):
 def sniff(head: bytes, suffix: str) -> bool:
     """Whether a file begins with a datagram of Live Link Face, of any version."""
     return _version_of(head) != ""
-
-
-def read(
-    path: Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    swap: str = "auto",
-    face: str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return a captured face as FAPs, at `rate` or at the rate that the datagrams name.
-
-    The options are those of `read_face`, and `fba.capture.from_blendshapes` says how it is done. Warns
-    (FbaWarning) of what was repaired. Raises FormatError, UnsupportedError, LimitError, OptionError.
-    """
-    return to_animation(read_face(path, swap=swap, face=face, limits=limits), rate, path, limits, warn=4)
 
 
 def read_face(

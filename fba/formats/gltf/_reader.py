@@ -7,8 +7,7 @@ rotations are the identity. So rotations are taken relative to the bind pose, in
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -17,7 +16,7 @@ from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.body import Skeleton
-from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture import Captured, SkeletonMotion, SkeletonOptions, retarget_motion
 from fba.capture.bones import find_bones
 from fba.capture.skeleton import MAX_FRAMES, check_memory
 from fba.errors import FbaWarning, ModelError
@@ -54,63 +53,54 @@ def sniff(head: bytes, suffix: str) -> bool:
     return head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"{" and (b'"asset"' in head or suffix == ".gltf")
 
 
-def read(
+def read_person(
     path: Path,
+    options: SkeletonOptions,
     *,
-    rate: Fraction | int | str | None = None,
-    scale: float | None = None,
-    origin: str = "source",
-    ground: str = "floor",
-    plant: bool = True,
-    spine: str | int = "spread",
-    joints: Mapping[str, str] | None = None,
     clip: str | int | None = None,
-    rest: str | int = "auto",
-    up: str = "auto",
+    rate: Fraction | int | str | None = None,
     limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Read the animation of a glTF skeleton as BAPs, and that of its face as FAPs, see `read_face_motion`.
+) -> Captured:
+    """Return the person in a glTF file: a skeleton as BAPs, and a face as FAPs, see `read_face_motion`.
 
-    The options are those of `fba.capture.from_skeleton`; clip: see `read_motion`. BAPs and FAPs in files of
-    this project are read as they are, with their own frames, unless an option other than clip and rate asks
-    for retargeting.
+    clip, rate: see `read_motion`. BAPs and FAPs in files of this project are read as they are, with their own
+    frames, unless the options ask for retargeting.
 
     Raises FormatError for anything that is not glTF, or whose skeleton is not a body, LimitError for more
     than the limits allow; warns (FbaWarning) of what is left out.
     """
     with naming_file(path):
         gltf = read_gltf(path, limits=limits)
-        plain = (joints, scale, origin, ground, plant, spine, rest, up) == (
-            None, None, "source", "floor", True, "spread", "auto", "auto",
-        )  # fmt: skip
-        if plain and gltf.animations:
-            own = gltf.animations[0] if clip is None else choose_clip(gltf, clip, range(len(gltf.nodes)))
-            note = find_note(gltf, own)
-            if note is not None:
-                animation = read_note(gltf, own, note)
-                return animation if rate is None else animation.resample(Fraction(rate), limits=limits)
+        if options == SkeletonOptions() and (stored := _read_stored(gltf, clip)) is not None:
+            return Captured(stored if rate is None else stored.resample(Fraction(rate), limits=limits))
         if (face_clip := _clip_of_face_alone(gltf, clip)) is not None:
-            return _read_face_alone(gltf, face_clip, rate, limits)
+            return Captured(_read_face_alone(gltf, face_clip, rate, limits))
+        motion = None
         try:
             with warnings.catch_warnings(record=True) as said:
                 warnings.simplefilter("always", FbaWarning)
-                sampled = _sample(gltf, clip, rate, limits)
-                animation = from_skeleton(
-                    sampled.motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant,
-                    spine=spine, rest=rest, up=up, limits=limits,
-                )  # fmt: skip
+                motion = _sample(gltf, clip, rate, limits)
+                made = retarget_motion(motion, None, options, limits=limits)
         except ModelError as error:
-            person = _moves_person(gltf, clip, rate, limits)  # whose pose is not clear
-            if person or joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
+            person = motion is not None and _has_limbs(motion)  # whose pose is not clear
+            if person or options.joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
                 raise
             if _count_turning(face_clip, gltf) >= MAX_HEAD_JOINTS:
                 text = f"{gltf.file}: no body is read, the face alone: {error.finding}"
                 warnings.warn(FbaWarning(text).with_remedies(*error.remedies), stacklevel=2)
-            return _read_face_alone(gltf, face_clip, rate, limits)
+            return Captured(_read_face_alone(gltf, face_clip, rate, limits))
         for each in said:  # not what concerns a skeleton that turned out to be none
             warnings.warn(each.message, each.category, stacklevel=2)
-        times = sampled.start + np.arange(len(animation)) / float(animation.rate)
-        return replace(animation, face=read_face_motion(gltf, sampled.clip, times))
+        return made
+
+
+def _read_stored(gltf: Gltf, clip: str | int | None) -> Animation | None:
+    """Return the BAPs and FAPs in a file of this project; None for other files."""
+    if not gltf.animations:
+        return None
+    own = gltf.animations[0] if clip is None else choose_clip(gltf, clip, range(len(gltf.nodes)))
+    note = find_note(gltf, own)
+    return None if note is None else read_note(gltf, own, note)
 
 
 def read_motion(
@@ -139,29 +129,16 @@ def sample_motion(
 ) -> SkeletonMotion:
     """Do the same as `read_motion` for a file that has been read."""
     try:
-        return _sample(gltf, clip, rate, limits).motion
+        return _sample(gltf, clip, rate, limits)
     except ModelError as error:
         found = error.finding.removeprefix(f"{gltf.file}: ")
         raise ModelError(f"{gltf.file}: {found}").with_remedies(*error.remedies) from error
 
 
-@dataclass(frozen=True, eq=False)
-class _Sampled:
-    """A clip, and the motion of the skeleton in it, from start on, seconds."""
-
-    motion: SkeletonMotion
-    clip: Clip
-    start: float
-
-
-def _moves_person(
-    gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None, limits: Limits
-) -> bool:
-    """Whether a clip turns the joints of a person with known limbs."""
+def _has_limbs(motion: SkeletonMotion) -> bool:
+    """Whether the limbs of a person are found among the joints of a motion."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
-            find_bones(_sample(gltf, clip, rate, limits).motion, None, Skeleton.default())
+        find_bones(motion, None, Skeleton.default())
     except ModelError:
         return False
     return True
@@ -217,7 +194,7 @@ def _count_frames(
 
 def _sample(
     gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None, limits: Limits
-) -> _Sampled:
+) -> SkeletonMotion:
     joints = find_joints(gltf)
     nodes, parents, bind, used = joints.nodes, joints.parents, joints.bind, joints.used
     place = {node: number for number, node in enumerate(nodes)}
@@ -252,7 +229,7 @@ def _sample(
     motion = replace(motion, rotations=turns, positions=root)
     if joints.humanoid is not None and joints.humanoid.kind == "VRM 0":
         motion = _turn_round(motion)
-    return _Sampled(motion, chosen, first)
+    return replace(motion, face=lambda moments: read_face_motion(gltf, chosen, first + moments))
 
 
 def _turn_round(motion: SkeletonMotion) -> SkeletonMotion:

@@ -10,7 +10,6 @@ import re
 import warnings
 from contextlib import suppress
 from fractions import Fraction
-from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -19,7 +18,6 @@ from fba.arrays import Float64
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import METRES
 from fba.errors import FbaWarning, FormatError
-from fba.formats.markers._encoding import read_face
 from fba.formats.markers._names import without_subject
 from fba.formats.markers._options import file_rate, rate_of_times
 from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines
@@ -39,7 +37,9 @@ def sniff(head: bytes, suffix: str) -> bool:
     return re.match(rb'(?:\xef\xbb\xbf)?"?Format Version"?\s*,', head, re.IGNORECASE) is not None
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
+def read_markers(
+    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
     """Return the markers of a CSV export of Motive; those without a label only if none has one.
 
     fps: the rate of a file that has none. Raises FormatError, LimitError; warns (FbaWarning) of markers
@@ -152,7 +152,3 @@ def _without_codes(lines: list[str], first: int, columns: list[str]) -> list[str
             cells[place] = ""
         result.append(",".join(cells))
     return result
-
-
-read = partial(read_face, read_markers)
-"""Returns the FAPs of the face in a file; the options are those of `read_face`."""

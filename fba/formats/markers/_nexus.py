@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -16,7 +15,6 @@ import numpy as np
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import METRES
 from fba.errors import FormatError
-from fba.formats.markers._encoding import read_face
 from fba.formats.markers._names import without_subject
 from fba.formats.markers._options import file_rate
 from fba.formats.markers._rows import build_motion, parse_rows, read_lines
@@ -34,7 +32,9 @@ def sniff(head: bytes, suffix: str) -> bool:
     return re.search(rb"Frame[,;\t]\"?Sub Frame", head, re.IGNORECASE) is not None or len(head) >= 65536
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
+def read_markers(
+    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
     """Return the trajectories of a CSV export of Nexus. fps: the rate of a file that has none.
 
     Raises FormatError, LimitError.
@@ -76,7 +76,3 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
         metres=METRES.get(unit, 0.001), unit=unit if unit in METRES else "", up="+z",
         name=FilePath(path).stem, path=path, lines=numbers,
     )  # fmt: skip
-
-
-read = partial(read_face, read_markers)
-"""Returns the FAPs of the face in a file; the options are those of `read_face`."""

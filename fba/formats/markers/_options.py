@@ -18,7 +18,7 @@ MAX_RATE = 100_000
 GIVE_RATE = Remedy("fps", "give one with {}", "100")
 
 
-def file_rate(stored: float | str, fps: Fraction | None, path: Path) -> Fraction:
+def file_rate(stored: float | str, fps: Fraction | int | str | None, path: Path) -> Fraction:
     """Return the frame rate of a file: what it says, or `fps` if it says 0 or nothing.
 
     Raises FormatError for anything but a positive number.

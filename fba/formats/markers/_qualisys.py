@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -15,7 +14,6 @@ import numpy as np
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import regular_times
 from fba.errors import FormatError
-from fba.formats.markers._encoding import read_face
 from fba.formats.markers._options import file_rate
 from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines, warn_if_cut
 from fba.formats.time_codes import parse_time_of_day
@@ -30,7 +28,9 @@ def sniff(head: bytes, suffix: str) -> bool:
     return re.match(rb"(?:\xef\xbb\xbf)?\s*NO_OF_FRAMES\t", head) is not None
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
+def read_markers(
+    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
     """Return the markers of a TSV export of Qualisys Track Manager. fps: the rate of a file that has none.
 
     Raises FormatError, LimitError; warns (FbaWarning) of a wrong number of frames.
@@ -80,7 +80,3 @@ def _first_number(settings: dict[str, list[str]], key: str) -> float:
         return float((settings.get(key) or ["nan"])[0])
     except ValueError:
         return float("nan")
-
-
-read = partial(read_face, read_markers)
-"""Returns the FAPs of the face in a file; the options are those of `read_face`."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import re
 from fractions import Fraction
-from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -18,7 +17,6 @@ from fba.arrays import Float64
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import MAX_MARKERS, METRES, regular_times
 from fba.errors import FormatError
-from fba.formats.markers._encoding import read_face
 from fba.formats.markers._options import file_rate, rate_of_times
 from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -45,7 +43,9 @@ def sniff(head: bytes, suffix: str) -> bool:
     return _is_long(cells) or (count >= MIN_MARKERS and 3 * count >= MIN_SHARE * len(cells))
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
+def read_markers(
+    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
     """Return the markers of a table. fps: the rate of a file without times.
 
     Raises FormatError, LimitError.
@@ -158,7 +158,3 @@ def _read_long(
     positions[frame, owner] = rows[:, axes]
     times = rows[starts, by_time] if by_time is not None else np.full(len(starts), np.nan)
     return list(names), positions, times, [numbers[n] for n in starts]
-
-
-read = partial(read_face, read_markers)
-"""Returns the FAPs of the face in a file; the options are those of `read_face`."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -16,7 +15,6 @@ import numpy as np
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import METRES
 from fba.errors import FormatError
-from fba.formats.markers._encoding import read_face
 from fba.formats.markers._names import without_subject
 from fba.formats.markers._options import file_rate, rate_of_times
 from fba.formats.markers._rows import (
@@ -38,7 +36,9 @@ def sniff(head: bytes, suffix: str) -> bool:
     return re.match(rb"(?:\xef\xbb\xbf)?\s*PathFileType\b", head) is not None
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
+def read_markers(
+    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
     """Return the markers of a TRC file. fps: the rate of a file that has none.
 
     Raises FormatError, LimitError; warns (FbaWarning) of a wrong number of frames.
@@ -114,7 +114,3 @@ def _number(text: str) -> float:
         return float(text)
     except ValueError:
         return float("nan")
-
-
-read = partial(read_face, read_markers)
-"""Returns the FAPs of the face in a file; the options are those of `read_face`."""

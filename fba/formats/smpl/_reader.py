@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
-from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from importlib.resources import files
@@ -19,9 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fba.animation import Animation, FaceTrack
+from fba.animation import FaceTrack
 from fba.arrays import Float64
-from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture import SkeletonMotion
 from fba.capture.blendshapes.combination import JAW_OPEN
 from fba.capture.blendshapes.conversion import convert_rows
 from fba.capture.sampling import find_rate, interpolate
@@ -66,40 +65,13 @@ def sniff(head: bytes, suffix: str) -> bool:
     return head.startswith(ZIP) and any(f"{name}.npy".encode() in head for name in NAMES)
 
 
-def read(
-    path: Path,
-    *,
-    rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
-    origin: str = "source",
-    ground: str = "floor",
-    plant: bool = True,
-    spine: str | int = "spread",
-    joints: Mapping[str, str] | None = None,
-    rest: str | int = "auto",
-    up: str = "auto",
-    limits: Limits = DEFAULT_LIMITS,
-) -> Animation:
-    """Return the motion of a body as BAPs, and of its jaw and eyes, where they move, as FAPs.
-
-    The options are those of `fba.capture.from_skeleton`; fps: of a file that has no rate. Raises FormatError,
-    LimitError; warns (FbaWarning).
-    """
-    with naming_file(path):
-        read_in = _read(path, fps, limits)
-        motion = _skeleton(read_in, path, limits)
-        animation = from_skeleton(
-            motion, rate, joints=joints, origin=origin, ground=ground, plant=plant, spine=spine, rest=rest,
-            up=up, limits=limits,
-        )  # fmt: skip
-        at = np.asarray(animation.index, dtype=np.float64) / float(animation.rate)
-        return replace(animation, face=_face(read_in, at, limits))
-
-
 def read_motion(
     path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> SkeletonMotion:
-    """Return the joints as they turn in the file, y up. Raises FormatError, LimitError."""
+    """Return the joints as they turn in the file, y up, and jaw and eyes, where they move, as a face.
+
+    fps: of a file that has no rate. Raises FormatError, LimitError.
+    """
     with naming_file(path):
         return _skeleton(_read(path, fps, limits), path, limits)
 
@@ -185,7 +157,7 @@ def _skeleton(read_in: _Motion, path: Path, limits: Limits) -> SkeletonMotion:
     return SkeletonMotion(
         names, np.array([names.index(row[1]) if row[1] else -1 for row in table]),
         np.array([row[2] for row in table]), turns, upright.apply(read_in.path), read_in.rate,
-        name=FilePath(path).stem, up="+y",
+        name=FilePath(path).stem, up="+y", face=lambda times: _face(read_in, times, limits),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
 """Readers of datagrams, one for each protocol.
 
-May use: the readers of files of the same content in `fba.formats`.
+May use: the readers in `fba.formats` of files with the same content.
 """

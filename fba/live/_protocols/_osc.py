@@ -1,10 +1,8 @@
-"""Read OSC 1.0: messages and bundles of them, in a datagram.
+"""Reader of OSC 1.0: the messages and bundles in a datagram.
 
-Source: "The Open Sound Control 1.0 Specification". Texts end with a NUL and fill multiples of four bytes;
-numbers are big-endian.
-
-This is not left to the package python-osc, of whose reader a UnicodeDecodeError escapes where a datagram is
-damaged, and which writes to the log for each such datagram.
+Source: "The Open Sound Control 1.0 Specification". Texts end with a NUL and are padded to multiples of four
+bytes; numbers are big-endian. The package python-osc is not used because it raises UnicodeDecodeError and
+writes to the log for damaged datagrams.
 """
 
 from __future__ import annotations
@@ -14,26 +12,21 @@ from typing import NamedTuple
 
 from fba.live._protocols.sample import DatagramError
 
-DEEPEST = 8
-"""Bundles within bundles."""
-MOST_ARGUMENTS = 256
+MAX_DEPTH = 8
+"""Deepest nesting of bundles."""
+MAX_ARGUMENTS = 256
 BUNDLE = b"#bundle\0"
 HEADER = 16
-"""Bytes of a bundle before its first element: the word and a time."""
+"""Size of a bundle before its first element, bytes: the word and a time."""
 SIZES = {"i": 4, "f": 4, "r": 4, "c": 4, "m": 4, "h": 8, "d": 8, "t": 8, "T": 0, "F": 0, "N": 0, "I": 0}
-NUMBERS = {
-    "i": struct.Struct(">i"),
-    "f": struct.Struct(">f"),
-    "h": struct.Struct(">q"),
-    "d": struct.Struct(">d"),
-}
-WRONG = "no OSC"
+NUMBERS = {tag: struct.Struct(form) for tag, form in (("i", ">i"), ("f", ">f"), ("h", ">q"), ("d", ">d"))}
+WRONG = "not OSC"
 
 Argument = str | float | None
 
 
 class Message(NamedTuple):
-    """An address such as "/VMC/Ext/T", and its arguments; None for those that are neither text nor number."""
+    """An address such as "/VMC/Ext/T", and its arguments; None for any that is neither text nor number."""
 
     address: str
     arguments: tuple[Argument, ...]
@@ -42,7 +35,7 @@ class Message(NamedTuple):
 def read_messages(data: bytes) -> list[Message]:
     """Return all messages of a datagram, in order. Raises DatagramError where it is damaged."""
     messages: list[Message] = []
-    _read(data, messages, DEEPEST)
+    _read(data, messages, MAX_DEPTH)
     return messages
 
 
@@ -66,10 +59,10 @@ def _message(data: bytes) -> Message:
     address, position = _text(data, 0)
     if not address.startswith("/"):
         raise DatagramError(WRONG)
-    if position == len(data):  # old senders leave out that there are no arguments
+    if position == len(data):  # old senders leave out the type tags if there are no arguments
         return Message(address, ())
     tags, position = _text(data, position)
-    if not tags.startswith(",") or len(tags) > MOST_ARGUMENTS:
+    if not tags.startswith(",") or len(tags) > MAX_ARGUMENTS:
         raise DatagramError(WRONG)
     arguments: list[Argument] = []
     for tag in tags[1:]:
@@ -85,7 +78,7 @@ def _message(data: bytes) -> Message:
 
 
 def _text(data: bytes, start: int) -> tuple[str, int]:
-    """Return the text that begins here, and where the next element does."""
+    """Return the text at a position, and the position of the next element."""
     end = data.find(b"\0", start)
     if end < 0:
         raise DatagramError(WRONG)

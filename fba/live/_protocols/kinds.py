@@ -1,4 +1,4 @@
-"""The kinds of live captures: their protocols, ports, and what asks for data."""
+"""The kinds of live captures: their protocols, ports and requests for data."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from fba.live._protocols.vtube import VTubeReader
 class Kind:
     """A kind of live capture.
 
-    name: as on the command line. description: who sends it. port: on which it is received by default.
-    reader: makes a reader for one address. longest: bytes of the longest datagram that is looked at.
-    asked_port: of the sender, on which it waits to be asked; 0 where it sends without. ask: returns what asks
-    it to send to a port. ask_every: seconds. rate: frames in a second of the stream, where neither sender nor
-    user says it; None: they are found in the first second. bodies: whether bones come, too.
+    name: as on the command line. description: the sender. port: the default port of the receiver. reader:
+    makes a reader for one address. longest: size of the longest accepted datagram, bytes. asked_port: port on
+    which the sender waits for requests; 0 if it needs none. ask: returns the request to send to a port.
+    ask_every: seconds between requests. rate: frame rate of the stream where neither sender nor user gives
+    one; None: that of the first second. bodies: whether bones are sent.
     """
 
     name: str
@@ -64,7 +64,7 @@ KINDS = (
 
 
 def find_kind(name: str) -> Kind:
-    """Return a kind by its name; OptionError for another name."""
+    """Return the kind with a name; OptionError for an unknown name."""
     names = [kind.name for kind in KINDS]
     if name not in names:
         raise OptionError(

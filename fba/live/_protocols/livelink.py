@@ -1,4 +1,4 @@
-"""Datagrams of Live Link Face, as `fba.formats.face_tables.livelink_udp` reads them from files."""
+"""Datagrams of Live Link Face, in the form of the files of `fba.formats.face_tables.livelink_udp`."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from fba.live._protocols.sample import DatagramError, Sample
 
 PLACE = "the datagram"
 EMPTY = "empty"
-LARGEST_RATE = 240
-"""Frames in a second; no camera of a telephone takes more."""
+MAX_RATE = 240
+"""Frames a second; no phone's camera takes more."""
 
 
 class LiveLinkReader:
-    """Reads datagrams of version 6, each of which is a frame."""
+    """Reads datagrams of version 6; each is a frame."""
 
     def __init__(self) -> None:
         self._newest: Sample | None = None
 
     def read(self, data: bytes, now: float) -> list[Sample]:
-        """Return the moment of a datagram; see `DatagramReader`."""
+        """Return the sample of a datagram; see `DatagramReader`."""
         try:
             if not data:
                 raise DatagramError(EMPTY)
@@ -32,20 +32,18 @@ class LiveLinkReader:
                 raise DatagramError("cut short")
             if stop != len(data):
                 raise DatagramError("longer than a datagram of Live Link Face")
-            if packet.rate > LARGEST_RATE:
-                raise DatagramError(f"with more than {LARGEST_RATE} frames in a second")
+            if packet.rate > MAX_RATE:
+                raise DatagramError(f"with more than {MAX_RATE} frames in a second")
             (weights,), (head,), (eyes,) = divide_values(packet.values[None])
             seen = not np.isnan(packet.values).any()
             check_weights(weights[None], ARKIT_ORDER, PLACE)
         except UnsupportedError as error:
             raise DatagramError(f"of another kind: {error.what}") from error
         except FormatError as error:
-            said = (
-                "with weights that are no shares of 1"
-                if "weight" in str(error)
-                else "no datagrams of Live Link Face"
-            )
-            raise DatagramError(said) from error
+            weights_wrong = "weight" in str(error)
+            raise DatagramError(
+                "with weights outside 0 to 1" if weights_wrong else "not of Live Link Face"
+            ) from error
         device, subject = packet.sender
         self._newest = Sample(
             packet.seconds, ARKIT_ORDER, weights if seen else None, head, eyes,
@@ -54,5 +52,5 @@ class LiveLinkReader:
         return [self._newest]
 
     def newest(self) -> Sample | None:
-        """Return the moment of the last datagram."""
+        """Return the last sample."""
         return self._newest

@@ -1,4 +1,4 @@
-"""`Sample`: what a sender says of one moment; `DatagramReader`, which finds it in datagrams."""
+"""`Sample`: the face and the bones that a sender reports at one moment; `DatagramReader`: reads samples."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fba.arrays import Float64
 
 
 class BoneTurn(NamedTuple):
-    """A bone in its parent's axes, y up, right-handed: position (3,) in metres, quaternion (w, x, y, z)."""
+    """A bone in its parent's axes, y up, right-handed: position (3,), metres; quaternion (w, x, y, z)."""
 
     position: Float64
     rotation: Float64
@@ -19,15 +19,14 @@ class BoneTurn(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """What a sender says of one moment.
+    """A face and bones at one moment.
 
-    seconds: of the sender's own clock. subject: the name that the sender gives to whom it shows; "" where the
-    protocol has none. device: tells senders apart that give the same name. rate: frames in a second that the
-    sender counts in; None where it does not say.
+    seconds: of the sender's clock. subject: name of the person shown; "" where the protocol has none. device:
+    distinguishes senders with the same subject. rate: the sender's frames a second, or None.
 
     names: of shapes. weights: float64 (N,), 0 to 1; None where no face is seen. head (3,), eyes (4,): angles
-    as in `fba.capture.ShapeMotion`; None where the protocol has none. bones: by name of Unity's humanoid
-    bones, those that have been sent so far; "" stands for the root of all.
+    as in `fba.capture.ShapeMotion`; None where the protocol has none. bones: all that were sent so far, by
+    name of Unity's humanoid bones; "" is the root.
     """
 
     seconds: float
@@ -42,18 +41,17 @@ class Sample:
 
 
 class DatagramError(Exception):
-    """A datagram that cannot be used; the text says what it is, as "cut short"; datagrams with one fault
-    have one text."""
+    """A datagram that cannot be used. The text completes "a datagram ...", such as "cut short"."""
 
 
 class DatagramReader(Protocol):
-    """Reads the datagrams of one address, in the order in which they come."""
+    """Reads the datagrams of one address, in the order of arrival."""
 
     def read(self, data: bytes, now: float) -> list[Sample]:
-        """Return the moments that are complete with this datagram, often one.
+        """Return the samples that this datagram completes, usually one.
 
-        now: when it came, in seconds of a clock that never goes back. Raises DatagramError.
+        now: arrival time, in seconds of a monotonic clock. Raises DatagramError.
         """
 
     def newest(self) -> Sample | None:
-        """Return what the sender says now, complete or not; None before the first datagram."""
+        """Return the newest sample, complete or not; None before the first datagram."""

@@ -1,4 +1,4 @@
-"""Unity's humanoid bones: what hangs on what, which joints of the standard they are, and Unity's axes."""
+"""Unity's humanoid bones: their parents, the joints of the standard that they are, and Unity's axes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from fba.arrays import Float64
 from fba.formats.gltf.humanoid import OLD_THUMB, joints_of_bones
 
 TO_OURS = np.array([-1.0, 1.0, 1.0])
-"""Factors of a position: Unity's x points to the right of who looks ahead, ours to the left."""
+"""Factors of a position: Unity's x points to the subject's right, ours to the left."""
 
 
 @cache
 def parents() -> dict[str, str]:
-    """Return the bone above each bone, "" above the hips; a bone comes after the one above it."""
+    """Return the parent of each bone, "" for the hips; parents come first."""
     result: dict[str, str] = {}
     text = (files(__package__) / "unity_bones.csv").read_text(encoding="utf-8")
     for row in csv.DictReader(text.splitlines()):
@@ -28,7 +28,7 @@ def parents() -> dict[str, str]:
 
 @cache
 def joint_of(bone: str) -> str | None:
-    """Return the joint of the standard that begins where a bone does; None for eyes and the jaw."""
+    """Return the joint of the standard at the start of a bone; None for eyes and the jaw."""
     side = next((word for word in ("Left", "Right") if bone.startswith(word)), "")
     plain = bone.removeprefix(side)
     plain = OLD_THUMB.get(plain, plain)
@@ -37,13 +37,13 @@ def joint_of(bone: str) -> str | None:
 
 
 def position(numbers: Float64) -> Float64:
-    """Return a position (3,) in our axes, y up and right-handed, of one in Unity's."""
+    """Return a position (3,) in our axes, y up and right-handed, for a position in Unity's."""
     result: Float64 = numbers * TO_OURS
     return result
 
 
 def rotation(numbers: Float64) -> Float64 | None:
-    """Return Unity's quaternion (x, y, z, w) as (w, x, y, z) in our axes; None for an impossible one."""
+    """Return Unity's quaternion (x, y, z, w) as (w, x, y, z) in our axes; None if it is far from length 1."""
     length = float(np.linalg.norm(numbers))
     if not 0.5 < length < 2:
         return None

@@ -1,8 +1,8 @@
-"""The VMC protocol: bones of an avatar and its expressions, as OSC messages.
+"""The VMC protocol: bones and expressions of an avatar, as OSC messages.
 
-A sender divides a frame into datagrams as it likes. What belongs to one frame lies between two messages
-`/VMC/Ext/T`, which give its time; senders without them end frames with `/VMC/Ext/Blend/Apply`, or begin the
-next by sending a bone again. Bones and expressions that a frame leaves out stay as they are.
+Senders divide frames into datagrams in any way. A frame lies between two messages `/VMC/Ext/T`, which give
+its time. Other senders end frames with `/VMC/Ext/Blend/Apply`, or begin the next by repeating a bone. Bones
+and expressions that a frame leaves out keep their values.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ PREFIX = "/VMC/"
 MAX_NAMES = 400
 """Largest number of expressions of an avatar; others are ignored."""
 MAX_COORDINATE = 1e4
-"""Largest coordinate of a bone, in metres."""
+"""Largest coordinate of a bone, metres."""
 MAX_VALUE = 4.0
-"""Largest value of an expression; more is no share of one."""
-USUAL_PERIOD = 1 / 60
-NOTHING = "nothing of VMC"
-WRONG = "wrong messages of VMC"
+"""Largest value of an expression."""
+INITIAL_PERIOD = 1 / 60
+NOTHING = "without messages of VMC"
+WRONG = "with wrong messages of VMC"
 
 
 class VmcReader:
@@ -36,13 +36,13 @@ class VmcReader:
         self._bones: dict[str, BoneTurn] = {}
         self._expressions: dict[str, float] = {}
         self._sent: set[str] = set()  # bones and expressions of this frame
-        self._time: float | None = None  # that the sender gave for this frame
+        self._time: float | None = None  # of this frame, by the sender
         self._timed = False
-        self._clock = SteadyClock(USUAL_PERIOD)
+        self._clock = SteadyClock(INITIAL_PERIOD)
         self._now = 0.0
 
     def read(self, data: bytes, now: float) -> list[Sample]:
-        """Return the frames that are complete with a datagram; see `DatagramReader`."""
+        """Return the frames that a datagram completes; see `DatagramReader`."""
         messages = read_messages(data)
         if not any(message.address.startswith(PREFIX) for message in messages):
             raise DatagramError(NOTHING)
@@ -53,11 +53,11 @@ class VmcReader:
         return samples
 
     def newest(self) -> Sample | None:
-        """Return what the sender says now, also where a frame is not complete."""
+        """Return the newest values, even if the frame is not complete."""
         return self._sample(self._now) if self._bones or self._expressions else None
 
     def _take(self, message: Message) -> list[Sample]:
-        """Take a message; return the frame that it ends."""
+        """Process a message; return the frame that it ends, if any."""
         address, arguments = message
         if address == "/VMC/Ext/T":
             (time,) = _numbers(arguments[:1], 1)
@@ -87,7 +87,7 @@ class VmcReader:
         return []
 
     def _end(self, time: float | None) -> list[Sample]:
-        """End a frame. time: of the next one, where the sender says it; None otherwise."""
+        """End a frame. time: of the next frame, by the sender, or None."""
         before, self._time, self._timed = self._time, time, time is not None
         if not self._sent or (time is not None and before == time):
             return []
@@ -101,14 +101,14 @@ class VmcReader:
 
 def _numbers(arguments: Sequence[Argument], count: int) -> list[float]:
     """Return arguments as numbers; DatagramError for other arguments, or too few."""
-    result = [float(one) for one in arguments if isinstance(one, int | float) and math.isfinite(one)]
+    result = [float(value) for value in arguments if isinstance(value, int | float) and math.isfinite(value)]
     if len(result) != count:
         raise DatagramError(WRONG)
     return result
 
 
 def _turn(arguments: Sequence[Argument]) -> BoneTurn:
-    """Return the position and the rotation behind the name of a bone."""
+    """Return the position and the rotation that follow the name of a bone."""
     numbers = np.array(_numbers(arguments[1:8], 7))
     rotation = unity_bones.rotation(numbers[3:])
     if rotation is None or np.abs(numbers[:3]).max() > MAX_COORDINATE:

@@ -1,7 +1,7 @@
-"""What VTube Studio on a telephone sends to other programs: a JSON object in a datagram for each frame.
+"""Datagrams of VTube Studio on a phone: a JSON object for each frame.
 
-`Rotation` is that of the face in ARKit's own axes (x to its left, y up, z ahead), in degrees, as programs
-that read it use it; no recording has confirmed it. The eyes turn by their shapes.
+`Rotation` is taken as the face's in ARKit's axes (x to its left, y up, z ahead), in degrees, as other
+programs do; no recording has confirmed it. The eyes are turned by their shapes.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from fba.formats.face_tables.shape_weights import check_weights, shape_of
 from fba.live._protocols.sample import DatagramError, Sample
 
 MIN_SHAPES = 5
-"""Smallest number of shapes with ARKit's names in an object that is a face."""
-NO_OBJECTS = "no objects of VTube Studio"
-LARGEST_ANGLE = 360.0
-LARGEST_TIME = 1e15
+"""Smallest number of shapes with ARKit's names in an object with a face."""
+NO_OBJECTS = "not objects of VTube Studio"
+MAX_ANGLE = 360.0
+MAX_TIME = 1e15
 
 
 class VTubeReader:
@@ -31,7 +31,7 @@ class VTubeReader:
         self._newest: Sample | None = None
 
     def read(self, data: bytes, now: float) -> list[Sample]:
-        """Return the moment of a datagram; see `DatagramReader`."""
+        """Return the sample of a datagram; see `DatagramReader`."""
         try:
             content = json.loads(data)
         except (ValueError, RecursionError) as error:
@@ -39,7 +39,7 @@ class VTubeReader:
         if not isinstance(content, dict) or not isinstance(content.get("FaceFound"), bool):
             raise DatagramError(NO_OBJECTS)
         stamp = _number(content.get("Timestamp"))
-        if not 0 <= stamp <= LARGEST_TIME:
+        if not 0 <= stamp <= MAX_TIME:
             raise DatagramError("without a time")
         weights = _weights(content.get("BlendShapes")) if content["FaceFound"] else {}
         if content["FaceFound"] and self._names is None:
@@ -52,7 +52,7 @@ class VTubeReader:
         return [self._newest]
 
     def newest(self) -> Sample | None:
-        """Return the moment of the last datagram."""
+        """Return the last sample."""
         return self._newest
 
 
@@ -76,14 +76,14 @@ def _weights(entries: Any) -> dict[str, float]:
     try:
         check_weights(np.array([list(weights.values())]), list(weights), "the object")
     except FormatError as error:
-        raise DatagramError("with weights that are no shares of 1") from error
+        raise DatagramError("with weights outside 0 to 1") from error
     return weights
 
 
 def _angles(value: Any) -> Float64 | None:
     """Return pitch, yaw and roll (3,), radians, of an object with x, y and z in degrees."""
     numbers = np.array([_number(value.get(axis)) if isinstance(value, dict) else np.nan for axis in "xyz"])
-    if not (np.abs(numbers) <= LARGEST_ANGLE).all():
+    if not (np.abs(numbers) <= MAX_ANGLE).all():
         return None
     angles: Float64 = np.radians((numbers + 180) % 360 - 180)
     return angles

@@ -1,20 +1,18 @@
-"""What a tracker sees of a face, and the control mask of 86 vertices that is made of it.
+"""The tracked points of a face, and the control mask of 86 vertices that is computed from them.
 
-May use: the face, and what `fba.capture.points` says of trackers.
+May use: the face, and `fba.capture.points`, which knows the trackers.
 """
 
 from fba.persona.points._adaptation import from_point_motion
-from fba.persona.points._distances import hausdorff_distance, mask_distance
-from fba.persona.points._procrustes import fit_similarity
-from fba.persona.points._registration import Registered, register
+from fba.persona.points._registration import Registered, fit_similarity, register
 from fba.persona.points._tracked import TrackedFace
+from fba.persona.points.layout import mask_distance
 
 __all__ = [
     "Registered",
     "TrackedFace",
     "fit_similarity",
     "from_point_motion",
-    "hausdorff_distance",
     "mask_distance",
     "register",
 ]

@@ -1,5 +1,4 @@
-"""Points of trackers that are known, iBUG's 68, OpenPose's 70, MediaPipe's 468 and 478, as the 64 of a
-Persona."""
+"""Points of common trackers (iBUG's 68, OpenPose's 70, MediaPipe's 468 and 478) as the 64 of a Persona."""
 
 from __future__ import annotations
 
@@ -20,51 +19,50 @@ from fba.persona.points.layout import TRACKED, point_weights
 from fba.rotations import axis_matrices
 
 PUPILS = {"3.5": ("3.7", "3.11"), "3.6": ("3.12", "3.8")}
-"""Pupils, which 68 points do not have, are taken to be between these corners of the eye."""
+"""Corners of the eye halfway between which the pupil is assumed; 68 points have no pupils."""
 RIGID = ("3.7", "3.8", "3.11", "3.12", "9.12", "9.15", "9.3", "9.1", "9.2")
-"""Places that tell how a head is turned."""
-MISFIT = 0.02
-"""Metres by which half of the points are off a known face at most."""
-SAMPLES = 60
-"""Frames, about, that tell whether points are those of a face."""
+"""Feature points that no muscle moves: they show the turn of the head."""
+MAX_MEDIAN_ERROR = 0.02
+"""Largest median distance of the points from those of a face, metres."""
+CHECKED_FRAMES = 60
+"""Approximate number of frames in which that is checked."""
 
 
 def from_point_motion(motion: PointMotion, *, aspect: float | None = None) -> TrackedFace:
-    """Return what a tracker of 68, 70, 468 or 478 points saw, as 64 points, head angles and a flag a frame.
+    """Return the 64 points and head angles for a tracker's 68, 70, 468 or 478 points.
 
-    aspect: of the picture, width / height, for points that are shares of it; None for the motion's own, or
-    what makes the points a face. Depth is not used. Angles are found from points that no muscle moves, and
-    count from a head that looks into the camera. Raises ModelError where no frame shows a face, or points
-    are not those of one. Warns of points that are mirrored or upside down, and of an aspect that is
-    guessed.
+    aspect: width / height of the picture, for points in shares of it; by default the motion's, or the aspect
+    with which the points are most like a face. Depth is not used. Angles are computed from points that no
+    muscle moves; they are 0 for a head that looks into the camera. Raises ModelError where no frame shows a
+    face, or the points are not those of a face. Warns where points are mirrored or upside down, and where the
+    aspect is guessed.
     """
     places = point_places(motion.count)
     names = tuple(name for name, place in places.items() if place in row_of())
     whole: Bool = np.asarray(np.isfinite(take_points(motion.positions, names)).all(axis=(1, 2)))
     if not whole.any():
-        raise ModelError(f"no face is seen whole in any of the {len(motion)} frames")
-    known = {places[name]: n for n, name in enumerate(names)}
-    template = neutral_points()[[row_of()[place] for place in known]]
+        raise ModelError(f"none of the {len(motion)} frames shows a whole face")
+    column_of = {places[name]: n for n, name in enumerate(names)}
+    template = neutral_points()[[row_of()[place] for place in column_of]]
     taken = take_points(motion.positions, names)[whole, :, :2]
     upright = upright_points(taken, names, places, template, motion.share, aspect or motion.aspect)
-    few = upright[:: max(1, len(upright) // SAMPLES)]
-    off = face_misfit(few, template)
-    if off > MISFIT:
+    error = face_misfit(upright[:: max(1, len(upright) // CHECKED_FRAMES)], template)
+    if error > MAX_MEDIAN_ERROR:
         raise ModelError(
-            f"the points do not lie as those of a face: they are {1000 * off:.0f} mm off; are they another "
-            "tracker's, or in another order?"
+            f"the points are not arranged as in a face: half of them are {1000 * error:.0f} mm off or more; "
+            "are they another tracker's, or in another order?"
         )
     features = np.zeros((len(upright), len(row_of()), 2))
-    for place, column in known.items():
+    for place, column in column_of.items():
         features[:, row_of()[place]] = upright[:, column]
     for pupil, corners in PUPILS.items():
-        if pupil not in known:
-            features[:, row_of()[pupil]] = upright[:, [known[one] for one in corners]].mean(axis=1)
-    _check_needed(set(known) | set(PUPILS))
+        if pupil not in column_of:
+            features[:, row_of()[pupil]] = upright[:, [column_of[name] for name in corners]].mean(axis=1)
+    _check_needed(set(column_of) | set(PUPILS))
     points = np.full((len(motion), TRACKED, 2), np.nan)
     points[whole] = (point_weights()[:TRACKED] @ features) * (1.0, -1.0)
     angles = np.full((len(motion), 3), np.nan)
-    rigid = [known[place] for place in RIGID if place in known]
+    rigid = [column_of[place] for place in RIGID if place in column_of]
     angles[whole] = head_angles(template[rigid], upright[:, rigid])
     if not whole.all():
         warnings.warn(
@@ -75,18 +73,18 @@ def from_point_motion(motion: PointMotion, *, aspect: float | None = None) -> Tr
     return TrackedFace(points, angles, whole, motion.times, motion.rate, motion.name)
 
 
-def _check_needed(known: set[str]) -> None:
-    """Raise ModelError where the points of a mask are made of places that a tracker does not have."""
+def _check_needed(tracked: set[str]) -> None:
+    """Raise ModelError where the mask needs feature points that a tracker lacks."""
     used = np.abs(point_weights()[:TRACKED]).sum(axis=0) > 0
-    missing = [name for name, row in row_of().items() if used[row] and name not in known]
+    missing = [name for name, row in row_of().items() if used[row] and name not in tracked]
     if missing:
-        raise ModelError(f"the tracker's points lack places of the mask: {', '.join(missing)}")
+        raise ModelError(f"the tracker's points lack feature points of the mask: {', '.join(missing)}")
 
 
 def head_angles(shape: Float64, points: Float64) -> Float64:
-    """Return pitch, yaw and roll, radians (T, 3), of a head whose rigid points (K, 3) are seen at (T, K, 2).
+    """Return pitch (down), yaw (left) and roll (right) of a head, (T, 3), radians, as FAPs 48 to 50.
 
-    points: x to the right, y up. FAPs 48 to 50 count angles so: down, to the head's left, to its right.
+    shape: its rigid points (K, 3). points: their positions (T, K, 2) in the picture, x to the right, y up.
     """
     rotation = fit_poses(shape, points).rotation
     # rotation = yaw . roll . pitch, the order of `fba.face.points`

@@ -1,4 +1,4 @@
-"""`TrackedFace`: what a tracker says of a face in a film."""
+"""`TrackedFace`: the points that a tracker followed in a film of a face."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from fba.errors import ModelError
 from fba.persona.points.layout import TRACKED
 
 MAX_COORDINATE = 1e7
-"""Coordinate, in pixels or any other unit, above which points are damaged."""
+"""Largest coordinate, in pixels or any other unit."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrackedFace:
-    """64 points on a face in each picture of a film, how its head is turned, and whether it was found.
+    """64 points of a face in each picture of a film, and the turn of its head.
 
-    points: float64 (T, 64, 2), in one unit, x to the right in the picture, y down;
-    `fba.persona.points.layout` says what each is. angles: float64 (T, 3), radians, of the head about x
-    (alpha, down), y (beta, to its left) and z (gamma, to its right), as FAPs 48 to 50 count them. tracked:
-    bool (T,); False for frames with numbers that are not finite. times: float64 (T,), seconds, increasing.
-    rate: nominal frames per second. name: of the performance.
+    points: float64 (T, 64, 2), in any unit, x to the right in the picture, y down; in the order of
+    `fba.persona.points.layout`. angles: float64 (T, 3), radians, of the head about x (alpha, down), y (beta,
+    to its left) and z (gamma, to its right), as FAPs 48 to 50 count them. tracked: bool (T,), whether the
+    tracker saw the face; False for frames with numbers that are not finite. times: float64 (T,), seconds,
+    increasing. rate: nominal frames per second. name: of the performance.
 
     Arrays are read-only copies. Raises ModelError if the parts contradict each other.
     """

@@ -1,13 +1,12 @@
 """The 64 points of a tracker, the 16 of a face's outline, and the 86 vertices of the control mask.
 
-`points.csv` says where each point is: sums of MPEG-4's feature points. `computed_vertices.csv` is Table 4.1
-of the source: the vertices that are computed from points, by their coordinates across the face; its last
-column is the feature point whose depth such a vertex has. `triangles.csv` joins vertices to triangles.
+`points.csv` gives the position of each point as a sum of MPEG-4's feature points. `computed_vertices.csv` is
+Table 4.1 of the source: the vertices that are computed from points, by their coordinates across the face; its
+last column names the feature point that gives the depth. `triangles.csv` joins vertices to triangles.
 
-The numbers of points are those of the source as far as its text gives them: 5 and 7 above the irises, 9 the
-outer end of the right brow, 11 to 26 the eyes, 39 and 48 the middles of the lips, 42 and 45 the corners of
-the mouth, 54 the base of the nose, 55 to 60 its bridge, tip and nostrils, 61 to 64 the irises. All else is
-ours.
+Points are numbered as in the source where its text gives numbers: 5 and 7 above the irises, 9 the outer end
+of the right brow, 11 to 26 the eyes, 39 and 48 the middles of the lips, 42 and 45 the corners of the mouth,
+54 the base of the nose, 55 to 60 its bridge, tip and nostrils, 61 to 64 the irises. Other numbers are ours.
 
 In arrays, row n is point n + 1. Axes: x to the face's left, y up, z forward, millimetres.
 """
@@ -33,15 +32,15 @@ OUTLINE = 16
 VERTICES = 86
 """Number of vertices of a mask."""
 IRIS = 4
-"""The last points of a tracker are those of the irises, which the mask has not."""
+"""Number of points of the irises: the last of a tracker's points, which the mask lacks."""
 SAME = TRACKED - IRIS
-"""Vertices that are points of the tracker: the first ones of the mask."""
+"""Number of vertices that are points of the tracker: the first of the mask."""
 PARTS = ("mouth", "left_eye", "right_eye", "left_brow", "right_brow")
-"""Parts of a face that are recognised apart, so that a user may join what an actor never joined."""
+"""Parts of a face, recognised separately: a user may combine what the actor never did together."""
 ANCHORS = {"mouth": 48, "left_eye": 15, "right_eye": 17, "left_brow": 15, "right_brow": 17}
-"""The point of each part that counts as still: the middle of the upper lip, inner corners of eyes."""
+"""The point relative to which each part moves: the middle of the upper lip, the inner corners of the eyes."""
 REGISTERED = (21, 19, 57, 60, 59, 48)
-"""Points by which a face is laid on the standard mask: corners of eyes, nose, middle of the upper lip."""
+"""Points that are fitted to the standard mask: corners of the eyes, nose, middle of the upper lip."""
 _TERM = re.compile(r"([+-]?)([\d.]+)(?:\*([\d.]+))?")
 MILLIMETRES = 1000.0
 
@@ -60,7 +59,7 @@ def _read(name: str) -> list[dict[str, str]]:
 
 @cache
 def point_weights() -> Float64:
-    """Return the shares (80, 84) of feature points in the points of tracker and outline."""
+    """Return the weights (80, 84) of feature points in the points of tracker and outline."""
     weights = np.zeros((TRACKED + OUTLINE, len(names())))
     for row in _read("points.csv"):
         for name, share in _terms(row["at"]):
@@ -77,26 +76,26 @@ def point_parts() -> tuple[str, ...]:
 
 @cache
 def point_names() -> tuple[str, ...]:
-    """Return what each of the 80 points is, in words."""
+    """Return the description of each of the 80 points."""
     return tuple(row["what"] for row in _read("points.csv"))
 
 
 @cache
 def part_points(part: str) -> Intp:
     """Return the rows of the tracked points of a part."""
-    return np.array([n for n, one in enumerate(point_parts()[:SAME]) if one == part], dtype=np.intp)
+    return np.array([n for n, other in enumerate(point_parts()[:SAME]) if other == part], dtype=np.intp)
 
 
 @cache
 def part_vertices(part: str) -> Intp:
-    """Return the rows of the vertices of the mask that a part moves."""
+    """Return the rows of the mask's vertices that belong to a part."""
     computed = [SAME + n for n, row in enumerate(_read("computed_vertices.csv")) if row["part"] == part]
     return np.array([*part_points(part), *computed], dtype=np.intp)
 
 
 @cache
 def vertex_weights() -> Float64:
-    """Return the shares (2, 86, 80) of points in the x and the y of vertices."""
+    """Return the weights (2, 86, 80) of points in the x and the y of vertices."""
     weights = np.zeros((2, VERTICES, TRACKED + OUTLINE))
     weights[:, range(SAME), range(SAME)] = 1.0
     for n, row in enumerate(_read("computed_vertices.csv")):
@@ -108,7 +107,7 @@ def vertex_weights() -> Float64:
 
 @cache
 def depth_weights() -> Float64:
-    """Return the shares (86, 84) of feature points in the depth of vertices."""
+    """Return the weights (86, 84) of feature points in the depth of vertices."""
     weights = np.zeros((VERTICES, len(names())))
     weights[:SAME] = point_weights()[:SAME]
     for n, row in enumerate(_read("computed_vertices.csv")):
@@ -137,16 +136,14 @@ def points_of_face(features: Float64) -> Float64:
 
 
 def mask_of_face(features: Float64) -> Float64:
-    """Return the mask (..., 86, 3), millimetres, of a face whose feature points (..., 84, 3) are known,
-    metres."""
+    """Return the mask (..., 86, 3), millimetres, of feature points (..., 84, 3), metres."""
     across = compute_vertices(points_of_face(features)[..., :2])
     deep = MILLIMETRES * (depth_weights() @ features[..., 2:])
     return np.concatenate([across, deep], axis=-1)
 
 
 def flat_mask(points: Float64) -> Float64:
-    """Return masks (..., 86, 3) of tracked points (..., 64, 2): depth and outline are those of the standard
-    mask."""
+    """Return masks (..., 86, 3) of tracked points (..., 64, 2), with the standard depth and outline."""
     outline = np.broadcast_to(
         standard_points()[TRACKED:, :2], (*points.shape[:-2], len(standard_points()) - TRACKED, 2)
     )
@@ -156,18 +153,29 @@ def flat_mask(points: Float64) -> Float64:
 
 
 def compute_vertices(points: Float64) -> Float64:
-    """Return x and y of the mask (..., 86, 2) from those of 80 points, Table 4.1 of the source."""
+    """Return x and y of the mask (..., 86, 2) for 80 points: Table 4.1 of the source."""
     across, up = vertex_weights()
     return np.stack([points[..., 0] @ across.T, points[..., 1] @ up.T], axis=-1)
 
 
 @cache
 def triangles() -> Int64:
-    """Return the triangles of the mask: int64 (130, 3), vertices counted from 0, counter-clockwise."""
+    """Return the triangles of the mask: int64 (130, 3), 0-based vertices, counter-clockwise."""
     rows = [[int(row[name]) - 1 for name in "abc"] for row in _read("triangles.csv")]
     array = np.array(rows, dtype=np.int64)
     array.flags.writeable = False
     return array
+
+
+def mask_distance(points: Float64, others: Float64) -> Float64:
+    """Return the mean distance of points from the nearest of the others (equation 3.16): float64 (...).
+
+    points: (..., N, D). others: (..., M, D). Not symmetric; the source uses this direction only. It is
+    Dubuisson and Jain's modification of Hausdorff's distance.
+    """
+    here, there = ((array**2).sum(axis=-1) for array in (points, others))
+    square = here[..., :, None] + there[..., None, :] - 2 * points @ np.swapaxes(others, -1, -2)
+    return np.asarray(np.sqrt(np.maximum(square.min(axis=-1), 0.0)).mean(axis=-1))
 
 
 def _frozen(array: Float64) -> Float64:

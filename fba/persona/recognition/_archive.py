@@ -1,9 +1,7 @@
-"""Files of a Persona and of what recognises expressions: a zip archive of a JSON header and arrays of
-numbers.
+"""Files of Personas and recognisers: zip archives of a JSON header and arrays.
 
-`header.json` has the kind of file, the version of its form and plain values; each other member is an array
-in NumPy's form (.npy) of numbers, never of Python objects. Two files of one content are the same, byte for
-byte.
+`header.json` has the kind of file, its version and plain values; each other member is an array of numbers in
+NumPy's format (.npy), never of Python objects. Equal content gives equal bytes.
 """
 
 from __future__ import annotations
@@ -23,8 +21,9 @@ from fba.source import Path, read_head
 
 HEADER = "header.json"
 MAX_HEADER = 1 << 20
-"""Bytes of the longest header."""
-MADE = (1980, 1, 1, 0, 0, 0)
+"""Largest size of a header, bytes."""
+DATE = (1980, 1, 1, 0, 0, 0)
+"""Modification date of all members."""
 
 
 def pack_archive(kind: str, version: int, header: dict[str, Any], arrays: dict[str, Array]) -> bytes:
@@ -32,24 +31,24 @@ def pack_archive(kind: str, version: int, header: dict[str, Any], arrays: dict[s
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
         text = json.dumps({"kind": kind, "version": version, **header}, indent=1, sort_keys=True)
-        archive.writestr(zipfile.ZipInfo(HEADER, MADE), text, zipfile.ZIP_DEFLATED)
+        archive.writestr(zipfile.ZipInfo(HEADER, DATE), text, zipfile.ZIP_DEFLATED)
         for name, array in sorted(arrays.items()):
             member = io.BytesIO()
             np.lib.format.write_array(member, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy", MADE), member.getvalue(), zipfile.ZIP_DEFLATED)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", DATE), member.getvalue(), zipfile.ZIP_DEFLATED)
     return data.getvalue()
 
 
 def read_archive(
     path: Path, kind: str, version: int, limits: Limits = DEFAULT_LIMITS, *, oldest: int | None = None
 ) -> tuple[dict[str, Any], dict[str, Float64]]:
-    """Return the header and the arrays of a file. oldest: version that is read, too; None for `version`.
+    """Return the header and the arrays of a file. oldest: oldest version that is read; by default `version`.
 
     Raises FormatError for a file of another kind or a damaged one; UnsupportedError for another version;
     LimitError.
     """
     if not read_head(path).startswith(ZIP):
-        raise FormatError(f"is no {kind} file", path=path)
+        raise FormatError(f"is not a {kind} file", path=path)
     try:
         with zipfile.ZipFile(path) as archive:
             size = archive.getinfo(HEADER).file_size
@@ -57,13 +56,13 @@ def read_archive(
                 raise FormatError(f"has a header of {size} bytes; expected {MAX_HEADER} at most", path=path)
             header = json.loads(archive.read(HEADER))
     except KeyError as error:
-        raise FormatError(f"is no {kind} file: it has no {HEADER}", path=path) from error
+        raise FormatError(f"is not a {kind} file: it has no {HEADER}", path=path) from error
     except FormatError:
         raise
     except Exception as error:  # zipfile, zlib and json fail in many ways on damage
         raise FormatError(f"is damaged: its header cannot be read: {error}", path=path) from error
     if not isinstance(header, dict) or header.get("kind") != kind:
-        raise FormatError(f"is no {kind} file", path=path)
+        raise FormatError(f"is not a {kind} file", path=path)
     given = header.get("version")
     oldest = version if oldest is None else oldest
     if type(given) is not int or not oldest <= given <= version:
@@ -74,13 +73,13 @@ def read_archive(
 
 
 class Fields:
-    """The parts of a file, checked as they are taken. FormatError for those that are missing or odd."""
+    """Checked access to the content of a file; FormatError where something is missing or has another form."""
 
     def __init__(self, path: Path, header: dict[str, Any], arrays: dict[str, Float64]) -> None:
         self._path, self._header, self._arrays = path, header, arrays
 
     def array(self, name: str, *shape: int | None) -> Float64:
-        """Return an array of finite numbers of this shape, None for any length."""
+        """Return an array of finite numbers of this shape; None stands for any length."""
         array = self._arrays.get(name)
         if array is None:
             raise FormatError(f"lacks the array {name}", path=self._path)
@@ -102,21 +101,21 @@ class Fields:
         return array.astype(np.intp)
 
     def text(self, name: str) -> str:
-        """Return a text of the header."""
+        """Return a text from the header."""
         value = self._header.get(name)
         if not isinstance(value, str):
             raise FormatError(f"{name} must be a text, not {value!r}"[:200], path=self._path)
         return value
 
     def texts(self, name: str) -> tuple[str, ...]:
-        """Return texts of the header."""
+        """Return a list of texts from the header."""
         value = self._header.get(name)
-        if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
+        if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
             raise FormatError(f"{name} must be a list of texts", path=self._path)
         return tuple(value)
 
     def number(self, name: str) -> float:
-        """Return a finite number of the header."""
+        """Return a finite number from the header."""
         value = self._header.get(name)
         if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
             raise FormatError(f"{name} must be a number, not {value!r}"[:200], path=self._path)

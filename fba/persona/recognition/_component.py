@@ -1,5 +1,4 @@
-"""`Component`: what is known of one part of the face: means, principal components, a network and its
-classes."""
+"""`Component`: recognition of the classes of a part: principal components and a small network."""
 
 from __future__ import annotations
 
@@ -7,26 +6,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Bool, Float64
-from fba.persona.recognition._network import Network, train
+from fba.arrays import Float64
+from fba.persona.points.layout import ANCHORS, part_points
 
-DIMENSIONS = {"mouth": 11, "left_eye": 5, "right_eye": 5, "left_brow": 5, "right_brow": 5}
-"""Principal components that are kept."""
-UNITS = {"mouth": 30, "left_eye": 20, "right_eye": 20, "left_brow": 20, "right_brow": 20}
-"""Hidden units of the networks."""
-WANTED_ACCURACY = {"mouth": 0.6, "left_eye": 0.9, "right_eye": 0.9, "left_brow": 0.9, "right_brow": 0.9}
-"""Share of the validation examples that a network must get right."""
-FLATTEST = 0.4
-"""Millimetres: corners of eyes that noise moves by less do not count for more."""
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """A network with one hidden layer of tanh units and a linear output for each class.
+
+    outputs = tanh(inputs . hidden + hidden_shift) . output + output_shift. hidden: float64 (D, H);
+    hidden_shift: (H,); output: (H, C); output_shift: (C,).
+    """
+
+    hidden: Float64
+    hidden_shift: Float64
+    output: Float64
+    output_shift: Float64
+
+    def __call__(self, inputs: Float64) -> Float64:
+        """Return outputs (..., C), about -1 to 1, for inputs (..., D)."""
+        return np.asarray(np.tanh(inputs @ self.hidden + self.hidden_shift) @ self.output + self.output_shift)
 
 
 @dataclass(frozen=True, eq=False)
 class Component:
     """A part of the face.
 
-    mean, spread: float64 (2K,), of the displacements that it was trained with. axes: (D, 2K), principal
-    components of the standardised ones. variance: (2K,), share of the variance that each component has, all
-    of them. network: its outputs are `classes`. share: of the validation examples that are right.
+    mean, spread: float64 (2K,), of the training displacements. axes: (D, 2K), principal components of the
+    standardised displacements. variance: (2K,), share of the variance of every principal component, also of
+    those left out. network: its outputs are `classes`. share: of the validation examples it gets right.
     """
 
     part: str
@@ -39,8 +47,7 @@ class Component:
     share: float
 
     def scores(self, moved: Float64) -> Float64:
-        """Return principal components (..., D) of displacements (..., 2K): z-scores, then a change of
-        basis."""
+        """Return principal components (..., D) of displacements (..., 2K)."""
         return np.asarray(((moved - self.mean) / self.spread) @ self.axes.T)
 
     def outputs(self, moved: Float64) -> Float64:
@@ -49,46 +56,16 @@ class Component:
 
     @property
     def kept_variance(self) -> float:
-        """Share of the variance that the components which are kept have together."""
+        """Share of the variance that `axes` cover."""
         return float(self.variance[: len(self.axes)].sum())
 
 
-def train_component(
-    part: str,
-    classes: tuple[str, ...],
-    moved: Float64,
-    targets: Bool,
-    check: Bool,
-    *,
-    tries: int = 3,
-    seed: int = 0,
-) -> Component:
-    """Return what examples teach of a part.
+def displacements(points: Float64, neutral: Float64, part: str) -> Float64:
+    """Return how far the points of a part are from the neutral face: float64 (T, 2K), all x, then all y.
 
-    moved: displacements (N, 2K); targets: bool (N, C), their classes; check: bool (N,), those kept for
-    validation.
+    points: (T, 64, 2) on the standard mask. neutral: (64, 2), or (T, 64, 2). Both are taken relative to the
+    part's anchor. Equation 4.3 of the source.
     """
-    used = targets.any(axis=1)
-    mean, spread = moved[~check].mean(axis=0), np.maximum(moved[~check].std(axis=0), FLATTEST)
-    standard = (moved - mean) / spread
-    variance, axes = find_axes(standard[~check])
-    axes = axes[: DIMENSIONS[part]]
-    scores = standard @ axes.T
-    learnt, held = used & ~check, used & check
-    training = train(
-        scores[learnt], targets[learnt], scores[held], targets[held],
-        units=UNITS[part], enough=WANTED_ACCURACY[part], tries=tries, seed=seed,
-    )  # fmt: skip
-    return Component(part, classes, mean, spread, axes, variance, training.network, training.share)
-
-
-def find_axes(values: Float64) -> tuple[Float64, Float64]:
-    """Return the principal components of values (N, K): shares of variance (K,) and axes (K, K).
-
-    Axes are rows, the one with the largest variance first, the largest of each one's numbers positive.
-    """
-    centred = values - values.mean(axis=0)
-    sizes, vectors = np.linalg.eigh(centred.T @ centred)
-    sizes, axes = np.maximum(sizes[::-1], 0.0), vectors.T[::-1]
-    largest = axes[np.arange(len(axes)), np.abs(axes).argmax(axis=1)]
-    return np.asarray(sizes / sizes.sum()), np.asarray(axes * np.sign(largest)[:, None])
+    rows, anchor = part_points(part), ANCHORS[part] - 1
+    moved, still = (face[..., rows, :2] - face[..., anchor : anchor + 1, :2] for face in (points, neutral))
+    return np.concatenate([moved[..., 0] - still[..., 0], moved[..., 1] - still[..., 1]], axis=-1)

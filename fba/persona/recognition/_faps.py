@@ -1,4 +1,4 @@
-"""Displaced masks as FAPs: each FAP is how far its feature point has moved along its axis, in its FAPU."""
+"""Conversion of displaced masks to FAPs: displacements of feature points along their axes, in FAPU."""
 
 from __future__ import annotations
 
@@ -14,32 +14,25 @@ from fba.face import Fapu, feature_point_names
 from fba.face.feature_points import row_of
 from fba.face.points import DIRECTIONS
 from fba.parameters import FAP_COUNT, faps
-from fba.persona.points.layout import (
-    IRIS,
-    SAME,
-    TRACKED,
-    point_weights,
-    standard_points,
-)
+from fba.persona.points.layout import SAME, TRACKED, point_weights, standard_points
 from fba.persona.recognition._recogniser import JAW_FAPS
 
 PUPILS = {"3.5": (61, 63), "3.6": (62, 64)}
-"""Pupils are between these points."""
+"""Points of the irises halfway between which the pupils are."""
 JAW = 3
 UPPER_LIDS = (18, 19)
 """Columns of the FAPs of the upper lids."""
 LOWER_LIDS = (20, 21)
 """Columns of the FAPs of the lower lids."""
 MIN_LID_FAPS = (-450.0, -150.0)
-"""FAPs of upper and lower lids that are open as far as lids go; narrow eyes at rest would ask for more."""
-LEFT_OUT = frozenset({61, 62, 63, 64})
-"""FAPs of the nose, by whose points faces are laid on the mask."""
+"""Smallest FAPs of upper and lower lids, the eyes wide open; faces with narrow eyes would exceed them."""
+NOSE_FAPS = frozenset({61, 62, 63, 64})
+"""FAPs that masks do not show: faces are registered by the points of the nose."""
 
 
 @dataclass(frozen=True)
-class Moved:
-    """A FAP that a vertex of the mask tells. row: of the vertex; axis and sign: of its motion; unit: its
-    FAPU."""
+class MaskFap:
+    """A FAP shown by a vertex of the mask. row: of the vertex; axis, sign: of its motion; unit: its FAPU."""
 
     fap: int
     row: int
@@ -49,49 +42,46 @@ class Moved:
 
 
 @cache
-def told_faps() -> tuple[Moved, ...]:
+def shown_faps() -> tuple[MaskFap, ...]:
     """Return the FAPs whose feature point is a vertex of the mask."""
-    weights = point_weights()[:SAME]
-    vertex = {}
-    for name, column in row_of().items():
-        rows = np.flatnonzero((weights[:, column] == 1.0) & ((weights != 0).sum(axis=1) == 1))
-        if len(rows):
-            vertex[name] = int(rows[0])
-    told = []
+    vertex = _vertex_of()
+    shown = []
     for fap in faps()[2:]:
         points = fap.feature_points
-        if (
-            fap.number in LEFT_OUT
-            or fap.positive not in DIRECTIONS
-            or len(points) != 1
-            or points[0] not in vertex
-        ):
+        if fap.number in NOSE_FAPS or fap.positive not in DIRECTIONS or len(points) != 1:
             continue
-        direction = np.array(DIRECTIONS[fap.positive])
-        axis = int(np.abs(direction).argmax())
-        told.append(Moved(fap.number, vertex[points[0]], axis, float(direction[axis]), fap.unit))
-    return tuple(told)
+        if points[0] in vertex:
+            direction = np.array(DIRECTIONS[fap.positive])
+            axis = int(np.abs(direction).argmax())
+            shown.append(MaskFap(fap.number, vertex[points[0]], axis, float(direction[axis]), fap.unit))
+    return tuple(shown)
 
 
 @cache
-def told_numbers() -> tuple[int, ...]:
-    """Return the numbers of the FAPs that masks tell, the jaw's among them."""
-    return tuple(sorted([JAW, *(one.fap for one in told_faps())]))
+def _vertex_of() -> dict[str, int]:
+    """Return the vertex of the mask at each feature point that has one."""
+    weights = point_weights()[:SAME]
+    alone = (weights != 0).sum(axis=1) == 1
+    rows = {name: np.flatnonzero((weights[:, column] == 1.0) & alone) for name, column in row_of().items()}
+    return {name: int(found[0]) for name, found in rows.items() if len(found)}
+
+
+@cache
+def shown_numbers() -> tuple[int, ...]:
+    """Return the numbers of the FAPs that masks show, including the jaw's."""
+    return tuple(sorted([JAW, *(fap.fap for fap in shown_faps())]))
 
 
 def measure_fapu(neutral: Float64) -> Fapu:
     """Return the FAPU of a neutral face, millimetres, from its tracked points (64, 2) on the standard mask.
 
-    Raises ModelError where they are not those of a neutral face.
+    Raises ModelError where they cannot be those of a neutral face.
     """
     features = np.full((len(feature_point_names()), 3), np.nan)
-    weights = point_weights()[: TRACKED - IRIS]
-    for row in row_of().values():
-        points = np.flatnonzero((weights[:, row] == 1.0) & ((weights != 0).sum(axis=1) == 1))
-        if len(points):
-            features[row, :2] = neutral[points[0]]
-    for pupil, (one, other) in PUPILS.items():
-        features[row_of()[pupil], :2] = (neutral[one - 1] + neutral[other - 1]) / 2
+    for name, vertex in _vertex_of().items():
+        features[row_of()[name], :2] = neutral[vertex]
+    for pupil, (above, below) in PUPILS.items():
+        features[row_of()[pupil], :2] = (neutral[above - 1] + neutral[below - 1]) / 2
     try:
         return Fapu.measure(features)
     except ModelError as error:
@@ -106,11 +96,7 @@ PART_UNITS = {
 
 
 def face_scale(fapu: Fapu, part: str) -> Float64:
-    """Return how much further a part of a face moves, across and up, than that of the standard face does:
-    (2,).
-
-    Faces show the same where they move by the same FAPs: an eye that is less open needs less to close.
-    """
+    """Return the factors (2,), across and up, from the standard face's displacements to those of a face."""
     standard = _standard_fapu()
     return np.array([fapu[unit] / standard[unit] for unit in PART_UNITS[part]])
 
@@ -121,15 +107,15 @@ def _standard_fapu() -> Fapu:
 
 
 def mask_faps(moved: Float64, fapu: Fapu, jaw: Float64) -> Float64:
-    """Return FAPs (T, 68) of masks whose vertices have moved by (T, 86, 3) millimetres from the neutral mask.
+    """Return FAPs (T, 68) for displacements (T, 86, 3) of masks from the neutral mask, millimetres.
 
-    fapu: of the neutral mask. jaw: (5,), `Recogniser.jaw`: FAP 3 is told by the lips.
+    fapu: of the neutral mask. jaw: (5,), `Recogniser.jaw`, from which FAP 3 follows the lips.
     """
     values = np.zeros((len(moved), FAP_COUNT))
-    for one in told_faps():
-        values[:, one.fap - 1] = one.sign * moved[:, one.row, one.axis] / fapu[one.unit]
+    for fap in shown_faps():
+        values[:, fap.fap - 1] = fap.sign * moved[:, fap.row, fap.axis] / fapu[fap.unit]
     for lids, widest in zip((UPPER_LIDS, LOWER_LIDS), MIN_LID_FAPS, strict=True):
         values[:, lids] = np.maximum(values[:, lids], widest)
     part_lids(values)
-    values[:, JAW - 1] = np.maximum(values[:, [fap - 1 for fap in JAW_FAPS]] @ jaw, 0.0)
+    values[:, JAW - 1] = np.maximum(values[:, [number - 1 for number in JAW_FAPS]] @ jaw, 0.0)
     return values

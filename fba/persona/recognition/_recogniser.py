@@ -1,4 +1,4 @@
-"""`Recogniser`: what was learnt of faces in general: five components, examples with their depth, the jaw."""
+"""`Recogniser`: knowledge of faces in general: five components, examples with their depth, the jaw."""
 
 from __future__ import annotations
 
@@ -15,33 +15,32 @@ from fba.errors import FormatError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.persona.points.layout import PARTS, VERTICES, part_points, part_vertices
 from fba.persona.recognition._archive import Fields, pack_archive, read_archive
-from fba.persona.recognition._component import Component
-from fba.persona.recognition._network import Network
+from fba.persona.recognition._component import Component, Network
 from fba.source import Path
 
 KIND = "persona recogniser"
 VERSION = 1
 NEIGHBOURS = 8
-"""Examples whose depth is averaged."""
+"""Number of examples whose depth is averaged."""
 JAW_FAPS = (4, 5, 52, 12, 13)
-"""FAPs of lips by which the FAP of the jaw, which no tracker sees, is told."""
+"""FAPs of the lips from which FAP 3 is estimated: no tracker sees the jaw."""
 MIN_OUTPUT = 0.1
-"""l1: the largest output below which an expression is unknown; outputs go from -1 to 1."""
+"""l1 of the source: an expression is unknown where the largest output, -1 to 1, is smaller."""
 SECOND_SHARE = 0.6
-"""l2: the share of the largest output above which the second one counts, too."""
+"""l2 of the source: the second class counts, too, where its output is above this share of the largest."""
 NONE = -1
 
 
 @dataclass(frozen=True, eq=False)
 class Recogniser:
-    """What recognises expressions, and knows what a picture does not show.
+    """Recognition of expressions, and the depth and the jaw, which pictures do not show.
 
-    components: by part. classes: names of what the examples are. example_classes: int (N,). example_labels:
-    part -> bool (N, C), of which of the component's classes each example is one. scores: part -> float64
-    (N, D), principal components of the examples. vertices: part -> float64 (2K, 2V), from displacements
-    relative to a part's anchor to those of its vertices on the mask, all x and then all y. depth: (N, 86),
-    millimetres that vertices move forward. jaw: (5,), FAP 3 for each of `JAW_FAPS`. seed: of the examples.
-    about: how it was trained.
+    components: by part. classes: names of the examples' classes. example_classes: int (N,), of each example.
+    example_labels: part -> bool (N, C), the component's classes that each example has. scores: part ->
+    float64 (N, D), principal components of the examples. vertices: part -> float64 (2K, 2V), map from
+    displacements relative to a part's anchor to those of its vertices on the mask, all x and then all y.
+    depth: (N, 86), forward displacements of the vertices, millimetres. jaw: (5,), coefficients of `JAW_FAPS`
+    in FAP 3. about: how it was trained.
     """
 
     components: dict[str, Component]
@@ -56,46 +55,42 @@ class Recogniser:
 
     @staticmethod
     def default() -> Recogniser:
-        """Return the one that comes with fba, trained with faces that are made up (docs/persona.md)."""
+        """Return the built-in recogniser, trained with synthetic faces (docs/persona.md)."""
         return _default()
 
     @staticmethod
     def load(path: Path, limits: Limits = DEFAULT_LIMITS) -> Recogniser:
-        """Return one from a file. Raises FormatError, UnsupportedError for another version, LimitError."""
+        """Return a recogniser from a file; FormatError, UnsupportedError for another version, LimitError."""
         header, arrays = read_archive(path, KIND, VERSION, limits)
         return _unpack(Fields(path, header, arrays), path)
 
     def save(self, path: Path) -> None:
-        """Write it to a file, atomically."""
+        """Write the recogniser to a file, atomically."""
         with atomic(path) as file:
             file.write(_pack(self))
 
     def find_depth(self, scores: Float64, classes: Intp) -> Float64:
-        """Return how far vertices move forward, (T, 86): as in the nearest examples of the same class of
-        the mouth.
+        """Return the forward displacements of vertices, (T, 86), from examples of the mouth's class.
 
-        The source takes the nearest one, and finds that masks tremble as it changes from frame to frame;
-        this is the mean of `NEIGHBOURS`.
-
-        scores: (T, 11), of mouths. classes: int (T,), of the mouth component; -1 for the nearest ones of
-        all.
+        The mean of the nearest `NEIGHBOURS`: with the nearest alone, as in the source, masks tremble as it
+        changes from frame to frame. scores: (T, 11), of mouths. classes: int (T,), of the mouth component; -1
+        for examples of any class.
         """
         deep = np.zeros((len(scores), VERTICES))
         labels = self.example_labels["mouth"]
         for number in np.unique(classes).tolist():
             rows = np.flatnonzero(classes == number)
-            known = np.flatnonzero(labels[:, number] if number >= 0 else labels.any(axis=1))
-            if not len(known):
+            examples = np.flatnonzero(labels[:, number] if number >= 0 else labels.any(axis=1))
+            if not len(examples):
                 continue
-            own = self.scores["mouth"][known]
-            square = (own**2).sum(axis=1) - 2 * scores[rows] @ own.T
-            near = np.argpartition(square, min(NEIGHBOURS, len(known)) - 1, axis=1)[:, :NEIGHBOURS]
-            deep[rows] = self.depth[known[near]].mean(axis=1)
+            there = self.scores["mouth"][examples]
+            square = (there**2).sum(axis=1) - 2 * scores[rows] @ there.T
+            near = np.argpartition(square, min(NEIGHBOURS, len(examples)) - 1, axis=1)[:, :NEIGHBOURS]
+            deep[rows] = self.depth[examples[near]].mean(axis=1)
         return deep
 
     def example_motion(self, part: str) -> Float64:
-        """Return how far the examples' vertices of a part have moved, (N, 2V), as far as kept components
-        tell."""
+        """Return the displacements of a part's vertices in the examples, (N, 2V), from their `scores`."""
         component = self.components[part]
         moved = (self.scores[part] @ component.axes) * component.spread + component.mean
         return np.asarray(moved @ self.vertices[part])
@@ -107,13 +102,13 @@ def _default() -> Recogniser:
         return Recogniser.load(path)
 
 
-def _pack(one: Recogniser) -> bytes:
+def _pack(recogniser: Recogniser) -> bytes:
     arrays: dict[str, Array] = {
-        "depth": one.depth.astype(np.float16), "jaw": one.jaw.astype(np.float32),
-        "example_classes": one.example_classes.astype(np.uint8),
+        "depth": recogniser.depth.astype(np.float16), "jaw": recogniser.jaw.astype(np.float32),
+        "example_classes": recogniser.example_classes.astype(np.uint8),
     }  # fmt: skip
-    header: dict[str, Any] = {"about": one.about, "classes": list(one.classes)}
-    for part, component in one.components.items():
+    header: dict[str, Any] = {"about": recogniser.about, "classes": list(recogniser.classes)}
+    for part, component in recogniser.components.items():
         net = component.network
         named = {
             "mean": component.mean, "spread": component.spread, "axes": component.axes,
@@ -122,9 +117,9 @@ def _pack(one: Recogniser) -> bytes:
             "output": net.output, "output_shift": net.output_shift,
         }  # fmt: skip
         arrays |= {f"{part}.{name}": array.astype(np.float32) for name, array in named.items()}
-        arrays[f"{part}.vertices"] = one.vertices[part].astype(np.float32)
-        arrays[f"{part}.scores"] = one.scores[part].astype(np.float16)
-        arrays[f"{part}.labels"] = one.example_labels[part].astype(np.uint8)
+        arrays[f"{part}.vertices"] = recogniser.vertices[part].astype(np.float32)
+        arrays[f"{part}.scores"] = recogniser.scores[part].astype(np.float16)
+        arrays[f"{part}.labels"] = recogniser.example_labels[part].astype(np.uint8)
         header |= {f"{part}.classes": list(component.classes), f"{part}.share": component.share}
     return pack_archive(KIND, VERSION, header, arrays)
 
@@ -174,21 +169,21 @@ class Labels:
         return len(self.first)
 
     def names(self, classes: tuple[str, ...]) -> list[str]:
-        """Return a name for each frame: "" for unknown, "LFAU_12", or "LFAU_26/LFAU_12", the principal
-        first."""
+        """Return a name for each frame: "" for unknown, "LFAU_12", or two, the principal class first."""
+        named = (*classes, "")  # NONE is the last
         return [
-            "" if one == NONE else classes[one] if other == NONE else f"{classes[one]}/{classes[other]}"
-            for one, other in zip(self.first.tolist(), self.second.tolist(), strict=True)
+            "/".join(filter(None, (named[first], named[second])))
+            for first, second in zip(self.first.tolist(), self.second.tolist(), strict=True)
         ]
 
 
 def decide(outputs: Float64, *, least: float = MIN_OUTPUT, second: float = SECOND_SHARE) -> Labels:
-    """Return the classes that outputs (T, C) say."""
+    """Return the classes of outputs (T, C): the largest from `least`, the next above `second` times that."""
     order = np.argsort(outputs, axis=1)
     rows = np.arange(len(outputs))
-    one = order[:, -1]
-    largest = outputs[rows, one]
-    other = order[:, -2] if outputs.shape[1] > 1 else np.full(len(outputs), NONE)
+    first = order[:, -1]
+    largest = outputs[rows, first]
+    runner_up = order[:, -2] if outputs.shape[1] > 1 else np.full(len(outputs), NONE)
     known = largest >= least
-    both = known & (outputs[rows, other] > second * largest)
-    return Labels(np.where(known, one, NONE), np.where(both, other, NONE))
+    both = known & (outputs[rows, runner_up] > second * largest)
+    return Labels(np.where(known, first, NONE), np.where(both, runner_up, NONE))

@@ -12,7 +12,7 @@ import numpy as np
 from fba.animation import Animation, Frame
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, write_mark
 from fba.errors import FbaWarning, OptionError, RangeError, Remedy
-from fba.planning._frame_order import check_order
+from fba.planning._live_encoder import check_order
 from fba.planning.rate._bucket import LeakyBucket
 from fba.planning.rate._expectations import expected_motion, quantiser_for
 from fba.planning.rate._visibility import slot_weights

@@ -14,9 +14,8 @@ from fba.codec import EncoderOptions, code_lengths, decode, quantise
 from fba.errors import FbaWarning, RangeError
 from fba.face import resolve
 from fba.face.resolve import known_faps
-from fba.limits import Limits
 from fba.planning._derived_faps import choose_faps, interpolated_faps
-from fba.planning._plan import plan_compact
+from fba.planning._plan import NO_LIMITS, plan_compact
 from fba.planning._segments import Cuts
 from fba.planning.rate._encoder import RateEncoder, RateStatistics
 from fba.planning.rate._errors import mean_distance
@@ -29,7 +28,6 @@ FINEST = (0.05, 0.0, 0.1)
 """Millimetres; see `RateEncoder`: the first is tried with all quantisers, the others with the best one."""
 TRIED_SECONDS = 30
 """Of the beginning, on which quantisers are tried."""
-_NO_LIMITS = Limits(frames=1 << 62, bytes=1 << 62)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +111,7 @@ def _encode(
     encoder = RateEncoder(rate, buffer, options, choose_quantisers=False, finest=setting.finest)
     encoder.expect(_changes_over(expected, setting.stride), exactly=True)
     data = encoder.push_animation(animation) + encoder.finish()
-    shown = decode(data, bap_steps=options.bap_steps, limits=_NO_LIMITS)
+    shown = decode(data, bap_steps=options.bap_steps, limits=NO_LIMITS)
     seconds = float((animation.index[-1] - animation.index[0] + 1) / animation.rate)
     return RatedStream(data, shown, options, encoder.statistics, 8 * len(data) / seconds)
 

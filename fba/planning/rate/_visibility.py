@@ -22,8 +22,6 @@ BODY_IMPORTANCE = 0.1
 """Bodies are seen from ten times as far as faces."""
 MIN_VISIBILITY = 0.01
 """Millimetres for a table step of what moves nothing on the built-in models: it may on others."""
-OFF_JOINTS = 0.03
-"""Metres from a joint to the points of a body that are measured."""
 
 
 @cache
@@ -67,11 +65,12 @@ def fap_millimetres() -> Float64:
 def bap_millimetres() -> Float64:
     """Return how far one unit of each BAP moves points 3 cm off the body's joints: float64 (296,)."""
     from fba.body import BapSolver
+    from fba.body.displacement import REACH
 
     steps = np.asarray(bap_steps("iso"), dtype=np.float64)
     moves = np.diag(STEPS * steps)
     solver = BapSolver()
-    offsets = np.concatenate([OFF_JOINTS * np.eye(3), np.ones((3, 1))], axis=1)
+    offsets = np.concatenate([REACH * np.eye(3), np.ones((3, 1))], axis=1)
     posed = np.asarray(solver.pose(moves.astype(np.int32))) @ offsets.T
     rest = np.asarray(solver.pose(np.zeros(BAP_COUNT, np.int32))) @ offsets.T
     distances = np.linalg.norm((posed - rest)[:, :, :3], axis=2).max(axis=(1, 2))

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
+from fba.face import FaceModel, Part
 from fba.face.eyeball import fit_sphere, flat_width
-from fba.face.model import FaceModel, Part, point_row
+from fba.face.model import point_row
 from fba.geometry import fit_similarity
 from fba_player.view._view import Eye
 

@@ -5,11 +5,13 @@ Garland and Heckbert's quadrics, "Simplifying Surfaces with Color and Texture us
 remain are some of the original ones.
 
 Bounds: `simplify` checks that corners are vertices, of which there are V points, and makes every array for V
-vertices and 3 F corners. `start` and `owners` list the triangles as they are; those that collapse name goals,
-which are corners of others. Poses have three coordinates each in points.
+vertices and 3 F corners. `Fans` list the triangles as they are; those that collapse name goals, which are
+corners of others. Poses have three coordinates each in points.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +26,31 @@ MAX_TURN_COSINE = 0.3
 """No triangle may turn by more than the angle of this cosine."""
 MIN_HEIGHT_SHARE = 0.05
 """Least height of a triangle, as a share of its longest side, unless it was thinner before."""
+
+
+class Fans(NamedTuple):
+    """The triangles around each vertex: those of v are owners[start[v] : start[v + 1]]; see `around`."""
+
+    triangles: Int32
+    start: Int64
+    owners: Int32
+
+
+class Quadrics(NamedTuple):
+    """Each vertex's quadric x.a.x + 2 b.x + c, (V, N, N), (V, N) and (V,), and its weight w (V,)."""
+
+    a: Float64
+    b: Float64
+    c: Float64
+    w: Float64
+
+
+class Fixed(NamedTuple):
+    """What keeps vertices: border, locked, bool (V,), and the largest squared error."""
+
+    border: Bool
+    locked: Bool
+    limit: float
 
 
 @compiled
@@ -44,23 +71,24 @@ def around(triangles: Int32, count: int, start: Int64, owners: Int32) -> None:
 
 
 @inlined
-def _count_triangles(triangles: Int32, start: Int64, owners: Int32, a: int, b: int) -> int:
+def _count_triangles(fans: Fans, a: int, b: int) -> int:
     """Return the number of triangles with an edge from a to b."""
     count = 0
-    for o in range(start[a], start[a + 1]):
-        other = triangles[owners[o]]
+    for o in range(fans.start[a], fans.start[a + 1]):
+        other = fans.triangles[fans.owners[o]]
         if other[0] == b or other[1] == b or other[2] == b:
             count += 1
     return count
 
 
 @compiled
-def borders(triangles: Int32, start: Int64, owners: Int32, border: Bool) -> None:
+def borders(fans: Fans, border: Bool) -> None:
     """Mark vertices with an edge that belongs to one triangle only."""
+    triangles = fans.triangles
     for t in range(len(triangles)):
         for k in range(3):
             a, b = triangles[t, k], triangles[t, (k + 1) % 3]
-            if _count_triangles(triangles, start, owners, a, b) == 1:
+            if _count_triangles(fans, a, b) == 1:
                 border[a] = border[b] = True
 
 
@@ -78,11 +106,10 @@ def _unit(vector: Float64) -> float:
 
 
 @compiled
-def _add(
-    points: Float64, p: int, e: Float64, f: Float64, weight: float, a: Float64, b: Float64, c: Float64, v: int
-) -> None:
+def _add(points: Float64, p: int, e: Float64, f: Float64, weight: float, sums: Quadrics, v: int) -> None:
     """Add to the quadric of v the squared distance to the plane that e and f span at the point p."""
     n = len(e)
+    a, b, c, _ = sums
     pe, pf, pp = 0.0, 0.0, 0.0
     for i in range(n):
         pe += points[p, i] * e[i]
@@ -97,18 +124,9 @@ def _add(
 
 
 @compiled
-def quadrics(
-    points: Float64,
-    triangles: Int32,
-    start: Int64,
-    owners: Int32,
-    a: Float64,
-    b: Float64,
-    c: Float64,
-    w: Float64,
-) -> None:
-    """Write each vertex's quadric x.a.x + 2 b.x + c, and its weight: the sum of squared distances to the
-    planes of its triangles and the lines of its borders."""
+def add_quadrics(points: Float64, fans: Fans, sums: Quadrics) -> None:
+    """Add to each vertex's quadric the squared distances to planes of its triangles and to its borders."""
+    triangles = fans.triangles
     n = points.shape[1]
     e, f = np.zeros(n), np.zeros(n)
     for t in range(len(triangles)):
@@ -126,19 +144,19 @@ def quadrics(
         if not (length > 1e-12 and high > 1e-12):
             continue
         for k in range(3):
-            _add(points, p, e, f, 0.5 * length * high, a, b, c, triangles[t, k])
-            w[triangles[t, k]] += 0.5 * length * high
+            _add(points, p, e, f, 0.5 * length * high, sums, triangles[t, k])
+            sums.w[triangles[t, k]] += 0.5 * length * high
         f[:] = 0.0
         for k in range(3):
             one, two = triangles[t, k], triangles[t, (k + 1) % 3]
-            if _count_triangles(triangles, start, owners, one, two) != 1:
+            if _count_triangles(fans, one, two) != 1:
                 continue
             for i in range(n):
                 e[i] = points[two, i] - points[one, i]
             length = _unit(e)
             if length > 1e-12:
-                _add(points, one, e, f, BORDER_WEIGHT * length * length, a, b, c, one)
-                _add(points, one, e, f, BORDER_WEIGHT * length * length, a, b, c, two)
+                _add(points, one, e, f, BORDER_WEIGHT * length * length, sums, one)
+                _add(points, one, e, f, BORDER_WEIGHT * length * length, sums, two)
 
 
 @inlined
@@ -151,12 +169,10 @@ def _apart(points: Float64, a: int, b: int, i: int) -> tuple[float, float, float
 
 
 @compiled
-def _fits(
-    points: Float64, poses: int, triangles: Int32, first: int, stop: int, owners: Int32, u: int, v: int
-) -> bool:
+def _fits(points: Float64, poses: int, fans: Fans, u: int, v: int) -> bool:
     """Return whether no triangle around u turns over or becomes a splinter when u goes to v, in any pose."""
-    for o in range(first, stop):
-        corners = triangles[owners[o]]
+    for o in range(fans.start[u], fans.start[u + 1]):
+        corners = fans.triangles[fans.owners[o]]
         if corners[0] == v or corners[1] == v or corners[2] == v:
             continue
         k = 0 if corners[0] == u else (1 if corners[1] == u else 2)
@@ -184,80 +200,71 @@ def _fits(
 
 
 @compiled
+def _find_neighbours(fans: Fans, u: int, near: Int32, shared: Int32) -> int:
+    """Write the neighbours of u, and how many triangles each shares with it; return their number."""
+    count = 0
+    for o in range(fans.start[u], fans.start[u + 1]):
+        for k in range(3):
+            v = fans.triangles[fans.owners[o], k]
+            if v == u:
+                continue
+            known = -1
+            for i in range(count):
+                if near[i] == v:
+                    known = i
+            if known >= 0:
+                shared[known] += 1
+            else:
+                near[count], shared[count] = v, 1
+                count += 1
+    return count
+
+
+@compiled
+def _squared_error(points: Float64, sums: Quadrics, u: int, v: int) -> float:
+    """Return the mean squared distance that u has moved from its planes when it goes to v."""
+    x, n = points[v], points.shape[1]
+    error = sums.c[u]
+    for j in range(n):
+        row = 2.0 * sums.b[u, j]
+        for k in range(n):
+            row += sums.a[u, j, k] * x[k]
+        error += row * x[j]
+    mean: float = error / max(sums.w[u], 1e-30)
+    return mean
+
+
+@compiled
 def candidates(
-    points: Float64,
-    poses: int,
-    triangles: Int32,
-    start: Int64,
-    owners: Int32,
-    border: Bool,
-    locked: Bool,
-    a: Float64,
-    b: Float64,
-    c: Float64,
-    w: Float64,
-    limit: float,
-    goal: Int32,
-    cost: Float64,
+    points: Float64, poses: int, fans: Fans, fixed: Fixed, sums: Quadrics, goal: Int32, cost: Float64
 ) -> int:
     """Write the neighbour that each vertex is best collapsed onto, or -1, and the squared error; return how
     many vertices have one.
 
     Bounds: at most MAX_TRIANGLES_AROUND triangles with two corners each besides the vertex are near it.
     """
-    n = points.shape[1]
     near = np.empty(2 * MAX_TRIANGLES_AROUND, dtype=np.int32)
     shared = np.empty(2 * MAX_TRIANGLES_AROUND, dtype=np.int32)
     count_with_goal = 0
     for u in range(len(points)):
         goal[u] = -1
-        first, stop = start[u], start[u + 1]
-        if locked[u] or first == stop or stop - first > MAX_TRIANGLES_AROUND:
+        around_u = fans.start[u + 1] - fans.start[u]
+        if fixed.locked[u] or around_u == 0 or around_u > MAX_TRIANGLES_AROUND:
             continue
-        count = 0
-        for o in range(first, stop):
-            for k in range(3):
-                v = triangles[owners[o], k]
-                if v == u:
-                    continue
-                known = -1
-                for i in range(count):
-                    if near[i] == v:
-                        known = i
-                if known >= 0:
-                    shared[known] += 1
-                else:
-                    near[count], shared[count] = v, 1
-                    count += 1
-        best = limit
+        count = _find_neighbours(fans, u, near, shared)
+        best = fixed.limit
         for i in range(count):
             v = near[i]
-            if shared[i] > 2 or (border[u] and (shared[i] != 1 or not border[v])):
+            if shared[i] > 2 or (fixed.border[u] and (shared[i] != 1 or not fixed.border[v])):
                 continue
-            x = points[v]
-            error = c[u]
-            for j in range(n):
-                row = 2.0 * b[u, j]
-                for k in range(n):
-                    row += a[u, j, k] * x[k]
-                error += row * x[j]
-            error /= max(w[u], 1e-30)
+            error = _squared_error(points, sums, u, v)
             if not error < best:
                 continue
             joint = 0  # common neighbours of the ends: more than triangles at the edge make it non-manifold
             for k in range(count):
-                other = near[k]
-                if other == v:
-                    continue
-                beside = False
-                for o in range(start[v], start[v + 1]):
-                    corner = triangles[owners[o]]
-                    if corner[0] == other or corner[1] == other or corner[2] == other:
-                        beside = True
-                        break
-                if beside:
+                if near[k] != v and _count_triangles(fans, v, near[k]) > 0:
                     joint += 1
-            if joint != shared[i] or not _fits(points, poses, triangles, first, stop, owners, u, v):
+            if joint != shared[i] or not _fits(points, poses, fans, u, v):
                 continue
             best = error
             goal[u] = v
@@ -268,23 +275,13 @@ def candidates(
 
 
 @compiled
-def collapse(
-    order: Int64,
-    goal: Int32,
-    triangles: Int32,
-    start: Int64,
-    owners: Int32,
-    touched: Bool,
-    onto: Int32,
-    a: Float64,
-    b: Float64,
-    c: Float64,
-    w: Float64,
-) -> int:
+def collapse(order: Int64, goal: Int32, fans: Fans, touched: Bool, onto: Int32, sums: Quadrics) -> int:
     """Collapse vertices onto their goals in this order, none next to another; return how many.
 
     Triangles that lose their area keep two equal corners. onto: (V,), written: what each vertex collapsed to.
     """
+    triangles, start, owners = fans
+    a, b, c, w = sums
     touched[:] = False
     done = 0
     for u in order:

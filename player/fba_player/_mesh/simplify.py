@@ -88,30 +88,29 @@ def simplify(
     start = np.zeros(count + 1, dtype=np.int64)
     owners = np.empty(3 * len(left), dtype=np.int32)
     loops.around(left, count, start, owners)
+    fans = loops.Fans(left, start, owners)
     border = np.zeros(count, dtype=bool)
-    loops.borders(left, start, owners, border)
+    loops.borders(fans, border)
     a, b = np.zeros((count, size, size)), np.zeros((count, size))
-    c, w = np.zeros(count), np.zeros(count)
-    loops.quadrics(points, left, start, owners, a, b, c, w)
+    sums = loops.Quadrics(a, b, c=np.zeros(count), w=np.zeros(count))
+    loops.add_quadrics(points, fans, sums)
     locked = _share_positions(points[:, :3])
     goal, cost = np.empty(count, dtype=np.int32), np.empty(count)
     touched = np.empty(count, dtype=bool)
     onto = np.arange(count, dtype=np.int32)
     first = np.full(count, len(tolerances), dtype=np.int32)
     for level, tolerance in enumerate(tolerances):
+        fixed = loops.Fixed(border, locked, tolerance**2)
         for _ in range(MAX_PASSES):
-            candidates = loops.candidates(
-                points, poses, left, start, owners, border, locked, a, b, c, w, tolerance**2, goal, cost
-            )
-            if not candidates:
+            if not loops.candidates(points, poses, fans, fixed, sums, goal, cost):
                 break
             movable = np.flatnonzero(goal >= 0)
             order = movable[np.argsort(cost[movable], kind="stable")]
-            done = loops.collapse(order, goal, left, start, owners, touched, onto, a, b, c, w)
+            done = loops.collapse(order, goal, fans, touched, onto, sums)
             first[(onto != np.arange(count)) & (first == len(tolerances))] = level
-            left = _without_flat(left)
-            loops.around(left, count, start, owners)
-            if done < MIN_REMOVED_SHARE * len(left):
+            fans = loops.Fans(_without_flat(fans.triangles), start, owners)
+            loops.around(fans.triangles, count, start, owners)
+            if done < MIN_REMOVED_SHARE * len(fans.triangles):
                 break
     return onto, first
 

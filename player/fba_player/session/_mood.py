@@ -6,8 +6,8 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba.emotion import Blend, Damping, combine, expression, expression_at, modify
-from fba.emotion.blending import FULL
-from fba.emotion.plane import HIGHEST, LOWEST
+from fba.emotion.blending import MAX_INTENSITY
+from fba.emotion.plane import SCALE_MAX, SCALE_MIN
 
 COMMON = ("anger", "surprise", "sadness", "sleepiness", "joy", "fear", "disgust")
 """The expressions that have a slider from the beginning."""
@@ -48,14 +48,14 @@ class PuppetMood:
 
     def set_weight(self, name: str, intensity: float) -> None:
         """Set the intensity of an expression; limited to 0 to 100. OptionError for an unknown name."""
-        self._weights[expression(name).name] = float(np.clip(intensity, 0.0, FULL))
+        self._weights[expression(name).name] = float(np.clip(intensity, 0.0, MAX_INTENSITY))
         self._mix()
 
     def move_point(self, activation: float, evaluation: float) -> None:
         """Set the point of the plane; limited to 1 to 7 each."""
         self._point = (
-            float(np.clip(activation, LOWEST, HIGHEST)),
-            float(np.clip(evaluation, LOWEST, HIGHEST)),
+            float(np.clip(activation, SCALE_MIN, SCALE_MAX)),
+            float(np.clip(evaluation, SCALE_MIN, SCALE_MAX)),
         )
         self._mix()
 

@@ -136,10 +136,10 @@ def test_out_of_order_doubled_lost_and_without_a_face(tmp_path: Path) -> None:
         (b"\0\1\0\4face" + bytes(60), "of another kind: Live Link Face, version 1 of the MetaHuman mode"),
         (SENT[0][:100], "cut short"),
         (SENT[0] + b"more", "longer than a datagram of Live Link Face"),
-        (b"garbage", "no datagrams of Live Link Face"),
+        (b"garbage", "not of Live Link Face"),
         (b"", "empty"),
         (SENT[0] + bytes(3000), "longer than 2048 bytes"),
-        (datagram([50.0] * 61, 1.0), "with weights that are no shares of 1"),
+        (datagram([50.0] * 61, 1.0), "with weights outside 0 to 1"),
         (datagram([0.1] * 61, 1.0, rate=900), "with more than 240 frames in a second"),
     ],
 )
@@ -159,7 +159,7 @@ def test_of_two_senders_the_first_or_the_one_that_is_named() -> None:
     assert dict(summary.other_senders) == {"'Bo' (10.0.0.2)": ROWS}
     assert said == [
         "receiving from 'iPhone' (10.0.0.2)",
-        "'Bo' (10.0.0.2) sends, too, and is left out",
+        "'Bo' (10.0.0.2) also sends, and is left out",
     ]
     named, _ = captured("livelink", mixed, sender="Bo")
     assert named == captured("livelink", at_rate(other))[0]
@@ -242,7 +242,7 @@ def test_records_of_ifacialmocap(version: int, tmp_path: Path) -> None:
     sent = at_rate([record.encode() for record in records])
     live, summary = captured("ifacialmocap", [*sent, (2.0, "10.0.0.2", b"StartStreaming")])
     check_same(live, from_blendshapes(ifacialmocap.read_face(path, fps=60)), off=1)
-    assert summary.refused == {"no records of iFacialMocap": 1}
+    assert summary.refused == {"not records of iFacialMocap": 1}
     lost = records[10].replace("jawOpen", "jawShut").encode()
     _, summary = captured("ifacialmocap", [*sent[:10], (10 / 60, "10.0.0.2", lost), *sent[11:]])
     assert (summary.used, summary.unseen) == (ROWS - 1, 1)
@@ -287,7 +287,7 @@ def test_objects_of_vtube_studio() -> None:
     assert expected is not None
     np.testing.assert_allclose(live.face.values, expected.values[: len(live)], atol=1)
     assert (summary.used, summary.unseen) == (ROWS - 1, 1)
-    assert dict(summary.refused) == {"no objects of VTube Studio": 6, "without a time": 1}
+    assert dict(summary.refused) == {"not objects of VTube Studio": 6, "without a time": 1}
 
 
 def test_what_is_shown_is_the_newest_datagram() -> None:
@@ -333,9 +333,9 @@ def test_the_summary_says_everything_once() -> None:
     summary.refuse("cut short")
     assert summary.lines() == [
         "90 datagrams from 'Anna' (10.0.0.2): 70 used, 5 without a face",
-        "3 out of order, put in order, 1 doubled, 2 too late, 4 with a time of their own",
+        "3 out of order, put in order, 1 doubled, 2 too late, 4 with a time that no other confirms",
         "2 gaps, 0.50 s at most, are bridged",
-        "the sender's clock was set 2 times; the stream goes on by ours",
+        "the sender's clock was set 2 times; the stream continues by ours",
         "left out: 1 cut short",
         "of other senders, left out: 'Bo' (10.0.0.3) (1)",
         "a note",
@@ -361,5 +361,5 @@ def test_what_is_sent_again_and_again() -> None:
     assert now[0] == pytest.approx(11 / 60)
     times = [recorded.read_packet(one, 0, "a.udp")[0] for one in sent]
     assert [round(60 * one.seconds, 3) for one in times if one is not None] == list(range(12))
-    with pytest.raises(FbaError, match="nothing can be sent there"):
+    with pytest.raises(FbaError, match="cannot be sent to"):
         send(animation, ("127.0.0.1", 0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from fractions import Fraction
 
 import numpy as np
@@ -204,7 +203,7 @@ def test_other_senders(options: dict[str, bool], person: fba.Animation) -> None:
     assert animation.body is not None
     assert person.body is not None
     assert len(animation) == pytest.approx(COUNT, abs=2)
-    assert ("the bones come without lengths; those of a usual body are taken" in summary.notes) == (
+    assert ("the bones come without lengths; those of the standard's body are used" in summary.notes) == (
         options.get("lengths") is False
     )
     joints = BapSolver()
@@ -218,17 +217,17 @@ def test_other_senders(options: dict[str, bool], person: fba.Animation) -> None:
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"", "no OSC"),
-        (b"#bundle\0", "no OSC"),
-        (bundle(osc("/VMC/Ext/OK", 1.0))[:-3], "no OSC"),
-        (bundle(b"") + b"\0\0\0\5abcde", "no OSC"),
-        (b"/VMC\xff\xfe" + b"\0" * 2 + b",Q\0\0", "no OSC"),
-        (osc("/avatar/parameters/x", 1.0), "nothing of VMC"),
-        (osc("/VMC/Ext/Bone/Pos", "Hips", 1.0), "wrong messages of VMC"),
-        (osc("/VMC/Ext/Bone/Pos", "Hips", *(0.0,) * 7), "wrong messages of VMC"),  # a turn of no length
-        (osc("/VMC/Ext/Bone/Pos", "Hips", float("nan"), *(0.0,) * 5, 1.0), "wrong messages of VMC"),
-        (osc("/VMC/Ext/Blend/Val", "A", 1e9), "wrong messages of VMC"),
-        (osc("/VMC/Ext/T", "now"), "wrong messages of VMC"),
+        (b"", "not OSC"),
+        (b"#bundle\0", "not OSC"),
+        (bundle(osc("/VMC/Ext/OK", 1.0))[:-3], "not OSC"),
+        (bundle(b"") + b"\0\0\0\5abcde", "not OSC"),
+        (b"/VMC\xff\xfe" + b"\0" * 2 + b",Q\0\0", "not OSC"),
+        (osc("/avatar/parameters/x", 1.0), "without messages of VMC"),
+        (osc("/VMC/Ext/Bone/Pos", "Hips", 1.0), "with wrong messages of VMC"),
+        (osc("/VMC/Ext/Bone/Pos", "Hips", *(0.0,) * 7), "with wrong messages of VMC"),  # a turn of no length
+        (osc("/VMC/Ext/Bone/Pos", "Hips", float("nan"), *(0.0,) * 5, 1.0), "with wrong messages of VMC"),
+        (osc("/VMC/Ext/Blend/Val", "A", 1e9), "with wrong messages of VMC"),
+        (osc("/VMC/Ext/T", "now"), "with wrong messages of VMC"),
     ],
 )
 def test_what_is_damaged_is_counted(data: bytes, reason: str) -> None:
@@ -243,16 +242,3 @@ def test_bundles_in_bundles_end_somewhere() -> None:
     assert read_messages(data)[0].address == "/VMC/Ext/OK"
     with pytest.raises(DatagramError):
         read_messages(bundle(data))
-
-
-def test_bytes_that_changed_on_the_way_are_an_error_or_a_message() -> None:
-    random.seed(4)
-    whole = SENT[0][2]
-    for _ in range(2000):
-        data = bytearray(whole)
-        for _ in range(random.randint(1, 6)):
-            data[random.randrange(len(data))] = random.randrange(256)
-        try:
-            VmcReader().read(bytes(data[: random.randint(0, len(data))]), 0.0)
-        except DatagramError:
-            continue

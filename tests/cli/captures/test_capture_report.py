@@ -15,8 +15,10 @@ import pytest
 import fba
 from fba import Animation, BodyTrack, FaceTrack
 from fba.body import Limits
+from fba.capture import preparation
 from fba.capture.comparison import Comparison, Difference
 from fba.cli.capture_report import CaptureReport, poor_line
+from fba.formats.bvh import _reader as reader
 from fba.parameters import baps
 
 BVH = """HIERARCHY
@@ -198,3 +200,25 @@ def test_legs_that_stay_as_they_are_retargeted(encode: Encode, tmp_path: Path, s
         found[plant] = thigh["mean"], capture["feet"]["within"]
     assert found["--no-plant"][0] < 0.01 < found["--plant"][0] < 2
     assert found["--no-plant"][1] < 0.9 < found["--plant"][1]
+
+
+def test_a_capture_is_read_and_prepared_once(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+
+    def counted(module: Any, name: str) -> None:
+        function = getattr(module, name)
+
+        def call(*arguments: Any, **options: Any) -> Any:
+            calls.append(name)
+            return function(*arguments, **options)
+
+        monkeypatch.setattr(module, name, call)
+
+    counted(reader, "parse")
+    counted(preparation, "find_bones")
+    said = run("encode", bvh(tmp_path), "-o", tmp_path / "a.fba", "--report", "--json")
+    assert said.code == 0
+    assert calls == ["parse", "find_bones"]
+    assert json.loads(said.out)["captures"][0]["frames"] == 3

@@ -66,7 +66,7 @@ def test_a_face_is_recorded_and_what_was_left_out_is_said(
     assert f"listening for Live Link Face on UDP port {port}" in said.err
     assert "receiving from 'iPhone' (127.0.0.1)" in said.err
     assert "120 datagrams from 'iPhone' (127.0.0.1): 60 used" in said.out
-    assert "left out: 60 no datagrams of Live Link Face" in said.out
+    assert "left out: 60 not of Live Link Face" in said.out
     assert "lost" not in said.out
     assert len(fba.read(path)) == 60
     assert "a.fba: 60 frames" in said.out
@@ -206,7 +206,7 @@ def test_a_telephone_is_asked(run: Callable[..., Any], tmp_path: Path) -> None:
         (["livelink"], 2, "give -o OUT.fba to record, --play to see it, or both"),
         (["livelink", "-o", "a.fba", "--model", "."], 2, "--model goes with --play"),
         (["livelink", "-o", "a.fba", "--ask", "10.0.0.2"], 2, "Live Link Face sends by itself"),
-        (["vtube", "-o", "a.fba", "--ask", "10.0.0.2:x", "--seconds", "0.1"], 1, "'x' is no port"),
+        (["vtube", "-o", "a.fba", "--ask", "10.0.0.2:x", "--seconds", "0.1"], 1, "'x' is not a port"),
         (
             ["livelink", "-o", "a.fba", "--host", "203.0.113.9", "--seconds", "0.1"],
             1,

@@ -102,7 +102,7 @@ def test_the_rules_have_parameters(run: Run) -> None:
         ("fear --seconds 2", "--seconds goes with -o"),
         ("fear -o x.fba --size 30x30", "--size goes with a picture or a film"),
         ("fear -o x.fba --seconds 1 --ease 0.6", "easing in and out takes 1.2 s"),
-        ("fear -o x.fba --seconds nan", "must be a number that is not negative"),
+        ("fear -o x.fba --seconds nan", "must be a number of at least 0"),
         ("fear -o x.fba --seconds 1e12", "are more than"),
         ("fear -o x.png --ease 1", "a picture shows the full expression"),
         ("--list -o x.fba", "--list prints a table"),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fba.errors import FbaWarning, ModelError
-from fba.face.authoring import author, from_morphs
+from fba.face.authoring import add_shapes, author
 from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
 from fba.face.feature_points import row_of
@@ -79,7 +79,7 @@ def sculpted(base: FaceModel) -> tuple[dict[str, dict[str, np.ndarray]], np.ndar
 
 @pytest.fixture(scope="module")
 def shaped(base: FaceModel, sculpted: tuple[dict[str, dict[str, np.ndarray]], np.ndarray]) -> FaceModel:
-    return from_morphs(base.parts, base.points, sculpted[0], bound=base.bound)
+    return add_shapes(author(base.parts, base.points, bound=base.bound), sculpted[0])
 
 
 def test_brows_use_the_shapes_and_the_smile_too(shaped: FaceModel) -> None:
@@ -145,7 +145,7 @@ def test_no_triangle_turns_over_at_the_limits(shaped: FaceModel) -> None:
 def test_shapes_that_nobody_knows_are_said(base: FaceModel) -> None:
     moved = np.ones((len(base.part("skin").vertices), 3), dtype=np.float32)
     with pytest.warns(FbaWarning, match="none of the 1 shapes is named after"):
-        model = from_morphs(base.parts, base.points, {"wobble": {"skin": moved}}, bound=base.bound)
+        model = add_shapes(author(base.parts, base.points, bound=base.bound), {"wobble": {"skin": moved}})
     assert {table.fap for table in model.tables} == {table.fap for table in base.tables}
 
 
@@ -163,7 +163,7 @@ def test_bad_shapes(base: FaceModel, moved: dict[str, np.ndarray | None], words:
         for part, array in moved.items()
     }
     with pytest.raises(ModelError, match=words):
-        from_morphs(base.parts, base.points, {"jawOpen": given}, bound=base.bound)
+        add_shapes(author(base.parts, base.points, bound=base.bound), {"jawOpen": given})
 
 
 def test_shapes_named_after_faps_are_taken_at_their_word(base: FaceModel, tmp_path: Path) -> None:

@@ -213,12 +213,12 @@ def test_skeleton_that_is_no_body(tmp_path: Path) -> None:
     path = tmp_path / "tail.bvh"
     path.write_text(text())
     with pytest.raises(FormatError, match=r"tail.bvh.*no known skeleton family"):
-        reader.read(path)
+        fba.read(path)
     with pytest.raises(FormatError):
-        reader.read(tmp_path)
+        fba.read(tmp_path)
     (tmp_path / "empty.bvh").touch()
     with pytest.raises(FormatError, match="empty"):
-        reader.read(tmp_path / "empty.bvh")
+        fba.read(tmp_path / "empty.bvh")
 
 
 def test_sniffs_content_not_name() -> None:

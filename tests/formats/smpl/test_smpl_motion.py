@@ -149,6 +149,14 @@ def test_python_objects_are_not_loaded(tmp_path: Path) -> None:
         read_motion(path)
 
 
+def test_metres_of_the_person_in_one_metre_of_the_file(tmp_path: Path) -> None:
+    path = saved(
+        tmp_path, poses=body().reshape(FRAMES, -1), trans=np.stack([RAMP, 0 * RAMP, 0.9 + 0 * RAMP], 1)
+    )
+    ways = [np.ptp(value(fba.read(path, scale=scale), "HumanoidRoot_tr_lateral")) for scale in (0.5, 1.0)]
+    assert ways[1] == pytest.approx(2 * ways[0], abs=2)
+
+
 @pytest.mark.parametrize("root", [STANDS, np.zeros(3), np.array([np.pi, 0.0, 0.0])])
 def test_heads_are_up_along_y(tmp_path: Path, root: np.ndarray) -> None:
     """Whether the file has z up, y up, or y down as cameras have it."""

@@ -18,7 +18,7 @@ def main() -> None:
     """Make examples, train, write the file, and print how well each part is recognised."""
     parser = argparse.ArgumentParser(prog="python -m tools.persona.training", description=main.__doc__)
     parser.add_argument("-o", "--output", type=Path, required=True, help="file to write")
-    parser.add_argument("--people", type=int, default=PEOPLE, help="faces that are made up")
+    parser.add_argument("--people", type=int, default=PEOPLE, help="number of synthetic faces")
     parser.add_argument("--each", type=int, default=EACH, help="examples of each class of each of them")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""Faces that are made up as a tracker sees them: turned, in perspective, and a little off."""
+"""Synthetic faces as a tracker sees them: turned, in perspective, and with noise."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TO_CAMERA = np.array([1.0, -1.0, -1.0])
 def photograph(
     features: Float64, angles: Float64, random: np.random.Generator, *, noise: float = NOISE
 ) -> tuple[Float64, Float64]:
-    """Return tracked points (T, 64, 2), pixels, y down, and head angles (T, 3) as they are told, radians.
+    """Return tracked points (T, 64, 2), pixels, y down, and head angles (T, 3) with their noise, radians.
 
     features: (T, 84, 3), metres. angles: (T, 3), pitch, yaw and roll of the head. noise: pixels.
     """

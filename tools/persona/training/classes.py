@@ -24,12 +24,11 @@ from fba.parameters import FAP_COUNT
 from fba.persona.points.layout import PARTS
 
 NEUTRAL = "NEUTRAL"
-LATERAL = {"12L", "12R"}
 
 
 @dataclass(frozen=True)
 class FaceClass:
-    """A class. recipe: what it is made of. labels: part -> names of the classes that it is an example of."""
+    """A class. recipe: its components. labels: part -> names of the classes of which it is an example."""
 
     name: str
     recipe: str
@@ -61,7 +60,7 @@ def face_classes() -> tuple[FaceClass, ...]:
 
 @cache
 def part_classes(part: str) -> tuple[str, ...]:
-    """Return the classes that the network of a part tells apart."""
+    """Return the classes of a part's network."""
     return tuple(dict.fromkeys(name for one in face_classes() for name in one.labels[part]))
 
 

@@ -1,5 +1,4 @@
-"""Examples of the 35 classes: faces that are made up, in several intensities and poses, with their true
-masks."""
+"""Examples of the 35 classes: synthetic faces in several intensities and poses, with their true masks."""
 
 from __future__ import annotations
 

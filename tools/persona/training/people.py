@@ -1,4 +1,4 @@
-"""Faces that are made up: feature points of two base heads, varied as adults' faces vary, and how FAPs move
+"""Synthetic faces: feature points of two base heads, varied as adults' faces vary, and how FAPs move
 them.
 
 Base 0 is the standard's neutral face, moved by the standard's rules; base 1 the built-in head, moved by its
@@ -26,22 +26,27 @@ DEVIATIONS = {
 }  # fmt: skip
 """Standard deviations of measures of adults' faces, as shares: after Farkas's tables of North Americans."""
 MOST = 2.0
-"""Deviations that a measure is off at most."""
-SMOOTH, REACH, ONE_SIDED = 0.0012, 0.02, 0.3
-"""Metres by which points are elsewhere besides, metres over which that is alike, share that one side has
-alone."""
-GAIN, LOPSIDED = 0.2, 0.1
-"""How much more or less persons move than others, by each FAP, and on one side (natural logarithms)."""
+"""Largest deviation of a measure, in standard deviations."""
+SMOOTH = 0.0012
+"""Standard deviation of a smooth displacement of all points, metres."""
+REACH = 0.02
+"""Distance over which that displacement is similar, metres."""
+ONE_SIDED = 0.3
+"""Share of it that differs between the sides."""
+GAIN = 0.2
+"""Standard deviation of the amplitude of each FAP between persons, natural logarithm."""
+LOPSIDED = 0.1
+"""The same between the sides of a face."""
 JAW_POINTS = ("2.1", "2.10", "2.11", "2.12", "2.13", "2.14")
 TEETH = ("9.8", "9.9", "9.10", "9.11")
 EYES = ("3.", "4.")
-LIDS_UP, LIDS_DOWN = ("3.1", "3.2", "3.13", "3.14"), ("3.3", "3.4", "3.9", "3.10")
+LIDS_UP = ("3.1", "3.2", "3.13", "3.14")
+LIDS_DOWN = ("3.3", "3.4", "3.9", "3.10")
 
 
 @dataclass(frozen=True, eq=False)
 class People:
-    """Faces that are made up. points: float64 (N, 84, 3), metres. base: int (N,), 0 or 1. gains: (N, 68),
-    of FAPs."""
+    """Synthetic faces. points: float64 (N, 84, 3), metres. base: int (N,), 0 or 1. gains: (N, 68)."""
 
     points: Float64
     base: Intp

@@ -1,4 +1,4 @@
-"""Trains what recognises expressions, from examples."""
+"""Training of a recogniser from examples."""
 
 from __future__ import annotations
 
@@ -7,27 +7,26 @@ import numpy as np
 from fba.arrays import Bool, Float64, Intp
 from fba.persona import Recogniser
 from fba.persona.points.layout import PARTS, VERTICES, flat_mask, part_vertices
-from fba.persona.recognition import Component
-from fba.persona.recognition._component import train_component
-from fba.persona.recognition._displacements import displacements
+from fba.persona.recognition import Component, displacements
 from fba.persona.recognition._faps import face_scale, mask_faps, measure_fapu
 from fba.persona.recognition._recogniser import JAW_FAPS
 from tools.persona.training.classes import class_labels, face_classes, part_classes
 from tools.persona.training.examples import Examples
+from tools.persona.training.networks import train_component
 
-HELD = 5
+FOLDS = 5
 """Every fifth person is kept for validation."""
-KEPT = 2
-"""Examples of each class of each person that are stored for depth, and for what faces do in general."""
+STORED = 2
+"""Examples of each class and person that are stored, for depth and for the general curves."""
 RIDGE = 1e-3
-"""Square millimetres for each example that coordinates of points are taken to be off."""
-NEUTRALS = 3
-"""Neutral examples of a part are at most this many times those of its largest class."""
+"""Assumed variance of a coordinate's noise, square millimetres an example."""
+MAX_NEUTRALS = 3
+"""Largest number of neutral examples of a part, relative to its largest other class."""
 
 
 def train_recogniser(examples: Examples, *, tries: int = 3, seed: int = 1, about: str = "") -> Recogniser:
-    """Return what examples teach; every fifth person is held back for validation."""
-    check = examples.person % HELD == HELD - 1
+    """Return a recogniser trained with examples; every fifth person is held back for validation."""
+    check = examples.person % FOLDS == FOLDS - 1
     random = np.random.default_rng(seed)
     components: dict[str, Component] = {}
     moved = {part: displacements(examples.points, examples.neutral, part) for part in PARTS}
@@ -40,7 +39,7 @@ def train_recogniser(examples: Examples, *, tries: int = 3, seed: int = 1, about
     kept = _stored(examples)
     return Recogniser(
         components,
-        tuple(one.name for one in face_classes()),
+        tuple(each.name for each in face_classes()),
         examples.classes[kept],
         {part: class_labels(part)[examples.classes[kept]] for part in PARTS},
         {part: components[part].scores(moved[part][kept]) for part in PARTS},
@@ -52,38 +51,37 @@ def train_recogniser(examples: Examples, *, tries: int = 3, seed: int = 1, about
 
 
 def _thin_neutral(targets: Bool, random: np.random.Generator) -> Intp:
-    """Return rows of examples, not more neutral ones (the first class) than `NEUTRALS` times those of
-    another class."""
-    most = NEUTRALS * int(targets[:, 1:].sum(axis=0).max())
+    """Return rows of examples, with neutral ones (the first class) thinned to `MAX_NEUTRALS`."""
+    most = MAX_NEUTRALS * int(targets[:, 1:].sum(axis=0).max())
     neutral = np.flatnonzero(targets[:, 0])
     chosen = random.permutation(neutral)[:most]
     return np.sort(np.concatenate([np.flatnonzero(~targets[:, 0]), chosen]))
 
 
 def _stored(examples: Examples) -> Intp:
-    """Return rows of the examples that are stored: for each person and class the first ones."""
+    """Return the first rows of each person and class: the examples that are stored."""
     key = examples.person * len(face_classes()) + examples.classes
     order = np.argsort(key, kind="stable")
     starts = np.searchsorted(key[order], key[order])
-    return np.sort(order[np.arange(len(order)) - starts < KEPT])
+    return np.sort(order[np.arange(len(order)) - starts < STORED])
 
 
 def _fit_vertices(examples: Examples, part: str, moved: Float64) -> Float64:
     """Return the map (2K, 2V) from displacements relative to a part's anchor to those of its vertices.
 
-    These are as far as the standard face would move (`face_scale`).
+    The latter are scaled to the standard face (`face_scale`).
     """
-    own = (flat_mask(examples.points) - flat_mask(examples.neutral))[:, part_vertices(part), :2]
+    vertices = (flat_mask(examples.points) - flat_mask(examples.neutral))[:, part_vertices(part), :2]
     for person in np.unique(examples.person).tolist():
         rows = np.flatnonzero(examples.person == person)
-        own[rows] /= face_scale(measure_fapu(examples.neutral[rows[0]]), part)
-    targets = np.concatenate([own[..., 0], own[..., 1]], axis=1)
+        vertices[rows] /= face_scale(measure_fapu(examples.neutral[rows[0]]), part)
+    targets = np.concatenate([vertices[..., 0], vertices[..., 1]], axis=1)
     normal = moved.T @ moved + RIDGE * len(moved) * np.eye(moved.shape[1])
     return np.asarray(np.linalg.solve(normal, moved.T @ targets))
 
 
 def _fit_jaw(examples: Examples) -> Float64:
-    """Return FAP 3 for each of the lips' FAPs that tell it: least squares, all examples."""
+    """Return the coefficients (5,) of the lips' FAPs in FAP 3: least squares over all examples."""
     moved = np.zeros((len(examples), VERTICES, 3))
     moved[:, :60, :2] = (examples.points - examples.neutral)[:, :60]
     values = np.zeros((len(examples), len(JAW_FAPS)))
@@ -91,6 +89,6 @@ def _fit_jaw(examples: Examples) -> Float64:
         rows = np.flatnonzero(examples.person == person)
         fapu = measure_fapu(examples.neutral[rows[0]])
         values[rows] = mask_faps(moved[rows], fapu, np.zeros(len(JAW_FAPS)))[:, [fap - 1 for fap in JAW_FAPS]]
-    if not examples.jaw.any():  # scans do not tell it: as of faces that are made up
+    if not examples.jaw.any():  # scans do not have it: that of the synthetic faces
         return Recogniser.default().jaw
     return np.asarray(np.linalg.lstsq(values, examples.jaw, rcond=None)[0])

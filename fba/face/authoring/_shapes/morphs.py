@@ -10,25 +10,23 @@ sculptor's shapes show.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.errors import FbaWarning
-from fba.face._expressions import Definitions
 from fba.face._tables import FaceDefTables
-from fba.face.authoring._author import author, author_lids
+from fba.face.authoring._author import author_lids
 from fba.face.authoring._shapes._mixing import GROUPS, Mixer, fold_limited_tables
 from fba.face.authoring._shapes._shapes import Morphs, Shapes, check_shapes
-from fba.face.model import FaceModel, Part
+from fba.face.model import FaceModel
 from fba.face.shape_names import canonical_names, fap_of
 from fba.parameters import faps
 
 if TYPE_CHECKING:
-    from fba.face.interpolation.table import InterpolationTable
+    pass
 
 EMPTY_SHAPE_MOTION = 1e-7
 """Metres up to which a shape moves its vertices that counts as empty."""
@@ -53,34 +51,14 @@ REPLACEMENT_SHAPES = {
 """Shapes that are used for FAPs where the mesh alone gives no table."""
 
 
-def from_morphs(
-    parts: Sequence[Part],
-    points: npt.ArrayLike,
-    morphs: Morphs,
-    *,
-    bound: npt.ArrayLike | None = None,
-    name: str = "",
-    definitions: Definitions | None = None,
-    fit: InterpolationTable | None = None,
-    notes: Mapping[str, str] | None = None,
-) -> FaceModel:
-    """Return a face whose tables are made from named shapes where they suffice, otherwise from the mesh
-    alone.
-
-    parts, points, bound, name, definitions, fit, notes: as `author`. morphs: displacements float32
-    (V, 3), metres, at weight 1, by the name of the shape and of the part; shapes are named as ARKit's
-    blendshapes (synonyms: `arkit.csv`) or as FAPs. Others are ignored.
-
-    FAPs for which neither suffices are in `lost`. Raises ModelError as `author`, and where displacements do
-    not fit their part.
-    """
-    base = author(parts, points, bound=bound, name=name, definitions=definitions, fit=fit, notes=notes)
-    return add_shapes(base, morphs)
-
-
 def add_shapes(base: FaceModel, morphs: Morphs) -> FaceModel:
-    """Return a face that `author` made, with tables from named shapes where they suffice; as
-    `from_morphs`."""
+    """Return a face that `author` made, with tables from named shapes where they suffice.
+
+    morphs: displacements float32 (V, 3), metres, at weight 1, by the names of the shape and of the part;
+    shapes are named as ARKit's blendshapes (synonyms: `arkit.csv`) or as FAPs. Others are ignored.
+
+    FAPs for which neither suffices are in `lost`. ModelError where displacements do not fit their part.
+    """
     moving = {
         shape: moved
         for shape, moved in morphs.items()

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from imgui_bundle import imgui
 
 from fba.emotion import NEUTRAL_POINT, expressions, known_points
-from fba.emotion.plane import HIGHEST, LOWEST
+from fba.emotion.plane import SCALE_MAX, SCALE_MIN
 from fba_player._ui import theme
 from fba_player._ui.panels.panel import choose_name, heading, shorten, tooltip
 from fba_player.session._mood import PuppetMood
@@ -128,14 +128,14 @@ class EmotionTab:
     def _place(self, activation: float, evaluation: float) -> tuple[float, float]:
         """Return where a point of the plane is drawn: evaluation to the right, activation upwards."""
         left, top, right, bottom = self.plane
-        along, up = ((value - LOWEST) / (HIGHEST - LOWEST) for value in (evaluation, activation))
+        along, up = ((value - SCALE_MIN) / (SCALE_MAX - SCALE_MIN) for value in (evaluation, activation))
         return left + along * (right - left), bottom - up * (bottom - top)
 
     def _value(self, x: float, y: float) -> tuple[float, float]:
         """Return the activation and evaluation at a place, in points; `PuppetMood.move_point` limits them."""
         left, top, right, bottom = self.plane
         along, up = (x - left) / max(right - left, 1.0), (bottom - y) / max(bottom - top, 1.0)
-        return LOWEST + up * (HIGHEST - LOWEST), LOWEST + along * (HIGHEST - LOWEST)
+        return SCALE_MIN + up * (SCALE_MAX - SCALE_MIN), SCALE_MIN + along * (SCALE_MAX - SCALE_MIN)
 
     def _slider(self, mood: PuppetMood, name: str, intensity: float, wide: float) -> None:
         x, y = imgui.get_cursor_screen_pos()

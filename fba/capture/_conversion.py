@@ -1,0 +1,67 @@
+"""`make_animation`: captures of any kind become animations here, whatever file they come from."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from fractions import Fraction
+from typing import Any
+
+from fba.capture._retarget import SkeletonOptions
+from fba.capture.action_units import ActionUnitMotion, from_action_units
+from fba.capture.blendshapes import ShapeMotion, from_blendshapes
+from fba.capture.markers._faces import from_markers
+from fba.capture.markers.motion import MarkerMotion
+from fba.capture.motion import SkeletonMotion
+from fba.capture.points import PointMotion, from_points
+from fba.capture.skeleton import Captured, retarget_motion
+from fba.errors import FbaWarning
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import Path, naming_file
+
+FaceCapture = ShapeMotion | ActionUnitMotion | MarkerMotion | PointMotion
+_FACES: Mapping[type[FaceCapture], Callable[..., Any]] = {
+    ShapeMotion: from_blendshapes,
+    ActionUnitMotion: from_action_units,
+    MarkerMotion: from_markers,
+    PointMotion: from_points,
+}
+_MARKERS = ("rate", "markers", "neutral", "gaze", "head_path")
+_OPTIONS: Mapping[str, tuple[str, ...]] = {
+    "skeleton": ("rate", *(field.name for field in fields(SkeletonOptions))),
+    "shapes": ("rate",),
+    "markers": _MARKERS,
+    "points": (*_MARKERS, "aspect"),
+}
+
+
+def capture_options(kind: str) -> tuple[str, ...]:
+    """Return the options of `make_animation` for a kind of capture; none for an unknown one.
+
+    kind: "skeleton", "shapes", which action units are as well, "markers" or "points".
+    """
+    return _OPTIONS.get(kind, ())
+
+
+def make_animation(
+    capture: SkeletonMotion | FaceCapture,
+    rate: Fraction | int | str | None = None,
+    *,
+    path: Path,
+    limits: Limits = DEFAULT_LIMITS,
+    **options: Any,
+) -> Captured:
+    """Return the animation of a capture, together with the capture.
+
+    rate: frames per second; None for the capture's own. path: the file that it is from, for messages.
+    options: of a skeleton the fields of `SkeletonOptions`, of others those of `from_markers` and
+    `from_points`. Warns (FbaWarning) of what the reader repaired. Raises FormatError where no animation can
+    be made, and what these functions raise.
+    """
+    for finding in getattr(capture, "findings", ()):
+        warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=4)
+    with naming_file(path):
+        if isinstance(capture, SkeletonMotion):
+            return retarget_motion(capture, rate, SkeletonOptions(**options), limits=limits)
+        return Captured(_FACES[type(capture)](capture, rate, limits=limits, **options), capture)
