@@ -107,7 +107,7 @@ def parse_integer(token: str, where: str, what: str) -> int:
 def find_beside(path: str | os.PathLike[str], name: str) -> Path | None:
     """Return the path of a file that another file names, in the same folder; None if there is no such file.
 
-    Names come from files of strangers: folders in them are dropped, so none reaches outside.
+    Names come from untrusted files: folders in them are dropped, so none reaches outside.
     """
     plain = name.replace("\\", "/").rsplit("/", 1)[-1]
     if not plain or plain in (".", "..") or "\0" in plain:

@@ -1,4 +1,4 @@
-"""The folder of the package `fba_player`; `player` was its name, which could be anyone's."""
+"""Former name of the package `fba_player`, which is in this folder; importing it raises ImportError."""
 
 raise ImportError(
     "the package 'player' is now called 'fba.player': from fba.player import ...", name="player"

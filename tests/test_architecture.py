@@ -90,7 +90,6 @@ fba.persona.points
 fba.persona.recognition
 fba.persona
 fba_conformance
-fba_conformance.suite._definitions
 fba_conformance.suite
 fba_player._mesh
 fba_player.view

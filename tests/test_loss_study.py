@@ -10,7 +10,7 @@ import pytest
 
 from bench import loss
 from fba import Animation, FbaWarning, decode
-from fba_conformance import _motion as motion
+from tools import synthetic_motion as motion
 
 ONCE, SECOND = loss.SETTINGS[0], loss.Setting("every second", Fraction(1))
 

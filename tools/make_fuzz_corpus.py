@@ -27,7 +27,6 @@ from fba.capture import MarkerMotion  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.live import KINDS  # noqa: E402
 from fba.persona import learn, save_persona  # noqa: E402
-from fba_conformance._small_streams import doubtful_marks, long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
 from mesh_files import ply  # noqa: E402
@@ -54,6 +53,7 @@ from tools.fuzz._small_head import (  # noqa: E402
     small_head_wfm,
     small_head_xface,
 )
+from tools.fuzz.small_streams import doubtful_marks, long_streams, small_streams  # noqa: E402
 from tools.persona.actors import act  # noqa: E402
 
 

@@ -11,7 +11,7 @@ from bench.bitrate.subjects import FACE
 from fba.arrays import Float32, Float64
 from fba.body.displacement import displacements
 from fba.face import Deformer, FaceModel
-from fba.face.deform.distances import vertex_distances
+from fba.face.deform.displacements import vertex_distances
 
 HEAD_TURN = slice(47, 50)
 """FAPs 48 to 50: the head's rotation, 1e-5 rad."""

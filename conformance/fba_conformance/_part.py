@@ -161,7 +161,7 @@ class Part:
                 )
 
     def make_slots(self) -> None:
-        """Make the slots of the main segment from mask and limits; a limit that nobody sent is 0."""
+        """Make the slots of the main segment from mask and limits; a limit that was never sent is 0."""
         self.slots = {}
         for number in self.low_level:
             # integer division towards zero, of the limits as sent or as in the table

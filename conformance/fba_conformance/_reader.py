@@ -59,7 +59,7 @@ class Reader:
         """Position of the next bit."""
         self.size = len(data) * 8
         self.disputed: int | None = None
-        """First bit at which the two ways to look for start codes see different things."""
+        """First bit at which the two methods of looking for start codes disagree."""
         self.plane: int | None = None
         self._elements: list[Element] = []
 
@@ -166,7 +166,7 @@ class Reader:
         return None
 
     def only_stuffing_left(self) -> bool:
-        """Whether only alignment stuffing is left before the end of the data."""
+        """Return whether only alignment stuffing is left before the end of the data."""
         left = self.size - self.bit
         return left == 0 or (left <= 8 and self._ahead(left) == _stuffing(left))
 

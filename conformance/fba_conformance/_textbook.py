@@ -16,7 +16,10 @@ from dataclasses import dataclass
 
 from fba.errors import BitstreamError
 
-HALF, QUARTER, TOP = 32768, 16384, 65535
+HALF = 32768
+QUARTER = 16384
+TOP = 65535
+"""Of the interval of 16 bits: half, quarter, and largest value."""
 COUNT_LIMIT = 16383
 """Sum of a table's counts at which all are halved."""
 ZERO_RUN = 22

@@ -37,7 +37,7 @@ HEADER = "fba-values 1"
 TIME_TOLERANCE = Fraction(1, 1000)
 """Seconds by which a time may differ: some decoders count in milliseconds."""
 LONGEST_DENOMINATOR = 10**6
-"""Times with a larger one are written as decimal numbers."""
+"""Times with a larger denominator are written as decimal numbers."""
 
 _FIELDS = {"viseme": len(VISEME_FIELDS), "expression": len(EXPRESSION_FIELDS)}
 _COUNTS = {"fap": FAP_COUNT, "bap": BAP_COUNT}
@@ -66,7 +66,7 @@ class PlaneValues:
         return replace(self, time=None)
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines of the plane, in the one order that we write."""
+        """Yield the lines of the plane, always in the same order."""
         yield "plane"
         if self.time is not None:
             yield f"time {_time_text(self.time)}"
@@ -106,7 +106,7 @@ class Listing:
         return sha256(self.text().encode()).hexdigest()
 
     def difference(self, other: Listing) -> str:
-        """Return the first way in which another listing differs, "" if in none. It may lack all times."""
+        """Return the first difference of another listing, "" without one. The other may lack all times."""
         timed = any(plane.time is not None for plane in other.planes)
         for number, (ours, theirs) in enumerate(zip(self.planes, other.planes, strict=False)):
             text = _plane_difference(ours, theirs, timed=timed)

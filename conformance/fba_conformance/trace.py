@@ -29,7 +29,9 @@ from fba_conformance.listing import element_dict, format_trace
 
 __all__ = ["Element", "Levels", "Walker", "decode_values", "element_dict", "format_trace", "planes", "trace"]
 
-FAP_BIT, BAP_BIT = 1, 2
+FAP_BIT = 1
+BAP_BIT = 2
+"""Bits of fba_object_mask."""
 _NAMED_STEPS = re.compile(rb"\x00\x00\x01\xb2fba bap_steps=(iso|visage);")
 """The mark before an object."""
 _CHECKED = re.compile(rb"fba (?:bap_steps=[a-z]+;)?crc32=[0-9]+;")

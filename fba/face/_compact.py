@@ -17,7 +17,8 @@ SHADES = 65535
 
 
 def compact(model: FaceModel) -> FaceModel:
-    """The face with displacements rounded to 2**-20 of the largest and colours to multiples of 1/65535.
+    """Return the face with displacements rounded to 2**-20 of the largest and colours to multiples of
+    1/65535.
 
     The error is less than a millionth of a vertex's motion; files get at least a tenth smaller. `save` does
     not round. Vertices that a FAP moves by less than the rounding stay in its tables.

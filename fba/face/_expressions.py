@@ -65,7 +65,7 @@ class Definitions:
 
     @staticmethod
     def default() -> Definitions:
-        """The built-in definitions."""
+        """Return the built-in definitions."""
         return _default()
 
 

@@ -74,12 +74,12 @@ class FaceDefMesh:
             object.__setattr__(self, name, array)
 
     def shift(self, value: float) -> Float32:
-        """Shift of each vertex by a FAP value, in FAPU: float32 (N, 3)."""
+        """Return the shift of each vertex by a FAP value, in FAPU: float32 (N, 3)."""
         return interval_lengths(self.borders, value) @ self.displacements
 
 
 def interval_lengths(borders: Int32, value: float) -> Float32:
-    """Length of each interval between 0 and a FAP value: float32 (K - 1,), with the value's sign.
+    """Return the length of each interval between 0 and a FAP value: float32 (K - 1,), with the value's sign.
 
     The worked example of the standard: borders [-1000, 0, 500, 1000] and the value 600 give
     [0, 500, 100].

@@ -20,7 +20,7 @@ PUPIL_FAP = {"left": 29, "right": 30}
 PUPIL_POINT = {"left": "3.5", "right": "3.6"}
 LID_POINTS = {"left": ("3.1", "3.3"), "right": ("3.2", "3.4")}
 """Middles of the upper and the lower lid margin."""
-FLAT = 0.3
+FLAT_RATIO = 0.3
 """Depth of an eye by its width below which it is a drawn iris, not a ball; of half a ball it is 0.5."""
 FEWEST_VERTICES = 8
 """Fewest vertices that determine a sphere."""
@@ -44,7 +44,7 @@ class Eyeball:
 
 
 def eyeballs(model: FaceModel) -> dict[str, Eyeball]:
-    """The eyeballs by side, "left" and "right": the biggest part of kind "eye" on each, if any."""
+    """Return the eyeballs by side, "left" and "right": the biggest part of kind "eye" on each, if any."""
     result: dict[str, Eyeball] = {}
     middle = _middle_x(model.points)
     for part in model.of_kind("eye"):
@@ -60,7 +60,7 @@ def eyeballs(model: FaceModel) -> dict[str, Eyeball]:
 
 
 def fit_eyeball(part: Part, pupil: Float64) -> tuple[Float64, float, float, float] | None:
-    """(centre, radius, error, share) of an eyeball, as in `Eyeball`; None for too few vertices.
+    """Return (centre, radius, error, share) of an eyeball, as in `Eyeball`; None for too few vertices.
 
     A flat eye, as drawn figures have, stands for a ball of usual size behind its pupil. pupil: (3,), NaN
     where unknown.
@@ -75,12 +75,13 @@ def fit_eyeball(part: Part, pupil: Float64) -> tuple[Float64, float, float, floa
 
 
 def flat_width(part: Part) -> float | None:
-    """The width of a flat eye, which is an iris without a ball, in the unit of the part; None for others."""
+    """Return the width of a flat eye, which is an iris without a ball, in the unit of the part; None for
+    others."""
     vertices = np.unique(part.vertices.astype(np.float64), axis=0)
     if len(vertices) < FEWEST_VERTICES:
         return None
     extents = np.ptp(vertices @ principal_axes(vertices)[0].T, axis=0)
-    return float(extents.max()) if extents[2] < FLAT * extents.max() else None
+    return float(extents.max()) if extents[2] < FLAT_RATIO * extents.max() else None
 
 
 def _middle_x(points: Float64) -> float:
@@ -90,7 +91,7 @@ def _middle_x(points: Float64) -> float:
 
 
 def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
-    """(centre, radius, error, share) of the sphere through most of a part's vertices, as in `Eyeball`.
+    """Return (centre, radius, error, share) of the sphere through most of a part's vertices, as in `Eyeball`.
 
     Least squares, repeated without outliers, such as a cornea or an iris. None for too few vertices.
     """
@@ -100,14 +101,9 @@ def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
     on_sphere = np.ones(len(vertices), dtype=bool)
     centre, radius = vertices.mean(axis=0), 0.0
     for _ in range(8):
-        origin = vertices[on_sphere].mean(axis=0)
-        near = vertices[on_sphere] - origin
-        system = np.column_stack([2 * near, np.ones(len(near))])
-        solution, _, rank, _ = np.linalg.lstsq(system, (near**2).sum(axis=1), rcond=None)
-        if rank < 4:
+        centre, radius, determined = fit_sphere(vertices[on_sphere])
+        if not determined:
             return None
-        centre = solution[:3] + origin
-        radius = float(np.sqrt(max(solution[3] + solution[:3] @ solution[:3], 0.0)))
         away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
         limit = max(3 * float(np.median(away)), 1e-6 * radius)
         inliers = away <= limit
@@ -120,15 +116,26 @@ def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
     return centre, radius, float(np.sqrt((away**2).mean())), float(on_sphere.mean())
 
 
+def fit_sphere(points: Float64) -> tuple[Float64, float, bool]:
+    """Return centre (3,) and radius of the sphere closest to points (N, 3), and whether they determine it."""
+    origin = points.mean(axis=0)
+    near = points - origin
+    system = np.column_stack([2 * near, np.ones(len(near))])
+    solution, _, rank, _ = np.linalg.lstsq(system, (near**2).sum(axis=1), rcond=None)
+    radius = float(np.sqrt(max(solution[3] + solution[:3] @ solution[:3], 0.0)))
+    return solution[:3] + origin, radius, bool(rank == 4)
+
+
 def gaze(model: FaceModel, eye: Eyeball) -> Float64 | None:
-    """Unit vector from the eyeball's centre to its pupil point, None where the model has none."""
+    """Return the unit vector from the eyeball's centre to its pupil point, None where the model has none."""
     arm = model.points[row_of()[PUPIL_POINT[eye.side]]] - eye.centre
     length = float(np.linalg.norm(arm))
     return arm / length if np.isfinite(length) and length > 0 else None
 
 
 def pupil_diameter(model: FaceModel, eye: Eyeball) -> float | None:
-    """Diameter of the pupil, metres, from the vertices that dilate_pupil moves most; None where unknown."""
+    """Return the diameter of the pupil, metres, from the vertices that dilate_pupil moves most; None where
+    unknown."""
     table = model.table_of.get(PUPIL_FAP[eye.side])
     direction = gaze(model, eye)
     if table is None or direction is None:
@@ -150,7 +157,7 @@ def pupil_diameter(model: FaceModel, eye: Eyeball) -> float | None:
 
 
 def distances_from_axis(points: Floating, centre: Float64, direction: Float64) -> Float64:
-    """(N,) distances of points (N, 3) from the line through a centre along a unit vector."""
+    """Return (N,) distances of points (N, 3) from the line through a centre along a unit vector."""
     arms = points.astype(np.float64) - centre
     distances: Float64 = np.linalg.norm(arms - np.outer(arms @ direction, direction), axis=1)
     return distances

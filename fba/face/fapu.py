@@ -34,7 +34,7 @@ class Fapu:
 
     @classmethod
     def measure(cls, points: npt.ArrayLike) -> Fapu:
-        """The FAPU of a neutral face, from its feature points (84, 3) in any unit of length.
+        """Return the FAPU of a neutral face, from its feature points (84, 3) in any unit of length.
 
         IRISD0 is the height of the eye opening, ES0 the distance between the pupils, ENS0 from the
         pupils down to the nose, MNS0 from the nose down to the mouth, MW0 the width of the mouth; each

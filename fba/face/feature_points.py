@@ -31,19 +31,19 @@ MIRRORED = {
 
 @cache
 def names() -> tuple[str, ...]:
-    """The 84 names, in the order of every array of feature points."""
+    """Return the 84 names, in the order of every array of feature points."""
     return tuple(point.name for point in feature_points())
 
 
 @cache
 def row_of() -> dict[str, int]:
-    """Row in an array of feature points, by name."""
+    """Return the row in an array of feature points, by name."""
     return {name: row for row, name in enumerate(names())}
 
 
 @cache
 def neutral_points() -> Float64:
-    """(84, 3) float64, metres; read-only."""
+    """Return (84, 3) float64, metres; read-only."""
     points = np.full((len(names()), 3), np.nan)
     with (files(__package__) / "neutral.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):

@@ -14,8 +14,8 @@ LARGEST_GAZE = 0.6
 """Radians from straight ahead that an eye turns at most here, in any direction.
 
 Eyes reach about 55 degrees at the very most (Guitton and Volle, 1987); beyond 30, people turn their heads."""
-UNIT = 1e5
-"""Units of the FAPs that turn eyeballs, a radian."""
+UNITS_PER_RADIAN = 1e5
+"""FAP units per radian, of the FAPs that turn eyeballs."""
 
 
 def limit_gaze(values: Float64, *, warn: bool = True) -> None:
@@ -27,7 +27,7 @@ def limit_gaze(values: Float64, *, warn: bool = True) -> None:
     found = False
     for yaw, pitch in zip(YAW_EYE, PITCH_EYE, strict=True):
         columns = [yaw - 1, pitch - 1]
-        angles = np.hypot(values[:, yaw - 1], values[:, pitch - 1]) / UNIT
+        angles = np.hypot(values[:, yaw - 1], values[:, pitch - 1]) / UNITS_PER_RADIAN
         values[:, columns] *= (LARGEST_GAZE / np.maximum(angles, LARGEST_GAZE))[:, None]
         found |= bool((angles > 1.01 * LARGEST_GAZE).any())
     if found and warn:

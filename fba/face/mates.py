@@ -17,7 +17,7 @@ from fba.parameters import faps
 
 @cache
 def donors() -> tuple[Intp, ...]:
-    """Columns (68,) that unsent FAPs copy, best first: mate, lip mate, the lip mate's mate.
+    """Return the columns (68,) that unsent FAPs copy, best first: mate, lip mate, the lip mate's mate.
 
     A FAP without such a mate has its own column.
     """
@@ -27,7 +27,7 @@ def donors() -> tuple[Intp, ...]:
 
 
 def fill(values: npt.NDArray[np.generic], sent: Bool) -> tuple[npt.NDArray[np.generic], Bool]:
-    """(values with unsent FAPs copied from their mates, mask of the values now known), as new arrays.
+    """Return (values with unsent FAPs copied from their mates, mask of the values now known), as new arrays.
 
     values: (..., 68). sent: bool (..., 68), whether the value was ever sent.
     """

@@ -115,14 +115,14 @@ class FaceModel(Meshes[Part]):
 
     @staticmethod
     def default() -> FaceModel:
-        """The built-in head."""
+        """Return the built-in head."""
         from fba.face.builtin import default
 
         return default()
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LIMITS) -> FaceModel:
-        """A face from a glTF 2.0 file (.glb or .gltf) with the FBA extension, as `save` writes it.
+        """Return a face from a glTF 2.0 file (.glb or .gltf) with the FBA extension, as `save` writes it.
 
         Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
         damaged, contradicts itself, or lacks the extension; LimitError where it takes more memory than the
@@ -159,15 +159,15 @@ class FaceModel(Meshes[Part]):
         return tuple(n for n, p in zip(names(), self.points, strict=True) if np.isnan(p).any())
 
     def of_kind(self, kind: str) -> tuple[Part, ...]:
-        """All parts of a kind."""
+        """Return all parts of a kind."""
         return tuple(part for part in self.parts if part.kind == kind)
 
     def with_tables(self, tables: tuple[FaceDefTables, ...], lost: Mapping[int, str]) -> FaceModel:
-        """The same face with other tables."""
+        """Return the same face with other tables."""
         return replace(self, tables=tables, lost=lost)
 
     def with_notes(self, notes: Mapping[str, str]) -> FaceModel:
-        """The same face with more notes."""
+        """Return the same face with more notes."""
         return replace(self, notes={**self.notes, **notes})
 
     def _check_points(self) -> None:
@@ -225,7 +225,7 @@ class FaceModel(Meshes[Part]):
 
 
 def bind(parts: tuple[Part, ...], points: npt.ArrayLike, most: float) -> Int32:
-    """int32 (84,): for each feature point the nearest vertex at most `most` metres away, else -1."""
+    """Return int32 (84,): for each feature point the nearest vertex at most `most` metres away, else -1."""
     from scipy.spatial import cKDTree
 
     positions = np.asarray(points, dtype=np.float64)
@@ -238,7 +238,7 @@ def bind(parts: tuple[Part, ...], points: npt.ArrayLike, most: float) -> Int32:
 
 
 def point_row(name: str) -> int:
-    """Row of a feature point in `FaceModel.points`; ModelError for an unknown name."""
+    """Return the row of a feature point in `FaceModel.points`; ModelError for an unknown name."""
     if name not in row_of():
         raise ModelError(f"there is no feature point {name!r}")
     return row_of()[name]

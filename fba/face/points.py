@@ -31,12 +31,18 @@ DIRECTIONS = {
 }
 """The standard's words for a positive motion, as vectors."""
 
-OPEN_JAW, THRUST_JAW, SHIFT_JAW = 3, 14, 15
-YAW_EYE, PITCH_EYE, DILATE_PUPIL = (23, 24), (25, 26), (29, 30)
+OPEN_JAW = 3
+THRUST_JAW = 14
+SHIFT_JAW = 15
+YAW_EYE = (23, 24)
+PITCH_EYE = (25, 26)
+DILATE_PUPIL = (29, 30)
 THRUST_EYE = {27: "3.5", 28: "3.6"}
 """Feature point of each eyeball, by the FAP that moves it forward."""
 TONGUE_ROLL = 47
-HEAD_PITCH, HEAD_YAW, HEAD_ROLL = 48, 49, 50
+HEAD_PITCH = 48
+HEAD_YAW = 49
+HEAD_ROLL = 50
 ROTATING = {OPEN_JAW, *YAW_EYE, *PITCH_EYE, *DILATE_PUPIL, TONGUE_ROLL, HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
 """FAPs that rotate or scale; `shift_table` leaves them out."""
 
@@ -48,7 +54,8 @@ EYEBALL_PER_IRIS = 1.03
 
 @cache
 def _followers() -> tuple[tuple[int, int, Float64], ...]:
-    """(row of a point, row of the point that it follows, (3,) share of each coordinate) of every follower."""
+    """Return (row of a point, row of the point that it follows, (3,) share of each coordinate) of every
+    follower."""
     with (files(__package__) / "followers.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     followers = []
@@ -62,7 +69,8 @@ def _followers() -> tuple[tuple[int, int, Float64], ...]:
 
 
 def shift_table(fapu: Fapu) -> Float64:
-    """(68, 84, 3) shift of each feature point by one step of each FAP; zero for FAPs that rotate or scale."""
+    """Return (68, 84, 3) shift of each feature point by one step of each FAP; zero for FAPs that rotate or
+    scale."""
     table = np.zeros((FAP_COUNT, len(names()), 3))
     for fap in faps():
         if fap.positive not in DIRECTIONS or fap.number in ROTATING:
@@ -134,7 +142,7 @@ class FeaturePointFace:
         return shift_table(self.fapu).reshape(FAP_COUNT, -1)
 
     def __call__(self, faps: npt.ArrayLike) -> Float32:
-        """Moved feature points: (68,) -> (84, 3), or (T, 68) -> (T, 84, 3), float32.
+        """Return the moved feature points: (68,) -> (84, 3), or (T, 68) -> (T, 84, 3), float32.
 
         Values as `resolve` gives them, in the units of the standard; columns 0 and 1 are ignored.
         Raises ValueError on another shape.
@@ -145,19 +153,19 @@ class FeaturePointFace:
         return (rotated[0] if single else rotated).astype(np.float32)
 
     def local(self, faps: npt.ArrayLike) -> Float32:
-        """Like calling, but in the frame of the head: without head pitch, yaw and roll."""
+        """Return what calling gives, but in the frame of the head: without head pitch, yaw and roll."""
         values, single = _as_frames(faps)
         moved = self._local(values)
         return (moved[0] if single else moved).astype(np.float32)
 
     def head_rotation(self, faps: npt.ArrayLike) -> Float64:
-        """Rotation of the head about its centre (point 7.1): (3, 3), or (T, 3, 3), float64."""
+        """Return the rotation of the head about its centre (point 7.1): (3, 3), or (T, 3, 3), float64."""
         values, single = _as_frames(faps)
         matrices = _head_matrices(values)
         return matrices[0] if single else matrices
 
     def eyeballs(self, faps: npt.ArrayLike) -> Eyeballs:
-        """Centres, gaze and pupils of the two eyes, (T, 2, ...)."""
+        """Return the centres, gaze and pupils of the two eyes, (T, 2, ...)."""
         values, _ = _as_frames(faps)
         yaw, pitch, dilation = (
             values[:, [n - 1 for n in pair]] for pair in (YAW_EYE, PITCH_EYE, DILATE_PUPIL)
@@ -189,7 +197,7 @@ class FeaturePointFace:
         return moved
 
     def _jaw_angle(self, values: Float64) -> Float64:
-        """The angle that lowers the chin (2.1) by exactly value x MNS, as far as the hinge allows."""
+        """Return the angle that lowers the chin (2.1) by exactly value x MNS, as far as the hinge allows."""
         chin = self.points[row_of()["2.1"]] - self.jaw_hinge
         radius, rest = np.hypot(chin[1], chin[2]), np.arctan2(chin[1], chin[2])
         height = chin[1] - values[:, OPEN_JAW - 1] * self.fapu.MNS
@@ -208,7 +216,8 @@ def _as_frames(faps: npt.ArrayLike) -> tuple[Float64, bool]:
 
 
 def _rotate_x(points: Float64, centre: Float64, angle: Float64) -> Float64:
-    """(T, N, 3): points (N, 3) rotated about an axis along x by each angle (T,); positive lowers +z."""
+    """Return (T, N, 3): points (N, 3) rotated about an axis along x by each angle (T,); positive lowers
+    +z."""
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     y, z = points[:, 1] - centre[1], points[:, 2] - centre[2]
     x = np.broadcast_to(points[:, 0], (len(angle), len(points)))
@@ -216,7 +225,7 @@ def _rotate_x(points: Float64, centre: Float64, angle: Float64) -> Float64:
 
 
 def _head_matrices(values: Float64) -> Float64:
-    """(T, 3, 3): yaw . roll . pitch, the order of the spine's joints; each angle FAP x 1e-5 rad."""
+    """Return (T, 3, 3): yaw . roll . pitch, the order of the spine's joints; each angle FAP x 1e-5 rad."""
     pitch, yaw, roll = (values[:, n - 1] * 1e-5 for n in (HEAD_PITCH, HEAD_YAW, HEAD_ROLL))
     matrices: Float64 = axis_matrices(1, yaw) @ axis_matrices(2, roll) @ axis_matrices(0, pitch)
     return matrices

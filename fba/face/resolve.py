@@ -41,7 +41,7 @@ class FaceSettings(Protocol):
 
 
 def resolve(track: FaceTrack, model: FaceSettings | None = None) -> Float32:
-    """The FAPs that a face shows at every frame: float32 (T, 68) in FAPU, columns 0 and 1 zero.
+    """Return the FAPs that a face shows at every frame: float32 (T, 68) in FAPU, columns 0 and 1 zero.
 
     - A FAP keeps its last value after it was sent. One never sent, or that the sender asks to have
       interpolated (`FaceTrack.interpolated`), follows from others by the model's interpolation table
@@ -62,7 +62,8 @@ def resolve(track: FaceTrack, model: FaceSettings | None = None) -> Float32:
 
 
 def known_faps(track: FaceTrack) -> tuple[Int32, Bool]:
-    """Values in force of all low-level FAPs at every frame, and masks of those that what was sent determines.
+    """Return the values in force of all low-level FAPs at every frame, and masks of those that what was sent
+    determines.
 
     int32 (T, 68) and bool (T, 68): as `resolve` without a model, before visemes and expressions are added.
     """
@@ -121,13 +122,13 @@ class Resolver:
         self._state = _initial_state(self._definitions)
 
     def copy(self) -> Resolver:
-        """An independent resolver in the same state."""
+        """Return an independent resolver in the same state."""
         other = copy.copy(self)
         other._state = copy.copy(self._state)
         return other
 
     def push(self, track: FaceTrack) -> Float32:
-        """FAPs shown over the next frames: float32 (T, 68), columns 0 and 1 zero."""
+        """Return the FAPs shown over the next frames: float32 (T, 68), columns 0 and 1 zero."""
         result = np.empty((len(track), FAP_COUNT), dtype=np.float32)
         for start in range(0, len(track), BLOCK):
             result[start : start + BLOCK] = self._push_block(track[start : start + BLOCK])
@@ -199,7 +200,8 @@ class _State:
     expression: Int16
 
     def hold_low_level(self, track: FaceTrack) -> tuple[Int32, Bool, Bool | None]:
-        """Values last sent, masks of the FAPs ever sent and of those to be interpolated, each (T, 68).
+        """Return the values last sent, masks of the FAPs ever sent and of those to be interpolated, each (T,
+        68).
 
         The last is None where no FAP is to be interpolated.
         """
@@ -222,7 +224,7 @@ class _State:
         return result
 
     def hold_high_level(self, track: FaceTrack) -> tuple[Int16, Int16]:
-        """Fields of the viseme (T, 4) and the expression (T, 6) in force."""
+        """Return the fields of the viseme (T, 4) and the expression (T, 6) in force."""
         viseme = hold(track.viseme, track.mask[:, :1], self.viseme)
         expression = hold(track.expression, track.mask[:, 1:2], self.expression)
         self.viseme, self.expression = viseme[-1].copy(), expression[-1].copy()
@@ -230,7 +232,7 @@ class _State:
 
 
 def _initial_state(definitions: Definitions | None = None) -> _State:
-    """The state before the first frame: nothing was sent."""
+    """Return the state before the first frame: nothing was sent."""
     definitions = definitions or Definitions.default()
     return _State(
         visemes=definitions.visemes,
@@ -244,7 +246,7 @@ def _initial_state(definitions: Definitions | None = None) -> _State:
 
 
 def _share(amounts: Int16) -> Float32:
-    """(T, 1) blend or intensity as a share of its largest; quantised ones may lie a little outside."""
+    """Return (T, 1) blend or intensity as a share of its largest; quantised ones may lie a little outside."""
     clipped: Float32 = np.clip(amounts, 0, INTENSITY_MAX).astype(np.float32)[:, None]
     return clipped / np.float32(INTENSITY_MAX)
 
@@ -261,20 +263,20 @@ class _DefinitionsInForce:
     in_force: Intp | None
 
     def look_up(self, select: Int16) -> Float32:
-        """(T, 68) definition of the selected viseme or expression at each frame."""
+        """Return (T, 68) definition of the selected viseme or expression at each frame."""
         if self.in_force is None:
             return self.rows[select]
         return self.rows[self.in_force[np.arange(len(select)), select]]
 
     def at_end(self) -> Float32:
-        """(selects, 68): the table in force after the last frame."""
+        """Return (selects, 68): the table in force after the last frame."""
         return self.rows if self.in_force is None else self.rows[self.in_force[-1]]
 
 
 def _redefine(
     table: Float32, defined: Bool, select: Int16, track: FaceTrack, *, mouth_only: bool
 ) -> _DefinitionsInForce:
-    """The definitions of a table, each replaced from the frame on that defines it: (T,) `defined`."""
+    """Return the definitions of a table, each replaced from the frame on that defines it: (T,) `defined`."""
     stored = np.array([f.group in MOUTH_GROUPS if mouth_only else f.group > 1 for f in faps()])
     events = np.flatnonzero(defined & (select > 0) & track.mask[:, stored].any(axis=1))
     if not len(events):

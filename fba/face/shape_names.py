@@ -18,32 +18,32 @@ from fba.parameters import FIRST_LOW_LEVEL_FAP, faps
 
 SIDES = {"l": "left", "r": "right", "lft": "left", "rgt": "right"}
 MOST_COMMON_WORDS = 3
-"""Most words before all names of a file that are left out."""
+"""Largest number of words before all names of a file that are left out."""
 FEWEST_ALIKE = 4
-"""Fewest names of which it is said that they begin alike."""
+"""Fewer names than this never count as beginning alike."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 
 @cache
 def arkit_names() -> tuple[str, ...]:
-    """The 52 names of ARKit's blendshapes, sorted."""
+    """Return the 52 names of ARKit's blendshapes, sorted."""
     return tuple(row["shape"] for row in _rows())
 
 
 def fap_of(name: str) -> int | None:
-    """Number of the FAP that a shape is named after, 3..68, or None."""
+    """Return the number of the FAP that a shape is named after, 3..68, or None."""
     return _faps().get(name.strip().lower())
 
 
 @lru_cache(1024)  # live captures ask for the same names with every datagram
 def arkit_of(name: str) -> str | None:
-    """ARKit's name for a shape, or None if it is not one of the 52."""
+    """Return ARKit's name for a shape, or None if it is not one of the 52."""
     known = _synonyms()
     return known.get(_words(name)) or known.get(_words(re.split(r"[.:|/]", name)[-1]))
 
 
 def canonical_names(names: Iterable[str]) -> dict[str, str]:
-    """ARKit's name -> the name that a file uses for it; of several ARKit's own, else the first.
+    """Return ARKit's name -> the name that a file uses for it; of several ARKit's own, else the first.
 
     Where no name is known, words with which most begin are left out: "head_eyeBlink_L", "A14_Eye_Blink_Left".
     """
@@ -64,7 +64,7 @@ def canonical_names(names: Iterable[str]) -> dict[str, str]:
 
 
 def _begin_alike(names: Sequence[str], count: int) -> bool:
-    """Whether more than half of several names begin with the same words, as many as `count`."""
+    """Return whether more than half of several names begin with the same words, as many as `count`."""
     starts = Counter(tuple(WORD.findall(name.lower())[:count]) for name in names)
     return len(names) >= FEWEST_ALIKE and 2 * max(starts.values()) > len(names)
 
@@ -90,5 +90,5 @@ def _faps() -> dict[str, int]:
 
 
 def _words(name: str) -> frozenset[str]:
-    """The words of a name without their order: writers put the side first or last."""
+    """Return the words of a name without their order: writers put the side first or last."""
     return frozenset(SIDES.get(word.lower(), word.lower()) for word in WORD.findall(name))

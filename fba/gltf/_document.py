@@ -70,7 +70,7 @@ class Document:
         return self._unpacked[index], entry
 
     def _stored(self, entry: Value) -> memoryview:
-        """The bytes of a buffer that a buffer view, or the extension that packs it, names."""
+        """Return the bytes of a buffer that a buffer view, or the extension that packs it, names."""
         buffer = self.buffers[entry.member("buffer").index(len(self.buffers), "buffer")]
         given = entry.get("byteOffset")
         offset = 0 if given is None else given.integer(0, glb.MAX_BYTES)
@@ -165,7 +165,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def find_extension(entry: Value, name: str) -> Value | None:
-    """The object of an extension in an entry of the document, or None."""
+    """Return the object of an extension in an entry of the document, or None."""
     extensions = entry.get("extensions")
     return None if extensions is None else extensions.get(name)
 

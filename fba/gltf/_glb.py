@@ -8,8 +8,10 @@ import warnings
 from fba.errors import FbaWarning, ModelError
 
 MAGIC = b"glTF"
-JSON_CHUNK, BIN_CHUNK = b"JSON", b"BIN\0"
-HEADER_BYTES, CHUNK_HEADER_BYTES = 12, 8
+JSON_CHUNK = b"JSON"
+BIN_CHUNK = b"BIN\0"
+HEADER_BYTES = 12
+CHUNK_HEADER_BYTES = 8
 MAX_BYTES = 1 << 30
 """Largest file, container or buffer that is read."""
 

@@ -15,7 +15,9 @@ from fba.gltf._draco import unpack_primitive
 from fba.gltf._scene import Mesh, Primitive
 from fba.gltf._values import Value
 
-TRIANGLES, STRIP, FAN = 4, 5, 6
+TRIANGLES = 4
+STRIP = 5
+FAN = 6
 """Modes of primitives that are surfaces."""
 MODES = 7
 """Number of modes of primitives."""

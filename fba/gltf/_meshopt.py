@@ -1,6 +1,6 @@
 """Buffer views packed by meshoptimizer: EXT_meshopt_compression, by appendices A and B of its specification.
 
-Own code, as meshoptimizer's own package for Python comes without wheels.
+Written here, as meshoptimizer's package for Python has no wheels.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def unpack_view(data: memoryview, entry: Value, budget: Budget) -> memoryview:
 
 
 def _filtered(rows: UInt8, entry: Value) -> Array:
-    """The elements (count, stride) after the filter that the view names."""
+    """Return the elements (count, stride) after the filter that the view names."""
     given = entry.get("filter")
     name = "NONE" if given is None else given.text(20)
     stride = rows.shape[1]
@@ -85,7 +85,7 @@ def _filtered(rows: UInt8, entry: Value) -> Array:
 
 
 def _unfold_octahedron(packed: Array) -> Array:
-    """Normals (N, 4), of which x and y were stored, and 1 as z; the fourth number stays."""
+    """Return the normals (N, 4), of which x and y were stored, and 1 as z; the fourth number stays."""
     most = float(np.iinfo(packed.dtype).max)
     one = np.maximum(packed[:, 2].astype(np.float64), 1.0)
     x, y = packed[:, 0] / one, packed[:, 1] / one
@@ -100,7 +100,7 @@ def _unfold_octahedron(packed: Array) -> Array:
 
 
 def _complete_quaternions(packed: Array) -> Array:
-    """Quaternions (N, 4), whose largest component was left out."""
+    """Return the quaternions (N, 4), whose largest component was left out."""
     largest = (packed[:, 3] & 3).astype(np.intp)
     one = np.maximum((packed[:, 3] | 3).astype(np.float64), 3.0)
     small = packed[:, :3] / one[:, None] * np.sqrt(0.5)

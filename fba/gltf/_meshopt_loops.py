@@ -68,7 +68,8 @@ def unpack_attributes(data: UInt8, out: UInt8) -> int:
 
 @inlined
 def _read_number(data: UInt8, state: Int64, end: int) -> int:
-    """The number of 7 bits a byte at state[POSITION], which moves on; -1 where the data end within it."""
+    """Return the number of 7 bits a byte at state[POSITION], which moves on; -1 where the data end within
+    it."""
     result = 0
     for shift in range(0, 35, 7):
         if state[POSITION] >= end:
@@ -83,7 +84,8 @@ def _read_number(data: UInt8, state: Int64, end: int) -> int:
 
 @inlined
 def _read_index(data: UInt8, state: Int64, end: int) -> int:
-    """An index as its difference from the last explicit one, state[LAST]; -1 where the data end within it."""
+    """Return an index as its difference from the last explicit one, state[LAST]; -1 where the data end within
+    it."""
     number = _read_number(data, state, end)
     if number < 0:
         return -1
@@ -93,7 +95,7 @@ def _read_index(data: UInt8, state: Int64, end: int) -> int:
 
 @inlined
 def _new_vertex(state: Int64) -> int:
-    """The next vertex that no triangle had before."""
+    """Return the next vertex that no triangle had before."""
     vertex = int(state[NEXT])
     state[NEXT] += 1
     return vertex
@@ -113,7 +115,7 @@ def _remember_edge(edges: Int64, state: Int64, a: int, b: int) -> None:
 
 @inlined
 def _third_corner(data: UInt8, vertices: Int64, state: Int64, end: int, code: int) -> int:
-    """The corner of a triangle that shares an edge; -1 where the data end within it."""
+    """Return the corner of a triangle that shares an edge; -1 where the data end within it."""
     if 0 < code < 13:
         return int(vertices[(state[VERTICES] - 1 - code) % FIFO])
     if code == 0:
@@ -129,7 +131,8 @@ def _third_corner(data: UInt8, vertices: Int64, state: Int64, end: int, code: in
 
 @inlined
 def _free_corner(data: UInt8, vertices: Int64, state: Int64, end: int, code: int) -> int:
-    """The second or third corner of a triangle that shares no edge; -1 where the data end within it."""
+    """Return the second or third corner of a triangle that shares no edge; -1 where the data end within
+    it."""
     if code == 0:
         return _new_vertex(state)
     if code == 15:
@@ -139,7 +142,7 @@ def _free_corner(data: UInt8, vertices: Int64, state: Int64, end: int, code: int
 
 @inlined
 def _free_corners(data: UInt8, vertices: Int64, state: Int64, end: int, code: int) -> tuple[int, int, int]:
-    """The corners of a triangle that shares no edge; one is -1 where the data do not fit."""
+    """Return the corners of a triangle that shares no edge; one is -1 where the data do not fit."""
     if code < 14:
         pair = int(data[end + code])
     else:

@@ -15,7 +15,7 @@ from fba.gltf._document import Document
 from fba.gltf._values import Value
 
 LEVEL = 7
-"""Of deflate: level 9 takes four times as long, for files 0.5 % smaller."""
+"""Level of deflate; level 9 takes four times as long, for files 0.5 % smaller."""
 
 
 def pack(array: Array) -> bytes:

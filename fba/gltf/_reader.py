@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import warnings
 
+import numpy as np
+
 from fba.errors import FbaWarning
 from fba.gltf._accessors import Accessors
-from fba.gltf._animations import read_animations
-from fba.gltf._document import Document, open_document
+from fba.gltf._document import MAX_ITEMS, Document, open_document
 from fba.gltf._materials import read_materials
 from fba.gltf._meshes import read_meshes
 from fba.gltf._nodes import read_nodes, read_roots, read_skins
-from fba.gltf._scene import Gltf
+from fba.gltf._scene import Animation, Channel, Gltf, Mesh, Node
+from fba.gltf._values import Value
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -33,6 +35,8 @@ KNOWN = {
     "FBA_face",
 }
 """Extensions that a file may require: they are read, or do not change shapes."""
+CHANNEL_TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
+"""Type of the elements of an animated property."""
 
 
 def read_gltf(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> Gltf:
@@ -60,7 +64,7 @@ def read_document(document: Document) -> Gltf:
         nodes=nodes,
         skins=skins,
         materials=materials,
-        animations=read_animations(document, accessors, nodes, meshes),
+        animations=_read_animations(document, accessors, nodes, meshes),
         roots=read_roots(document, nodes),
         order=order,
         document=document.root,
@@ -82,3 +86,55 @@ def _check_extensions(document: Document) -> None:
                 warnings.warn(f"{entry.file}: {name} cannot be read; left out", FbaWarning, stacklevel=3)
                 continue
             raise entry.error(f"the file needs the extension {name}, which fba does not support")
+
+
+def _read_animations(
+    document: Document, accessors: Accessors, nodes: tuple[Node, ...], meshes: tuple[Mesh, ...]
+) -> tuple[Animation, ...]:
+    """Return all animations, in order, without channels that have no node or belong to extensions."""
+    animations = []
+    for number, entry in enumerate(document.entries("animations")):
+        document.budget.charge(1024, entry)
+        name = entry.get("name")
+        samplers = entry.member("samplers").elements(MAX_ITEMS)
+        channels = []
+        for each in entry.member("channels").elements(MAX_ITEMS):
+            document.budget.charge(512, each)
+            target = each.member("target")
+            path = target.member("path").text(100)
+            node = target.get("node")
+            sampler = samplers[each.member("sampler").index(len(samplers), "sampler")]
+            if node is not None and path in CHANNEL_TYPES:
+                where = node.index(len(nodes), "node")
+                width = _width(target, path, nodes[where], meshes)
+                channel = _channel(accessors, sampler, where, path, width)
+                # charged for every channel that shares the keys, so that millions of channels are refused
+                document.budget.charge(channel.times.nbytes + channel.values.nbytes, each)
+                channels.append(channel)
+        animations.append(Animation(f"animation {number}" if name is None else name.text(), tuple(channels)))
+    return tuple(animations)
+
+
+def _width(target: Value, path: str, node: Node, meshes: tuple[Mesh, ...]) -> int:
+    """Return how many numbers a key has; for weights, one for each morph target of the node's mesh."""
+    if path != "weights":
+        return 4 if path == "rotation" else 3
+    count = 0 if node.mesh is None else len(meshes[node.mesh].morph_names)
+    if not count:
+        raise target.error("animates the weights of a node whose mesh has no morph targets")
+    return count
+
+
+def _channel(accessors: Accessors, sampler: Value, node: int, path: str, width: int) -> Channel:
+    given = sampler.get("interpolation")
+    interpolation = "LINEAR" if given is None else given.choice("LINEAR", "STEP", "CUBICSPLINE")
+    times = accessors.floats(sampler.member("input"), "SCALAR")[:, 0]
+    if (np.diff(times) <= 0).any() or times[0] < 0:
+        raise sampler.member("input").error("the times of the keys must increase, from 0 or later")
+    cubic = 3 if interpolation == "CUBICSPLINE" else 1
+    per_key = width if path == "weights" else 1
+    values = accessors.floats(
+        sampler.member("output"), CHANNEL_TYPES[path], count=len(times) * cubic * per_key
+    )
+    shape = (len(times), 3, width) if cubic == 3 else (len(times), width)
+    return Channel(node, path, interpolation, times, values.reshape(shape))

@@ -35,7 +35,7 @@ class Budget:
         self._source += size
 
     def copy(self) -> Budget:
-        """Return a budget with the same used, for one of several things that are made of the file."""
+        """Return a budget that has used as much, for one of several results made from the file."""
         copied = Budget(self._limits, self._source)
         copied._used = self._used
         return copied

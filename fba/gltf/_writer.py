@@ -18,7 +18,8 @@ from fba.gltf._materials import WEBP, media_type
 from fba.gltf._packed import pack
 from fba.source import Path
 
-ATTRIBUTES, ELEMENTS = 34962, 34963
+ATTRIBUTES = 34962
+ELEMENTS = 34963
 """Targets of buffer views: vertex attributes, and indices of triangles."""
 RESTART = 65535
 """The index of 16 bits by which a primitive restarts: no vertex can have it."""

@@ -75,7 +75,7 @@ def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
 
 
 def _telling_name(gltf: Gltf, number: int, mesh: str) -> str:
-    """The name of a node, of its mesh, or of the nearest node above it: the first that a person gave.
+    """Return the name of a node, of its mesh, or of the nearest node above it: the first that a person gave.
 
     Exporters that split or compress meshes leave the person's names to the nodes above.
     """

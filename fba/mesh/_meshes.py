@@ -59,7 +59,7 @@ def mesh_arrays(
     texcoords: npt.ArrayLike | None,
     colours: npt.ArrayLike | None,
 ) -> dict[str, Float32 | Int32]:
-    """Checked, read-only copies of a mesh's arrays by name; missing normals are computed.
+    """Return checked, read-only copies of a mesh's arrays by name; missing normals are computed.
 
     where: begins messages. ModelError for other shapes, indices out of range, numbers not finite.
     """

@@ -45,7 +45,7 @@ def read_mtl(
 ) -> dict[str, Material]:
     """Return materials by name of an .mtl file that lies beside an OBJ file; none where it is missing.
 
-    pictures: those that were read before.
+    pictures: a cache of the pictures already read.
 
     Kd is the colour (sRGB, as writers put it there), Ns the shine, map_Kd the picture: PNG or JPEG
     beside the file, others are left out with an FbaWarning. Raises ModelError naming the line.

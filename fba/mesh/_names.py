@@ -1,4 +1,4 @@
-"""Names of parts, each made different from all before it."""
+"""Unique names of parts."""
 
 from __future__ import annotations
 

@@ -12,7 +12,8 @@ from fba.limits import DEFAULT_LIMITS
 
 
 def read_pixels(texture: bytes, most: float = math.inf) -> UInt8 | None:
-    """uint8 (H, W, 4) of a PNG, JPEG or WebP picture, made smaller to have at most `most` pixels each way.
+    """Return uint8 (H, W, 4) of a PNG, JPEG or WebP picture, made smaller to have at most `most` pixels each
+    way.
 
     None where it is damaged, or has more pixels than the default limits allow.
     """

@@ -29,7 +29,9 @@ MAX_PROPERTIES = 200
 AT_ONCE = 65536
 """Lists that are joined at once."""
 FACE_LISTS = ("vertex_indices", "vertex_index")
-NAMES_S, NAMES_T = ("s", "u", "texture_u"), ("t", "v", "texture_v")
+S_NAMES = ("s", "u", "texture_u")
+T_NAMES = ("t", "v", "texture_v")
+"""Names of the properties that are texture coordinates."""
 
 
 @dataclass
@@ -290,7 +292,7 @@ class _Reader:
         )
 
     def _texcoords(self, columns: dict[str, Float64]) -> Float64 | None:
-        for s, t in zip(NAMES_S, NAMES_T, strict=True):
+        for s, t in zip(S_NAMES, T_NAMES, strict=True):
             if s in columns and t in columns:
                 pair = np.stack([columns[s], 1.0 - columns[t]], axis=1)
                 return pair if (np.abs(pair) < 1e6).all() else None

@@ -11,7 +11,7 @@ from fba.arrays import Bool, Float32, Float64, Int32
 from fba.codec import EncoderOptions, EncoderStatistics, decode
 from fba.errors import ModelError, OptionError
 from fba.face import Deformer, FaceModel, resolve
-from fba.face.deform.distances import vertex_distances
+from fba.face.deform.displacements import vertex_distances
 from fba.face.learning import Spread, send_sources
 from fba.face.learning.reduction import linked_columns
 from fba.face.learning.sensitivity import displacements

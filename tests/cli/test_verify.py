@@ -13,7 +13,7 @@ import pytest
 
 import fba
 from fba.codec import digest
-from fba_conformance import _motion as motion
+from tools import synthetic_motion as motion
 
 Run = Callable[..., tuple[int, str, str]]
 

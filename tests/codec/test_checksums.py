@@ -13,10 +13,10 @@ import pytest
 import fba
 from fba import Animation, BitstreamError, Decoder, EncoderOptions, FbaError, FbaWarning
 from fba.codec import Damage, Encoder, probe_stream, verify_stream, write_mark
-from fba_conformance import _motion as motion
-from fba_conformance._small_streams import doubtful_marks
 from fba_conformance.trace import planes as read_planes
 from fba_conformance.trace import trace
+from tools import synthetic_motion as motion
+from tools.fuzz.small_streams import doubtful_marks
 from tools.look_ahead import random_options
 
 PERIOD = 10

@@ -24,7 +24,7 @@ from fba import (
     decode,
     encode,
 )
-from fba_conformance import _motion as motion
+from tools import synthetic_motion as motion
 
 NAMES = ["face", "body", "high level", "both in sections"]
 

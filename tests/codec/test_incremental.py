@@ -26,7 +26,7 @@ from fba import (
     decode,
     encode,
 )
-from fba_conformance import _motion as motion
+from tools import synthetic_motion as motion
 
 EVERY = ["talking", "walking", "both", "part comes and goes"]
 

@@ -16,7 +16,7 @@ from fba.codec import Damage, FrameRate, PlaneSettings, RangeLists, TimeCode, en
 from fba.codec._stream.clock import StreamClock
 from fba.codec._stream.damage import DamageLog
 from fba.codec._stream.plane_times import PlaneTimes, RestartPoints
-from fba_conformance import _motion as motion
+from tools import synthetic_motion as motion
 
 EVERY_SECOND = EncoderOptions(intra_period=1, start_codes=True, mark=False)
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from codec_streams import animations, steps
 from fba import Animation, BodyTrack, Decoder, EncoderOptions, FaceTrack, decode, encode
-from fba_conformance import _motion as motion
 from fba_conformance._values import plane_records
 from fba_conformance.trace import decode_values
+from tools import synthetic_motion as motion
 
 QUANTS = st.one_of(st.sampled_from([0, 1, 2]), st.integers(0, 31))
 PERIODS = st.sampled_from([None, None, Fraction(1, 100), Fraction(1, 5), 2.5])

@@ -17,7 +17,7 @@ from fba import Animation, Decoder, EncoderOptions, FbaWarning, RangeError, deco
 from fba.codec import Block, FrameBuffer, FrameRate, PlaneSettings, TimeCode, encode_planes
 from fba.codec._compact_buffer import CompactBuffer
 from fba.limits import DEFAULT_LIMITS
-from fba_conformance import _motion as motion
+from tools import synthetic_motion as motion
 
 SKIP_MAX = 15 << 20
 NTSC = Fraction(1000, 1001)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fba import compiled
-from fba_conformance._small_streams import small_streams
+from tools.fuzz.small_streams import small_streams
 
 SCRIPT = """
 import sys
@@ -21,10 +21,10 @@ if "no-numba" in sys.argv:
 import hashlib, json
 import fba
 from fba import compiled
-from fba_conformance import _motion as motion
+from tools import synthetic_motion as motion
 from tools.fuzz import _engine as fuzz
 from tools.fuzz.targets import find_target
-from fba_conformance._small_streams import small_streams
+from tools.fuzz.small_streams import small_streams
 from fractions import Fraction
 
 result = {"compiled": compiled.is_compiled(), "numba": sys.modules.get("numba") is not None}

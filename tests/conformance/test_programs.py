@@ -17,6 +17,7 @@ from fba_conformance.suite._process import run_program
 from fba_conformance.suite.index import Vector, read_vectors
 from fba_conformance.suite.programs import Program, check_decoder, check_encoder, parse_program
 from fba_conformance.suite.runner import expected_listing
+from tools.vectors import broken
 
 VECTORS = {Path(one.name).stem: one for one in read_vectors()}
 JAW, CUT = VECTORS["jaw"], VECTORS["two_damages"]
@@ -167,9 +168,10 @@ def test_a_decoder_with_a_mistake_fails_as_a_program(
     monkeypatch: pytest.MonkeyPatch, mistake: str, found: str, passed: str
 ) -> None:
     def run(self: Program, values: dict[str, str], output: Path) -> programs.Run:
-        arguments = ["decode", values["in"], values["out"], "--bap-steps", values["bap_steps"]]
-        monkeypatch.setattr(sys, "argv", ["program", *arguments, "--mistake", mistake])
-        example_program.main()
+        monkeypatch.setattr(
+            sys, "argv", ["broken", mistake, values["in"], values["out"], values["bap_steps"]]
+        )
+        broken.main()
         return programs.Run(0)
 
     monkeypatch.setattr(Program, "run", run)

@@ -94,7 +94,9 @@ SEGMENTS = st.lists(
 
 
 @given(SEGMENTS, st.integers(0, 9), st.sampled_from(["", "0", "1"]), st.booleans())
-def test_there_and_back(segments: list[list[tuple[int, int]]], offset: int, behind: str, learn: bool) -> None:
+def test_encoded_segments_are_decoded_again(
+    segments: list[list[tuple[int, int]]], offset: int, behind: str, learn: bool
+) -> None:
     """Segments one behind another, with anything before and behind them, zeros included."""
     coded = [
         encode_segment([s for _, s in pairs], [FrequencyTable(n) for n, _ in pairs], learn=learn)

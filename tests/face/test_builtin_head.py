@@ -49,7 +49,7 @@ def test_its_origin_and_licence_are_told(head: FaceModel) -> None:
     assert (folder / "head.glb").stat().st_size < 5_000_000
 
 
-def test_symmetric(head: FaceModel) -> None:
+def test_the_built_in_head_is_symmetric(head: FaceModel) -> None:
     for part in head.parts:
         name = part.name.replace("left", "#").replace("right", "left").replace("#", "right")
         other = head.part(name).vertices

@@ -26,7 +26,6 @@ from fba.face.importers import KINDS as HEADS
 from fba.face.importers import sniff
 from fba.formats.registry import format_of, formats
 from fba.live import KINDS
-from fba_conformance._small_streams import small_streams
 from tools.fuzz import __main__ as program
 from tools.fuzz import _campaign as campaign
 from tools.fuzz import _engine as engine
@@ -36,6 +35,7 @@ from tools.fuzz._minimise import minimise
 from tools.fuzz._mutation import mutate
 from tools.fuzz._outcome import ContractError, Outcome
 from tools.fuzz.corpus import CHECKOUT, read_corpus
+from tools.fuzz.small_streams import small_streams
 from tools.fuzz.targets import Target, find_target, targets
 
 SEED = 20_000

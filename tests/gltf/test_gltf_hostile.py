@@ -236,7 +236,7 @@ def test_files_outside_the_folder_are_refused(tmp_path: Path, uri: str) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
-def test_files_that_are_no_files(tmp_path: Path) -> None:
+def test_missing_files_folders_and_pipes_are_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "empty").touch()
     (tmp_path / "short").write_bytes(b"1234")
@@ -323,6 +323,6 @@ def test_small_files_do_not_ask_for_endless_work() -> None:
         read(bomb_of_skins().glb())
 
 
-def test_many_empty_things_are_refused() -> None:
+def test_too_many_empty_entries_are_refused() -> None:
     with pytest.raises(ModelError, match=r"nodes: 300000 elements, more than the 262144 that can be read"):
         read(json.dumps({"asset": {"version": "2.0"}, "nodes": [{}] * 300_000}).encode())

@@ -100,7 +100,7 @@ class TestMemory:
     @pytest.mark.parametrize(
         ("view", "body", "pictures"), [("figure", False, 300), ("points", False, 40), ("figure", True, 40)]
     )
-    def test_hundreds_of_pictures_hold_it(
+    def test_hundreds_of_pictures_leave_no_objects(
         self, view: str, body: bool, pictures: int, living: Callable[[], int]
     ) -> None:
         """pictures: in each round."""
@@ -117,7 +117,7 @@ class TestMemory:
         assert living() == 0
 
     @pytest.mark.slow
-    def test_so_do_switches_and_cameras(self, living: Callable[[], int]) -> None:
+    def test_switches_and_cameras_leave_no_objects(self, living: Callable[[], int]) -> None:
         scene = small_scene()
         values = {"wireframe": True, "points": True, "influence": 3, "normals": True, "grid": True,
                   "skeleton": "through", "background": "grey", "eyes": False, "shadows": False}  # fmt: skip
@@ -139,7 +139,7 @@ class TestMemory:
             assert_every_round_holds_memory(switch_all, living)
         assert living() == 0
 
-    def test_so_does_opening_and_closing(self) -> None:
+    def test_opening_and_closing_leaves_no_objects(self) -> None:
         scene = small_scene()
 
         def open_and_close() -> None:
@@ -179,7 +179,7 @@ class TestSizes:
         assert (apart > 30).mean() < 0.02  # edges alone
 
     @pytest.mark.parametrize("size", [(0, 5), (5, 0), (-3, 4)])
-    def test_none_is_refused(self, size: tuple[int, int]) -> None:
+    def test_sizes_below_one_pixel_are_refused(self, size: tuple[int, int]) -> None:
         with pytest.raises(ValueError, match="1x1"):
             Offscreen(small_scene(), size)
 
@@ -193,7 +193,7 @@ class TestSizes:
 
 @pytest.mark.usefixtures("opengl")
 class TestSeveral:
-    def test_two_by_turns_draw_what_one_draws(self) -> None:
+    def test_two_that_draw_in_turns_draw_what_one_draws(self) -> None:
         scene = small_scene()
         with Offscreen(scene, (48, 36)) as alone:
             expected = [alone.frame(t / 10) for t in range(5)]

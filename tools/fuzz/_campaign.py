@@ -29,7 +29,7 @@ HANGING = 120.0
 COMPILING = 600.0
 """The same for the files of the corpus, the first of which compile the loops."""
 WAITING = 30.0
-"""How many times as long by the clock: beside ten busy programs, compiling took over five times as long."""
+"""Factor for the same by the clock: beside ten busy programs, compiling took over five times as long"""
 MINIMISED_SECONDS = 60.0
 MOST_DEATHS = 20
 """Processes of one target that may die before the run gives up on it."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fba.errors import OptionError
-from fba_conformance._small_streams import doubtful_marks, long_streams, small_streams
+from tools.fuzz.small_streams import doubtful_marks, long_streams, small_streams
 from tools.fuzz.targets import Target
 
 CHECKOUT = Path(__file__).parents[2] / "tests" / "fuzz" / "corpus"

@@ -1,6 +1,6 @@
 """The conformance suite: streams with the values that decoders must find, and what checks them.
 
-`fba conformance` runs it on this codec or on other programs. `generate` writes the vectors, which come with
-the package; `coverage` says which vectors reach what, `broken` which of them find decoders with a fault.
+`fba conformance` runs it on this codec or on other programs. In a checkout, `tools/vectors` makes the
+vectors, and measures what they reach and which faulty decoders they find.
 May use: the second decoder, the codec's public names, formats.
 """

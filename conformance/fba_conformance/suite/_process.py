@@ -1,4 +1,4 @@
-"""Run a program that is tested: with a time limit, whatever it does."""
+"""Run the program under test, with limits on its time and output."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from typing import IO
 OUTPUT_LIMIT = 64 << 20
 """Bytes of output at which a program is stopped; the longest listing of the suite has 0.3 million."""
 _POLL = 0.02
-"""Seconds between two looks at the size of the output."""
+"""Seconds between two checks of the size of the output."""
 _TAIL = 4096
 """Bytes of standard error that are kept."""
 _SHOWN = 200
@@ -76,7 +76,7 @@ def fill_in(words: list[str], values: Mapping[str, str]) -> list[str]:
 
 
 def run_program(words: list[str], output: Path, seconds: float) -> Run:
-    """Run a program, and stop it and all that it started when its time is over.
+    """Run a program; stop it, and all that it started, when its time is over.
 
     output: a file that it writes; if that grows beyond `OUTPUT_LIMIT`, the program is stopped, too. Its
     standard output is thrown away. Raises OSError if it cannot be started.
@@ -97,7 +97,7 @@ def run_program(words: list[str], output: Path, seconds: float) -> Run:
         stopped = _wait(process, output, seconds)
     finally:
         _stop(process)
-        reader.join(1)  # longer only where something that it started has left its session
+        reader.join(1)  # takes longer only if something that it started has left its session
     return Run(None if stopped else process.returncode, stopped, _last_line(bytes(tail)))
 
 

@@ -1,4 +1,4 @@
-"""The suite as a zip, for those who have no Python: streams, expected values as text, checksums, a README.
+"""The suite as a zip, for use without Python: streams, expected values as text, checksums, a README.
 
 Nothing in it is compressed, and all times are the same, so that its bytes do not depend on the machine:
 versions of zlib compress differently.
@@ -11,12 +11,13 @@ from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from typing import Any, BinaryIO
 
-from fba_conformance.suite.generate import Made, index_text
+from fba_conformance.suite.index import Vector, index_text
+from fba_conformance.suite.runner import expected_listing
 
 NAME = "fba-conformance"
 """The folder in the zip."""
 _TIME = (1980, 1, 1, 0, 0, 0)
-"""The earliest that a zip can say."""
+"""The earliest time that a zip can contain."""
 
 _README = """\
 FBA CONFORMANCE SUITE
@@ -60,8 +61,8 @@ With Python, `fba conformance FOLDER --decoder 'yours {in} {out}'` does all that
 """
 
 
-def write_archive(file: BinaryIO, vectors: Iterable[Made]) -> int:
-    """Write the zip; return the number of vectors. vectors: as made anew."""
+def write_archive(file: BinaryIO, vectors: Iterable[Vector]) -> int:
+    """Write the zip; return the number of vectors."""
     contents = dict(_files(vectors))
     sums = "".join(f"{sha256(data).hexdigest()}  {name}\n" for name, data in sorted(contents.items()))
     contents["SHA256SUMS"] = sums.encode()
@@ -74,13 +75,13 @@ def write_archive(file: BinaryIO, vectors: Iterable[Made]) -> int:
     return sum(name.endswith(".fba") for name in contents)
 
 
-def _files(vectors: Iterable[Made]) -> Iterator[tuple[str, bytes]]:
+def _files(vectors: Iterable[Vector]) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of streams, values, index and README."""
     entries = []
-    for entry, data, listing in vectors:
-        entries.append(entry)
-        yield entry["stream"], data
-        yield entry["stream"].replace(".fba", ".txt"), listing.text().encode()
+    for vector in vectors:
+        entries.append(vector.entry)
+        yield vector.name, vector.data()
+        yield vector.name.replace(".fba", ".txt"), expected_listing(vector).text().encode()
     yield "index.json", index_text(entries).encode()
     yield "README.txt", (_README + "\n".join(_vector_table(entries)) + "\n").encode()
 

@@ -4,8 +4,7 @@
 
     fba conformance --decoder 'python -m fba_conformance.suite.example_program decode {in} {out}'
 
-Add --textbook for the independent decoder, and --mistake NAME for one that has a mistake, see `broken`.
-docs/test-a-codec.md has the encoder's command.
+Add --textbook for the independent decoder. docs/test-a-codec.md has the encoder's command.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +23,6 @@ from fba.codec import Damage, Decoder, EncoderOptions, encode
 from fba.errors import FbaError, FbaWarning
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 from fba_conformance._values import HEADER, Listing, PlaneValues, block_values, read_values, trace_values
-from fba_conformance.suite._mistakes import Mistake, mistakes
-from fba_conformance.suite.broken import broken_decoder
 from fba_conformance.trace import planes
 
 
@@ -39,12 +35,6 @@ def decode_textbook(data: bytes, bap_steps: str) -> Iterator[str]:
     except FbaError as error:
         yield f"error {error}"
     yield "end"
-
-
-def decode_with(mistake: Mistake, data: bytes, bap_steps: str) -> Iterator[str]:
-    """Yield the lines of a listing from the independent decoder with a mistake."""
-    with broken_decoder(mistake) as decode:
-        yield from decode(data, bap_steps).text().splitlines()
 
 
 def decode_codec(data: bytes, bap_steps: str) -> Iterator[str]:
@@ -111,8 +101,6 @@ def main() -> None:
         command.add_argument("--bap-steps", choices=BAP_STEP_TABLES, default="iso")
         if name == "decode":
             command.add_argument("--textbook", action="store_true", help="the independent decoder")
-            names = [mistake.name for mistake in mistakes()]
-            command.add_argument("--mistake", choices=names, metavar="NAME", help="the same with a mistake")
         else:
             command.add_argument("--rate", type=Fraction, default=Fraction(25))
             command.add_argument("--fap-quant", type=int, default=1)
@@ -121,9 +109,6 @@ def main() -> None:
     warnings.simplefilter("ignore", FbaWarning)
     if arguments.command == "decode":
         decode = decode_textbook if arguments.textbook else decode_codec
-        if arguments.mistake is not None:
-            mistake = next(one for one in mistakes() if one.name == arguments.mistake)
-            decode = partial(decode_with, mistake)
         lines = decode(arguments.input.read_bytes(), arguments.bap_steps)
         arguments.output.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
         return

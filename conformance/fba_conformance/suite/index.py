@@ -8,6 +8,7 @@ wrote: `stream`, `bap_steps`, `decoded_fap`, `decoded_bap`, `epf`, `source_fap`,
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from typing import Any
 from fba.errors import FormatError
 from fba_conformance._values import Listing, read_values
 
-OWN = Path(__file__).parents[1] / "vectors"
+SHIPPED_VECTORS = Path(__file__).parents[1] / "vectors"
 OTHER_GROUP = "vectors"
 """Group of vectors whose index does not name one."""
 
@@ -81,9 +82,15 @@ class Vector:
         return found
 
 
+def index_text(entries: Sequence[dict[str, Any]]) -> str:
+    """Return the content of index.json."""
+    lines = ",\n".join(json.dumps(entry) for entry in entries)
+    return f"[\n{lines}\n]\n"
+
+
 def read_vectors(folder: Path | None = None) -> list[Vector]:
     """Return the vectors of a folder, or those that come with fba. FormatError without a valid index."""
-    folder = folder or OWN
+    folder = folder or SHIPPED_VECTORS
     index = folder / "index.json"
     try:
         entries = json.loads(index.read_text(encoding="utf-8"))

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from fba.errors import FbaError, FbaWarning, FormatError
 from fba_conformance._values import Listing, read_values, trace_values
-from fba_conformance.suite._judgement import find_fault
 from fba_conformance.suite._process import OUTPUT_LIMIT, Run, fill_in, run_program, split_command
 from fba_conformance.suite.index import Vector
 from fba_conformance.suite.result import Result
@@ -19,7 +18,7 @@ from fba_conformance.suite.runner import expected_listing
 from fba_conformance.trace import decode_values, planes
 
 SECONDS = 20.0
-"""How long a program may take for a vector, if nobody says otherwise."""
+"""Default time limit of a program for a vector, seconds."""
 FILES = ("in", "out")
 DECODER_PLACES = (*FILES, "bap_steps")
 ENCODER_PLACES = (*DECODER_PLACES, "rate", "fap_quant", "bap_quant")
@@ -37,7 +36,7 @@ class Program:
     seconds: float = SECONDS
 
     def has_place(self, name: str) -> bool:
-        """Whether the command line has "{name}"."""
+        """Return whether the command line has "{name}"."""
         return any(f"{{{name}}}" in word for word in self.words)
 
     def run(self, values: Mapping[str, str], output: Path) -> Run:
@@ -169,6 +168,31 @@ def _steps_reason(vector: Vector) -> str:
 
 
 def unknown_places(program: Program, known: Iterable[str]) -> list[str]:
-    """Return places such as "{input}" in a command line that nothing is put into."""
+    """Return the places, such as "{input}", in a command line that nothing fills."""
     names = {part.partition("}")[0] for word in program.words for part in word.split("{")[1:] if "}" in part}
     return sorted(f"{{{name}}}" for name in names - set(known) if name.isidentifier())
+
+
+def find_fault(vector: Vector, expected: Listing, found: Listing, *, failed: bool) -> str:
+    """Return what is wrong with what a decoder found, "" if nothing is. failed: its exit status was not 0.
+
+    In a damaged stream it must report the damage, by a line `error` or by its exit status, and may give all
+    planes that can be salvaged, or only some of those before the damage; never another plane.
+    """
+    if not vector.damaged:
+        if found.error_after is not None:
+            return f"reports damage in plane {found.error_after}, which has none"
+        if not found.ended:
+            return f"the output breaks off behind {len(found.planes)} planes: its last line is not `end`"
+        return expected.difference(found)
+    given = list(found.planes)
+    if found.error_after is None:
+        if not failed:
+            return f"reports no error; the stream is damaged in plane {vector.planes_before}"
+        if not found.ended:
+            given = given[:-1]  # it may have ended within a plane
+    if not expected.difference(Listing(given)):
+        return ""
+    before = Listing(expected.planes[: min(len(given), vector.planes_before)])
+    wrong = before.difference(Listing(given))
+    return f"{wrong} (the damage is in plane {vector.planes_before})" if wrong else ""

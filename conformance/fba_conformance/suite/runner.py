@@ -40,7 +40,7 @@ def expected_listing(vector: Vector) -> Listing:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
         try:
-            listing = _own_listing(vector)
+            listing = _codec_listing(vector)
         except FbaError:
             listing = None
         if "values" not in vector.entry:
@@ -82,8 +82,8 @@ def salvage_blocks(data: bytes, bap_steps: str) -> list[Block]:
     return [*decoder.push_blocks(data), *decoder.finish_blocks()]
 
 
-def _own_listing(vector: Vector) -> Listing:
-    """Return what this codec finds in a vector."""
+def _codec_listing(vector: Vector) -> Listing:
+    """Return what this codec decodes from a vector."""
     if vector.damaged:
         blocks = salvage_blocks(vector.data(), vector.bap_steps)
         return Listing(block_values(blocks, times=vector.times), vector.planes_before)
@@ -105,7 +105,7 @@ def _check_damaged(vector: Vector) -> Result:
     if (kind, error.plane, before) != (expected["kind"], expected["plane"], expected["plane"]):
         text = f"{before} planes, then {kind} in plane {error.plane}, expected {expected['kind']} in plane"
         return Result(vector.name, False, None, f"{text} {expected['plane']}: {error}")
-    return _check_digest(vector, _own_listing(vector))
+    return _check_digest(vector, _codec_listing(vector))
 
 
 def _check_valid(vector: Vector) -> Result:
@@ -147,7 +147,7 @@ def _check_digest(vector: Vector, found: Listing) -> Result:
 
 
 def _check_files(vector: Vector, frames: list[Frame]) -> str:
-    """Return how decoded frames differ from the files of another decoder, or ""; it numbers planes."""
+    """Return how decoded frames differ from the files of another decoder, or ""."""
     from fba.formats.text.bap import read_bap
     from fba.formats.text.fap import read_fap
 

@@ -189,11 +189,11 @@ def _chosen(vectors: Sequence[Vector], names: Sequence[str]) -> Sequence[Vector]
 def _write_archive(path: Path, folder: Path | None, *, no_clobber: bool) -> None:
     """Write the suite as a zip."""
     from fba_conformance.suite.archive import write_archive
-    from fba_conformance.suite.generate import made_vectors
+    from fba_conformance.suite.index import read_vectors
 
     if folder is not None:
         raise click.UsageError("--zip writes the vectors that come with fba; leave the folder out")
     outputs = Outputs([Output("--zip", path)], no_clobber=no_clobber)
     with outputs.file(path) as name, atomic(name) as file:
-        count = write_archive(file, made_vectors())
+        count = write_archive(file, read_vectors())
     outputs.say(f"{display_name(path)}: {count} vectors")

@@ -68,7 +68,7 @@ def author(
     fit: InterpolationTable | None = None,
     notes: Mapping[str, str] | None = None,
 ) -> FaceModel:
-    """A face whose tables are made from the shape of the mesh alone.
+    """Return a face whose tables are made from the shape of the mesh alone.
 
     parts: the skin, and if present eyeballs (one part each), teeth, tongue, the inside of the mouth,
     brows, lashes, hair; upright, looking along +z, metres. points: (84, 3), rows as
@@ -115,7 +115,8 @@ def author(
 
 
 def author_lids(model: FaceModel, sculpted: Mapping[int, Sequence[Float64]]) -> dict[int, FaceDefTables]:
-    """Tables by FAP (19..22) of lids that move as shapes do; FAPs whose lid no shape moves are left out.
+    """Return the tables by FAP (19..22) of lids that move as shapes do; FAPs whose lid no shape moves are
+    left out.
 
     sculpted: by FAP, displacements (V, 3) of the model's vertices, metres: of several shapes, the first that
     moves the lid.
@@ -140,7 +141,7 @@ def author_lids(model: FaceModel, sculpted: Mapping[int, Sequence[Float64]]) -> 
 
 
 def _start(parts: tuple[Part, ...], surface: Surface, points: Float64, bound: Int32) -> _Authoring:
-    """The authoring of a face, without any motion yet."""
+    """Return the authoring of a face, without any motion yet."""
     marks = find_landmarks(surface, points, bound)
     limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
     eyes = find_eyes(marks, parts)
@@ -162,7 +163,7 @@ def _check_size(parts: tuple[Part, ...]) -> None:
 
 
 def _attach_parts(marks: Landmarks, parts: tuple[Part, ...], eyes: Mapping[str, Eye]) -> dict[str, Anchors]:
-    """The attachment to the skin of each part that moves with it, by name; what is in an eye stays."""
+    """Return the attachment to the skin of each part that moves with it, by name; what is in an eye stays."""
     result = {}
     es = marks.fapu.ES * 1024
     for part in parts:
@@ -179,7 +180,7 @@ def _attach_parts(marks: Landmarks, parts: tuple[Part, ...], eyes: Mapping[str, 
 
 
 def _is_in_eyes(part: Part, eyes: Mapping[str, Eye]) -> bool:
-    """Whether all of a part is within the reach of an eyeball, as the whites of drawn eyes are."""
+    """Return whether all of a part is within the reach of an eyeball, as the whites of drawn eyes are."""
     away = [np.linalg.norm(part.vertices - eye.centre, axis=1) / eye.radius for eye in eyes.values()]
     return bool(len(part.vertices)) and bool((np.min(away, axis=0) < IN_EYE).all())
 
@@ -322,7 +323,7 @@ class _Authoring:
 
 
 def jaw_angles_at_values(motion: Motion, values: Float64, angles: Float64) -> Float64:
-    """(K,) angles of the jaw at the values of a motion that may have been stopped, radians."""
+    """Return (K,) angles of the jaw at the values of a motion that may have been stopped, radians."""
     result = np.interp(motion.values, values, angles)
     for k in range(1, len(result)):
         if np.array_equal(motion.shifts[k], motion.shifts[k - 1]):

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @cache
 def default() -> FaceModel:
-    """The built-in head; read on first use."""
+    """Return the built-in head; read on first use."""
     from dataclasses import replace
 
     from fba.face._expressions import Definitions

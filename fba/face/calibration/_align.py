@@ -14,13 +14,13 @@ from fba.geometry import fit_similarity, principal_axes
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of length of files, in metres."""
-HUMAN = (0.7, 1.4)
+HUMAN_SIZES = (0.7, 1.4)
 """Range of a person's size relative to the model, from a child of two to a giant. Beyond it, the unit is
 wrong."""
-OWN_AXES = np.radians(15.0)
+RIGHT_ANGLE_TOLERANCE = np.radians(15.0)
 """Rotations this close to multiples of 90 degrees are rounded to them: the rest is a difference of faces."""
 FEWEST_POINTS = 4
-FLAT = 0.02
+FLAT_RATIO = 0.02
 """Ratio of smallest to largest spread below which points lie in a plane, as those of a photograph do."""
 MIRRORED_FIT = 0.6
 """Points are taken as mirrored if their mirror image fits with less than this share of the error."""
@@ -45,7 +45,7 @@ class Alignment:
 
 
 def align(given: Float64, reference: Float64, *, unit: str | float | None = None) -> Alignment:
-    """A person's feature points (84, 3), scaled, rotated and shifted to match a reference (84, 3).
+    """Return a person's feature points (84, 3), scaled, rotated and shifted to match a reference (84, 3).
 
     NaN marks unknown points. unit: a name in `UNITS`, or metres for one unit of the file; None finds it.
     Raises ModelError where fewer than four points are known in both, or where they coincide or lie on one
@@ -55,7 +55,7 @@ def align(given: Float64, reference: Float64, *, unit: str | float | None = None
     _check(given, known)
     here, there = given[known], reference[known]
     flatness = [spread[2] / spread[0] for _, spread in (principal_axes(here), principal_axes(there))]
-    flat = bool(flatness[0] < FLAT and flatness[1] > 2 * FLAT)
+    flat = bool(flatness[0] < FLAT_RATIO and flatness[1] > 2 * FLAT_RATIO)
     if flat:
         rotation, mirrored = _find_flat_pose(here, there), False
         angle = _angle(rotation)
@@ -78,7 +78,7 @@ def align(given: Float64, reference: Float64, *, unit: str | float | None = None
 
 
 def known_rows(*points: Float64) -> Bool:
-    """(N,) mask of the rows that are finite in all of the arrays (N, 3)."""
+    """Return (N,) mask of the rows that are finite in all of the arrays (N, 3)."""
     return np.asarray(np.isfinite(np.hstack(points)).all(axis=1))
 
 
@@ -122,14 +122,16 @@ def _fit_rotation(here: Float64, there: Float64, *, reflected: bool = False) -> 
 
 
 def _robust_weights(errors: Float64, points: Float64) -> Float64:
-    """(N,) Geman-McClure weights of points (N, 3) by their errors (N,), near 1 below the median error."""
+    """Return (N,) Geman-McClure weights of points (N, 3) by their errors (N,), near 1 below the median
+    error."""
     usual = max(1.5 * float(np.median(errors)), 1e-9 * float(np.abs(points).max()))
     weights: Float64 = 1.0 / (1.0 + (errors / (2 * usual)) ** 2) ** 2
     return weights
 
 
 def _find_flat_pose(here: Float64, there: Float64) -> Float64:
-    """(3, 3) rotation of points in a plane onto the model seen from the front, the better side forward."""
+    """Return (3, 3) rotation of points in a plane onto the model seen from the front, the better side
+    forward."""
     axes, _ = principal_axes(here)
     axes[2] = np.cross(axes[0], axes[1])
     flat = (here - here.mean(axis=0)) @ axes.T
@@ -143,7 +145,7 @@ def _find_flat_pose(here: Float64, there: Float64) -> Float64:
 
 
 def _snap_to_axes(matrix: Float64) -> Float64:
-    """The nearest rotation by multiples of 90 degrees if within `OWN_AXES`, else the matrix unchanged."""
+    """Return the nearest rotation by right angles within `RIGHT_ANGLE_TOLERANCE`, else the matrix itself."""
     right_angled = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
@@ -152,7 +154,7 @@ def _snap_to_axes(matrix: Float64) -> Float64:
             if np.linalg.det(turn) > 0:
                 right_angled.append(turn)
     nearest = min(right_angled, key=lambda turn: _angle(matrix @ turn.T))
-    return nearest if _angle(matrix @ nearest.T) < OWN_AXES else matrix
+    return nearest if _angle(matrix @ nearest.T) < RIGHT_ANGLE_TOLERANCE else matrix
 
 
 def _angle(matrix: Float64) -> float:
@@ -160,7 +162,7 @@ def _angle(matrix: Float64) -> float:
 
 
 def _robust_size(posed: Float64, there: Float64) -> tuple[float, Float64]:
-    """(size of there relative to posed, (N,) weight of each point), robust against outliers."""
+    """Return (size of there relative to posed, (N,) weight of each point), robust against outliers."""
     weight = np.ones(len(posed))
     size = 1.0
     for _ in range(20):
@@ -172,7 +174,7 @@ def _robust_size(posed: Float64, there: Float64) -> tuple[float, Float64]:
 
 
 def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
-    """(metres for one unit, its name or ""). size: factor by which the points fit the model best."""
+    """Return (metres for one unit, its name or ""). size: factor by which the points fit the model best."""
     if isinstance(unit, str):
         if unit not in UNITS:
             raise ModelError(f"there is no unit of length {unit!r}; there are {', '.join(UNITS)}")
@@ -183,13 +185,14 @@ def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
         return float(unit), ""
     for name in ("mm", "cm", "m"):
         # `size` scales the points to the model; the true unit may differ from it by as much as people do.
-        if HUMAN[0] <= UNITS[name] / size <= HUMAN[1]:
+        if HUMAN_SIZES[0] <= UNITS[name] / size <= HUMAN_SIZES[1]:
             return UNITS[name], name
     return size, ""
 
 
 def centre_on_pupils(points: Float64, reference: Float64) -> Float64:
-    """Points (84, 3) shifted so that the midpoint of the pupils is the reference's; unchanged if unknown."""
+    """Return the points (84, 3) shifted so that the midpoint of the pupils is the reference's; unchanged if
+    unknown."""
     rows = [row_of()["3.5"], row_of()["3.6"]]
     shift = reference[rows].mean(axis=0) - points[rows].mean(axis=0)
     return points + shift if np.isfinite(shift).all() else points

@@ -29,7 +29,7 @@ MEAN_STRETCH_WEIGHT = 1e-6
 def carry_tables(
     model: FaceModel, parts: tuple[Part, ...], points: Float64, fapu: Fapu, shape: Shape
 ) -> tuple[FaceDefTables, ...]:
-    """The model's tables for its parts in another shape, one for each.
+    """Return the model's tables for its parts in another shape, one for each.
 
     parts: the parts after fitting, in the model's order. points: (84, 3) fitted feature points, metres.
     fapu: of the fitted face. A displacement keeps its length in FAPU and rotates with the face around it.
@@ -78,7 +78,7 @@ def carry_tables(
 
 
 def _lid_stretches(model: FaceModel, parts: tuple[Part, ...]) -> dict[str, Float64]:
-    """By part name: (V, 3, 3) stretch of the skin, for skin and for the parts on it."""
+    """Return the stretch of the skin (V, 3, 3), for skin and for the parts on it, by name."""
     from scipy.spatial import cKDTree
 
     stretches = {
@@ -124,8 +124,8 @@ def _carry_transform(
 
 
 def _carry_hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Float64, float]:
-    """(centre (3,), size): a hinge moved by the affine map of the feature points, and the ratio of the chin's
-    new distance from it to the old one.
+    """Return (centre (3,), size): a hinge moved by the affine map of the feature points, and the ratio of the
+    chin's new distance from it to the old one.
     """
     known = known_rows(points, model.points)
     here, there = model.points[known], points[known]
@@ -140,7 +140,8 @@ def _carry_hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Fl
 
 
 def _point_correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str, Float64]) -> Float64 | None:
-    """(K, 3, 3) matrices that restore the motion per FAPU of the FAP's own point; None if no mesh has it."""
+    """Return (K, 3, 3) matrices that restore the motion per FAPU of the FAP's own point; None if no mesh has
+    it."""
     for name in faps()[table.fap - 1].feature_points:
         vertex = int(model.bound[row_of()[name]])
         for mesh in table.meshes:
@@ -153,7 +154,8 @@ def _point_correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str
 
 
 def _rotation_and_scale(a: Float64, b: Float64) -> Float64:
-    """(3, 3) smallest rotation, with a scale, that takes a to b; the unit matrix where either is zero."""
+    """Return (3, 3) smallest rotation, with a scale, that takes a to b; the unit matrix where either is
+    zero."""
     lengths = float(np.linalg.norm(a)), float(np.linalg.norm(b))
     if min(lengths) < 1e-9:
         return np.eye(3)
@@ -162,7 +164,8 @@ def _rotation_and_scale(a: Float64, b: Float64) -> Float64:
 
 
 def surface_stretches(part: Part, after: Floating) -> Float64:
-    """(V, 3, 3) linear map that takes the surface around each vertex of a part to vertices `after` (V, 3).
+    """Return (V, 3, 3) linear map that takes the surface around each vertex of a part to vertices `after` (V,
+    3).
 
     Least squares over the edges at the vertex; its normal goes to the new normal, scaled as the surface is.
     """
@@ -197,7 +200,7 @@ def keep_lid_on_eyeball(
     before: tuple[Float64, Float64],
     after: tuple[Float64, Float64],
 ) -> Float64:
-    """Displacements (N, K - 1, 3), metres a step, corrected so that the lid keeps to the eyeball.
+    """Return the displacements (N, K - 1, 3), metres a step, corrected so that the lid keeps to the eyeball.
 
     before, after: neutral vertices (N, 3) and displacements (N, K - 1, 3) of the old and the new face. At
     every border a vertex gets as many radii from the eyeball's centre as on the old face, but for the
@@ -224,7 +227,7 @@ def keep_lid_on_eyeball(
 
 
 def _positions_at_borders(vertices: Float64, moves: Float64, steps: Float64, zero: int) -> Float64:
-    """(N, K, 3) position of each vertex at each border."""
+    """Return (N, K, 3) position of each vertex at each border."""
     path = np.concatenate([np.zeros((len(vertices), 1, 3)), moves * steps[:, None]], axis=1).cumsum(axis=1)
     positions: Float64 = vertices[:, None] + path - path[:, [zero]]
     return positions

@@ -10,26 +10,27 @@ from fba.arrays import Float64
 from fba.errors import FbaWarning
 from fba.face.feature_points import MIRRORED, names, row_of
 
-APART = 0.012
+MIN_DISTANCE = 0.012
 """Points further apart on the face than this share of the pupils' distance must not coincide."""
-TOGETHER = 0.1
+COINCIDENT_SHARE = 0.1
 """Points nearer to each other than this share of their distance on the face coincide."""
-FAR_OFF = 0.75
-"""A point is a mistake if its error exceeds this share of the pupils' distance ..."""
-FAR_OFF_USUAL = 6.0
-"""... and this many times the median error, and its mate on the other side differs."""
-TURNED = np.radians(20.0)
+MISTAKE_DISTANCE = 0.75
+"""A point is a mistake if its error exceeds this share of the pupils' distance and `MISTAKE_RATIO`, and its
+mate differs."""
+MISTAKE_RATIO = 6.0
+"""Multiple of the median error, see `MISTAKE_DISTANCE`."""
+MAX_TILT = np.radians(20.0)
 """The plane of symmetry is computed from the points unless it deviates from x = 0 by more than this."""
-PUPIL = 0.2
+MAX_PUPIL_OFFSET = 0.2
 """Share of the lid opening by which a pupil may be off the middle of the lids."""
 LIPS = (("2.2", "2.3", "8.2"), ("2.6", "2.8", "8.7"), ("2.7", "2.9", "8.8"))
 """Points of the upper and the lower inner lip, and of the outer lip below."""
-OPEN = 0.01
+MAX_LIP_GAP = 0.01
 """Share of the mouth's width by which lips may be apart without a warning."""
-CLOSE_ENOUGH = 0.25
+TOLERATED_GAP = 0.25
 """Lips stay unchanged if they are off by less than this share of the distance between two such points."""
 TEETH = ("9.10", "9.11")
-FREE = ("7.1", "11.5")
+FREE_POINTS = ("7.1", "11.5")
 """Points on no surface: they do not describe its shape, and authors place them differently."""
 
 _MEET = (
@@ -42,7 +43,7 @@ _OTHER = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 
 
 def drop_mistakes(points: Float64, expected: Float64) -> Float64:
-    """Points (84, 3) with obvious mistakes set to NaN; an FbaWarning names each.
+    """Return the points (84, 3) with obvious mistakes set to NaN; an FbaWarning names each.
 
     expected: (84, 3), the model's points at the person's size, metres. Of two points that coincide but are
     apart on the model, the one less symmetric to its mate is dropped, or else the one further from its
@@ -59,7 +60,12 @@ def drop_mistakes(points: Float64, expected: Float64) -> Float64:
             apart = float(np.linalg.norm(expected[a] - expected[b]))
             given = float(np.linalg.norm(points[a] - points[b]))
             meet = {names()[a], names()[b]} in _MEET
-            if meet or apart < APART * unit or given > TOGETHER * apart or np.isnan(result[[a, b], 0]).any():
+            if (
+                meet
+                or apart < MIN_DISTANCE * unit
+                or given > COINCIDENT_SHARE * apart
+                or np.isnan(result[[a, b], 0]).any()
+            ):
                 continue
             error = asymmetry if abs(asymmetry[a] - asymmetry[b]) > 0.01 * unit else away
             worse = a if error[a] > error[b] else b
@@ -69,10 +75,10 @@ def drop_mistakes(points: Float64, expected: Float64) -> Float64:
                 f"{apart * 1000:.0f} mm apart: {names()[worse]} is left out"
             )
     usual = float(np.median(away[rows])) if len(rows) else 0.0
-    limit = max(FAR_OFF * unit, FAR_OFF_USUAL * usual)
+    limit = max(MISTAKE_DISTANCE * unit, MISTAKE_RATIO * usual)
     shift = points - expected
     for row in rows:
-        if np.isnan(result[row, 0]) or names()[row] in FREE or not away[row] > limit:
+        if np.isnan(result[row, 0]) or names()[row] in FREE_POINTS or not away[row] > limit:
             continue
         other = _OTHER.get(names()[row])
         mate = shift[row_of()[other]] * (-1.0, 1.0, 1.0) if other else np.full(3, np.nan)
@@ -127,7 +133,7 @@ def _symmetry_plane(points: Float64) -> tuple[Float64, float]:
     if known.any():
         across = (left - right).sum(axis=0)
         length = float(np.linalg.norm(across))
-        if length > 0 and across[0] / length > np.cos(TURNED):
+        if length > 0 and across[0] / length > np.cos(MAX_TILT):
             normal = across / length
     middle = [row_of()[name] for name in names() if name not in _OTHER]
     halves = np.vstack([(left + right) / 2, points[middle][np.isfinite(points[middle]).all(axis=1)]])
@@ -135,7 +141,7 @@ def _symmetry_plane(points: Float64) -> tuple[Float64, float]:
 
 
 def centre_pupils(points: Float64) -> tuple[Float64, tuple[str, ...]]:
-    """(points (84, 3) with pupils at mid-height between the lids, names of those that were moved).
+    """Return (points (84, 3) with pupils at mid-height between the lids, names of those that were moved).
 
     Lids are tangent to the iris in a neutral face, so the pupil is in the middle. An FbaWarning names a
     pupil further off than drooping lids explain.
@@ -145,7 +151,7 @@ def centre_pupils(points: Float64) -> tuple[Float64, tuple[str, ...]]:
     for pupil, upper, lower in (("3.5", "3.1", "3.3"), ("3.6", "3.2", "3.4")):
         y, top, bottom = (points[row_of()[name], 1] for name in (pupil, upper, lower))
         off = y - (top + bottom) / 2
-        if abs(off) > PUPIL * (top - bottom) > 0:
+        if abs(off) > MAX_PUPIL_OFFSET * (top - bottom) > 0:
             full[row_of()[pupil], 1] -= off
             moved.append((pupil, off))
     if moved:
@@ -159,7 +165,8 @@ def centre_pupils(points: Float64) -> tuple[Float64, tuple[str, ...]]:
 
 
 def shut_mouth(points: Float64, reference: Float64) -> Float64:
-    """Points (84, 3) with lips and teeth that meet as those of the reference do; the upper ones stay.
+    """Return the points (84, 3) with lips and teeth that meet as those of the reference do; the upper ones
+    stay.
 
     reference: (84, 3), the model's points at the person's size. If the person's mouth is open, the whole
     lower lip is raised, and an FbaWarning says how far.
@@ -175,16 +182,16 @@ def shut_mouth(points: Float64, reference: Float64) -> Float64:
         if np.isnan(full[a]).any():
             full[a] = full[b] - apart  # NaN where neither is known
         rise = full[a] + apart - full[b]
-        if np.linalg.norm(rise) < CLOSE_ENOUGH * np.linalg.norm(apart):
+        if np.linalg.norm(rise) < TOLERATED_GAP * np.linalg.norm(apart):
             continue
         if np.isfinite(rise).all():
             full[b] += rise
-            if abs(rise[1]) > OPEN * width:
+            if abs(rise[1]) > MAX_LIP_GAP * width:
                 full[c] += rise
             widest = max(widest, float(rise[1]), key=abs)
         elif np.isfinite(full[a]).all():
             full[b] = full[a] + apart
-    if abs(widest) > OPEN * width:
+    if abs(widest) > MAX_LIP_GAP * width:
         fault = "the mouth is open by" if widest > 0 else "the lower lip is in the upper one by"
         _warn(
             f"{fault} {abs(widest) * 1000:.1f} mm, but the lips of a neutral face touch: "
@@ -193,7 +200,7 @@ def shut_mouth(points: Float64, reference: Float64) -> Float64:
     a, b = (row_of()[name] for name in TEETH)
     apart = full[a] + reference[b] - reference[a] - full[b]
     if np.isfinite(apart).all():
-        if np.linalg.norm(apart) > 2 * OPEN * width:
+        if np.linalg.norm(apart) > 2 * MAX_LIP_GAP * width:
             _warn(
                 f"upper and lower teeth are {np.linalg.norm(apart) * 1000:.1f} mm from touching as those "
                 "of a neutral face do: the lower ones were moved"
@@ -203,7 +210,7 @@ def shut_mouth(points: Float64, reference: Float64) -> Float64:
 
 
 def _between(points: Float64, left: str, right: str) -> float:
-    """Distance of two points in x, metres; 0.06 where it is unknown or not positive."""
+    """Return the distance of two points in x, metres; 0.06 where it is unknown or not positive."""
     distance = float(points[row_of()[left], 0] - points[row_of()[right], 0])
     return distance if np.isfinite(distance) and distance > 0 else 0.06
 

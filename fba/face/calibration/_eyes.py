@@ -13,17 +13,17 @@ from fba.errors import FbaWarning
 from fba.face.calibration._field import linear_field
 from fba.face.eyeball import Eyeball
 
-LID = 1.10
+LID_RADII = 1.10
 """Skin within this many radii of the eyeball's centre is on it: the lids and their lining."""
 REACH = 1.6
 """Beyond this many radii the eyeball has no influence on the skin."""
-SIZES = (0.75, 1.35)
+SIZE_LIMITS = (0.75, 1.35)
 """Limits of an eyeball's size relative to the face around it."""
 WIDEST_IRIS = np.radians(42.0)
 """Largest angle at the eyeball's centre between gaze and edge of the iris."""
-BARELY = 1.003
+JUST_OUTSIDE_RADII = 1.003
 """Radii from the centre at which a lid is just outside the eyeball."""
-DEEP = 0.0005
+MAX_SILENT_SETBACK = 0.0005
 """Metres by which an eyeball may be set back without a warning."""
 MIN_WEIGHT = 0.02
 """Weight (`eyeball_weight`) up to which points are ignored for the eyeball."""
@@ -44,7 +44,7 @@ class FittedEye:
     iris_was: float
 
     def __call__(self, vertices: Floating) -> Float64:
-        """Vertices (N, 3) of the old eyeball moved and scaled, the iris widened on the sphere."""
+        """Return the vertices (N, 3) of the old eyeball moved and scaled, the iris widened on the sphere."""
         arms = np.asarray(vertices, dtype=np.float64) - self.was.centre
         distance = np.linalg.norm(arms, axis=1)
         unit = arms / np.maximum(distance, 1e-12)[:, None]
@@ -73,7 +73,7 @@ def fit_eye(
     iris: tuple[float, float],
     given: tuple[Float64, Float64],
 ) -> FittedEye:
-    """The eyeball that fits under the fitted lids as the old one does under the old lids.
+    """Return the eyeball that fits under the fitted lids as the old one does under the old lids.
 
     skin: (V, 3) vertices before and after. pupil: its point before and after. size: of the fitted
     face around the eye relative to the old one. pupil_given: keep the pupil exactly in place, with the
@@ -84,7 +84,7 @@ def fit_eye(
     from scipy.optimize import least_squares
 
     distance = np.linalg.norm(skin[0] - eye.centre, axis=1)
-    lids = distance < LID * eye.radius
+    lids = distance < LID_RADII * eye.radius
     clearance, lid_vertices = distance[lids] / eye.radius, skin[1][lids]
     depth = float(np.linalg.norm(pupil[0] - eye.centre)) / eye.radius
     front = pupil[1]
@@ -98,7 +98,7 @@ def fit_eye(
         usual = np.array([0.5 * (radius - size * eye.radius), 0.3 * (values[1] + depth * radius - front[2])])
         return np.concatenate([away / np.sqrt(max(len(away), 1)), usual])
 
-    low, high = (bound * size * eye.radius for bound in SIZES)
+    low, high = (bound * size * eye.radius for bound in SIZE_LIMITS)
     start = np.array([size * eye.radius, front[2] - depth * size * eye.radius])
     if pupil_given:
         best = least_squares(
@@ -116,7 +116,7 @@ def fit_eye(
         float(np.arcsin(min(across / 2 / ball, np.sin(WIDEST_IRIS))))
         for across, ball in ((iris[0], eye.radius), (iris[1], radius))
     ]
-    clear = np.minimum(np.linalg.norm(given[0] - eye.centre, axis=1) / eye.radius, BARELY)
+    clear = np.minimum(np.linalg.norm(given[0] - eye.centre, axis=1) / eye.radius, JUST_OUTSIDE_RADII)
     values[1] -= _setback(given[1], clear * radius, centre(values), eye.side)
     fitted_eye = FittedEye(eye, centre(values), radius, angles[1], angles[0])
     # The pupil's own vertex may be a little off the axis.
@@ -125,11 +125,12 @@ def fit_eye(
 
 
 def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> float:
-    """Metres by which an eyeball must be set back for points (K, 3) to be at least (K,) from its centre."""
+    """Return the metres by which an eyeball must be set back for points (K, 3) to be at least (K,) from its
+    centre."""
     across = np.hypot(*(given - centre)[:, :2].T)
     room = np.sqrt(np.maximum(least**2 - across**2, 0.0))
     back = float(np.where(room > 0, centre[2] + room - given[:, 2], 0.0).max(initial=0.0))
-    if back > DEEP:
+    if back > MAX_SILENT_SETBACK:
         warnings.warn(
             f"the lids of the {side} eye lie {back * 1000:.1f} mm inside its eyeball: "
             "the eyeball and its pupil were set back",
@@ -142,7 +143,7 @@ def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> floa
 def lay_lids_on(
     eye: FittedEye, skin: Float64, fitted: Float64, sources: Float64, targets: Float64
 ) -> Float64:
-    """(V, 3) the fitted skin, laid on an eyeball as the old skin was on the old one.
+    """Return (V, 3) the fitted skin, laid on an eyeball as the old skin was on the old one.
 
     Near the sphere it keeps its distance from it, in proportion; further out it stays as fitted. The given
     points (sources before, targets after) reach their targets, and no other vertex that was outside the
@@ -171,14 +172,14 @@ def _lay_on(eye: FittedEye, skin: Float64, fitted: Float64) -> Float64:
 
 
 def eyeball_weight(eye: FittedEye, points: Float64) -> Float64:
-    """(N,) influence of the eyeball on points (N, 3): 1 on it, 0 beyond `REACH`."""
+    """Return (N,) influence of the eyeball on points (N, 3): 1 on it, 0 beyond `REACH`."""
     distance = np.linalg.norm(points - eye.was.centre, axis=1)
-    weight: Float64 = 1 - smoothstep((distance / eye.was.radius - LID) / (REACH - LID))
+    weight: Float64 = 1 - smoothstep((distance / eye.was.radius - LID_RADII) / (REACH - LID_RADII))
     return weight
 
 
 def _push_outside(eye: FittedEye, skin: Float64, moved: Float64, near: Bool, sources: Float64) -> Float64:
-    """`moved` (V, 3), with vertices inside the eyeball pushed out onto it, in place; sources stay."""
+    """Return `moved` (V, 3), with vertices inside the eyeball pushed out onto it, in place; sources stay."""
     from scipy.spatial import cKDTree
 
     before = np.linalg.norm(skin - eye.was.centre, axis=1) / eye.was.radius

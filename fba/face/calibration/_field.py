@@ -12,16 +12,16 @@ from fba.face.feature_points import names
 from fba.geometry import nearest_orthonormal
 from fba.mesh import vertex_normals
 
-WELL_KNOWN = 0.02
+MIN_SPREAD = 0.02
 """Metres: the affine part covers directions in which the points spread by more than this."""
 ANCHOR_DISTANCE = 0.08
 """Metres from every source, for an adult head, beyond which only the affine part acts."""
 ANCHORS = 60
 SAME_PLACE = 1e-5
 """Sources within this many metres are merged into one."""
-DIFFERENCE = 1e-4
+DERIVATIVE_STEP = 1e-4
 """Metres between a point and those at which its derivatives are computed."""
-SLACK = 1e-9
+ANCHOR_SMOOTHING = 1e-9
 """Smoothing of the anchors: they keep the far field near zero, not exactly at it."""
 LEAST_VOLUME = 0.04
 """The deformation folds where its local volume is below this share of the usual one."""
@@ -47,18 +47,18 @@ class Field:
         return moved
 
     def rotations(self, points: Floating) -> Float64:
-        """(N, 3, 3) rotation of the deformation at each point, without its stretch."""
+        """Return (N, 3, 3) rotation of the deformation at each point, without its stretch."""
         return nearest_orthonormal(self.jacobians(points))
 
     def jacobians(self, points: Floating) -> Float64:
-        """(N, 3, 3) Jacobian of the deformation at each point, by central differences."""
+        """Return (N, 3, 3) Jacobian of the deformation at each point, by central differences."""
         flat = np.asarray(points, dtype=np.float64)
-        columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * DIFFERENCE]
-        return np.stack(columns, axis=2) / (2 * DIFFERENCE)
+        columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * DERIVATIVE_STEP]
+        return np.stack(columns, axis=2) / (2 * DERIVATIVE_STEP)
 
 
 def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str, size: float) -> Field:
-    """The deformation of a mesh (V, 3) that takes sources (N, 3) to targets (N, 3).
+    """Return the deformation of a mesh (V, 3) that takes sources (N, 3) to targets (N, 3).
 
     size: of the person relative to the face. An affine map covers directions in which the points spread, a
     radial basis function (`KERNELS`) the rest; anchors on the mesh keep that near zero far from all points,
@@ -69,20 +69,21 @@ def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str,
     sources, targets = _merge_coincident(sources, targets)
     origin, target = sources.mean(axis=0), targets.mean(axis=0)
     here, there = sources - origin, targets - target
-    spread = here.T @ here / len(here) + WELL_KNOWN**2 * np.eye(3)
-    pull = there.T @ here / len(here) + size * WELL_KNOWN**2 * np.eye(3)
+    spread = here.T @ here / len(here) + MIN_SPREAD**2 * np.eye(3)
+    pull = there.T @ here / len(here) + size * MIN_SPREAD**2 * np.eye(3)
     matrix = pull @ np.linalg.inv(spread)
     anchors = anchors_far_from(np.asarray(mesh, dtype=np.float64), sources)
     centres = np.vstack([sources, anchors])
     left = np.vstack([there - here @ matrix.T, np.zeros((len(anchors), 3))])
-    smoothing = np.concatenate([np.zeros(len(sources)), np.full(len(anchors), SLACK)])
+    smoothing = np.concatenate([np.zeros(len(sources)), np.full(len(anchors), ANCHOR_SMOOTHING)])
     affine = np.linalg.matrix_rank(centres - centres[0], tol=1e-4) == 3 and len(centres) > 4
     rest = RBFInterpolator(centres, left, kernel=kernel, smoothing=smoothing, degree=1 if affine else 0)
     return Field(matrix, origin, target, rest)
 
 
 def anchors_far_from(mesh: Float64, sources: Float64) -> Float64:
-    """(K, 3): up to `ANCHORS` vertices, spread over that part of a mesh that is far from all sources."""
+    """Return (K, 3): up to `ANCHORS` vertices, spread over that part of a mesh that is far from all
+    sources."""
     from scipy.spatial import cKDTree
 
     away = cKDTree(sources).query(mesh)[0]
@@ -99,7 +100,8 @@ def anchors_far_from(mesh: Float64, sources: Float64) -> Float64:
 
 
 def bump_field(centres: Float64, shifts: Float64, width: float) -> Any:
-    """A function from points (N, 3) to shifts: exact at the centres, fading within about `width` metres."""
+    """Return a function from points (N, 3) to shifts: exact at the centres, fading within about `width`
+    metres."""
     centres, shifts = _merge_coincident(centres, shifts)
     gram = np.exp(-_squares(centres, centres) / (2 * width**2))
     strength = np.linalg.lstsq(gram, shifts, rcond=None)[0]
@@ -108,7 +110,7 @@ def bump_field(centres: Float64, shifts: Float64, width: float) -> Any:
 
 
 def linear_field(centres: Float64, shifts: Float64) -> Any:
-    """A function from points (N, 3) to shifts (N, 3): exact at the centres, linear between them."""
+    """Return a function from points (N, 3) to shifts (N, 3): exact at the centres, linear between them."""
     from scipy.interpolate import RBFInterpolator
 
     centres, shifts = _merge_coincident(centres, shifts)
@@ -116,13 +118,14 @@ def linear_field(centres: Float64, shifts: Float64) -> Any:
 
 
 def _squares(a: Float64, b: Float64) -> Float64:
-    """(N, M) squared distances between points (N, 3) and (M, 3)."""
+    """Return (N, M) squared distances between points (N, 3) and (M, 3)."""
     squares: Float64 = ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)
     return squares
 
 
 def _merge_coincident(sources: Float64, targets: Float64) -> tuple[Float64, Float64]:
-    """Sources and targets (K, 3), coinciding sources (as of touching lips) merged, their targets averaged."""
+    """Return the sources and targets (K, 3), coinciding sources (as of touching lips) merged, their targets
+    averaged."""
     from scipy.spatial import cKDTree
 
     group = np.arange(len(sources))
@@ -136,13 +139,14 @@ def _merge_coincident(sources: Float64, targets: Float64) -> tuple[Float64, Floa
 
 
 def folded_vertices(field: Field, mesh: Floating, size: float) -> Intp:
-    """Vertices at which the deformation turns space inside out, or nearly so. size: its usual scale."""
+    """Return the vertices at which the deformation turns space inside out, or nearly so. size: its usual
+    scale."""
     volume = np.linalg.det(field.jacobians(mesh)) / size**3
     return np.flatnonzero(~(volume > LEAST_VOLUME))
 
 
 def turned_over_triangles(before: Floating, after: Float64, triangles: Integer) -> tuple[Intp, float]:
-    """(triangles that a deformation turns over, their share of the total area before).
+    """Return (triangles that a deformation turns over, their share of the total area before).
 
     A triangle has turned over if its normal agreed with the mean of its neighbours' normals before but
     opposes it after: a rotation of the whole surface does not count.
@@ -159,7 +163,8 @@ def turned_over_triangles(before: Floating, after: Float64, triangles: Integer) 
 
 
 def nearest_points(points: Float64, sources: Float64, rows: Intp) -> tuple[str, ...]:
-    """Names of the four feature points (rows, at sources (N, 3)) that are nearest to most of the points."""
+    """Return the names of the four feature points (rows, at sources (N, 3)) that are nearest to most of the
+    points."""
     from scipy.spatial import cKDTree
 
     if not len(points) or not len(sources):

@@ -46,7 +46,7 @@ def fit(
     tables: Literal["auto", "carry", "author"] = "auto",
     name: str | None = None,
 ) -> FaceModel:
-    """The model deformed smoothly into the shape of a person, through the person's feature points.
+    """Return the model deformed smoothly into the shape of a person, through the person's feature points.
 
     points: float (84, 3), rows as `feature_point_names()`, NaN where unknown, in any unit and pose. unit:
     "mm", "cm", "m", "in", or metres for one unit; None finds it. Points that one side lacks are mirrored
@@ -98,7 +98,7 @@ def fit(
 
 
 def points_of_distances(model: FaceModel, distances: Mapping[str, float]) -> Float64:
-    """Feature points (84, 3) of a face of which only the distances of the FAPU are known.
+    """Return the feature points (84, 3) of a face of which only the distances of the FAPU are known.
 
     distances: any of `FAPU_DISTANCES` in any unit, as in Xface files; ES0 is required, as it sets the size.
     Points that no distance concerns are NaN. Raises ModelError for a distance that is unknown or not
@@ -156,7 +156,8 @@ def _swap_to_own_sides(points: Float64) -> Float64:
 
 
 def _size(here: Float64, there: Float64) -> float:
-    """The person's size relative to the model: the median over all pairs of points, so robust to outliers."""
+    """Return the person's size relative to the model: the median over all pairs of points, so robust to
+    outliers."""
     from scipy.spatial.distance import pdist
 
     before, after = pdist(here), pdist(there)
@@ -165,7 +166,7 @@ def _size(here: Float64, there: Float64) -> float:
 
 
 def _iris_diameters(model: FaceModel, targets: Float64, size: float) -> tuple[float, float]:
-    """(before, after) diameter of the iris, metres: the height of a neutral face's lid opening."""
+    """Return (before, after) diameter of the iris, metres: the height of a neutral face's lid opening."""
     row = row_of()
     before = model.fapu.IRISD * PER_DISTANCE
     heights = [
@@ -184,7 +185,7 @@ def _iris_diameters(model: FaceModel, targets: Float64, size: float) -> tuple[fl
 def _deform_without_folds(
     model: FaceModel, targets: Float64, known: Bool, sure: Bool, size: float, iris: tuple[float, float]
 ) -> Shape:
-    """The shape by the smoothest deformation that does not fold.
+    """Return the shape by the smoothest deformation that does not fold.
 
     Raises ModelError, naming the points, where every kernel folds.
     """
@@ -211,7 +212,7 @@ def _deform_without_folds(
 
 
 def _check_folds(model: FaceModel, parts: tuple[Part, ...], targets: Float64, known: Bool) -> None:
-    """Raises ModelError where too many triangles of the fitted skin have turned over."""
+    """Raise ModelError where too many triangles of the fitted skin have turned over."""
     for old, new in zip(model.parts, parts, strict=True):
         if old.kind not in ("skin", "mouth") or not len(old.triangles):
             continue
@@ -248,7 +249,7 @@ def _with_tables(model: FaceModel, fitted: FaceModel, shape: Shape, how: str) ->
 
 
 def _best_tables(first: Poser, second: Poser) -> FaceModel:
-    """The first model with the second's tables for every FAP where these break fewer rules."""
+    """Return the first model with the second's tables for every FAP where these break fewer rules."""
     tables = {table.fap: table for table in first.model.tables}
     for table in second.model.tables:
         fap = table.fap

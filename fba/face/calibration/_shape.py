@@ -30,9 +30,9 @@ INNER = ("3.5", "3.6", *TEETH["upper"], *TEETH["lower"], *TONGUE, "7.1", "11.5")
 ON_LIDS = ("lash", "brow", "hair", "other")
 """Kinds of parts that move with the skin under them."""
 LIPS = ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9")
-SNAP = 2e-5
+SNAP_DISTANCE = 2e-5
 """Metres: vertices this close to a target are moved onto it; the difference is invisible."""
-BESIDE = 0.005
+BEHIND_LIPS_DISTANCE = 0.005
 """Teeth within this many metres of a point of the lips, in x and y, are behind it."""
 TONGUE_WIDTH = 0.012
 """A given point moves the tongue within about this many metres."""
@@ -56,7 +56,7 @@ class Shape:
 
 
 def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: tuple[float, float]) -> Shape:
-    """All parts and feature points of a model after a deformation.
+    """Return all parts and feature points of a model after a deformation.
 
     targets: (84, 3), required positions of the feature points in metres, NaN where the field gives them.
     given: (84,), mask of the points that are reliable in the person's data. iris: its diameter before and
@@ -113,7 +113,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
 
 
 def _snap_to_points(model: FaceModel, vertices: dict[str, Float64], targets: Float64) -> None:
-    """Move vertices of feature points that are within SNAP of their target exactly onto it, in place.
+    """Move vertices of feature points that are within SNAP_DISTANCE of their target onto it, in place.
 
     Points that nearly coincide, such as those of two lips, share one source point of the deformation.
     """
@@ -122,12 +122,12 @@ def _snap_to_points(model: FaceModel, vertices: dict[str, Float64], targets: Flo
             own = int(model.bound[row]) - model.starts[part.name]
             if part.kind not in ("skin", "mouth") or not 0 <= own < len(part.vertices):
                 continue
-            if np.linalg.norm(vertices[part.name][own] - targets[row]) < SNAP:
+            if np.linalg.norm(vertices[part.name][own] - targets[row]) < SNAP_DISTANCE:
                 vertices[part.name][own] = targets[row]
 
 
 def _surface_points(model: FaceModel, targets: Float64) -> tuple[Float64, Float64]:
-    """((K, 3), (K, 3)): the known points on the surface before, and their targets."""
+    """Return ((K, 3), (K, 3)): the known points on the surface before, and their targets."""
     outer = np.array([name not in INNER for name in names()])
     known = known_rows(targets, model.points) & outer
     return model.points[known], targets[known]
@@ -143,7 +143,7 @@ def fit_size(before: Floating, after: Float64) -> Similarity:
 def _fit_teeth_and_tongue(
     model: FaceModel, field: Field, targets: Float64, given: Bool
 ) -> tuple[dict[str, Similarity], Map]:
-    """(map of the teeth by jaw, map of the tongue)."""
+    """Return (map of the teeth by jaw, map of the tongue)."""
     row = row_of()
     teeth = [part.vertices for part in model.of_kind("teeth")]
     inside = teeth or [part.vertices for part in model.of_kind("tongue")] or [model.vertices]
@@ -165,7 +165,7 @@ def _fit_teeth_and_tongue(
 
 
 def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarity:
-    """The map of the teeth, shifted back so that they are as far behind the inner lips as before."""
+    """Return the map of the teeth, shifted back so that they are as far behind the inner lips as before."""
     known = [row for row in (row_of()[name] for name in LIPS) if np.isfinite(model.points[row]).all()]
     vertices = np.concatenate([part.vertices for part in model.of_kind("teeth")]).astype(np.float64)
     lips, moved = field(model.points[known]), teeth.apply(vertices)
@@ -179,13 +179,14 @@ def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarit
 
 
 def _foremost_z(points: Float64, point: Float64) -> float:
-    """The greatest z of points (N, 3) right behind or before a point; -inf without such points."""
-    near = np.hypot(points[:, 0] - point[0], points[:, 1] - point[1]) < BESIDE
+    """Return the greatest z of points (N, 3) right behind or before a point; -inf without such points."""
+    near = np.hypot(points[:, 0] - point[0], points[:, 1] - point[1]) < BEHIND_LIPS_DISTANCE
     return float(points[near, 2].max()) if near.any() else -np.inf
 
 
 def _fit_tongue(base: Similarity, here: Float64, there: Float64) -> Map:
-    """The map of the tongue, which moves as the lower teeth (`base`), and takes given points to others."""
+    """Return the map of the tongue, which moves as the lower teeth (`base`), and takes given points to
+    others."""
     if not len(here):
         return base.apply
     rest = bump_field(here, there - base.apply(here), TONGUE_WIDTH)
@@ -193,7 +194,7 @@ def _fit_tongue(base: Similarity, here: Float64, there: Float64) -> Map:
 
 
 def _jaw(model: FaceModel, part: Part) -> str:
-    """The jaw of a part of the teeth, "upper" or "lower": above or below the line where they meet."""
+    """Return the jaw of a part of the teeth, "upper" or "lower": above or below the line where they meet."""
     edges = model.points[[row_of()["9.10"], row_of()["9.11"]], 1]
     heights = [float(one.vertices[:, 1].mean()) for one in model.of_kind("teeth")]
     boundary = float(edges.mean()) if np.isfinite(edges).all() else float(np.mean(heights))
@@ -203,7 +204,7 @@ def _jaw(model: FaceModel, part: Part) -> str:
 def _lid_shift_at(
     vertices: Floating, skin: Float64, shift: Float64, eyes: Mapping[str, FittedEye]
 ) -> Float64:
-    """(V, 3) shift of the nearby skin by `lay_lids_on`, for parts that stand on the skin."""
+    """Return (V, 3) shift of the nearby skin by `lay_lids_on`, for parts that stand on the skin."""
     from scipy.spatial import cKDTree
 
     near = np.zeros(len(skin), dtype=bool)
@@ -226,7 +227,7 @@ def _points(
     teeth: Mapping[str, Similarity],
     tongue: Map,
 ) -> Float64:
-    """(84, 3) feature points after the deformation: bound ones at their vertices, others as given."""
+    """Return (84, 3) feature points after the deformation: bound ones at their vertices, others as given."""
     points = field(np.nan_to_num(model.points))
     for jaw, group in TEETH.items():
         for name in group:
@@ -246,7 +247,8 @@ def _points(
 
 
 def rebuild_part(part: Part, vertices: Float64) -> Part:
-    """The part with other vertices, its normals rotated with the surface so that seams stay invisible."""
+    """Return the part with other vertices, its normals rotated with the surface so that seams stay
+    invisible."""
     before, after = (
         vertex_normals(corners, part.triangles).astype(np.float64) for corners in (part.vertices, vertices)
     )

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from fba.face.model import FaceModel
 
 
-MODERATE = 300.0
+TESTED_VALUE = 300.0
 """Value at which regions are checked; for FAPs in units of angle, 100 times it."""
 EYE_FAPS = range(23, 31)
 """FAPs that move eyeballs."""
-SHARE = 0.03
+STILL_SHARE = 0.03
 """Vertices that move less than this share of the largest motion count as still."""
 
 
 def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Finding]:
-    """Deviations of a face's motions from the standard; an empty list without deviations.
+    """Return the deviations of a face's motions from the standard; an empty list without deviations.
 
     faps: numbers of the FAPs to check (3..68), all by default; those in `model.lost` are left out. For
     each: its feature point moves by value x FAPU in the standard's direction (within 5 % at small values;
@@ -51,7 +51,7 @@ def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Find
 
 
 def check_posed(poser: Poser, wanted: Iterable[int], *, combined: bool = True) -> list[Finding]:
-    """`check_faps` for a model that already has a `Poser`, which makes repeated checks faster.
+    """Return what `check_faps` does for a model that already has a `Poser`: repeated checks are faster.
 
     combined: also what several FAPs do together.
     """
@@ -96,7 +96,7 @@ def _check_combinations(poser: Poser, wanted: set[int]) -> Iterator[Finding]:
 
 @cache
 def region_table() -> dict[int, tuple[tuple[str, ...], float]]:
-    """By FAP: the points of its region, and how far from them its motion may reach, in ES0."""
+    """Return the points of each FAP's region, and how far from them its motion may reach, in ES0."""
     regions = {}
     with (files(__package__) / "fap_regions.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -106,7 +106,7 @@ def region_table() -> dict[int, tuple[tuple[str, ...], float]]:
 
 
 def _check_region(poser: Poser, fap: int) -> Iterator[Finding]:
-    """A finding where vertices move that are too far from the points of the FAP's region."""
+    """Yield a finding where vertices move that are too far from the points of the FAP's region."""
     if fap not in region_table():
         return
     names, reach = region_table()[fap]
@@ -115,11 +115,11 @@ def _check_region(poser: Poser, fap: int) -> Iterator[Finding]:
     if not len(points):
         return
     entry = fap_table()[fap - 1]
-    value = MODERATE if entry.unit != "AU" else MODERATE * 100
+    value = TESTED_VALUE if entry.unit != "AU" else TESTED_VALUE * 100
     moved = np.linalg.norm(poser.shift({fap: value}), axis=1)
     if not moved.max() > 0:
         return
-    moving = np.flatnonzero(moved > SHARE * moved.max())
+    moving = np.flatnonzero(moved > STILL_SHARE * moved.max())
     eyes = np.zeros(len(moved), dtype=np.bool_)
     for part in poser.model.of_kind("eye"):  # an eyeball belongs to its eye, however big it is
         start = poser.model.starts[part.name]

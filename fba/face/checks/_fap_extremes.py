@@ -21,23 +21,23 @@ HAIR = ("lash", "hair")
 """Kinds of parts that are two-sided: their triangles cannot turn over."""
 LIDS = {19, 20, 21, 22}
 EYE_CORNERS = ("3.7", "3.11", "3.8", "3.12")
-CORNER = 0.12
+CORNER_RADIUS = 0.12
 """Radius about the eye's corners that is not checked, as a share of the eye's width."""
 RIGID = {HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
 MAX_STRETCH = 8.0
 """Factor by which an edge may grow."""
 SHORT_EDGE = 0.3
-"""Share of the typical edge; shorter edges may grow by that factor from this length."""
-SPECK = 0.003
+"""Share of the typical edge length, which stands for shorter edges there."""
+MAX_TURNED_SHARE = 0.003
 """Share of the moving surface that may turn over in the folds of skin at the corners of eyes."""
 DEGENERATE = 1e-5
 """Triangles smaller than this share of the median area are ignored."""
-FACING = -0.3
+TURNED_COSINE = -0.3
 """A triangle has turned over if the cosine between its normal and its neighbours' is below this."""
 
 
 def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
-    """Yields a finding per part whose triangles turn over or tear at either end of a FAP's range."""
+    """Yield a finding per part whose triangles turn over or tear at either end of a FAP's range."""
     entry = faps()[fap - 1]
     if fap in RIGID or entry.i_limits is None:
         return
@@ -56,7 +56,7 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
             )
             if part.kind in HAIR:
                 over = 0
-            if over and not (fap in TURNING and share <= SPECK):
+            if over and not (fap in TURNING and share <= MAX_TURNED_SHARE):
                 yield Finding(
                     entry.label,
                     "no triangle turns over at the limits of its range",
@@ -74,19 +74,20 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
 
 
 def _checked_triangles(poser: Poser, part: Part, fap: int) -> Integer:
-    """(M, 3) triangles of a part; for lid FAPs without those at the eyes' corners, where skin folds."""
+    """Return (M, 3) triangles of a part; for lid FAPs without those at the eyes' corners, where skin
+    folds."""
     if fap not in LIDS:
         return part.triangles
     corners = np.array([poser.point(name) for name in EYE_CORNERS])
     wide = np.linalg.norm(corners[0] - corners[1]), np.linalg.norm(corners[2] - corners[3])
     away = np.linalg.norm(part.vertices[:, None] - corners, axis=2)
-    within = (np.nan_to_num(away, nan=np.inf) < CORNER * np.nan_to_num(np.repeat(wide, 2))).any(axis=1)
+    within = (np.nan_to_num(away, nan=np.inf) < CORNER_RADIUS * np.nan_to_num(np.repeat(wide, 2))).any(axis=1)
     counted: Integer = part.triangles[~_touching(within, part.triangles)]
     return counted
 
 
 def _touching(mask: Bool, triangles: Integer) -> Bool:
-    """(F,) mask of the triangles (F, 3) with a vertex in a mask (V,)."""
+    """Return (F,) mask of the triangles (F, 3) with a vertex in a mask (V,)."""
     touching: Bool = mask[triangles[:, 0]] | mask[triangles[:, 1]] | mask[triangles[:, 2]]
     return touching
 
@@ -94,7 +95,7 @@ def _touching(mask: Bool, triangles: Integer) -> Bool:
 def count_damage(
     before: Float64, after: Float64, triangles: Integer, *, turning: bool
 ) -> tuple[int, int, float]:
-    """(triangles turned over, edges torn, share of the moving area turned over)."""
+    """Return (triangles turned over, edges torn, share of the moving area turned over)."""
     moves = np.abs(after - before) > 1e-9
     moved_triangles = triangles[_touching(moves[:, 0] | moves[:, 1] | moves[:, 2], triangles)]
     sides = [
@@ -109,7 +110,7 @@ def count_damage(
     not_degenerate = areas > DEGENERATE * np.median(areas) if len(areas) else areas > 0
     if turning:
         facing = [_facing(normal, moved_triangles, len(before)) for normal in normals]
-        over = (facing[0] > 0) & (facing[1] < FACING)
+        over = (facing[0] > 0) & (facing[1] < TURNED_COSINE)
     else:
         over = dot(normals[0], normals[1]) <= 0
     over &= not_degenerate
@@ -121,7 +122,7 @@ def count_damage(
 
 
 def _facing(normals: Float64, triangles: Integer, count: int) -> Float64:
-    """(F,) cosine between each triangle's normal and that of the triangles around it."""
+    """Return (F,) cosine between each triangle's normal and that of the triangles around it."""
     sums = np.zeros((count, 3))
     for corner in range(3):
         np.add.at(sums, triangles[:, corner], normals)
@@ -132,6 +133,6 @@ def _facing(normals: Float64, triangles: Integer, count: int) -> Float64:
 
 
 def _moved_rigidly(before: Float64, after: Float64) -> bool:
-    """Whether the vertices moved as a rigid body, which harms no triangle."""
+    """Return whether the vertices moved as a rigid body, which harms no triangle."""
     a, b = before - before.mean(axis=0), after - after.mean(axis=0)
     return bool(np.abs(a @ nearest_rotation(a.T @ b) - b).max() < 1e-4 * max(float(np.ptp(a)), 1e-9))

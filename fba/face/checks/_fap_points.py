@@ -31,7 +31,7 @@ SMALL_ANGLE = 5000.0
 """The same for FAPs that count in 1e-5 rad."""
 ACCURACY = 0.05
 """Largest error of a feature point, as a share of its motion."""
-MATE = 0.01
+MATE_TOLERANCE = 0.01
 """Distance that its mate may move, as a share of the point's."""
 ARC = {OPEN_JAW, 19, 20, 21, 22}
 """FAPs whose points follow an arc: they may move in depth too."""
@@ -40,7 +40,7 @@ HEAD_AXIS = {HEAD_PITCH: (1.0, 0.0, 0.0), HEAD_YAW: (0.0, 1.0, 0.0), HEAD_ROLL: 
 
 
 def check_point(poser: Poser, fap: int) -> Iterator[Finding]:
-    """Yields findings about how a FAP moves its feature point."""
+    """Yield findings about how a FAP moves its feature point."""
     if fap in HEAD_AXIS:
         yield from _check_head(poser, fap)
     elif fap in (*YAW_EYE, *PITCH_EYE):
@@ -79,12 +79,12 @@ def _check_shift(poser: Poser, fap: int) -> Iterator[Finding]:
         moved = poser.shift({fap: SMALL_VALUE})
         share = float(np.linalg.norm(moved[poser.vertex(other)]))
         share /= max(float(np.linalg.norm(moved[poser.vertex(point)])), 1e-12)
-        if share > MATE:
+        if share > MATE_TOLERANCE:
             yield Finding(
                 entry.label,
                 f"{other}, the mate, stays",
                 f"{share:.1%} of the way of {point}",
-                f"under {MATE:.0%}",
+                f"under {MATE_TOLERANCE:.0%}",
             )
 
 
@@ -197,7 +197,7 @@ def _eye_vertices(poser: Poser, side: str) -> Intp:
 
 
 def _rotation(before: Float64, after: Float64) -> Float64:
-    """(3,) rotation vector, radians, that takes points (N, 3) about the origin closest to others."""
+    """Return (3,) rotation vector, radians, that takes points (N, 3) about the origin closest to others."""
     from scipy.spatial.transform import Rotation
 
     if len(before) < 3:

@@ -17,42 +17,43 @@ SIDES = {"left": (19, 21), "right": (20, 22)}
 CLOSED = 1024
 SPLITS = (1024, 896, 768, 640, 512, 424)
 """Values of the upper lid's FAP that are tried, each with the rest to 1024 for the lower lid."""
-GAP = 0.02
+MAX_GAP = 0.02
 """Widest gap allowed, as a share of IRISD0."""
-CORNER = 0.04
+CORNER_WIDTH = 0.04
 """Share of the opening's width at each end that is not checked."""
-CUT = 0.01
+MAX_CUT = 0.01
 """Depth to which a closed lid may cut into the eyeball beyond the open one, as a share of its radius."""
-OUTSIDE = 0.97
+OUTSIDE_RADII = 0.97
 """Only vertices that are at least this many radii from the eyeball's centre on the open lid are checked."""
 
 
 def check_lids(poser: Poser, side: str) -> Iterator[Finding]:
-    """Yields findings about the lids of one side, "left" or "right"."""
+    """Yield findings about the lids of one side, "left" or "right"."""
     upper, lower = SIDES[side]
     subject = f"FAP {upper} and {lower}, {side} lids"
     gap, split = max((lid_gap(poser, side, split), split) for split in SPLITS)
-    if not gap <= GAP:
+    if not gap <= MAX_GAP:
         yield Finding(
             subject,
             "lids meet where their values add up to 1024",
             f"a gap of {gap:.1%} of IRISD0 at {split} + {CLOSED - split}",
-            f"under {GAP:.0%}",
+            f"under {MAX_GAP:.0%}",
         )
     if not poser.eyes[side].measured or poser.eyes[side].flat:
         return
     cut, split = max((lid_cut(poser, side, split), split) for split in SPLITS)
-    if not cut <= CUT:
+    if not cut <= MAX_CUT:
         yield Finding(
             subject,
             "lids do not cut the eyeball",
             f"{cut:.1%} of its radius deep at {split} + {CLOSED - split}",
-            f"at most {CUT:.0%}",
+            f"at most {MAX_CUT:.0%}",
         )
 
 
 def lid_gap(poser: Poser, side: str, split: float) -> float:
-    """The widest distance between the margins of closed lids, as a share of IRISD0; nan without margins.
+    """Return the widest distance between the margins of closed lids, as a share of IRISD0; nan without
+    margins.
 
     What margins of few edges cannot avoid is not counted: where one has a corner between two vertices of the
     other, the other's edge cuts it off.
@@ -64,7 +65,7 @@ def lid_gap(poser: Poser, side: str, split: float) -> float:
         return float("nan")
     # At the corners the lids are one skin.
     ends = sorted((lines[0][0, 0], lines[0][-1, 0]))
-    margin = CORNER * (ends[1] - ends[0])
+    margin = CORNER_WIDTH * (ends[1] - ends[0])
     widest = 0.0
     for line, other in (lines, lines[::-1]):
         between = (line[:, 0] > ends[0] + margin) & (line[:, 0] < ends[1] - margin)
@@ -74,7 +75,8 @@ def lid_gap(poser: Poser, side: str, split: float) -> float:
 
 
 def _cut_corners(line: Float64, other: Float64) -> Float64:
-    """(N,) distances of the vertices of a line (N, 3) from itself, as the other's vertices (M, 3) sample it.
+    """Return (N,) distances of the vertices of a line (N, 3) from itself, as the other's vertices (M, 3)
+    sample it.
 
     The samples are the line's points at the x of the other's vertices.
     """
@@ -85,7 +87,8 @@ def _cut_corners(line: Float64, other: Float64) -> Float64:
 
 
 def lid_cut(poser: Poser, side: str, split: float) -> float:
-    """Greatest depth of closed lids inside the eyeball beyond that of open ones, as a share of its radius."""
+    """Return the greatest depth of closed lids inside the eyeball beyond that of open ones, as a share of its
+    radius."""
     upper, lower = SIDES[side]
     eye = poser.eyes[side]
     surface = poser.marks.surface
@@ -94,7 +97,7 @@ def lid_cut(poser: Poser, side: str, split: float) -> float:
     moving = np.abs(after - before).max(axis=1) > 1e-6
     profile = _measure_profile(poser, side)
     # The inner side of a lid may run into the eyeball where it cannot be seen.
-    outside = profile.depth(before) < (1 - OUTSIDE) * eye.radius
+    outside = profile.depth(before) < (1 - OUTSIDE_RADII) * eye.radius
     triangles = surface.triangles[
         moving[surface.triangles].any(axis=1) & outside[surface.triangles].all(axis=1)
     ]
@@ -116,7 +119,7 @@ class _EyeballProfile:
     reach: Float64
 
     def depth(self, points: Float64) -> Float64:
-        """(N,) metres below the eyeball's surface, negative outside."""
+        """Return (N,) metres below the eyeball's surface, negative outside."""
         angle, distance = _polar(self.eye, points)
         result: Float64 = np.interp(angle, self.angles, self.reach) - distance
         return result
@@ -136,14 +139,14 @@ def _measure_profile(poser: Poser, side: str) -> _EyeballProfile:
 
 
 def _polar(eye: Eye, points: Float64) -> tuple[Float64, Float64]:
-    """(N,) angle of points (N, 3) from the gaze, radians, and distance from the eyeball's centre."""
+    """Return (N,) angle of points (N, 3) from the gaze, radians, and distance from the eyeball's centre."""
     arms = points - eye.centre
     distance = np.linalg.norm(arms, axis=1)
     return np.arccos(np.clip(arms @ eye.gaze / np.maximum(distance, 1e-12), -1, 1)), distance
 
 
 def _distances_to_line(points: Float64, line: Float64) -> Float64:
-    """(N,) distances of points from a polyline (M, 3)."""
+    """Return (N,) distances of points from a polyline (M, 3)."""
     start, along = line[:-1], np.diff(line, axis=0)
     length = np.maximum((along**2).sum(axis=1), 1e-30)
     share = np.clip(((points[:, None] - start) * along).sum(axis=2) / length, 0.0, 1.0)

@@ -39,7 +39,8 @@ class Rule:
     sign: float = 1.0
 
     def violation(self, points: Float64, unit: float) -> tuple[str, str] | None:
-        """Texts (found, expected) where points (84, 3) break the rule, else None, as for unknown points."""
+        """Return the texts (found, expected) where points (84, 3) break the rule, else None, as for unknown
+        points."""
         others = [name for name in (self.first, self.second) if name]
         column = AXES[self.axis]
         value, *limits = (float(points[row_of()[name], column]) for name in (self.point, *others))
@@ -66,7 +67,7 @@ class Rule:
 
 @cache
 def rules() -> tuple[Rule, ...]:
-    """Every rule of `locations.csv`, and the mirror image of those for one side."""
+    """Return every rule of `locations.csv`, and the mirror image of those for one side."""
     result = []
     with (files(__package__) / "locations.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -84,7 +85,7 @@ def rules() -> tuple[Rule, ...]:
 
 
 def check_locations(points: Float64) -> Iterator[Finding]:
-    """Yields a finding per broken rule, for feature points (84, 3) in metres, NaN where unknown."""
+    """Yield a finding per broken rule, for feature points (84, 3) in metres, NaN where unknown."""
     unit = float(points[row_of()["3.5"], 0] - points[row_of()["3.6"], 0])
     for left, right in MIRRORED.items():
         pair = points[[row_of()[left], row_of()[right]], 0]
@@ -117,14 +118,14 @@ class Size:
 
 @cache
 def human_sizes() -> tuple[Size, ...]:
-    """Every size of `human.csv`."""
+    """Return every size of `human.csv`."""
     with (files(__package__) / "human.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     return tuple(Size(low=float(row.pop("low")), high=float(row.pop("high")), **row) for row in rows)
 
 
 def check_sizes(points: Float64) -> Iterator[Finding]:
-    """Yields a finding per size outside its limits. points: (84, 3), metres, NaN where unknown."""
+    """Yield a finding per size outside its limits. points: (84, 3), metres, NaN where unknown."""
     for size in human_sizes():
         ends = points[[row_of()[size.first], row_of()[size.second]], AXES[size.axis]]
         millimetres = abs(float(ends[0] - ends[1])) * 1000

@@ -14,18 +14,18 @@ from fba.face.points import OPEN_JAW
 PAIRS = ((4, 5), (8, 10), (9, 11))
 """Inner lip FAPs, each upper one with the lower one below it."""
 OUTER_PAIRS = ((51, 52), (55, 57), (56, 58))
-TOGETHER = 150.0
+TESTED_VALUE = 150.0
 """Value by which both lips are moved together, up and down."""
-APART = 0.06
+MAX_GAP = 0.06
 """How much the gap between lips that move together may widen, as a share of MNS0."""
-OPEN = 400.0
+OPEN_VALUE = 400.0
 """Value of open_jaw at which the mouth is checked."""
 MAX_UNWANTED_MOTION = 0.03
 """Share of the chin's motion by which points may move that should stay."""
 
 
 def check_mouth(poser: Poser) -> Iterator[Finding]:
-    """Yields findings about lips, teeth and tongue."""
+    """Yield findings about lips, teeth and tongue."""
     present = set(poser.model.table_of)
     if all(fap in present for pair in PAIRS for fap in pair):
         yield from _check_touching_lips(poser)
@@ -34,7 +34,8 @@ def check_mouth(poser: Poser) -> Iterator[Finding]:
 
 
 def lip_gap(poser: Poser, value: float) -> float:
-    """Widening of the gap between lips that all move down by the same value, as a share of MNS0."""
+    """Return the widening of the gap between lips that all move down by the same value, as a share of
+    MNS0."""
     pairs = [*PAIRS, *(pair for pair in OUTER_PAIRS if set(pair) <= set(poser.model.table_of))]
     values = {fap: sign * value for pair in pairs for fap, sign in zip(pair, (1, -1), strict=True)}
     now, before = (_lip_distances(poser, vertices) for vertices in (poser.pose(values), poser.neutral))
@@ -44,19 +45,19 @@ def lip_gap(poser: Poser, value: float) -> float:
 
 
 def _check_touching_lips(poser: Poser) -> Iterator[Finding]:
-    for value in (TOGETHER, -TOGETHER):
+    for value in (TESTED_VALUE, -TESTED_VALUE):
         gap = lip_gap(poser, value)
-        if gap > APART:
+        if gap > MAX_GAP:
             yield Finding(
                 "FAPs 4, 5 and 8-11, inner lips",
                 "lips stay in touch where top and bottom add up to 0",
                 f"{gap:.1%} of MNS0 further apart at {value:g} and {-value:g}",
-                f"under {APART:.0%}",
+                f"under {MAX_GAP:.0%}",
             )
 
 
 def _lip_distances(poser: Poser, moved: Float64) -> Float64:
-    """(C,) gap between the lips along the middle three quarters of the mouth, metres."""
+    """Return (C,) gap between the lips along the middle three quarters of the mouth, metres."""
     upper, lower = (poser.contour(f"{name} inner lip", moved) for name in ("upper", "lower"))
     if len(upper) < 3 or len(lower) < 3:
         return np.zeros(0)
@@ -67,7 +68,7 @@ def _lip_distances(poser: Poser, moved: Float64) -> Float64:
 
 
 def _check_jaw_opening(poser: Poser) -> Iterator[Finding]:
-    moved = poser.pose({OPEN_JAW: OPEN})
+    moved = poser.pose({OPEN_JAW: OPEN_VALUE})
     shift = moved - poser.neutral
     chin = float(np.linalg.norm(shift[poser.vertex("2.1")]))
     label = f"FAP {OPEN_JAW} open_jaw"
@@ -84,23 +85,25 @@ def _check_jaw_opening(poser: Poser) -> Iterator[Finding]:
     for name in ("9.9", "9.11", "6.1", "6.2"):
         if poser.has(name):
             way = float(shift[poser.vertex(name)][1])
-            if way > -0.5 * OPEN * poser.model.fapu.MNS:
+            if way > -0.5 * OPEN_VALUE * poser.model.fapu.MNS:
                 yield Finding(
                     label,
                     f"{name} sinks with the jaw",
                     f"{way * 1000:.2f} mm",
-                    f"below {-500 * OPEN * poser.model.fapu.MNS:.2f} mm",
+                    f"below {-500 * OPEN_VALUE * poser.model.fapu.MNS:.2f} mm",
                 )
     if poser.has("9.10", "9.11"):
         gap = moved[poser.vertex("9.10"), 1] - moved[poser.vertex("9.11"), 1]
         was = poser.neutral[poser.vertex("9.10"), 1] - poser.neutral[poser.vertex("9.11"), 1]
-        if gap - was < 0.5 * OPEN * poser.model.fapu.MNS:
+        if gap - was < 0.5 * OPEN_VALUE * poser.model.fapu.MNS:
             yield Finding(
                 label, "teeth part", f"{(gap - was) * 1000:.2f} mm", "at least half of the chin's way"
             )
-    lips: dict[int, float] = {fap: -OPEN for fap in (5, 10, 11, 52, 57, 58) if fap in poser.model.table_of}
+    lips: dict[int, float] = {
+        fap: -OPEN_VALUE for fap in (5, 10, 11, 52, 57, 58) if fap in poser.model.table_of
+    }
     if {5, 10, 11} <= set(lips):
-        wide = _lip_distances(poser, poser.pose(lips | {OPEN_JAW: OPEN}))
+        wide = _lip_distances(poser, poser.pose(lips | {OPEN_JAW: OPEN_VALUE}))
         rest = _lip_distances(poser, poser.neutral)
         if len(wide) and (wide - rest).min() <= 0:
             yield Finding(

@@ -35,19 +35,20 @@ PUPIL: Limits = (0.15, 0.5)
 """Relative deviation of the pupil's diameter from a third of the iris's."""
 IRIS_OF_EYEBALL = (0.38, 0.62)
 """Range of the iris's diameter as a share of the eyeball's; a typical one is 11.7 mm of 24 mm."""
-ROUND = 0.02
+MAX_ROUNDNESS_ERROR = 0.02
 """Root mean square deviation of an eyeball from a sphere, as a share of its radius."""
 LIPS: Limits = (0.01, 0.03)
 LIP_LINE: Limits = (0.05, 0.15)
 TEETH: Limits = (0.02, 0.06)
 TONGUE: Limits = (0.08, 0.25)
 """Shares of the width of the mouth."""
-SYMMETRY = 0.04
-"""Mean deviation from the mirror image, as a share of the distance between the pupils, that is a warning."""
+MAX_ASYMMETRY = 0.04
+"""A larger mean deviation from the mirror image, as a share of the pupils' distance, is a warning."""
 
 
 def check_neutral(model: FaceModel) -> list[Finding]:
-    """Deviations of the model's rest position from the standard's neutral face; [] without deviations.
+    """Return the deviations of the model's rest position from the standard's neutral face; [] without
+    deviations.
 
     "error" where FAPs would play wrongly, "warning" where it merely looks odd or cannot be checked.
     """
@@ -88,12 +89,12 @@ def _check_eyes(model: FaceModel) -> Iterator[Finding]:
 
 def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
     subject = f"{eye.side} eye"
-    if eye.error > ROUND * eye.radius:
+    if eye.error > MAX_ROUNDNESS_ERROR * eye.radius:
         yield Finding(
             subject,
             "eyeball is a sphere",
             f"{_mm(eye.error)} off it on average",
-            f"at most {_mm(ROUND * eye.radius)}",
+            f"at most {_mm(MAX_ROUNDNESS_ERROR * eye.radius)}",
             "warning",
         )
     direction = gaze(model, eye)
@@ -124,7 +125,7 @@ def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
 
 
 def _check_lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator[Finding]:
-    """The iris, as big as IRISD0 and centred on the pupil, touches both lid margins."""
+    """Yield findings unless an iris as big as IRISD0 and centred on the pupil touches both lid margins."""
     iris = model.fapu.IRISD * PER_DISTANCE
     pupil = _point(model, PUPIL_POINT[side])
     for name, edge in ((upper, 0.5 * iris), (lower, -0.5 * iris)):
@@ -175,7 +176,8 @@ def _check_teeth(model: FaceModel) -> Iterator[Finding]:
 
 
 def _check_touching(model: FaceModel, upper: str, lower: str, rule: str, limits: Limits) -> Iterator[Finding]:
-    """Two feature points are at one height; limits: shares of the width of the mouth."""
+    """Yield a finding unless two feature points are at the same height. limits: shares of the mouth's
+    width."""
     width = model.fapu.MW * PER_DISTANCE
     gap = float(_point(model, upper)[1] - _point(model, lower)[1])
     yield from _judge(
@@ -189,14 +191,15 @@ def _check_touching(model: FaceModel, upper: str, lower: str, rule: str, limits:
 
 
 def _surface(part: Part) -> Float64:
-    """Corners, edge midpoints and centres of a part's triangles: dense enough even for coarse teeth."""
+    """Return the corners, edge midpoints and centres of a part's triangles: dense enough even for coarse
+    teeth."""
     corners = part.vertices[part.triangles].astype(np.float64)
     edges = (corners + np.roll(corners, 1, axis=1)) / 2
     return np.concatenate([part.vertices, edges.reshape(-1, 3), corners.mean(axis=1)])
 
 
 def _jaws(parts: tuple[Part, ...]) -> tuple[Part, Part] | None:
-    """The highest and the lowest part of the teeth, where there are two."""
+    """Return the highest and the lowest part of the teeth, where there are two."""
     ordered = sorted(
         (p for p in parts if len(p.vertices)), key=lambda part: float(part.vertices[:, 1].mean())
     )
@@ -247,13 +250,13 @@ def _check_symmetry(points: Float64) -> Iterator[Finding]:
     apart = left[known] - right[known]
     apart[:, 0] -= np.median(apart[:, 0])  # the face need not be centred on x = 0
     distance = np.linalg.norm(apart, axis=1)
-    if distance.mean() > SYMMETRY * unit:
+    if distance.mean() > MAX_ASYMMETRY * unit:
         worst = list(MIRRORED.items())[int(np.flatnonzero(known)[int(distance.argmax())])]
         yield Finding(
             "left and right",
             "symmetry",
             f"{_mm(distance.mean())} on average, {_mm(distance.max())} for {worst[0]} and {worst[1]}",
-            f"{_mm(SYMMETRY * unit)} on average, unless the face is meant so",
+            f"{_mm(MAX_ASYMMETRY * unit)} on average, unless the face is meant so",
             "warning",
         )
 
@@ -266,7 +269,7 @@ def _point(model: FaceModel, name: str) -> Float64:
 def _judge(
     deviation: float, limits: Limits, subject: str, rule: str, found: str, expected: str
 ) -> Iterator[Finding]:
-    """Yields a finding where a deviation exceeds the limits; none where it is unknown (NaN)."""
+    """Yield a finding where a deviation exceeds the limits; none where it is unknown (NaN)."""
     if deviation > limits[0]:
         yield Finding(subject, rule, found, expected, "error" if deviation > limits[1] else "warning")
 

@@ -43,14 +43,16 @@ class Poser:
     def findings(
         self, rule: str, faps: Iterable[int], check: Callable[[], Iterator[Finding]]
     ) -> tuple[Finding, ...]:
-        """What a check finds that depends on the neutral face and the tables of these FAPs alone; kept."""
+        """Return what a check finds, cached: it depends only on the neutral face and the tables of these
+        FAPs."""
         key = (rule, *(self.model.table_of.get(fap, fap) for fap in faps))
         if key not in self._landmarks.findings:
             self._landmarks.findings[key] = tuple(check())
         return self._landmarks.findings[key]
 
     def pose(self, values: Mapping[int, float]) -> Float64:
-        """(V, 3) float64, metres: all vertices under FAP values by number, without the head's rotation."""
+        """Return (V, 3) float64, metres: all vertices under FAP values by number, without the head's
+        rotation."""
         moved = self.neutral.copy()
         tables = [
             (self.model.table_of[fap], value) for fap, value in values.items() if fap in self.model.table_of
@@ -76,19 +78,19 @@ class Poser:
         return moved
 
     def shift(self, values: Mapping[int, float]) -> Float64:
-        """(V, 3) float64, metres: displacement of each vertex from the neutral face."""
+        """Return (V, 3) float64, metres: displacement of each vertex from the neutral face."""
         return self.pose(values) - self.neutral
 
     def vertex(self, point: str) -> int:
-        """The vertex of a feature point, counted through all parts; -1 if it is bound to none."""
+        """Return the vertex of a feature point, counted through all parts; -1 if it is bound to none."""
         return int(self.model.bound[row_of()[point]])
 
     def has(self, *points: str) -> bool:
-        """Whether all these feature points are bound to vertices."""
+        """Return whether all these feature points are bound to vertices."""
         return all(self.vertex(point) >= 0 for point in points)
 
     def point(self, point: str) -> Float64:
-        """(3,) a neutral feature point."""
+        """Return (3,) a neutral feature point."""
         position: Float64 = self.model.points[row_of()[point]]
         return position
 
@@ -103,18 +105,18 @@ class Poser:
         return self._landmarks.eyes
 
     def surface(self, moved: Float64) -> Float64:
-        """(N, 3): posed vertices (V, 3) of the model as vertices of `marks.surface`."""
+        """Return (N, 3): posed vertices (V, 3) of the model as vertices of `marks.surface`."""
         result = self.marks.surface.vertices.copy()
         result[self.marks.surface.number] = moved[self.marks.surface.pool]
         return result
 
     def contour(self, name: str, moved: Float64) -> Float64:
-        """(M, 3): a contour of the posed face, corner to corner; empty where the face has none."""
+        """Return (M, 3): a contour of the posed face, corner to corner; empty where the face has none."""
         return self.surface(moved)[self.marks.contour(name)]
 
 
 class _NeutralLandmarks:
-    """Landmarks and eyes of a model's neutral face, found when they are first needed.
+    """Landmarks and eyes of a model's neutral face, located on first use.
 
     findings: by the name of the rule and the tables (the FAP where it has none) that were checked.
     """
@@ -134,7 +136,7 @@ class _NeutralLandmarks:
 
 
 def _same_face(one: FaceModel, other: FaceModel) -> bool:
-    """Whether two models differ only in their tables and names."""
+    """Return whether two models differ only in their tables and names."""
     return (
         len(one.parts) == len(other.parts)
         and all(a is b for a, b in zip(one.parts, other.parts, strict=True))
@@ -144,7 +146,8 @@ def _same_face(one: FaceModel, other: FaceModel) -> bool:
 
 
 def apply_transform(points: Float64, kind: str, amount: Float64, centre: npt.ArrayLike) -> Float64:
-    """Points (N, 3) after a "rotation" (vector, radians), "scale" (1 + amount) or "translation" by (3,)."""
+    """Return the points (N, 3) after a "rotation" (vector, radians), "scale" (1 + amount) or "translation" by
+    (3,)."""
     from scipy.spatial.transform import Rotation
 
     if kind == "translation":

@@ -109,8 +109,8 @@ class Deformer:
     def __call__(
         self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None
     ) -> Float32:
-        """Vertices of all parts in order, the head turned: float32 (V, 3), metres, for FAPs (68,), or
-        (T, V, 3) for (T, 68).
+        """Return the vertices of all parts in order, the head turned: float32 (V, 3), metres, for FAPs (68,),
+        or (T, V, 3) for (T, 68).
 
         faps: numbers of any type, as `resolve` gives them, in the units of the standard; columns 0 and 1
         (viseme, expression) are ignored. out: written to and returned. normals: filled with unit normals,
@@ -125,11 +125,11 @@ class Deformer:
     def local(
         self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None
     ) -> Float32:
-        """Like calling, but in the frame of the head: without the transforms of `HEAD`."""
+        """Return what calling gives, but in the frame of the head: without the transforms of `HEAD`."""
         return self._run(faps, out, normals, with_head=False)
 
     def head_matrices(self, faps: npt.ArrayLike) -> Float64:
-        """Transforms of the head: float64 (4, 4) for FAPs (68,), (T, 4, 4) for (T, 68).
+        """Return the transforms of the head: float64 (4, 4) for FAPs (68,), (T, 4, 4) for (T, 68).
 
         For column vectors: `calling = matrix . local`. Errors as when called.
         """
@@ -138,8 +138,8 @@ class Deformer:
         return matrices[0] if single else matrices
 
     def part_matrices(self, faps: npt.ArrayLike) -> Float64:
-        """Transforms of each part within the head: float64 (P, 4, 4) for FAPs (68,), (T, P, 4, 4) for (T,
-        68), in the order of `model.parts`.
+        """Return the transforms of each part within the head: float64 (P, 4, 4) for FAPs (68,), (T, P, 4, 4)
+        for (T, 68), in the order of `model.parts`.
 
         The matrix of an eyeball rotates it from looking straight ahead to its current gaze, in the frame of
         the head; `head_matrices . part_matrices` is that in the world. The identity for parts without
@@ -150,7 +150,7 @@ class Deformer:
         return matrices[0] if single else matrices
 
     def feature_points(self, faps: npt.ArrayLike, *, local: bool = False) -> Float64:
-        """Moved feature points: float64 (84, 3) for FAPs (68,), (T, 84, 3) for (T, 68), metres.
+        """Return the moved feature points: float64 (84, 3) for FAPs (68,), (T, 84, 3) for (T, 68), metres.
 
         A point bound to a vertex moves with it. Others move with the transforms of the part that they
         belong to: a pupil with the nearest eye, points of tongue and teeth with the nearest part of
@@ -207,7 +207,7 @@ class Deformer:
 
 
 def frame_values(values: npt.ArrayLike) -> tuple[Float64, bool]:
-    """FAPs as float64 (T, 68), and whether they were one frame (68,)."""
+    """Return the FAPs as float64 (T, 68), and whether they were one frame (68,)."""
     array = np.asarray(values)
     if array.ndim not in {1, 2} or array.shape[-1] != FAP_COUNT:
         raise ValueError(f"FAPs must have shape ({FAP_COUNT},) or (T, {FAP_COUNT}), not {array.shape}")
@@ -234,7 +234,7 @@ POINT_KINDS = {"3.5": "eye", "3.6": "eye", "6": "tongue", "9.8": "teeth", "9.9":
 
 
 def _find_owners(model: FaceModel) -> Int64:
-    """(84,) the part whose transforms move each feature point, -1 for the head alone."""
+    """Return (84,) the part whose transforms move each feature point, -1 for the head alone."""
     owner = np.full(len(names()), -1, dtype=np.int64)
     ends = np.cumsum([len(part.vertices) for part in model.parts])
     for row, name in enumerate(names()):

@@ -130,7 +130,7 @@ def multiply(outer: Float64, inner: Float64, result: Float64) -> None:
 
 @compiled
 def poses_of_frames(values: Float64, transforms: Transforms, poses: Float64) -> None:
-    """`compose` for FAPs `values` (T, 68); poses: (T, P + 1, 3, 4)."""
+    """Write to `poses` (T, P + 1, 3, 4) what `compose` does for each of FAPs `values` (T, 68)."""
     for frame in range(len(values)):
         compose(values[frame], transforms, poses[frame])
 
@@ -257,7 +257,7 @@ class Scratch(NamedTuple):
 
 
 def allocate_scratch(vertices: int, parts: int) -> Scratch:
-    """Working arrays for a face of this number of vertices and parts."""
+    """Return the working arrays for a face of this number of vertices and parts."""
     return Scratch(
         moved=np.empty((vertices, 3), dtype=np.float32),
         touched=np.zeros(parts, dtype=np.int64),

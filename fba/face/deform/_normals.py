@@ -14,7 +14,7 @@ SEAM_COSINE = 0.7
 """Coincident vertices share a normal where their neutral normals differ by less than about 45 degrees. Along
 the seam of a texture they differ a little where each side was shaded by itself."""
 SEAM_MOTION = 0.01
-"""... and where FAPs move them equally but for this share. Lips touch, but move apart."""
+"""They also share it only where FAPs move them equally but for this share: lips touch, but move apart."""
 SURFACES_MAX = 16
 """Surfaces that may meet at one point; a mesh with more there is damaged."""
 
@@ -50,7 +50,7 @@ class Surface(NamedTuple):
 
 
 def build_surface(model: FaceModel, moved_rows: Integer) -> Surface:
-    """The `Surface` of a model. moved_rows: the vertices that some FaceDefMesh moves, in any order."""
+    """Return the `Surface` of a model. moved_rows: the vertices that some FaceDefMesh moves, in any order."""
     moved = np.zeros(len(model.vertices), dtype=bool)
     moved[moved_rows] = True
     group = _group_seams(model)
@@ -92,7 +92,8 @@ def build_surface(model: FaceModel, moved_rows: Integer) -> Surface:
 
 
 def _sum_normals(vertices: Float64, triangles: Int32, corners: Int64, count: int) -> Float64:
-    """(count, 3) sums of the triangles' normals, as long as twice their area, over `corners` (F, 3)."""
+    """Return (count, 3) sums of the triangles' normals, as long as twice their area, over `corners` (F,
+    3)."""
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     across = np.cross(b - a, c - a)
     summed = np.empty((count, 3))
@@ -102,7 +103,7 @@ def _sum_normals(vertices: Float64, triangles: Int32, corners: Int64, count: int
 
 
 def _group_seams(model: FaceModel) -> Int64:
-    """(V,) number of each vertex's group: those that are one point of one smooth surface share it."""
+    """Return (V,) number of each vertex's group: those that are one point of one smooth surface share it."""
     part = np.repeat(np.arange(len(model.parts)), [len(p.vertices) for p in model.parts])
     vertices = model.vertices + np.float32(0)  # -0 is 0
     order = np.lexsort((*vertices.T, part))
@@ -127,7 +128,7 @@ def _group_seams(model: FaceModel) -> Int64:
 
 
 def _agree(normals: Float32, motions: list[Float64], one: Intp, other: Intp) -> Bool:
-    """Whether each pair of coincident vertices has nearly the same normal and moves equally."""
+    """Return whether each pair of coincident vertices has nearly the same normal and moves equally."""
     agree = np.einsum("ij,ij->i", normals[one], normals[other]) > SEAM_COSINE
     for motion in motions:
         apart = np.abs(motion[one] - motion[other]).max(axis=1, initial=0)
@@ -136,7 +137,7 @@ def _agree(normals: Float32, motions: list[Float64], one: Intp, other: Intp) -> 
 
 
 def _test_motion(model: FaceModel, sign: float) -> Float64:
-    """(V, 3) shifts of the vertices when every FAP has a value of its own, of one sign."""
+    """Return (V, 3) shifts of the vertices when every FAP has a value of its own, of one sign."""
     moved = np.zeros(model.vertices.shape)
     for table in model.tables:
         value = sign * (200.0 + 37.0 * (table.fap * 29 % 67))

@@ -1,4 +1,4 @@
-"""How far a face's vertices are from where others put them: `Displacements`."""
+"""How far the vertices of a face are apart when it shows two sets of FAPs."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float64, Int64
+from fba.arrays import Float32, Float64, Int64
 from fba.face.deform._deformer import Deformer, frame_values
 from fba.face.deform.flat_tables import KIND_ORDER, Shifts, Transforms
 from fba.face.model import FaceModel
 
 BLOCK = 256
 """Frames per call of the compiled loop: Ctrl-C takes effect between calls only."""
+VERTEX_BLOCK = 16
+"""Frames whose vertices are in memory at once."""
 BINS = 4000
-"""Of the histogram of distances, up to `FURTHEST`."""
-FURTHEST = 0.02
-"""Metres: beyond that, percentiles are this."""
+"""Bins of the histogram of distances, up to `MAX_DISTANCE`."""
+MAX_DISTANCE = 0.02
+"""Metres: larger percentiles are given as this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +27,7 @@ class Displacements:
     """Distances between the vertices that two sequences of FAPs give, in the frame of the head.
 
     largest: float64 (T,), metres, in each frame; worst: int64 (T,), its vertex. counts: int64 (B,), how
-    often any vertex was so far off, in bins of FURTHEST / BINS, vertices that did not move in the first.
+    often any vertex was so far off, in bins of MAX_DISTANCE / BINS, vertices that did not move in the first.
     """
 
     largest: Float64
@@ -39,11 +41,11 @@ class Displacements:
         """
         wanted = percent / 100 * self.counts.sum()
         number = int(np.searchsorted(np.cumsum(self.counts), wanted))
-        return number * FURTHEST / BINS
+        return number * MAX_DISTANCE / BINS
 
 
 class DisplacementMeter:
-    """Measures how far the vertices of a face are off: much faster than two calls of `Deformer.local`.
+    """Measures how far vertices are apart, much faster than two calls of `Deformer.local`.
 
     Only what differs is computed: a vertex is where `Deformer.local` puts it, up to rounding in 32 bits.
     """
@@ -80,7 +82,7 @@ class DisplacementMeter:
             own_largest, own_worst = np.zeros(len(frames)), np.zeros(len(frames), dtype=np.int64)
             self._loops.measure_frames(
                 first[frames], second[frames], model.vertices, tables.part_start, tables.shifts,
-                tables.transforms, self._scratch, own_largest, own_worst, FURTHEST / BINS, counts,
+                tables.transforms, self._scratch, own_largest, own_worst, MAX_DISTANCE / BINS, counts,
             )  # fmt: skip
             largest[frames], worst[frames] = own_largest, own_worst
         counts[0] += max(self._count_movable() * count - int(counts.sum()), 0)
@@ -108,3 +110,18 @@ class DisplacementMeter:
             step = float(np.degrees(np.linalg.norm(transforms.amount[number])))
             most[part] = max(most[part], float(off[transforms.column[number]]) * step)
         return most[0], most[1]
+
+
+def vertex_distances(deformer: Deformer, one: npt.ArrayLike, other: npt.ArrayLike) -> Float64:
+    """Return the largest distance between a vertex in one pose and in the other: float64 (T,), metres.
+
+    In the frame of the head, whose rotation counts nothing. one, other: (T, 68), as `Deformer` takes them.
+    """
+    first, second = np.asarray(one), np.asarray(other)
+    result = np.zeros(len(first))
+    differs = np.flatnonzero((first != second).any(axis=1))
+    for start in range(0, len(differs), VERTEX_BLOCK):
+        rows = differs[start : start + VERTEX_BLOCK]
+        shifts: Float32 = deformer.local(first[rows]) - deformer.local(second[rows])
+        result[rows] = np.sqrt(np.einsum("tvi,tvi->tv", shifts, shifts).max(axis=1))
+    return result

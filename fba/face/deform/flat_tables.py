@@ -17,7 +17,8 @@ VALUE_MAX = 2**31 - 1
 """FAPs beyond this are refused: no stream carries more than 32 bits."""
 KIND_ORDER = ("translation", "rotation", "scale")
 """The order in which the transforms of a part are nested, outermost first, as in a Transform node."""
-HEAD_PITCH, HEAD_ROLL = 48, 50
+HEAD_PITCH = 48
+HEAD_ROLL = 50
 
 
 class Shifts(NamedTuple):
@@ -72,13 +73,13 @@ Members = list[tuple[Intp, Intp]]
 
 
 def all_vertices(model: FaceModel) -> Members:
-    """Every vertex of every part, in order."""
+    """Return every vertex of every part, in order."""
     sizes = [np.arange(len(part.vertices)) for part in model.parts]
     return [(own, own + model.starts[part.name]) for part, own in zip(model.parts, sizes, strict=True)]
 
 
 def bound_points(model: FaceModel) -> Members:
-    """The vertices that feature points are bound to; the rows are those of the points."""
+    """Return the vertices that feature points are bound to; the rows are those of the points."""
     members = []
     for part in model.parts:
         own = model.bound - model.starts[part.name]
@@ -88,7 +89,7 @@ def bound_points(model: FaceModel) -> Members:
 
 
 def flatten_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]]) -> Shifts:
-    """All FaceDefMesh for the given vertices, in metres, without displacements of zero.
+    """Return all FaceDefMesh for the given vertices, in metres, without displacements of zero.
 
     Raises ModelError where a displacement is too large for the dtype.
     """
@@ -136,7 +137,7 @@ def flatten_shifts(model: FaceModel, members: Members, dtype: type[np.floating[A
 
 
 def _count_rows(model: FaceModel, members: Members, number: dict[str, int]) -> int:
-    """Number of rows of the tables, displacements of zero included."""
+    """Return the number of rows of the tables, displacements of zero included."""
     count = 0
     for table in model.tables:
         for mesh in table.meshes:
@@ -151,7 +152,7 @@ _Interval = tuple[float, float, Intp, Float64, Float64]
 
 
 def _cut_intervals(mesh: FaceDefMesh, own: Intp, rows: Intp, size: int, unit: float) -> list[_Interval]:
-    """(upper end, anchor, rows, metres per step, metres at the anchor) of each interval."""
+    """Return (upper end, anchor, rows, metres per step, metres at the anchor) of each interval."""
     index = np.full(size, -1)  # of a vertex in the FaceDefMesh
     index[mesh.vertices] = np.arange(len(mesh.vertices))
     listed = index[own]
@@ -175,7 +176,7 @@ def _cut_intervals(mesh: FaceDefMesh, own: Intp, rows: Intp, size: int, unit: fl
 
 
 def _moves(shifts: Float64) -> Bool:
-    """(N,) whether any of three components is not 0; several times faster than any(axis=1)."""
+    """Return (N,) whether any of three components is not 0; several times faster than any(axis=1)."""
     nonzero = shifts != 0
     moves: Bool = nonzero[:, 0] | nonzero[:, 1] | nonzero[:, 2]
     return moves
@@ -188,7 +189,8 @@ def _check(per_step: Float64, at_anchor: Float64, dtype: type[np.floating[Any]],
 
 
 def flatten_transforms(model: FaceModel) -> Transforms:
-    """The transforms of each part, nested as `Deformer` documents. ModelError where one is too large."""
+    """Return the transforms of each part, nested as `Deformer` documents. ModelError where one is too
+    large."""
     names = [*(part.name for part in model.parts), HEAD]
     entries: list[list[tuple[tuple[int, float], int, list[float], tuple[float, ...]]]] = [[] for _ in names]
     for table in model.tables:

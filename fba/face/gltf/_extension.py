@@ -24,7 +24,8 @@ VERSION = 1
 
 
 def extension(builder: Builder, model: FaceModel, nodes: list[int]) -> dict[str, Any]:
-    """The extension object of a model; its arrays are added to `builder`. nodes: the node of each part."""
+    """Return the extension object of a model; its arrays are added to `builder`. nodes: the node of each
+    part."""
     part_numbers = {part.name: number for number, part in enumerate(model.parts)}
     content: dict[str, Any] = {
         "version": VERSION,
@@ -100,7 +101,7 @@ def _transform(transform: FaceDefTransform, part_numbers: dict[str, int]) -> dic
 
 
 def _definitions(table: Float32, select_names: tuple[str, ...]) -> list[dict[str, Any]]:
-    """The FAPs that are not 0 of selects 1, 2, ..."""
+    """Return the FAPs that are not 0 of selects 1, 2, ..."""
     return [
         {"name": name, "faps": {_fap(int(n) + 1): float(row[n]) for n in np.flatnonzero(row)}}
         for name, row in zip(select_names[1:], table[1:], strict=True)

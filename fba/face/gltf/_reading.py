@@ -37,7 +37,7 @@ FLOAT32_MAX = float(np.finfo(np.float32).max)
 
 
 def read_model(document: Document) -> FaceModel:
-    """The face in an opened glTF document. Raises ModelError naming the position of what is wrong."""
+    """Return the face in an opened glTF document. Raises ModelError naming the position of what is wrong."""
     content = optional_member(document.root.get("extensions"), NAME)
     if content is None:
         raise document.root.error(
@@ -136,7 +136,7 @@ def _definitions(content: Value) -> Definitions:
 
 
 def _poses(listed: Value, select_names: tuple[str, ...]) -> Float32:
-    """float32 (selects, 68): FAPs of each select; row 0 is "none"."""
+    """Return float32 (selects, 68): FAPs of each select; row 0 is "none"."""
     count = len(select_names) - 1
     entries = listed.elements(count + 1)
     if len(entries) != count:
@@ -203,7 +203,7 @@ def _text(content: Value, key: str) -> str:
 
 
 def _fap_number(name: str, value: Value) -> int:
-    """The number of a low-level FAP by its name. value: named in the error."""
+    """Return the number of a low-level FAP by its name. value: named in the error."""
     number = fap_numbers().get(name, 0)
     if number < FIRST_LOW_LEVEL_FAP:
         raise value.error(f"{name[:60]!a} is not the name of a low-level FAP")

@@ -42,7 +42,8 @@ def save(model: FaceModel, path: Path) -> None:
 
 
 def build(model: FaceModel) -> Builder:
-    """The glTF document of a model. Raises ModelError where glTF cannot represent it, with the reason."""
+    """Return the glTF document of a model. Raises ModelError where glTF cannot represent it, with the
+    reason."""
     builder = Builder()
     builder.root["extensionsUsed"] = [NAME]
     builder.root["scene"] = 0
@@ -63,7 +64,7 @@ def build(model: FaceModel) -> Builder:
 
 
 def _targets(builder: Builder, model: FaceModel) -> list[dict[str, int]]:
-    """For each part, the accessors of its morph targets by FAP name."""
+    """Return the accessors of the morph targets of each part, by FAP name."""
     targets: list[dict[str, int]] = [{} for _ in model.parts]
     ends = np.cumsum([len(part.vertices) for part in model.parts])[:-1]
     for number, shift in displacements(model):

@@ -23,13 +23,13 @@ from fba.parameters import FAP_COUNT, fap_numbers, faps
 
 @cache
 def morph_values() -> dict[int, int]:
-    """FAP value at weight 1, by FAP number, 3..68."""
+    """Return the FAP value at weight 1, by FAP number, 3..68."""
     with (files(__package__) / "morph_values.csv").open(encoding="utf-8") as file:
         return {fap_numbers()[row["fap"]]: int(row["value"]) for row in csv.DictReader(file)}
 
 
 def displacements(model: FaceModel) -> Iterator[tuple[int, Float32]]:
-    """Yields, for every table, the FAP's number and the shifts of vertices at its value, float32 (V, 3).
+    """Yield, for every table, the FAP's number and the shifts of vertices at its value, float32 (V, 3).
 
     Raises ModelError for a shift that is not finite.
     """

@@ -29,7 +29,7 @@ def import_model(
     name: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> FaceModel:
-    """A face model from a file that knows nothing of FAPs, with tables for all FAPs that it can serve.
+    """Return a face model from a file that knows nothing of FAPs, with tables for all FAPs that it can serve.
 
     path: a file, or MakeHuman's folder. kind: one of `KINDS`, by default recognised.
     points: the feature points, as the path of a CSV, JSON or FDP file, an array (84, 3) in the file's

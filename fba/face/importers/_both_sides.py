@@ -24,14 +24,14 @@ BOTH = {
     "smile": "mouthSmile",
 }
 """ARKit's names, without the side, of shapes of both sides (in small letters only)."""
-MOVED = 0.2
+MOVED_SHARE = 0.2
 """Share of a shape's largest motion above which a vertex shows where the shape is."""
-BLEND = 0.1
+BLEND_WIDTH = 0.1
 """Width over which one side goes over into the other, as a share of the width of what moves."""
 
 
 def split_sides(pieces: Sequence[Piece]) -> list[Piece]:
-    """The pieces, with shapes of both sides as shapes of each, too, where the file has none of those."""
+    """Return the pieces, with shapes of both sides also cut into shapes of each side that the file lacks."""
     result = list(pieces)
     known = canonical_names(sorted({name for piece in pieces for name in piece.morphs}))
     for name in sorted({name for piece in pieces for name in piece.morphs}):
@@ -44,7 +44,7 @@ def split_sides(pieces: Sequence[Piece]) -> list[Piece]:
         if ends is None:
             continue
         known |= dict.fromkeys(sides, name)
-        middle, width = sum(ends) / 2, BLEND * (ends[1] - ends[0])
+        middle, width = sum(ends) / 2, BLEND_WIDTH * (ends[1] - ends[0])
         for k, piece in enumerate(result):
             if name in piece.morphs:
                 x = piece.part.vertices[:, 0].astype(np.float64)
@@ -56,12 +56,12 @@ def split_sides(pieces: Sequence[Piece]) -> list[Piece]:
 
 
 def _ends(pieces: Sequence[Piece], name: str) -> tuple[float, float] | None:
-    """The least and the largest x of what a shape moves; None where it moves nothing."""
+    """Return the least and the largest x of what a shape moves; None where it moves nothing."""
     moving = [(piece.part.vertices, _sizes(piece.morphs[name])) for piece in pieces if name in piece.morphs]
     most = max((float(size.max(initial=0.0)) for _, size in moving), default=0.0)
     if not most > 0:
         return None
-    x = np.concatenate([vertices[size > MOVED * most, 0] for vertices, size in moving])
+    x = np.concatenate([vertices[size > MOVED_SHARE * most, 0] for vertices, size in moving])
     return float(x.min()), float(x.max())
 
 

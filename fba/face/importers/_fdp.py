@@ -31,7 +31,8 @@ BINDS = {
 
 
 def import_fdp(options: ImportOptions) -> FaceModel:
-    """A face from an FDP file and its mesh: a .wfm, .obj or .ply of the same name, or Xface's .wrl files.
+    """Return a face from an FDP file and its mesh: a .wfm, .obj or .ply of the same name, or Xface's .wrl
+    files.
 
     Raises ModelError where the mesh is missing.
     """
@@ -51,7 +52,7 @@ def import_fdp(options: ImportOptions) -> FaceModel:
 
 
 def _import_xface(fdp: Fdp, options: ImportOptions) -> FaceModel:
-    """The neutral mesh of an Xface face, with new tables.
+    """Return the neutral mesh of an Xface face, with new tables.
 
     The file's own regions and weights do not follow the standard: a point moves by a tenth to a third of what
     its FAP says.

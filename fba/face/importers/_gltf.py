@@ -62,7 +62,7 @@ MAX_EXPRESSIONS = 4096
 
 
 def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
-    """A face from a .glb or .gltf head; one that `FaceModel.save` wrote is simply loaded.
+    """Return a face from a .glb or .gltf head; one that `FaceModel.save` wrote is simply loaded.
 
     points: as `import_model`. Morph targets named as ARKit's blendshapes, or as FAPs, give tables; feature
     points that are not given are located by them. Avatars of VRM 0, which look to -z, are turned to +z
@@ -87,7 +87,7 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
 
 
 def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceModel:
-    """A face from pieces whose feature points are to be found."""
+    """Return a face from pieces whose feature points must be located."""
     upright, points, uneven, notes = locate(pieces, options)
     model = finish_import(upright, points, {}, replace(options, up="y"), notes, given=False)
     if uneven >= MIRRORED_TABLES:
@@ -99,7 +99,7 @@ def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceM
 
 
 def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Float64, float, dict[str, str]]:
-    """(pieces stood upright, their feature points (84, 3) in their unit, asymmetry, notes) of a head.
+    """Return (pieces stood upright, their feature points (84, 3) in their unit, asymmetry, notes) of a head.
 
     Raises ModelError as `find_points`.
     """
@@ -121,7 +121,7 @@ def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Fl
 
 
 def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -> tuple[list[Piece], bool]:
-    """(every surface of a glTF file as a piece, whether the file is a face model of this project).
+    """Return (every surface of a glTF file as a piece, whether the file is a face model of this project).
 
     Origins of vertices are counted through the pieces. Avatars of VRM 0 are turned to look to +z.
     """
@@ -175,7 +175,7 @@ def gltf_pieces(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -
 
 
 def _with_gloss(colours: Float32, material: Material) -> Float32:
-    """Vertex colours times the material's; the fourth, opacity in glTF, is gloss here."""
+    """Return the vertex colours times the material's; the fourth, opacity in glTF, is gloss here."""
     result = colours.copy()
     result[:, :3] *= np.array(material.colour, dtype=np.float32)
     result[:, 3] = 1.0 - material.roughness
@@ -215,7 +215,7 @@ def expression_targets(gltf: Gltf) -> dict[int, dict[str, list[tuple[int, float]
 def name_shapes(
     morphs: Mapping[str, Float32], names: tuple[str, ...], targets: Mapping[str, list[tuple[int, float]]]
 ) -> dict[str, Float32]:
-    """Morph targets of a surface with ARKit's names for the expressions of its mesh.
+    """Return the morph targets of a surface with ARKit's names for the expressions of its mesh.
 
     morphs: displacements (V, 3) by name. names: those of all targets of the mesh. targets: of
     `expression_targets`. One target that is an expression is renamed, several are added up; shapes that
@@ -237,7 +237,7 @@ def name_shapes(
 
 
 def _vrm_expressions(gltf: Gltf) -> Iterator[tuple[str, list[Value], float]]:
-    """Of each expression of VRM 0 and VRM 1 the preset, the binds to morph targets, and their full weight."""
+    """Yield preset, binds to morph targets and their full weight of each expression of VRM 0 and VRM 1."""
     extensions = gltf.document.get("extensions")
     if extensions is None:
         return

@@ -38,7 +38,8 @@ POINT_FILES = (".points.csv", ".points.json", ".fdp", ".csv", ".json")
 
 
 def import_mesh(options: ImportOptions, form: str, points: object = None) -> FaceModel:
-    """A face from a mesh file without motion. form: "obj", "ply" or "wfm". points: as `import_model`."""
+    """Return a face from a mesh file without motion. form: "obj", "ply" or "wfm". points: as
+    `import_model`."""
     path = Path(options.path)
     polygons = READERS[form](path)
     given = given_points(points) if points is not None else points_beside(path, POINT_FILES)
@@ -56,7 +57,7 @@ def import_mesh(options: ImportOptions, form: str, points: object = None) -> Fac
 def polygon_pieces(
     polygons: Polygons, materials: Mapping[str, Material], path: str | os.PathLike[str] = "the mesh"
 ) -> list[Piece]:
-    """A piece for each group and material of a mesh file; those without triangles are left out.
+    """Return a piece for each group and material of a mesh file; those without triangles are left out.
 
     path: named in the ModelError for more than `MAX_PIECES`.
     """
@@ -78,7 +79,7 @@ def polygon_pieces(
 
 
 def _point_positions(polygons: Polygons, given: GivenPoints, path: str) -> tuple[Float64, dict[str, int]]:
-    """Positions (84, 3) of the points in the mesh's unit, and their vertices.
+    """Return the positions (84, 3) of the points in the mesh's unit, and their vertices.
 
     Vertices decide, as positions may be in another unit; an FbaWarning names points where both disagree.
     Points on the wrong side of the face are corrected.
@@ -111,7 +112,8 @@ def _point_positions(polygons: Polygons, given: GivenPoints, path: str) -> tuple
 
 
 def _in_unit_of_mesh(given: Float64, positions: Float64, bound: list[str], path: str) -> Float64:
-    """Positions (84, 3), those of points without a vertex converted to the unit and origin of the mesh.
+    """Return the positions (84, 3), those of points without a vertex converted to the unit and origin of the
+    mesh.
 
     given: as the file of points says. positions: those of the `bound` points taken from their vertices. Warns
     of given positions that do not agree with their vertices.
@@ -143,7 +145,7 @@ def _in_unit_of_mesh(given: Float64, positions: Float64, bound: list[str], path:
 
 
 def read_materials(path: str | os.PathLike[str]) -> dict[str, Material]:
-    """The materials of the .mtl files that an OBJ file names, by name."""
+    """Return the materials of the .mtl files that an OBJ file names, by name."""
     libraries: dict[str, None] = {}
     for line, text in read_lines(path):
         if text.startswith("mtllib"):

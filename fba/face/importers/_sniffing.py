@@ -23,7 +23,7 @@ OBJ_WORDS = (b"v ", b"f ", b"vt ", b"vn ", b"g ", b"o ", b"mtllib", b"usemtl", b
 
 
 def sniff(path: str | os.PathLike[str]) -> str:
-    """The kind of a source, one of `KINDS`; ModelError, listing them, for anything else."""
+    """Return the kind of a source, one of `KINDS`; ModelError, listing them, for anything else."""
     path = Path(path)
     if path.is_dir():
         from fba.face.importers.makehuman.makehuman import base_file

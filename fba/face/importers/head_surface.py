@@ -1,4 +1,4 @@
-"""The surface of a head as its file has it, with the feature points that are known of it so far.
+"""The surface of a head as in its file, with the feature points given or located so far.
 
 For placing the others by hand: vertices keep the numbers, unit and axes of the file.
 """
@@ -70,7 +70,7 @@ def read_head_surface(
     kinds: Mapping[str, str] | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> HeadSurface:
-    """The surface of a head, with its points as `import_model` would get them, as far as it would.
+    """Return the surface of a head, with its points as `import_model` would get them, as far as it would.
 
     Arguments as of `import_model`. Transparent shells in front of the eyes, and parts without triangles, are
     left out. Raises ModelError for a file that is damaged, unknown, or needs no points; OptionError for an
@@ -131,7 +131,7 @@ def _check_numbers(given: GivenPoints, count: int, path: str) -> None:
 
 
 def _find(pieces: Sequence[Piece], options: ImportOptions) -> tuple[GivenPoints, str]:
-    """(the points that the importer finds by itself, how): all of them, those of the eyes, or none."""
+    """Return (the points that the importer finds by itself, how): all of them, those of the eyes, or none."""
     path = os.fspath(options.path)
     try:
         upright, points, _, _ = locate(list(pieces), options)
@@ -147,7 +147,8 @@ def _find(pieces: Sequence[Piece], options: ImportOptions) -> tuple[GivenPoints,
 def _in_file(
     pieces: Sequence[Piece], upright: Sequence[Piece], assembled: Sequence[Piece], points: Float64
 ) -> GivenPoints:
-    """Points (84, 3) of upright pieces as vertices of the file, those on none as positions in its axes.
+    """Return the points (84, 3) of upright pieces as vertices of the file, those on none as positions in its
+    axes.
 
     assembled: the upright pieces as parts of a face.
     """

@@ -24,7 +24,8 @@ def evaluate(
     viseme: Int16,
     expression: Int16,
 ) -> tuple[Float64, Bool, Bool]:
-    """FAP values with unknown ones filled in by a FIT: (values, known, from_high_level), all (T, 68).
+    """Return the FAP values with unknown ones filled in by a FIT: (values, known, from_high_level), all (T,
+    68).
 
     values: (T, 68). known: bool (T, 68), mask of those to keep; columns 0 and 1 say whether a viseme and an
     expression are in force. viseme: int16 (T, 4), expression: int16 (T, 6), their fields. Returns new
@@ -56,7 +57,8 @@ def estimate(
     viseme: Int16,
     expression: Int16,
 ) -> tuple[Float64, Bool]:
-    """What a FIT would give for each FAP if that one alone were unknown: (values, whether any), (T, 68).
+    """Return what a FIT would give for each FAP if that one alone were unknown: (values, whether any), (T,
+    68).
 
     The arguments are those of `evaluate`.
     """
@@ -74,7 +76,8 @@ _Numbers = Callable[[str], Float64]
 
 
 def _numbers(filled: Float64, viseme: Int16, expression: Int16) -> _Numbers:
-    """A function that returns a FAP, or a field of a viseme or an expression, by name, as it is now: (T,)."""
+    """Return a function that returns a FAP, or a field of a viseme or an expression, by name, as it is now:
+    (T,)."""
     fields = {
         name: np.clip(array[:, column], 0, INTENSITY_MAX).astype(np.float64)
         for high, array in (("viseme", viseme), ("expression", expression))
@@ -89,14 +92,14 @@ def _numbers(filled: Float64, viseme: Int16, expression: Int16) -> _Numbers:
 
 
 def _columns(link: Link) -> list[int]:
-    """Columns of the source set of a link."""
+    """Return the columns of the source set of a link."""
     return [fap_numbers()[name] - 1 for name in link.source]
 
 
 def _results(
     table: InterpolationTable, fap: int, number: _Numbers, known: Bool, missing: Bool
 ) -> Iterator[tuple[Link, Intp, Float64]]:
-    """The values (N,) that each link to a FAP gives, and the rows (N,) that it gives them for.
+    """Yield the values (N,) that each link to a FAP gives, and the rows (N,) that it gives them for.
 
     missing: bool (T,), for which the FAP is wanted; cleared here where a link gives it.
     """
@@ -119,7 +122,7 @@ def _rows(number: _Numbers, frames: Intp | slice, name: str) -> Float64:
 
 
 def _ratio(function: Function, number: Callable[[str], Float64], count: int) -> tuple[Float64, Bool]:
-    """(count,) values of a function, and a mask of those that are valid."""
+    """Return (count,) values of a function, and a mask of those that are valid."""
     result = _sum(function.numerator, number, count)
     valid = np.isfinite(result)
     if function.denominator:

@@ -49,7 +49,7 @@ NONE = -1
 
 
 def links_from_node(node: Mapping[str, Sequence[float]]) -> list[Link]:
-    """The links in the fields of a node, by their names in the standard; absent fields are empty.
+    """Return the links in the fields of a node, by their names in the standard; absent fields are empty.
 
     Raises ModelError naming the field where counts do not fit together or a number is out of bounds.
     """
@@ -74,7 +74,7 @@ def links_from_node(node: Mapping[str, Sequence[float]]) -> list[Link]:
 
 
 def node_from_links(links: Sequence[Link]) -> dict[str, list[int] | list[float]]:
-    """The fields of a node; equal sets are listed once."""
+    """Return the fields of a node; equal sets are listed once."""
     integers: dict[str, list[int]] = {name: [] for name in INTEGER_FIELDS}
     coefficients: dict[str, list[float]] = {name: [] for name in FLOAT_FIELDS}
     sets: dict[tuple[str, ...], int] = {}
@@ -113,7 +113,8 @@ class _Field:
         return len(self.numbers) - self.used
 
     def take(self, count: int, why: str) -> list[float]:
-        """The next numbers; ModelError where too few are left. why: what needs them, for the message."""
+        """Return the next numbers; ModelError where too few are left. why: what needs them, for the
+        message."""
         if self.left < count:
             raise ModelError(
                 f"{self.name} of the FIT ends after {len(self.numbers)} numbers: {why} needs {count} more, "
@@ -124,7 +125,7 @@ class _Field:
 
 
 def _read_field(name: str, values: Sequence[float]) -> _Field:
-    """The numbers of a field; ModelError where one is out of bounds."""
+    """Return the numbers of a field; ModelError where one is out of bounds."""
     if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
         raise ModelError(f"{name} of the FIT must be a list of numbers, not {type(values).__name__}")
     numbers = [to_float(value) for value in values]

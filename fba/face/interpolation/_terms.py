@@ -61,7 +61,7 @@ class Link:
 
 
 def to_float(value: object) -> float:
-    """The value as a float; NaN if it is not a number."""
+    """Return the value as a float; NaN if it is not a number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return math.nan
     try:

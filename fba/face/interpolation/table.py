@@ -65,20 +65,20 @@ class InterpolationTable:
 
     @classmethod
     def from_node(cls, node: Mapping[str, Sequence[float]]) -> InterpolationTable:
-        """The table described by the fields of a BIFS node FIT, by name; ModelError for wrong ones."""
+        """Return the table described by the fields of a BIFS node FIT, by name; ModelError for wrong ones."""
         return cls(_node.links_from_node(node))
 
     def to_node(self) -> dict[str, list[int] | list[float]]:
-        """The fields of a BIFS node FIT; `from_node` reads them back."""
+        """Return the fields of a BIFS node FIT; `from_node` reads them back."""
         return _node.node_from_links(self.links)
 
     @classmethod
     def from_dict(cls, data: object) -> InterpolationTable:
-        """The table that `to_dict` wrote. Raises ModelError naming the entry that is wrong."""
+        """Return the table that `to_dict` wrote. Raises ModelError naming the entry that is wrong."""
         return cls(_links_from_dict(data))
 
     def to_dict(self) -> dict[str, Any]:
-        """The table as lists, dicts, strings and numbers, for JSON."""
+        """Return the table as lists, dicts, strings and numbers, for JSON."""
         return _dict_from_links(self.links)
 
     @cached_property
@@ -102,7 +102,7 @@ class InterpolationTable:
 
 
 def sources_of(links: Iterable[Link]) -> dict[int, set[int]]:
-    """By destination FAP: the source FAPs of all links to it."""
+    """Return the source FAPs of all links to each destination FAP."""
     numbers = fap_numbers()
     sources: dict[int, set[int]] = {}
     for link in links:
@@ -112,7 +112,8 @@ def sources_of(links: Iterable[Link]) -> dict[int, set[int]]:
 
 
 def find_circle(links: Iterable[Link]) -> list[str]:
-    """Names of FAPs that depend on one another in a circle, the first again at the end; else []."""
+    """Return the names of FAPs that depend on one another in a circle, the first again at the end; else
+    []."""
     sources = sources_of(links)
     unvisited, path = set(sources), list[int]()
     while unvisited:
@@ -131,13 +132,13 @@ def find_circle(links: Iterable[Link]) -> list[str]:
 
 @cache
 def select_limits() -> dict[str, int]:
-    """Largest value of each select that an impulse may ask for."""
+    """Return the largest value of each select that an impulse may ask for."""
     limits = {name: VISEME_SELECT_MAX for name in VISEME_FIELDS if "select" in name}
     return limits | {name: EXPRESSION_SELECT_MAX for name in EXPRESSION_FIELDS if "select" in name}
 
 
 def _check_link(link: Link, number: int) -> Link:
-    """The link with its numbers normalised; ModelError where something in it is wrong."""
+    """Return the link with its numbers normalised; ModelError where something in it is wrong."""
     where = f"link {number} of the FIT"
     if not isinstance(link, Link):
         raise ModelError(f"{where} is {type(link).__name__}, not a Link")

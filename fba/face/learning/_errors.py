@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
 from fba.face.deform._deformer import Deformer
-from fba.face.deform.distances import vertex_distances
+from fba.face.deform.displacements import vertex_distances
 from fba.parameters import fap_steps
 
 

@@ -13,8 +13,15 @@ from fba.errors import FbaError, FbaWarning, ModelError
 from fba.face.deform._deformer import Deformer
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.learning._errors import ErrorSum, FitError
-from fba.face.learning._moments import HEAD, add_up, measure
-from fba.face.learning._regression import choose_order, fewest, fit_coefficients, make_table
+from fba.face.learning._regression import (
+    HEAD,
+    add_up,
+    choose_order,
+    fewest,
+    fit_coefficients,
+    make_table,
+    measure,
+)
 from fba.face.learning.reduction import linked_columns, send_sources
 from fba.face.learning.sensitivity import displacements
 from fba.face.model import FaceModel
@@ -28,7 +35,7 @@ BLOCKS = 5
 """Parts of a single stream that are held out in turn."""
 MOST_FOLDS = 50
 """Most times that learning is repeated without a part of the streams."""
-UNSEEN = 1e-9
+UNSEEN_WEIGHT = 1e-9
 """mm^2 by which a step of a FAP counts more, so that those that the model does not show count at all."""
 _LOW_LEVEL = np.arange(1, FAP_COUNT + 1) >= FIRST_LOW_LEVEL_FAP
 """Which columns are not a viseme or an expression."""
@@ -110,7 +117,7 @@ class _Learner:
         self._deformer = Deformer(model)
         self._motion = displacements(self._deformer)
         flat = self._motion.reshape(FAP_COUNT, -1)
-        self.metric: Float64 = flat @ flat.T + np.diag(UNSEEN / fap_steps().astype(np.float64) ** 2)
+        self.metric: Float64 = flat @ flat.T + np.diag(UNSEEN_WEIGHT / fap_steps().astype(np.float64) ** 2)
         self.moments = add_up(self._part_moments)
         self._check_model(np.asarray(flat.any(axis=1)))
 

@@ -52,7 +52,7 @@ def _copies(values: Int32, mask: Bool, linked: Bool) -> list[int]:
 
 
 def _equals_its_donor(values: Int32, column: int, kept: Bool) -> bool:
-    """Whether the first mate of a column that is kept has the same values."""
+    """Return whether the first mate of a column that is kept has the same values."""
     donor = next((int(one[column]) for one in donors() if kept[one[column]]), None)
     return donor is not None and bool((values[:, donor] == values[:, column]).all())
 

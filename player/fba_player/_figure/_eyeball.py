@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
-from fba.compiled import compiled
 from fba.face import FaceModel, Part
-from fba.face.eyeball import flat_width
+from fba.face.eyeball import fit_sphere, flat_width
 from fba.face.model import point_row
 from fba.geometry import fit_similarity
 from fba_player.view._view import Eye
@@ -18,8 +17,8 @@ from fba_player.view._view import Eye
 MAX_ROUNDNESS_ERROR = 0.03
 """A part whose median distance from its sphere exceeds this share of the radius is drawn as a mesh."""
 MIN_BALL_VERTICES = 12
-"""Parts with fewer vertices are no eyeballs; with fewer behind, all of them give an eyeball's rotation."""
-SAMPLED = 96
+"""A part with fewer vertices is not an eyeball; with fewer behind the pupil, all give its rotation."""
+SAMPLED_VERTICES = 96
 """Vertices from which an eyeball's rotation is computed."""
 DILATE = (29, 30)
 LIDS = (("3.1", "3.3", "3.7", "3.11"), ("3.2", "3.4", "3.12", "3.8"))
@@ -46,12 +45,11 @@ class Eyeball:
     step: float
 
     def pose(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
-        """The eye for moved vertices (V, 3) of its part and of the face; matrix: (4, 4), into the world."""
+        """Return the eye for moved vertices (V, 3) of its part and of the face; matrix: (4, 4), into the
+        world."""
         moved = part.take(self.rows, axis=0).astype(np.float64)
-        turn, centre = _fit_motion(self.neutral, moved, self.centre)
-        if not np.isfinite(turn).all():  # the samples lie in a plane
-            turn = fit_similarity(self.neutral, moved).rotation
-            centre = moved.mean(axis=0) + turn @ (self.centre - self.neutral.mean(axis=0))
+        fitted = fit_similarity(self.neutral, moved)
+        turn, centre = fitted.rotation, fitted.target + fitted.rotation @ (self.centre - fitted.centre)
         frame = np.eye(4)
         frame[:3, :3] = turn * self.radius
         frame[:3, 3] = centre
@@ -66,7 +64,8 @@ class Eyeball:
         )
 
     def _lid_positions(self, face: Float32, centre: Float64) -> Float64:
-        """(4, 3): lid middles and corners relative to the centre, in radii; an open eye's if missing."""
+        """Return middles and corners of the lids (4, 3) relative to the centre, in radii; missing ones as of
+        an open eye."""
         if min(self.lids) >= 0:
             known: Float64 = (face.take(self.lids, axis=0) - centre) / self.radius
             return known
@@ -78,13 +77,13 @@ class Eyeball:
 
 
 def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
-    """The sphere that fits a part, or None if it is not round."""
+    """Return the sphere that fits a part, or None if it is not round."""
     vertices = part.vertices.astype(np.float64)
     if len(vertices) < MIN_BALL_VERTICES or flat_width(part) is not None:
         return None
     on_sphere = np.ones(len(vertices), dtype=bool)
-    for _ in range(4):  # leaves out what stands out, such as a cornea
-        centre, radius = _fit_sphere(vertices[on_sphere])
+    for _ in range(4):  # without what stands out, such as a cornea
+        centre, radius, _ = fit_sphere(vertices[on_sphere])
         away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
         on_sphere = away <= max(float(np.quantile(away, 0.7)), 1e-9)
     if not np.isfinite(radius) or radius <= 0 or float(np.median(away)) > MAX_ROUNDNESS_ERROR * radius:
@@ -95,63 +94,7 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     behind = np.flatnonzero((vertices[:, 2] - centre[2]) < 0.75 * radius)
     if len(behind) < MIN_BALL_VERTICES:
         behind = np.arange(len(vertices))
-    rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED).astype(int))]
+    rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED_VERTICES).astype(int))]
     unit = model.fapu.IRISD
     lids = tuple(int(model.bound[point_row(name)]) for name in LIDS[side])
     return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit)
-
-
-def _fit_sphere(points: Float64) -> tuple[Float64, float]:
-    """Centre (3,) and radius of the sphere that fits points (N, 3) best."""
-    middle = points.mean(axis=0)
-    p = points - middle
-    a = np.column_stack([2 * p, np.ones(len(p))])
-    solution = np.linalg.lstsq(a, (p * p).sum(axis=1), rcond=None)[0]
-    centre = solution[:3]
-    return centre + middle, float(np.sqrt(max(solution[3] + centre @ centre, 0.0)))
-
-
-@compiled
-def _fit_motion(before: Float64, after: Float64, centre: Float64) -> tuple[Float64, Float64]:
-    """The rotation (3, 3) that takes points (N, 3) best to others, and the image (3,) of `centre`.
-
-    The orthogonal factor of their covariance by Newton's iteration (Higham 1986); NaN if that fails.
-
-    Bounds: an eyeball takes both for the same rows of its part; all that is written is made here.
-    """
-    start, middle = np.zeros(3), np.zeros(3)
-    for i in range(len(before)):
-        for k in range(3):
-            start[k] += before[i, k] / len(before)
-            middle[k] += after[i, k] / len(before)
-    x = np.zeros((3, 3))
-    for i in range(len(before)):
-        for j in range(3):
-            for k in range(3):
-                x[j, k] += (after[i, j] - middle[j]) * (before[i, k] - start[k])
-    y = np.zeros((3, 3))  # cofactors: the inverse transposed, times the determinant
-    for _ in range(60):
-        for j in range(3):
-            j1, j2 = (j + 1) % 3, (j + 2) % 3
-            for k in range(3):
-                k1, k2 = (k + 1) % 3, (k + 2) % 3
-                y[j, k] = x[j1, k1] * x[j2, k2] - x[j1, k2] * x[j2, k1]
-        determinant = x[0, 0] * y[0, 0] + x[0, 1] * y[0, 1] + x[0, 2] * y[0, 2]
-        if not determinant > 1e-300:
-            x[:] = np.nan
-            break
-        scale = determinant ** (-1.0 / 3.0)
-        change = 0.0
-        for j in range(3):
-            for k in range(3):
-                new = 0.5 * (scale * x[j, k] + y[j, k] / (scale * determinant))
-                change = max(change, abs(new - x[j, k]))
-                x[j, k] = new
-        if change < 1e-12:
-            break
-    image = np.zeros(3)
-    for j in range(3):
-        image[j] = middle[j]
-        for k in range(3):
-            image[j] += x[j, k] * (centre[k] - start[k])
-    return x, image

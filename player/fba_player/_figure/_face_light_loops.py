@@ -1,7 +1,7 @@
 """Compiled loops of `fba_player._figure.face_light`: light at vertices from their precomputed visibility.
 
-Bounds: tables are those of one part (`face_light._table`), with a column for each of its vertices or of those
-near the mouth, which are numbers of the former. Light has a row for each vertex: checked here.
+Bounds: a table (`face_light._table`) has a column for each vertex of a part, or for each vertex near the
+mouth, whose numbers are columns of the first. Light has a row for each vertex: checked here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from fba.compiled import compiled
 
 class Table(NamedTuple):
     """Visibility of N vertices (see `fba_player._figure.occlusion`) with the mouth shut, and, of the M
-    vertices near it, with the mouth wide open. One row a harmonic: loops over vertices then run fastest.
+    vertices near it, with the mouth wide open. A row for each harmonic: loops over vertices then run fastest.
     """
 
     light: Float32
@@ -64,8 +64,8 @@ def light_vertices(table: Table, basis: Float32, share: float, more: float, ligh
 
 @compiled
 def blend_swaying(light: Float32, still: Float32, rows: Intp, share: Float32) -> None:
-    """Blend rows of light (N, 4) with `still` (M, 4), the same vertices standing still. share: (M,), how far
-    each goes with the head."""
+    """Blend rows of light (N, 4) with `still` (M, 4), the light of the same vertices at rest. share: (M,),
+    how far each moves with the head."""
     for k in range(len(rows)):
         for column in range(4):
             light[rows[k], column] = still[k, column] + share[k] * (light[rows[k], column] - still[k, column])
@@ -75,7 +75,7 @@ def blend_swaying(light: Float32, still: Float32, rows: Intp, share: Float32) ->
 def _products(
     light: Float32, through: Float32, basis: Float32, count: int
 ) -> tuple[Float32, Float32, Float32]:
-    """Key light, rim light, and rim light through the skin, each (count,)."""
+    """Return key light, rim light, and rim light through the skin, each (count,)."""
     key = np.zeros(count, dtype=np.float32)
     rim, back = np.zeros_like(key), np.zeros_like(key)
     for k in range(0, basis.shape[1], 4):  # four at a time: the sums are read and written less often

@@ -29,25 +29,32 @@ TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
 HAIRY = ("lash", "brow", "hair")
 MAX_HAIR_WIDTH = 0.0012
 """Strips wider than this (m) are not single hairs."""
-ROUGH = 0.36
+RELIEF_STRENGTH = 0.36
 """Strength of the skin's relief."""
-NECK = 2.3
+NECK_LENGTH = 2.3
 """Length over which the neck bends, in multiples of the eye-nose separation (ENS)."""
-MAX_BENT_SHARE, BENT_COSINE, LONG_EDGE = 0.1, 0.8, 0.005
-"""Light is computed for every pixel if more than this share of a part's edges bend by more than the angle
-with this cosine and are longer than this (m)."""
-NORMAL_WEIGHT, TEXTURE_WEIGHT, COLOUR_WEIGHT = 0.002, 0.5, 0.004
-"""Weights for simplification: the error in metres that equals a normal off by its length, a texture off by a
-metre, and a colour off by its whole range."""
+MAX_BENT_SHARE = 0.1
+"""Light is computed for every pixel if more than this share of a part's edges are long and bent."""
+BENT_COSINE = 0.8
+"""An edge is bent if the cosine between the normals at its ends is below this."""
+LONG_EDGE = 0.005
+"""An edge is long from this length on, metres."""
+NORMAL_WEIGHT = 0.002
+"""Error in metres that weighs as much in simplification as a normal off by its length."""
+TEXTURE_WEIGHT = 0.5
+"""The same for texture coordinates off by a metre on the surface."""
+COLOUR_WEIGHT = 0.004
+"""The same for a colour off by its whole range."""
 
 
 def compute_sway(model: FaceModel) -> Float32:
-    """float32 (V,): how far each vertex turns with the head, from 1 above jaw and ears to 0 down the neck."""
+    """Return float32 (V,): how far each vertex turns with the head, from 1 above jaw and ears to 0 down the
+    neck."""
     chin = known_middle(model, ("2.1", "2.10"))
     lobe = known_middle(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
     if chin is None or lobe is None:
         return np.ones(len(model.vertices), dtype=np.float32)
-    reach = NECK * model.fapu.ENS * 1024
+    reach = NECK_LENGTH * model.fapu.ENS * 1024
     y, z = model.vertices[:, 1].astype(np.float64), model.vertices[:, 2].astype(np.float64)
     # The border between head and neck rises from below the chin to below the ears, and is level behind them.
     along = np.clip((z - lobe[2]) / max(chin[2] - lobe[2], 1e-6), 0.0, 1.0)
@@ -56,14 +63,14 @@ def compute_sway(model: FaceModel) -> Float32:
 
 
 def known_middle(model: FaceModel, names: Sequence[str]) -> Float64 | None:
-    """(3,): the middle of the first two of the named feature points that the face has, or None."""
+    """Return (3,): the middle of the first two of the named feature points that the face has, or None."""
     points = np.array([model.points[point_row(name)] for name in names])
     known = points[np.isfinite(points).all(axis=1)][:2]
     return np.asarray(known.mean(axis=0)) if len(known) else None
 
 
 def make_shape(part: Part, sways: Float32) -> FaceShape:
-    """The constant data of a part. sways: (V,), how far its vertices turn with the head."""
+    """Return the constant data of a part. sways: (V,), how far its vertices turn with the head."""
     colours = part.colours
     if colours is None:
         row = (*part.material.colour, 1.0 - part.material.roughness)
@@ -91,8 +98,8 @@ def make_shape(part: Part, sways: Float32) -> FaceShape:
 def detail_levels(
     part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None
 ) -> DetailLevels:
-    """Levels of detail of a part for these poses, (V, 3) each. more: (V, N), attributes to preserve besides
-    normals, colours and texture, scaled to metres."""
+    """Return the levels of detail of a part for these poses, (V, 3) each. more: (V, N), attributes to
+    preserve besides normals, colours and texture, scaled to metres."""
     columns = list(poses)
     if part.normals is not None:
         columns.append(part.normals * NORMAL_WEIGHT)
@@ -107,20 +114,21 @@ def detail_levels(
 
 
 def part_rows(model: FaceModel | BodyModel, name: str) -> slice:
-    """The slice of a part's vertices in the arrays of its model. Raises KeyError for an unknown name."""
+    """Return the slice of a part's vertices in the arrays of its model. Raises KeyError for an unknown
+    name."""
     start = model.starts[name]
     return slice(start, start + len(model.part(name).vertices))
 
 
 def with_triangles(shape: FaceShape, triangles: Int32) -> FaceShape:
-    """The shape with these triangles (F, 3) only."""
+    """Return the shape with these triangles (F, 3) only."""
     triangles = np.ascontiguousarray(triangles, dtype=np.int32)
     coarser = None if shape.coarser is None else replace(shape.coarser, triangles=triangles)
     return replace(shape, triangles=triangles, coarser=coarser)
 
 
 def find_hairs(part: Part) -> Float32 | None:
-    """float32 (V, 8) as in `FaceShape.across`, or None if a part does not consist of single hairs.
+    """Return float32 (V, 8) as in `FaceShape.across`, or None if a part does not consist of single hairs.
 
     A hair is a strip of two rows of vertices that ends in a point; the vertex opposite to another is the
     nearest one joined to it by an edge.
@@ -155,7 +163,7 @@ def find_hairs(part: Part) -> Float32 | None:
 
 
 def _pieces(edges: Intp, count: int) -> Intp:
-    """(V,): the lowest vertex in each vertex's connected piece. edges: (E, 2), in both directions."""
+    """Return (V,): the lowest vertex in each vertex's connected piece. edges: (E, 2), in both directions."""
     lowest = np.arange(count)
     while True:  # each round halves the remaining distance
         lower = lowest.copy()
@@ -168,15 +176,15 @@ def _pieces(edges: Intp, count: int) -> Intp:
 
 
 def _relief(part: Part) -> tuple[float, float]:
-    """Strength of the skin's relief and its repetitions, so that each is `RELIEF` metres wide."""
+    """Return the strength of the skin's relief and its repetitions, so that each is `RELIEF` metres wide."""
     if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
         return (0.0, 1.0)
     metres = texture_breadth(part.vertices, part.texcoords, part.triangles)
-    return (ROUGH, min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
+    return (RELIEF_STRENGTH, min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
 
 
 def _is_smooth(part: Part) -> bool:
-    """Whether most edges bend so little that light may be interpolated between vertices."""
+    """Return whether most edges bend so little that light may be interpolated between vertices."""
     if part.normals is None or not len(part.triangles):
         return True
     normals, corners = part.normals[part.triangles], part.vertices[part.triangles]
@@ -186,7 +194,7 @@ def _is_smooth(part: Part) -> bool:
 
 
 def _picture(part: Part) -> FacePicture | None:
-    """The part's texture, or None, with an FbaWarning if it cannot be read."""
+    """Return the part's texture, or None, with an FbaWarning if it cannot be read."""
     if part.material.texture is None:
         return None
     try:

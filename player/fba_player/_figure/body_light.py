@@ -22,7 +22,7 @@ from fba_player._mesh.simplify import DetailLevels
 
 Prepared = tuple[Int32, Int32, Float32, Float32]
 
-REACH = (1.0, 0.95, 0.0, 0.25)
+UNOBSTRUCTED_LIGHT = (1.0, 0.95, 0.0, 0.25)
 """Light that reaches an unobstructed body: key, sky, through, rim; it shades itself most from behind."""
 CAPSULES = (
     ("sacroiliac", "vt4", 0.115),
@@ -36,15 +36,15 @@ CAPSULES = (
 """Joints at both ends, and the radius (m) for a body 1.75 m tall."""
 KEY = tuple(np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION))
 ADULT_HEIGHT = 1.75
-COARSE = 0.0064
+SAMPLING_ERROR = 0.0064
 """Light is computed at the vertices that are left when the surface is simplified with this error (m)."""
 NEIGHBOURS = 3
 """Number of sampled vertices from which the light at a vertex is interpolated."""
 MIN_CACHED_VERTICES = 4000
 """Neighbours are cached on disk for bodies with at least this many vertices."""
-MAKING = 1
+CACHE_VERSION = 1
 """Cache version of neighbours; increment when `_nearest_samples` gives other results."""
-FOLDS = 0.75
+FOLD_STRENGTH = 0.75
 """Strength of occlusion by folds: below 1, as cloth lets light through and the posture changes."""
 
 
@@ -63,16 +63,16 @@ class BodyLight:
     radii: Float64
 
     def shade(self, positions: Float32, normals: Float32, joints: Float64) -> Float32:
-        """float32 (V, 4), as in `FaceMesh.light`; meaningless at parts that are not drawn.
+        """Return float32 (V, 4), as in `FaceMesh.light`; meaningless at parts that are not drawn.
 
         positions, normals: (V, 3) of the body in the world. joints: (J, 4, 4), its joint matrices. Without
-        numba, nothing is in the light's way.
+        numba, nothing blocks the light.
         """
         if not len(positions) == len(normals) == len(self.body.vertices):
             raise ValueError(f"{len(positions)} positions for a body of {len(self.body.vertices)} vertices")
-        light = np.empty((len(positions), len(REACH)), dtype=np.float32)
+        light = np.empty((len(positions), len(UNOBSTRUCTED_LIGHT)), dtype=np.float32)
         if not is_compiled() or not len(self.ends):
-            light[:] = REACH
+            light[:] = UNOBSTRUCTED_LIGHT
             return light
         sampled, near, shares, folds = self._prepared
         capsules = _capsules(joints[self.ends.ravel(), :3, 3].reshape(-1, 2, 3), self.radii)
@@ -83,7 +83,7 @@ class BodyLight:
 
     @cached_property
     def _prepared(self) -> Prepared:
-        """What does not change with the pose, for the V vertices of all parts.
+        """Data for the V vertices of all parts that do not change with the pose.
 
         (N,) vertices at which light is computed; (V, NEIGHBOURS) indices into these from which each vertex
         is interpolated, and (V, NEIGHBOURS) their weights; (V,) share of the sky that folds leave.
@@ -95,7 +95,7 @@ class BodyLight:
                 rows.append(np.arange(min(len(part.vertices), 1)))  # not drawn
                 continue
             coarser = self.coarser[part.name]
-            left = None if coarser is None else coarser.triangles_within(COARSE)
+            left = None if coarser is None else coarser.triangles_within(SAMPLING_ERROR)
             rows.append(np.arange(len(part.vertices)) if left is None or not len(left) else np.unique(left))
         near, shares = _nearest_samples([part.vertices for part in body.parts], rows)
         starts = [body.starts[part.name] for part in body.parts]
@@ -107,12 +107,12 @@ class BodyLight:
             ),
             near,
             shares,
-            (1 - FOLDS * (1 - np.clip(open_, 0, 1))).astype(np.float32),
+            (1 - FOLD_STRENGTH * (1 - np.clip(open_, 0, 1))).astype(np.float32),
         )
 
 
 def build_body_light(body: BodyModel, coarser: Mapping[str, DetailLevels | None]) -> BodyLight:
-    """The light on a body; coarser as in `BodyLight`."""
+    """Return the light on a body; coarser as in `BodyLight`."""
     names = body.skeleton.names
     known = [row for row in CAPSULES if row[0] in names and row[1] in names]
     ends = np.array([[names.index(a), names.index(b)] for a, b, _ in known], dtype=np.intp)
@@ -150,7 +150,7 @@ def _nearest_samples(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, 
     if total < MIN_CACHED_VERTICES:
         near, shares = make()
         return near, shares
-    key = make_key("near", MAKING, *parts, *rows)
+    key = make_key("near", CACHE_VERSION, *parts, *rows)
     near, shares = load_or_make(key, ((total, NEIGHBOURS),) * 2, make, [np.int32, np.float32])
     if near.min() < 0 or near.max() >= sum(map(len, rows)):
         near, shares = make()
@@ -158,9 +158,9 @@ def _nearest_samples(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, 
 
 
 def _capsules(ends: Float64, radii: Float64) -> Float32:
-    """float32 (K, 11) for ends (K, 2, 3) and radii (K,): one end (3), the axis to the other end (3), its
-    inverse squared length, its component towards the key light, the inverse squared length of the rest, the
-    radius and its square."""
+    """Return float32 (K, 11) for ends (K, 2, 3) and radii (K,): one end (3), the axis to the other end (3),
+    its inverse squared length, its component towards the key light, the inverse squared length of the rest,
+    the radius and its square."""
     capsules = np.empty((len(ends), 11), dtype=np.float32)
     axis = ends[:, 1] - ends[:, 0]
     squared = np.maximum(np.einsum("ij,ij->i", axis, axis), 1e-9)
@@ -175,7 +175,8 @@ def _capsules(ends: Float64, radii: Float64) -> Float32:
 def _shade_by_capsules(
     positions: Float32, normals: Float32, rows: Int32, capsules: Float32, past: Float32
 ) -> None:
-    """Write past (N, 2): the shares of the key light and of the sky that come past the capsules to rows (N,).
+    """Write `past` (N, 2): the shares of key light and sky that the capsules let through to vertices `rows`
+    (N,).
 
     One capsule after another and without branches, so that the loops over vertices are vectorised.
 
@@ -233,8 +234,8 @@ def _interpolate(past: Float32, near: Int32, shares: Float32, folds: Float32, li
     Bounds: `near` are rows of past (`_nearest_samples` checks those of the cache), for each vertex of the
     body, whose number `shade` checks.
     """
-    lit, open_ = np.float32(REACH[0]), np.float32(REACH[1])
-    through, rim = np.float32(REACH[2]), np.float32(REACH[3])
+    lit, open_ = np.float32(UNOBSTRUCTED_LIGHT[0]), np.float32(UNOBSTRUCTED_LIGHT[1])
+    through, rim = np.float32(UNOBSTRUCTED_LIGHT[2]), np.float32(UNOBSTRUCTED_LIGHT[3])
     for i in range(len(light)):
         key, sky = np.float32(0.0), np.float32(0.0)
         for k in range(near.shape[1]):

@@ -27,8 +27,8 @@ from fba_player.view._geometry import rotation_vector
 from fba_player.view._view import Eye, FaceMesh, FaceShape
 from fba_player.view.camera import Subject
 
-CUT = 0.45
-"""On a body, what turns with the head by less than this is left out: the body has its own neck."""
+MIN_SWAY_ON_BODY = 0.45
+"""On a body, vertices that turn with the head by less than this share are left out: the body has a neck."""
 
 GRIMACE = {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300,
            6: 200, 7: 200, 53: 200, 54: 200}  # fmt: skip
@@ -93,7 +93,7 @@ class FaceFigure:
         return Subject(centre, 0.71 * (top - low), 0.60 * (top - low))
 
     def pose(self, faps: Float32) -> Pose:
-        """The face for FAPs (68,); the last one is cached."""
+        """Return the face for FAPs (68,); the last one is cached."""
         if self._pose is None or not np.array_equal(self._pose.faps, faps):
             self._pose = self._posed(faps.copy())
         return self._pose
@@ -106,7 +106,7 @@ class FaceFigure:
     def meshes(
         self, faps: Float32, matrix: Float64, *, on_body: bool = False, without: Sequence[str] = ()
     ) -> list[FaceMesh]:
-        """All parts but the eyeballs for FAPs (68,); matrix: (4, 4), into the world.
+        """Return all parts but the eyeballs for FAPs (68,); matrix: (4, 4), into the world.
 
         on_body: whether to leave out the lower neck and shoulders. without: kinds of parts to leave out.
         """
@@ -126,18 +126,19 @@ class FaceFigure:
         return meshes
 
     def rows(self, name: str) -> slice:
-        """The slice of a part's vertices in the arrays of the model. Raises KeyError for an unknown name."""
+        """Return the slice of a part's vertices in the arrays of the model. Raises KeyError for an unknown
+        name."""
         return part_rows(self.model, name)
 
     def shade(self, faps: Float32, frame: Float64) -> Float32:
-        """float32 (V, 4), the light that reaches the model's vertices, as in `FaceMesh.light`.
+        """Return float32 (V, 4), the light that reaches the model's vertices, as in `FaceMesh.light`.
 
         frame: (4, 4), the turned head's frame into the world.
         """
         return self.light.shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
 
     def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:
-        """The eyeballs for FAPs (68,); matrix: (4, 4), into the world.
+        """Return the eyeballs for FAPs (68,); matrix: (4, 4), into the world.
 
         turned: whether the matrix contains the head's turn already.
         """
@@ -149,7 +150,8 @@ class FaceFigure:
         ]
 
     def points(self, faps: Float32, matrix: Float64) -> Float64:
-        """float64 (84, 3): feature points in the world for FAPs (68,); NaN for those that the face lacks."""
+        """Return float64 (84, 3): feature points in the world for FAPs (68,); NaN for those that the face
+        lacks."""
         points = self.deformer.feature_points(faps)
         moved: Float64 = points @ matrix[:3, :3].T + matrix[:3, 3]
         return moved
@@ -159,14 +161,14 @@ class FaceFigure:
         """The parts without the lower neck and shoulders."""
         shapes = {}
         for name, shape in self.shapes.items():
-            above = (shape.sway[shape.triangles] > CUT).all(axis=1)
+            above = (shape.sway[shape.triangles] > MIN_SWAY_ON_BODY).all(axis=1)
             if above.any():
                 shapes[name] = with_triangles(shape, shape.triangles[above])
         return shapes
 
 
 def build_figure(model: FaceModel) -> FaceFigure:
-    """A figure of any face. Its occlusion is computed on first use, in about a second."""
+    """Return a figure of any face. Its occlusion is computed on first use, in about a second."""
     deformer, sway = Deformer(model), compute_sway(model)
     extremes = [_extreme_positions(deformer, faps) for faps in ({}, MOUTH_OPEN, GRIMACE)]
     shapes, eyeballs = {}, []
@@ -185,7 +187,7 @@ def build_figure(model: FaceModel) -> FaceFigure:
 
 
 def _extreme_positions(deformer: Deformer, faps: dict[int, int]) -> Float32:
-    """float32 (V, 3): the face for values by FAP number, without the head's turn."""
+    """Return float32 (V, 3): the face for values by FAP number, without the head's turn."""
     values = np.zeros(FAP_COUNT, dtype=np.float32)
     for number, value in faps.items():
         values[number - 1] = value
@@ -193,7 +195,7 @@ def _extreme_positions(deformer: Deformer, faps: dict[int, int]) -> Float32:
 
 
 def _head_centre(model: FaceModel) -> Float64:
-    """(3,): the centre of the head's rotation in its tables; the origin if they do not turn it."""
+    """Return (3,): the centre of the head's rotation in its tables; the origin if they do not turn it."""
     for number in (48, 49, 50):
         table = model.table_of.get(number)
         for transform in table.transforms if table is not None else ():

@@ -16,19 +16,20 @@ from fba.face import Deformer, FaceModel
 from fba.face.model import point_row
 from fba_player._figure._face_light_loops import Table, blend_swaying, light_vertices
 from fba_player._figure._face_parts import part_rows
-from fba_player._figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
+from fba_player._figure.occlusion import CACHE_VERSION, HARMONICS, Visibility, bake, weights
 
-KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
+KEY_DIRECTION = (0.70, 0.68, 0.80)
+RIM_DIRECTION = (-0.55, 0.50, -0.85)
 """Directions of key and rim light; the same as in shaders/lighting.glsl."""
 LIGHTS = np.array([KEY_DIRECTION, RIM_DIRECTION])
 MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
               51: -250, 55: -200, 56: -200, 52: -900, 57: -700, 58: -700}  # fmt: skip
 """FAPs of a mouth so wide open that light falls in."""
-FREE = (0.9, 0.8, 0.0, 0.3)
+FREE_LIGHT = (0.9, 0.8, 0.0, 0.3)
 """Light on a tongue that is put out: key, sky, through, rim."""
-ON_TEETH = 0.3
+TEETH_FILL_SHARE = 0.3
 """Share of the missing light that is added on teeth when the mouth is open."""
-STEP = 2
+TURN_DECIMALS = 2
 """Decimals to which the head's rotation is rounded; the light changes invisibly little."""
 MIN_SWAY = 0.05
 """Occlusion is not computed at vertices that turn with the head by less than this."""
@@ -62,7 +63,7 @@ class FaceLight:
         self._tongues = [part_rows(model, part.name) for part in model.of_kind("tongue")]
 
     def shade(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
-        """float32 (V, 4), 0..1: the share of light that reaches each vertex, as in `FaceMesh.light`.
+        """Return float32 (V, 4), 0..1: the share of light that reaches each vertex, as in `FaceMesh.light`.
 
         positions: (V, 3), without the head's turn (3, 3). matrix: (3, 3), the face's rotation in the world.
         Returns the same array until something changes.
@@ -70,7 +71,7 @@ class FaceLight:
         share = round(self._mouth_open(positions, self.baked.gaps), 2)
         out = [self._out_of_mouth(positions[rows, 2], positions) for rows in self._tongues]
         # In steps too small to be seen, so that a pose looks the same whatever was shown before it.
-        turned, still = np.round((matrix @ turn).T, STEP), np.round(matrix.T, STEP)
+        turned, still = np.round((matrix @ turn).T, TURN_DECIMALS), np.round(matrix.T, TURN_DECIMALS)
         key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
         if self._last is None or self._last[0] != key:
             lights = _basis(turned) if np.array_equal(turned, still) else _basis(turned, still)
@@ -78,14 +79,16 @@ class FaceLight:
         return self._last[1]
 
     def _shaded(self, share: float, lights: Float32, out: list[Float32]) -> Float32:
-        """float32 (V, 4) for a mouth open by `share`. out: (N,) for each tongue, how far it is out."""
+        """Return float32 (V, 4) for a mouth open by `share`. out: (N,) for each tongue, how far it is out."""
         light = np.empty((len(self._sway), 4), dtype=np.float32)
         for part, baked in zip(self._model.parts, self._part_lights, strict=True):
             # Teeth get more light than falls in, as a photographer would have it.
-            baked.shade(share, lights, ON_TEETH * share if part.kind == "teeth" else 0.0, light[baked.rows])
+            baked.shade(
+                share, lights, TEETH_FILL_SHARE * share if part.kind == "teeth" else 0.0, light[baked.rows]
+            )
         for rows, outside in zip(self._tongues, out, strict=True):
             if outside.any():
-                light[rows] += (np.array(FREE, dtype=np.float32) - light[rows]) * outside[:, None]
+                light[rows] += (np.array(FREE_LIGHT, dtype=np.float32) - light[rows]) * outside[:, None]
         return light
 
     @cached_property
@@ -107,7 +110,8 @@ class FaceLight:
         return math.sqrt(float(way @ way))
 
     def _out_of_mouth(self, depths: Float32, positions: Float32) -> Float32:
-        """float32 (N,), 0..1: how far vertices of a tongue at these depths (z) are out between the lips."""
+        """Return float32 (N,), 0..1: how far vertices of a tongue at these depths (z) are out between the
+        lips."""
         if self._lips is None:
             return np.zeros(len(depths), dtype=np.float32)
         reach = 0.12 * self._model.fapu.ENS * 1024
@@ -145,18 +149,19 @@ class FaceLight:
         return self._deformer.local(faps, out=positions, normals=normals), normals
 
     def _near_mouth(self, positions: Float32) -> Bool:
-        """bool (V,): vertices about as near to the mouth as the eyes are to the nose."""
+        """Return bool (V,): vertices about as near to the mouth as the eyes are to the nose."""
         away = np.linalg.norm(positions - positions[self._lips].mean(axis=0), axis=1)
         return np.asarray(away < 1.1 * self._model.fapu.ENS * 1024)
 
 
 def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
-    """What `bake` returns, stored in the disk cache: computing it takes half a second of every start."""
+    """Return what `bake` returns, stored in the disk cache: computing it takes half a second of every
+    start."""
 
     def make() -> list[Float16]:
         return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
 
-    digest = hashlib.sha256(BAKING.encode())
+    digest = hashlib.sha256(CACHE_VERSION.encode())
     for array in (positions, normals, triangles, within):
         digest.update(np.ascontiguousarray(array).data)
     count = len(within)
@@ -167,10 +172,10 @@ def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, wi
 
 @dataclass(frozen=True, eq=False)
 class _PartLight:
-    """What the light at the vertices of one part is computed from.
+    """Data for the light at the vertices of one part.
 
-    rows: of the part in the model. table: of its N vertices. swaying: those (M,) that do not go with the head
-    all the way, sway: (M,), how far, and still: their table.
+    rows: the part in the model. table: visibility of its N vertices. swaying: the vertices (M,) that follow
+    the head only partly; sway: (M,), how far; still: their visibility.
     """
 
     rows: slice
@@ -183,8 +188,8 @@ class _PartLight:
         """Write light (N, 4): key light, sky, through, rim light.
 
         share: how far the mouth is wide open. lights: (2, 16), weights of the harmonics for key and rim light
-        for what goes with the head, then, where they differ, two more rows for what stands still. on_teeth:
-        the share of the missing light that is added.
+        at vertices that move with the head; where the head has turned, two more rows for vertices at rest.
+        on_teeth: the share of the missing light that is added.
         """
         light_vertices(self.table, lights[:2], share, on_teeth, light)
         if len(lights) > 2 and len(self.swaying):
@@ -194,7 +199,7 @@ class _PartLight:
 
 
 def _part_light(baked: Baked, rows: slice, sway: Float32) -> _PartLight:
-    """The tables of a part's rows of a model. sway: (V,), of all vertices of the model."""
+    """Return the tables of a part's rows of a model. sway: (V,), of all vertices of the model."""
     vertices = np.arange(rows.start, rows.stop)
     swaying = np.flatnonzero(sway[vertices] < 1)
     still = _table(baked, vertices[swaying])
@@ -202,7 +207,7 @@ def _part_light(baked: Baked, rows: slice, sway: Float32) -> _PartLight:
 
 
 def _table(baked: Baked, vertices: Intp) -> Table:
-    """The visibility of some vertices of a model."""
+    """Return the visibility of some vertices of a model."""
     near = np.flatnonzero(baked.near[vertices])
     shut, wide = (
         [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]
@@ -212,7 +217,7 @@ def _table(baked: Baked, vertices: Intp) -> Table:
 
 
 def _basis(*turns: Float64) -> Float32:
-    """float32 (2 N, 16): weights of the harmonics for key and rim light under N rotations (3, 3)."""
+    """Return float32 (2 N, 16): weights of the harmonics for key and rim light under N rotations (3, 3)."""
     towards = np.empty((2 * len(turns), 3))
     for k, into in enumerate(turns):
         np.dot(LIGHTS, into.T, out=towards[2 * k : 2 * k + 2])

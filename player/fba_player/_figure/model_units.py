@@ -18,7 +18,7 @@ EXPECTED = {"eye": "eyes", "teeth": "teeth"}
 
 
 def prepare_model(model: FaceModel) -> FaceModel:
-    """The model, or a copy scaled to a person's size if its unit cannot be metres.
+    """Return the model, or a copy scaled to a person's size if its unit cannot be metres.
 
     Gives an FbaWarning for such a unit, for missing eyes or teeth, and for missing FaceDefTables.
     """
@@ -36,7 +36,7 @@ def prepare_model(model: FaceModel) -> FaceModel:
 
 
 def resize(model: FaceModel, factor: float) -> FaceModel:
-    """A copy of the face, `factor` times as large."""
+    """Return a copy of the face, `factor` times as large."""
     return replace(
         model,
         parts=tuple(

@@ -16,7 +16,7 @@ from fba.compiled import compiled, is_compiled
 
 DIRECTIONS = 72
 """Number of directions from which the mesh is rendered."""
-PIXEL = 0.0014
+PIXEL_SIZE = 0.0014
 """Size of a depth map's pixel, metres: finer than the folds that are to be shaded."""
 MAX_DEPTH_PIXELS = 400
 SOFTNESS = (1.0, 0.92, 0.72, 0.46)
@@ -24,15 +24,15 @@ SOFTNESS = (1.0, 0.92, 0.72, 0.46)
 SKIN_DEPTH = 0.0045
 """Depth (m) at which light through skin has faded to 1/e."""
 HARMONICS = 16
-BAKING = "1"
+CACHE_VERSION = "1"
 """Cache version; increment when `bake` gives other results."""
 
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """light: float32 (V, 16), harmonics of the visibility of each direction, 1 if free. through: float32
-    (V, 16), harmonics of the light through the skin from behind. open: float32 (V,), the free share of the
-    hemisphere above each vertex, weighted by the cosine."""
+    """light: float32 (V, 16), harmonics of the visibility of each direction, 1 if free. through: float32 (V,
+    16), harmonics of the light through the skin from behind. open: float32 (V,), the unobstructed share of
+    the hemisphere above each vertex, weighted by the cosine."""
 
     light: Float32
     through: Float32
@@ -50,7 +50,7 @@ def bake(
     triangles: Int32,
     within: Bool | None = None,
 ) -> Visibility:
-    """The visibility of every vertex (V, 3) of a mesh; takes about half a second for 20,000 vertices.
+    """Return the visibility of every vertex (V, 3) of a mesh; takes about half a second for 20,000 vertices.
 
     within: bool (V,), the vertices whose visibility is computed, all by default; others may count as free.
     Without numba, which would take minutes, all vertices count as free.
@@ -66,7 +66,7 @@ def bake(
         baked = vertices[rows]
         centre = (baked.min(axis=0) + baked.max(axis=0)) / 2
         reach = float(np.linalg.norm(baked - centre, axis=1).max()) * 1.01
-        size = int(np.clip(2 * reach / PIXEL, 16, MAX_DEPTH_PIXELS))
+        size = int(np.clip(2 * reach / PIXEL_SIZE, 16, MAX_DEPTH_PIXELS))
         depth = np.empty((size, size), dtype=np.float32)
         for column, direction in enumerate(directions):
             frame = _frame(direction).astype(np.float32)
@@ -82,12 +82,12 @@ def bake(
 
 
 def weights(directions: Float64) -> Float64:
-    """float64 (N, 16): weights for rows of `Visibility`, for large lights in directions (N, 3)."""
+    """Return float64 (N, 16): weights for rows of `Visibility`, for large lights in directions (N, 3)."""
     return harmonics(directions) * _bands()
 
 
 def harmonics(directions: Float64) -> Float64:
-    """float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
+    """Return float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
     values = np.empty((len(directions), HARMONICS))
     _harmonics(np.ascontiguousarray(directions, dtype=np.float64), values)
     return values
@@ -123,7 +123,7 @@ def _bands() -> Float64:
 
 @cache
 def _directions() -> Float64:
-    """float64 (N, 3): unit vectors spread evenly over the sphere."""
+    """Return float64 (N, 3): unit vectors spread evenly over the sphere."""
     k = np.arange(DIRECTIONS) + 0.5
     z = 1 - 2 * k / DIRECTIONS
     around = np.pi * (1 + 5**0.5) * k
@@ -132,7 +132,7 @@ def _directions() -> Float64:
 
 
 def _frame(direction: Float64) -> Float64:
-    """float64 (3, 3), as rows: right, up and towards the viewer, who looks from this direction."""
+    """Return float64 (3, 3), as rows: right, up and towards the viewer, who looks from this direction."""
     aside = np.cross(direction, (0.0, 1.0, 0.0) if abs(direction[1]) < 0.9 else (1.0, 0.0, 0.0))
     aside /= np.linalg.norm(aside)
     return np.stack([aside, np.cross(direction, aside), direction])
@@ -167,8 +167,8 @@ def _mirror(visible: Float32, normals: Float32, directions: Float32) -> None:
 def _draw_depths(seen: Float32, triangles: Int32, depth: Float32) -> None:
     """Draw the depths of front-facing triangles. seen: (V, 3), x and y in -1..1, z towards the viewer.
 
-    Bounds: pixels are limited to the square of depths after they have become integers, whatever they were;
-    corners are vertices of the mesh, which `bake` is given for a model that is checked.
+    Bounds: pixels are clamped to the map after conversion to integers, whatever they were before; corners are
+    vertices of the mesh, which `bake` gets from a checked model.
     """
     size = depth.shape[0]
     depth[:] = -10.0
@@ -211,8 +211,8 @@ def _read_depths(
 ) -> None:
     """Write for vertices `rows` their visibility in a depth map, and the light that comes through to them.
 
-    Bounds: rows are vertices, of which all arrays have one each. Pixels are limited as in `_draw_depths`, and
-    the next ones are there: a map has 16 or more.
+    Bounds: rows are vertices, and all arrays have a row for each. Pixels are clamped as in `_draw_depths`,
+    and have neighbours: a map has 16 or more.
     """
     size = depth.shape[0]
     half = 0.5 * size

@@ -20,11 +20,14 @@ from fba_player._figure.wrinkles import wrinkle_strengths
 from fba_player.view._view import Eye, FaceMesh, FaceShape
 
 SCATTER = {"skin": 1.0, "neck": 1.0}
-SEEN_WEIGHTS, BEND = 6, 0.02
-"""Simplification preserves skin weights in this many random projections, scaled to this many metres."""
+WEIGHT_PROJECTIONS = 6
+"""Number of random projections of the skin weights that simplification preserves."""
+WEIGHT_SCALE = 0.02
+"""Metres as which a skin weight of 1 counts in simplification."""
 HEAD_SHARE = 0.3
 """A part of a body with its own head is drawn in full detail if more than this share of it is on the head."""
-WORLD, NOWHERE = np.eye(4), np.zeros(3)
+WORLD = np.eye(4)
+NO_TURN = np.zeros(3)
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
 
@@ -46,7 +49,7 @@ class Person:
 
     @property
     def headroom(self) -> float:
-        """Metres from the joint that carries the head to the top of the body's own; 0 without one."""
+        """Metres from the joint that carries the head to the top of the body's own head; 0 without one."""
         rows = head_rows(self.body)
         if self.head is not None or not rows.any():
             return 0.0
@@ -54,7 +57,7 @@ class Person:
         return float(1.1 * ((self.body.vertices[rows] - skull[:3, 3]) @ skull[:3, :3])[:, 1].max())
 
     def joints(self, faps: Float32, matrices: Float64) -> Float64:
-        """Joint matrices (J, 4, 4) with the head turned on the skull base by FAPs (68,)."""
+        """Return the joint matrices (J, 4, 4) with the head turned on the skull base by FAPs (68,)."""
         turn = self.figure.pose(faps).turn
         return (
             turn_own_head(self.body, matrices, turn)
@@ -63,7 +66,7 @@ class Person:
         )
 
     def frame(self, joints: Float64) -> Float64:
-        """(4, 4): from the face model's frame into the world."""
+        """Return (4, 4): from the face model's frame into the world."""
         if self.head is not None:
             return self.head.frame(joints)
         skull = skull_of(self.body)
@@ -73,7 +76,8 @@ class Person:
         return frame
 
     def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
-        """All parts but the eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
+        """Return all parts but the eyeballs for FAPs (68,) and joint matrices that contain the head's
+        turn."""
         positions, normals = np.empty_like(self.body.vertices), np.empty_like(self.body.vertices)
         own = self.body.own_head if self.head is None else None
         if own is None:
@@ -99,15 +103,15 @@ class Person:
         return meshes
 
     def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
-        """The eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
+        """Return the eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
         return [] if self.head is None else self.figure.eyes(faps, self.frame(joints), turned=True)
 
 
 def build_person(body: BodyModel, figure: FaceFigure) -> Person:
-    """A person of a body and a face, which is put where the body says that the pupils are.
+    """Return a person of a body and a face, placed where the body says that the pupils are.
 
     Triangles of the face under the body's clothes are left out, and so are parts of kind "other" that lie
-    wholly below the chin. A body that does not say so keeps its own head, which FAPs turn.
+    wholly below the chin. A body without such a place keeps its own head, which FAPs turn.
     """
     model = figure.model
     if body.eyes is None:
@@ -128,14 +132,15 @@ def build_person(body: BodyModel, figure: FaceFigure) -> Person:
 
 
 def head_rows(body: BodyModel) -> Bool:
-    """Mask (V,) of the body's vertices that its skull carries more than any other joint."""
+    """Return the mask (V,) of the body's vertices that its skull carries more than any other joint."""
     below = body.skeleton.descendants(skull_of(body))
     mask: Bool = np.isin(body.joints[:, 0], below) & (body.weights[:, 0] > 0)
     return mask
 
 
 def head_middle(body: BodyModel) -> Float64:
-    """(3,): the middle of the head of a body that has one, as modelled; else the joint that carries heads."""
+    """Return the middle (3,) of the body's own head, as modelled; without one, the joint that carries
+    heads."""
     rows = head_rows(body)
     if not rows.any():
         joint: Float64 = body.bind[skull_of(body), :3, 3]
@@ -146,7 +151,7 @@ def head_middle(body: BodyModel) -> Float64:
 
 
 def turn_own_head(body: BodyModel, matrices: Float64, turn: Float64) -> Float64:
-    """Joint matrices (J, 4, 4) with the head turned about the joint that carries it.
+    """Return the joint matrices (J, 4, 4) with the head turned about the joint that carries it.
 
     turn: (4, 4), what FAPs do to a face.
     """
@@ -165,7 +170,7 @@ def turn_own_head(body: BodyModel, matrices: Float64, turn: Float64) -> Float64:
 
 
 def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]:
-    """The face's parts by name, without the triangles that clothes hide."""
+    """Return the face's parts by name, without the triangles that clothes hide."""
     model, shapes = figure.model, {}
     chin = model.points[point_row("2.1")][1]
     for name, shape in figure.shapes.items():
@@ -182,8 +187,8 @@ def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]
 def _shape(part: BodyPart, joints: int) -> FaceShape:
     shape = make_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
     # Vertices must remain where joints bend the body: preserve the weights, in a few fixed projections.
-    random = np.random.default_rng(7).standard_normal((joints, SEEN_WEIGHTS)) / SEEN_WEIGHTS**0.5
-    carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * BEND
+    random = np.random.default_rng(7).standard_normal((joints, WEIGHT_PROJECTIONS)) / WEIGHT_PROJECTIONS**0.5
+    carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * WEIGHT_SCALE
     coarser = detail_levels(part, [part.vertices], carried.astype(np.float32))
     open_surface = part.material.two_sided
     return replace(
@@ -199,5 +204,6 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
 def _mesh_in_world(
     shape: FaceShape, rows: slice, positions: Float32, normals: Float32, light: Float32
 ) -> FaceMesh:
-    """A part, cut from its model's arrays (V, 3), (V, 3) and (V, 4), which are in the world already."""
-    return FaceMesh(shape, positions[rows], normals[rows], light[rows], WORLD, NOWHERE, NOWHERE)
+    """Return a part, cut from its model's arrays (V, 3), (V, 3) and (V, 4), which are in the world
+    already."""
+    return FaceMesh(shape, positions[rows], normals[rows], light[rows], WORLD, NO_TURN, NO_TURN)

@@ -18,8 +18,8 @@ from fba.face import FaceModel, Part
 from fba.face.model import point_row
 from fba_player._mesh.wrinkle_map import WRINKLES
 
-BEGINNING = 0.5
-"""Share of the motion that brings a wrinkle out fully at which it begins: half of a frown shows none."""
+BEGINNING_SHARE = 0.5
+"""A wrinkle begins at this share of the motion at which it is full: half a frown shows none."""
 
 MAP_POINTS = {
     "3.7": (0.690, -0.020), "3.11": (0.286, -0.048), "3.9": (0.515, -0.165), "3.13": (0.514, 0.159),
@@ -37,18 +37,18 @@ MIRRORED = {
 """The points of the right side."""
 NEEDED = ("3.7", "3.11", "4.1", "4.3", "9.3", "8.3", "8.1")
 """Points without which a face shows no wrinkles."""
-DEEPEST = 0.75
+MAX_DEPTH = 0.75
 """How far behind the pupils the map reaches, in eye separations: not onto ears and neck."""
-OUTSIDE = 9.0
-"""How far beside the map a vertex lies that has no wrinkles."""
+OUTSIDE_OF_MAP = 9.0
+"""Coordinate, far outside of the map, of vertices without wrinkles."""
 STIFFNESS = 1e-4
 """How far the map may miss feature points to bend less (regularisation of the spline)."""
 
 
 @cache
 def _table() -> tuple[Intp, Intp, Float64]:
-    """The rows of wrinkles.csv: their wrinkles (R,), columns of their FAPs, left and right (2, R), and the
-    values that bring the wrinkles out fully (R,)."""
+    """Return the rows of wrinkles.csv: their wrinkles (R,), columns of their FAPs, left and right (2, R), and
+    the values that bring the wrinkles out fully (R,)."""
     with (files(__package__) / "wrinkles.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     kinds = np.array([WRINKLES.index(row["wrinkle"]) for row in rows])
@@ -57,22 +57,22 @@ def _table() -> tuple[Intp, Intp, Float64]:
 
 
 def wrinkle_strengths(faps: Float32) -> Float32:
-    """float32 (2, 4), 0..1: how strong each of `WRINKLES` is on the left and on the right side.
+    """Return the strength of each of `WRINKLES` on the left and the right side: float32 (2, 4), 0..1.
 
-    faps: (68,). A FAP counts in its own direction only; what several of them do adds up.
+    faps: (68,). A FAP counts only in the direction of its row; effects of several FAPs add up.
     """
     kinds, columns, full = _table()
     shares = np.maximum(faps[columns] / full, 0.0)
     strengths = np.zeros((2, len(WRINKLES)))
     for side in range(2):
         np.add.at(strengths[side], kinds, shares[side])
-    return smoothstep((strengths - BEGINNING) / (1 - BEGINNING)).astype(np.float32)
+    return smoothstep((strengths - BEGINNING_SHARE) / (1 - BEGINNING_SHARE)).astype(np.float32)
 
 
 def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
-    """float32 (V, 2): where the vertices of a part lie in the map, x positive on the face's left; outside of
-    it where they have no wrinkles. None for a part that is no skin, and for a face that shall have none or
-    lacks the points needed."""
+    """Return float32 (V, 2): where the vertices of a part lie in the map, x positive on the face's left;
+    outside of it where they have no wrinkles. None for parts other than skin, and for faces that show no
+    wrinkles or lack the points needed."""
     if not model.wrinkles or part.kind != "skin":
         return None
     own, shown = _known_points(model)
@@ -81,20 +81,20 @@ def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
     spline = _ThinPlate(own, shown)
     flat = _in_front(model, part.vertices.astype(np.float64))
     places = spline(flat[:, :2])
-    behind = flat[:, 2] < -DEEPEST
-    places[behind, 0] += np.copysign(OUTSIDE, places[behind, 0])
+    behind = flat[:, 2] < -MAX_DEPTH
+    places[behind, 0] += np.copysign(OUTSIDE_OF_MAP, places[behind, 0])
     return places.astype(np.float32)
 
 
 def _in_front(model: FaceModel, positions: Float64) -> Float64:
-    """Positions (N, 3) relative to the middle of the pupils, in eye separations."""
+    """Return the positions (N, 3) relative to the middle of the pupils, in eye separations."""
     middle = model.points[[point_row("3.5"), point_row("3.6")]].mean(axis=0)
     away: Float64 = (positions - middle) / (model.fapu.ES * 1024)
     return away
 
 
 def _known_points(model: FaceModel) -> tuple[Float64, Float64] | tuple[None, None]:
-    """The points (N, 2) of a face that the map knows, and their places in the map (N, 2)."""
+    """Return the points (N, 2) of a face that have places in the map, and these places (N, 2)."""
     own, shown = [], []
     for name, (x, y) in MAP_POINTS.items():
         for side, point in ((1, name), (-1, MIRRORED.get(name, ""))):
@@ -124,14 +124,14 @@ class _ThinPlate:
         self._weights = np.linalg.lstsq(matrix, np.vstack([values, np.zeros((3, 2))]), rcond=None)[0]
 
     def __call__(self, places: Float64) -> Float64:
-        """The spline (N, 2) at places (N, 2)."""
+        """Return the spline (N, 2) at places (N, 2)."""
         basis = np.column_stack([_bending(places, self._points), np.ones(len(places)), places])
         values: Float64 = basis @ self._weights
         return values
 
 
 def _bending(places: Float64, points: Float64) -> Float64:
-    """(N, M): r^2 log r of the distances between places (N, 2) and points (M, 2)."""
+    """Return (N, M): r^2 log r of the distances between places (N, 2) and points (M, 2)."""
     squared = ((places[:, None] - points[None]) ** 2).sum(axis=2)
     bending: Float64 = 0.5 * squared * np.log(np.maximum(squared, 1e-30))
     return bending

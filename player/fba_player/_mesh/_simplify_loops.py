@@ -18,13 +18,13 @@ import numpy as np
 from fba.arrays import Bool, Float64, Int32, Int64
 from fba.compiled import compiled, inlined
 
-BORDER = 2.0
+BORDER_WEIGHT = 2.0
 """Weight of a border relative to the surface."""
 MAX_TRIANGLES_AROUND = 64
 """A vertex with more triangles than this is never removed."""
-TURNED = 0.3
+MAX_TURN_COSINE = 0.3
 """No triangle may turn by more than the angle of this cosine."""
-THIN = 0.05
+MIN_HEIGHT_SHARE = 0.05
 """Least height of a triangle, as a share of its longest side, unless it was thinner before."""
 
 
@@ -155,8 +155,8 @@ def add_quadrics(points: Float64, fans: Fans, sums: Quadrics) -> None:
                 e[i] = points[two, i] - points[one, i]
             length = _unit(e)
             if length > 1e-12:
-                _add(points, one, e, f, BORDER * length * length, sums, one)
-                _add(points, one, e, f, BORDER * length * length, sums, two)
+                _add(points, one, e, f, BORDER_WEIGHT * length * length, sums, one)
+                _add(points, one, e, f, BORDER_WEIGHT * length * length, sums, two)
 
 
 @inlined
@@ -170,7 +170,7 @@ def _apart(points: Float64, a: int, b: int, i: int) -> tuple[float, float, float
 
 @compiled
 def _fits(points: Float64, poses: int, fans: Fans, u: int, v: int) -> bool:
-    """Whether no triangle around u turns over or becomes a splinter when u goes to v, in any pose."""
+    """Return whether no triangle around u turns over or becomes a splinter when u goes to v, in any pose."""
     for o in range(fans.start[u], fans.start[u + 1]):
         corners = fans.triangles[fans.owners[o]]
         if corners[0] == v or corners[1] == v or corners[2] == v:
@@ -185,14 +185,14 @@ def _fits(points: Float64, poses: int, fans: Fans, u: int, v: int) -> bool:
             ax, ay, az = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
             bx, by, bz = ey * vz - ez * vy, ez * vx - ex * vz, ex * vy - ey * vx
             before, after = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
-            if ax * bx + ay * by + az * bz <= TURNED * np.sqrt(before * after):
+            if ax * bx + ay * by + az * bz <= MAX_TURN_COSINE * np.sqrt(before * after):
                 return False
             edge = ex * ex + ey * ey + ez * ez
             u_far = (ux - ex) ** 2 + (uy - ey) ** 2 + (uz - ez) ** 2
             v_far = (vx - ex) ** 2 + (vy - ey) ** 2 + (vz - ez) ** 2
             longest_before = max(edge, ux * ux + uy * uy + uz * uz, u_far)
             longest_after = max(edge, vx * vx + vy * vy + vz * vz, v_far)
-            if np.sqrt(after) < THIN * longest_after and (
+            if np.sqrt(after) < MIN_HEIGHT_SHARE * longest_after and (
                 after * longest_before * longest_before < before * longest_after * longest_after
             ):
                 return False
@@ -260,7 +260,7 @@ def candidates(
             error = _squared_error(points, sums, u, v)
             if not error < best:
                 continue
-            joint = 0  # neighbours of both ends: more than the edge has triangles would make a non-manifold
+            joint = 0  # common neighbours of the ends: more than triangles at the edge make it non-manifold
             for k in range(count):
                 if near[k] != v and _count_triangles(fans, v, near[k]) > 0:
                     joint += 1

@@ -8,7 +8,8 @@ from fba.arrays import Float32, Int32
 
 
 def _sheet(rows: int, columns: int) -> Int32:
-    """int32 (F, 3): triangles of a band of rows x columns vertices whose last column joins the first."""
+    """Return int32 (F, 3): triangles of a band of rows x columns vertices whose last column joins the
+    first."""
     r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
     a, b = r * columns + c, r * columns + (c + 1) % columns
     both = np.stack([a, b, b + columns, a, b + columns, a + columns], axis=-1)
@@ -16,8 +17,8 @@ def _sheet(rows: int, columns: int) -> Int32:
 
 
 def capsule_mesh(around: int = 20, cap: int = 6) -> tuple[Float32, Int32]:
-    """Vertices (V, 4) and triangles (F, 3) of a capsule: a point on the unit sphere, y along the axis, and
-    the end that it belongs to, 0 or 1."""
+    """Return the vertices (V, 4) and triangles (F, 3) of a capsule: a point on the unit sphere, y along the
+    axis, and the end that it belongs to, 0 or 1."""
     lower = np.linspace(-np.pi / 2, 0, cap + 1)
     latitudes = np.concatenate([lower, -lower[::-1]])
     ends = np.repeat([0.0, 1.0], cap + 1)
@@ -31,7 +32,7 @@ def capsule_mesh(around: int = 20, cap: int = 6) -> tuple[Float32, Int32]:
 
 
 def sphere_mesh(rows: int = 20, around: int = 32) -> tuple[Float32, Int32]:
-    """Vertices (V, 3) and triangles (F, 3) of the unit sphere, its poles on the z axis."""
+    """Return the vertices (V, 3) and triangles (F, 3) of the unit sphere, its poles on the z axis."""
     latitudes = np.linspace(0, np.pi, rows)
     turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
     flat = np.sin(latitudes)[:, None]
@@ -41,5 +42,5 @@ def sphere_mesh(rows: int = 20, around: int = 32) -> tuple[Float32, Int32]:
 
 
 def tube_mesh(count: int, around: int = 8) -> Int32:
-    """int32 (F, 3): triangles of a tube of `count` rings with `around` vertices each."""
+    """Return int32 (F, 3): triangles of a tube of `count` rings with `around` vertices each."""
     return _sheet(count, around)

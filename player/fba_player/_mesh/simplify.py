@@ -20,7 +20,7 @@ MIN_TRIANGLES = 200
 MAX_PASSES = 40
 MIN_REMOVED_SHARE = 0.004
 """A pass that removes less than this share of the vertices is the last one of its level."""
-MAKING = "2"
+CACHE_VERSION = "2"
 """Cache version; increment when `simplify` gives other results."""
 
 
@@ -37,8 +37,8 @@ class DetailLevels:
     triangles: Int32
 
     def triangles_within(self, tolerance: float) -> Int32 | None:
-        """int32 (F, 3): triangles of the coarsest level whose error is at most `tolerance` (m); None for the
-        mesh as it is."""
+        """Return int32 (F, 3): triangles of the coarsest level whose error is at most `tolerance` (m); None
+        for the mesh as it is."""
         level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
         if level < 0 or len(self.triangles) < MIN_TRIANGLES or not is_compiled():
             return None
@@ -54,7 +54,7 @@ class DetailLevels:
     @cached_property
     def _collapses(self) -> tuple[Int32, Int32]:
         """What `simplify` returns."""
-        digest = hashlib.sha256(MAKING.encode())
+        digest = hashlib.sha256(CACHE_VERSION.encode())
         for array in (self.points, self.triangles):
             digest.update(np.ascontiguousarray(array).data)
 
@@ -71,20 +71,20 @@ class DetailLevels:
 def simplify(
     points: Float64, poses: int, triangles: Int32, tolerances: Sequence[float] = TOLERANCES
 ) -> tuple[Int32, Int32]:
-    """For each vertex, int32 (V,) twice: the vertex that it collapses onto, and the level at which it does.
+    """Return the vertex that each vertex collapses onto, and the level at which it does: int32 (V,) twice.
 
     The level is an index into tolerances (m, rising), or their number for a vertex that stays. points, poses,
     triangles: as in `DetailLevels`. Borders keep their course; vertices that share a position stay.
-    ValueError for triangles of other vertices, and for poses that points do not have.
+    ValueError for triangles that name other vertices, and for more poses than the points hold.
     """
     from fba_player._mesh import _simplify_loops as loops
 
     count, size = points.shape
     left = np.ascontiguousarray(triangles, dtype=np.int32).copy()
     if left.size and not 0 <= left.min() <= left.max() < count:
-        raise ValueError(f"triangles name vertices that there are not: there are {count}")
+        raise ValueError(f"triangles name vertices beyond the {count} that exist")
     if not 0 <= 3 * poses <= size:
-        raise ValueError(f"points of {size} coordinates have no {poses} poses")
+        raise ValueError(f"points of {size} coordinates cannot hold {poses} poses")
     start = np.zeros(count + 1, dtype=np.int64)
     owners = np.empty(3 * len(left), dtype=np.int32)
     loops.around(left, count, start, owners)
@@ -116,13 +116,13 @@ def simplify(
 
 
 def _without_flat(triangles: Int32) -> Int32:
-    """The triangles (F, 3) with three different corners."""
+    """Return the triangles (F, 3) with three different corners."""
     a, b, c = triangles.T
     return np.ascontiguousarray(triangles[(a != b) & (b != c) & (c != a)])
 
 
 def _share_positions(positions: Float64) -> Bool:
-    """bool (V,): whether another vertex has the same position, as along a seam, which would gape."""
+    """Return bool (V,): whether another vertex has the same position, as along a seam, which would gape."""
     rounded = np.ascontiguousarray(np.round(positions * 1e6).astype(np.int64))
     _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
     shared: Bool = counts[inverse.ravel()] > 1

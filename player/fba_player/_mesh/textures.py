@@ -21,23 +21,27 @@ from fba.limits import DEFAULT_LIMITS, Limits
 
 MAX_PICTURE_SIZE = 4096
 """Pixels to which wider or higher pictures are scaled down."""
-PIXEL_BYTES, SCALED_BYTES, COEFFICIENT_BYTES = 4, 8, 6
-"""Memory of a pixel while it is decoded, and scaled down; of a progressive JPEG, that of its coefficients."""
-BAND = 256
+PIXEL_BYTES = 4
+"""Memory of a decoded pixel."""
+SCALED_BYTES = 8
+"""Memory of a pixel while the picture is scaled down."""
+COEFFICIENT_BYTES = 6
+"""Memory of the coefficients of a pixel of a progressive JPEG."""
+BAND_ROWS = 256
 """Rows that are converted at once."""
 MIN_CACHED_BYTES = 100_000
 """Files of at least this many bytes are cached on disk when reduced."""
-MAKING = 2
+CACHE_VERSION = 2
 """Cache version of pictures; increment when `FacePicture` gives other pixels or measures."""
 
 RELIEF_SIZE = 256
 RELIEF = 0.022
 """Metres after which the skin's relief repeats."""
-SHARES = ((3.0, 0.35), (9.0, 0.7), (26.0, 1.0), (60.0, 0.6))
+NOISE_BANDS = ((3.0, 0.35), (9.0, 0.7), (26.0, 1.0), (60.0, 0.6))
 """Bands of the relief's noise: grains across the picture, and their weights."""
-SPREAD = 0.17
+NOISE_DEVIATION = 0.17
 """Standard deviation of a channel of the relief, as a share of its range."""
-RELIEF_MAKING = 1
+RELIEF_CACHE_VERSION = 1
 """Cache version of the relief; increment when `skin_relief` gives other pixels."""
 
 
@@ -59,11 +63,12 @@ class FacePicture:
         return _decode(self.data)
 
     def reduced(self, factor: int) -> UInt8:
-        """uint8 (h, w, 4): reduced by `factor` each way, as square roots of linear light, and alpha."""
+        """Return uint8 (h, w, 4): reduced by `factor` each way, as square roots of linear light, and
+        alpha."""
         if factor < 2 or len(self.data) < MIN_CACHED_BYTES:
             return _reduced(self.pixels, factor)
         width, height = (-(-across // factor) for across in self.size)
-        key = make_key("texture", MAKING, factor, np.frombuffer(self.data, dtype=np.uint8))
+        key = make_key("texture", CACHE_VERSION, factor, np.frombuffer(self.data, dtype=np.uint8))
         (pixels,) = load_or_make(
             key, ((height, width, 4),), lambda: [_reduced(self.pixels, factor)], np.uint8
         )
@@ -71,7 +76,7 @@ class FacePicture:
 
 
 def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture:
-    """The picture in the bytes of a PNG, JPEG or WebP file.
+    """Return the picture in the bytes of a PNG, JPEG or WebP file.
 
     Raises OSError, ValueError or SyntaxError if it cannot be read, LimitError if it has more pixels, or takes
     more memory for its bytes, than the limits allow.
@@ -79,7 +84,7 @@ def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture
     _check_size(data, limits)
 
     def measure() -> list[Int32]:
-        """Width, height, and 1 if it is opaque."""
+        """Return the width, height, and 1 if it is opaque."""
         pixels = _decode(data)
         height, width = pixels.shape[:2]
         return [np.array([width, height, (pixels[..., 3] == 255).all()], dtype=np.int32)]
@@ -87,7 +92,7 @@ def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture
     if len(data) < MIN_CACHED_BYTES:
         (measures,) = measure()
     else:
-        key = make_key("picture", MAKING, np.frombuffer(data, dtype=np.uint8))
+        key = make_key("picture", CACHE_VERSION, np.frombuffer(data, dtype=np.uint8))
         (measures,) = load_or_make(key, ((3,),), measure, np.int32)
         if measures.min() < 0 or measures.max() > MAX_PICTURE_SIZE:
             (measures,) = measure()
@@ -132,15 +137,15 @@ def _prepare(image: Any) -> None:
 
 
 def _decode(data: bytes) -> UInt8:
-    """uint8 (H, W, 4): the pixels of a file, at most `MAX_PICTURE_SIZE` wide and high."""
+    """Return uint8 (H, W, 4): the pixels of a file, at most `MAX_PICTURE_SIZE` wide and high."""
     with _opened(data) as image:
         _prepare(image)
         if max(image.size) > MAX_PICTURE_SIZE:
             image.thumbnail((MAX_PICTURE_SIZE, MAX_PICTURE_SIZE))
         pixels = np.empty((image.height, image.width, 4), dtype=np.uint8)
-        for top in range(0, image.height, BAND):  # a whole copy in RGBA would double the memory
-            rows = image.crop((0, top, image.width, min(top + BAND, image.height)))
-            pixels[top : top + BAND] = np.asarray(rows.convert("RGBA"))
+        for top in range(0, image.height, BAND_ROWS):  # a whole copy in RGBA would double the memory
+            rows = image.crop((0, top, image.width, min(top + BAND_ROWS, image.height)))
+            pixels[top : top + BAND_ROWS] = np.asarray(rows.convert("RGBA"))
         return pixels
 
 
@@ -155,17 +160,18 @@ def _reduced(pixels: UInt8, factor: int) -> UInt8:
 
 @cache
 def _roots() -> tuple[int, ...]:
-    """Table from sRGB codes to square roots of linear light, 0..255."""
+    """Return the table from sRGB codes to square roots of linear light, 0..255."""
     return tuple(int(v) for v in np.round(255 * np.sqrt(linear_light(np.arange(256) / 255))))
 
 
 def linear_light(srgb: Float64) -> Float64:
-    """Linear light of values in sRGB, both 0..1."""
+    """Return linear light of values in sRGB, both 0..1."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def texture_breadth(positions: Float32, texcoords: Float32, triangles: Int32) -> float:
-    """Metres that the whole width of a texture covers on a mesh (a median); 0 where it covers nothing."""
+    """Return the metres that the whole width of a texture covers on a mesh (a median); 0 where it covers
+    nothing."""
     if not len(triangles):
         return 0.0
     corners, flat = positions[triangles], texcoords[triangles]
@@ -177,11 +183,11 @@ def texture_breadth(positions: Float32, texcoords: Float32, triangles: Int32) ->
 
 
 def skin_relief() -> UInt8:
-    """uint8 (256, 256, 3): the fine relief of skin, three channels of repeating noise around 128.
+    """Return uint8 (256, 256, 3): the fine relief of skin, three channels of repeating noise around 128.
 
     From pores to the coarser grain seen from further away; always the same, stored in the disk cache.
     """
-    key = make_key("relief", RELIEF_MAKING, RELIEF_SIZE, SPREAD, SHARES)
+    key = make_key("relief", RELIEF_CACHE_VERSION, RELIEF_SIZE, NOISE_DEVIATION, NOISE_BANDS)
     (pixels,) = load_or_make(key, ((RELIEF_SIZE, RELIEF_SIZE, 3),), lambda: [_make_relief()], np.uint8)
     return pixels
 
@@ -191,10 +197,11 @@ def _make_relief() -> UInt8:
     along = np.fft.fftfreq(RELIEF_SIZE, 1 / RELIEF_SIZE)
     distance = np.hypot(along[:, None], along[None])
     bands = sum(
-        share * np.exp(-(((distance - grains) / (0.45 * grains)) ** 2)) / grains for grains, share in SHARES
+        share * np.exp(-(((distance - grains) / (0.45 * grains)) ** 2)) / grains
+        for grains, share in NOISE_BANDS
     )
     white = np.fft.fft2(random.standard_normal((3, RELIEF_SIZE, RELIEF_SIZE)))
     noise = np.real(np.fft.ifft2(white * bands))
     noise /= noise.std(axis=(1, 2), keepdims=True)
-    pixels = np.clip(127.5 + 255 * SPREAD * noise, 0, 255).astype(np.uint8)
+    pixels = np.clip(127.5 + 255 * NOISE_DEVIATION * noise, 0, 255).astype(np.uint8)
     return np.ascontiguousarray(pixels.transpose(1, 2, 0))

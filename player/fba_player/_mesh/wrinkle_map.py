@@ -16,20 +16,25 @@ from fba.cache import load_or_make, make_key
 
 WRINKLES = ("forehead", "frown", "eye corner", "cheek")
 """One channel of the map each."""
-WIDTH, TOP, BOTTOM = 1.25, 1.25, -1.55
-"""What the map shows, in eye separations: to the left of the middle, above and below the pupils."""
+WIDTH = 1.25
+"""Left edge of the map: eye separations from the middle of the pupils."""
+TOP = 1.25
+BOTTOM = -1.55
+"""Upper and lower edge: eye separations above the pupils."""
 TEXELS = 256
 """Texels of an eye separation."""
 SHAPE = (round((TOP - BOTTOM) * TEXELS), round(WIDTH * TEXELS))
 PLAIN = 128
 """Value where there is no wrinkle; lower is darker."""
-EDGE = 0.42
-"""Brightness of the lower edge, of the groove's darkness."""
-EDGE_BELOW, EDGE_BREADTH = 1.7, 1.5
-"""How far below the groove the edge is brightest, and its breadth, in widths of the groove."""
-FADE = 4.0
+EDGE_BRIGHTNESS = 0.42
+"""Brightness of the lower edge, as a share of the groove's darkness."""
+EDGE_BELOW = 1.7
+"""Distance of the brightest line of the edge below the groove, in widths of the groove."""
+EDGE_BREADTH = 1.5
+"""Breadth of the edge, in widths of the groove."""
+END_STEEPNESS = 4.0
 """How steeply lines thin out towards their ends: over a quarter of their length each."""
-MAKING = 1
+CACHE_VERSION = 1
 """Cache version; increment when `wrinkle_map` gives other pixels."""
 
 Stroke = tuple[Sequence[tuple[float, float]], float, float]
@@ -66,8 +71,18 @@ STROKES: dict[str, tuple[Stroke, ...]] = {
 
 
 def wrinkle_map() -> UInt8:
-    """uint8 (H, W, 4): the wrinkles, each in its own channel, around `PLAIN`; stored in the disk cache."""
-    key = make_key("wrinkles", MAKING, TEXELS, EDGE, EDGE_BELOW, EDGE_BREADTH, FADE, repr(STROKES))
+    """Return uint8 (H, W, 4): the wrinkles, each in its own channel, around `PLAIN`; stored in the disk
+    cache."""
+    key = make_key(
+        "wrinkles",
+        CACHE_VERSION,
+        TEXELS,
+        EDGE_BRIGHTNESS,
+        EDGE_BELOW,
+        EDGE_BREADTH,
+        END_STEEPNESS,
+        repr(STROKES),
+    )
     (pixels,) = load_or_make(key, ((*SHAPE, len(WRINKLES)),), lambda: [_draw()], np.uint8)
     return pixels
 
@@ -81,18 +96,18 @@ def _draw() -> UInt8:
         for points, width, darkness in STROKES[name]:
             groove = _stroke(across, up, points, width)
             edge = _stroke(across, up + EDGE_BELOW * width, points, EDGE_BREADTH * width)
-            shade += darkness * (EDGE * edge - groove)
+            shade += darkness * (EDGE_BRIGHTNESS * edge - groove)
         pixels[..., channel] = np.clip(np.round(PLAIN + 127 * shade), 0, 255)
     return pixels
 
 
 def _stroke(across: Float64, up: Float64, points: Sequence[tuple[float, float]], width: float) -> Float64:
-    """(H, W), 0..1: a soft line through points, which thins out towards its ends."""
+    """Return (H, W), 0..1: a soft line through points, which thins out towards its ends."""
     line = _smooth(np.array(points))
     along = np.linspace(0, 1, len(line))
     strength = np.zeros(across.shape)
     for (x, y), where in zip(line, along, strict=True):
-        fade = min(1.0, FADE * min(where, 1 - where) + 0.05)
+        fade = min(1.0, END_STEEPNESS * min(where, 1 - where) + 0.05)
         sigma = width * (0.55 + 0.45 * fade)
         reach = 3 * sigma
         near = (np.abs(across[0] - x) < reach).nonzero()[0]
@@ -106,7 +121,7 @@ def _stroke(across: Float64, up: Float64, points: Sequence[tuple[float, float]],
 
 
 def _smooth(points: Float64) -> Float64:
-    """(N, 2): points on a Catmull-Rom curve through `points`, about two a texel."""
+    """Return (N, 2): points on a Catmull-Rom curve through `points`, about two a texel."""
     ends = np.vstack([2 * points[0] - points[1], points, 2 * points[-1] - points[-2]])
     pieces = []
     for a, b, c, d in zip(ends, ends[1:], ends[2:], ends[3:], strict=False):

@@ -27,9 +27,9 @@ TRACK = 40.0
 BUTTONS = TOP + TRACK + 13.0
 STRIP = (4.0, 9.0)
 """Upper and lower edge of the strip of expressions, in points below the timeline."""
-GRIP = 7.0
+GRIP_DISTANCE = 7.0
 """Distance in points within which the mouse grabs a mark."""
-APART = 86.0
+LABEL_DISTANCE = 86.0
 """Least distance in points between labels of the ruler."""
 
 
@@ -46,13 +46,8 @@ class Bar:
         """Left, top, right, bottom of the timeline in points; for tests and pictures."""
         self.buttons = Buttons()
 
-    @property
-    def held(self) -> bool:
-        """Whether the mouse is dragging in the timeline."""
-        return bool(self._held)
-
     def height(self, display: tuple[float, float]) -> float:
-        """Height of the bar in points, in a display of this size."""
+        """Return the height of the bar in points, in a display of this size."""
         return HEIGHT if display[1] >= 260 and display[0] >= 330 else LOW_HEIGHT
 
     def draw(self, session: Session, display: tuple[float, float]) -> None:
@@ -80,10 +75,10 @@ class Bar:
         self.area = (ruler.left, top, ruler.right, bottom)
         if ruler.right - ruler.left < 8:
             return
-        imgui.set_cursor_screen_pos((ruler.left - GRIP, y + 4))
+        imgui.set_cursor_screen_pos((ruler.left - GRIP_DISTANCE, y + 4))
         imgui.invisible_button(
             "timeline",
-            (ruler.right - ruler.left + 2 * GRIP, TOP - 4 + TRACK),
+            (ruler.right - ruler.left + 2 * GRIP_DISTANCE, TOP - 4 + TRACK),
             EITHER_BUTTON,
         )
         hovered = imgui.is_item_hovered()
@@ -129,7 +124,7 @@ class Bar:
         near = {name: abs(ruler.x(time) - x) for name, time in marks.items() if time is not None}
         if near:
             name = min(near, key=lambda one: near[one])
-            if near[name] <= GRIP and abs(ruler.x(session.transport.time) - x) >= near[name]:
+            if near[name] <= GRIP_DISTANCE and abs(ruler.x(session.transport.time) - x) >= near[name]:
                 return name
         return "head"
 
@@ -222,8 +217,8 @@ class Bar:
 
 
 def _ticks(ruler: Ruler) -> tuple[list[float], list[tuple[float, float, str]]]:
-    """x of the small ticks; and (x, left edge of the label, label) of the large ones."""
-    step = ruler.step(APART)
+    """Return the x of small ticks, and (x, left edge of the label, label) of large ones."""
+    step = ruler.step(LABEL_DISTANCE)
     large = []
     for time in ruler.ticks(step):
         x, text = ruler.x(time), label(time, step)
@@ -233,7 +228,7 @@ def _ticks(ruler: Ruler) -> tuple[list[float], list[tuple[float, float, str]]]:
 
 
 def _span(session: Session) -> tuple[float, float]:
-    """Times of the first and the last frame."""
+    """Return the times of the first and the last frame."""
     timeline = session.scene.timeline
     start = float(timeline.start)
     return start, max(float(timeline.time_of(timeline.frames - 1)), start)

@@ -8,12 +8,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-EDGE, GAP, FOLDED_GAP = 14.0, 10.0, 4.0
-"""Points around columns, between panels, and below folded panels."""
+EDGE = 14.0
+"""Points around a column."""
+GAP = 10.0
+"""Points between two panels."""
+FOLDED_GAP = 4.0
+"""Points below a folded panel."""
 TITLE = 32.0
 """Height of a folded panel, which shows only its title."""
-MIDDLE, MIN_MIDDLE = 0.3, 240.0
-"""Least width between the columns: a share of the display's, and points."""
+MIN_MIDDLE_SHARE = 0.3
+"""Least width between the columns, as a share of the display's."""
+MIN_MIDDLE = 240.0
+"""Least width between the columns, in points."""
 MIN_COLUMN = 280.0
 """Least width of a column; if two do not fit beside the middle, there is only the right one."""
 
@@ -55,7 +61,8 @@ class Docks:
             self._arranged = ((), {})
 
     def arrange(self, requests: list[DockRequest], wide: float, top: float, high: float) -> dict[str, Dock]:
-        """Positions of panels by name, in a display `wide` points wide with `high` free points from `top` on.
+        """Return the positions of panels by name, in a display `wide` points wide with `high` free points
+        from `top` on.
 
         Panels whose title has no room are left out.
         """
@@ -66,7 +73,7 @@ class Docks:
         self._sides = {name: side for name, side in self._sides.items() if name in names}
         self._used = [name for name in self._used if name in names]
         room = wide - 2 * EDGE
-        middle = max(MIDDLE * wide, MIN_MIDDLE)
+        middle = max(MIN_MIDDLE_SHARE * wide, MIN_MIDDLE)
         both = room - middle >= 2 * MIN_COLUMN
         columns: dict[str, list[DockRequest]] = {"left": [], "right": []}
         known = [name for name in self._sides if name in names]  # in the order in which they opened
@@ -112,7 +119,7 @@ class Docks:
 
 
 def free_middle(docks: Iterable[Dock], wide: float) -> tuple[float, float]:
-    """Shares of the width that the columns cover at the left and at the right."""
+    """Return the shares of the width that the columns cover at the left and at the right."""
     left = right = 0.0
     for dock in docks:
         if dock.left <= EDGE:
@@ -123,7 +130,7 @@ def free_middle(docks: Iterable[Dock], wide: float) -> tuple[float, float]:
 
 
 def _side(request: DockRequest, columns: dict[str, list[DockRequest]], high: float) -> str:
-    """The side for a new panel: its own if all fit there, else the other if they do, else the emptier.
+    """Return the side for a new panel: its own if all fit there, else the other if they do, else the emptier.
 
     All fit with the heights that they ask for if possible, else with their least heights.
     """
@@ -149,7 +156,8 @@ def _gaps(column: list[DockRequest], folded: set[str]) -> float:
 
 
 def _share_height(least: list[float], most: list[float], room: float) -> list[float]:
-    """Heights from `least` to `most`; the room beyond the least is shared in proportion to the difference."""
+    """Return the heights from `least` to `most`; the room beyond the least is shared in proportion to the
+    difference."""
     least = [min(low, high) for low, high in zip(least, most, strict=True)]
     missing = sum(most) - sum(least)
     spare = min(max(room - sum(least), 0.0), missing)

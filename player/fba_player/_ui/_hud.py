@@ -13,7 +13,7 @@ from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
 
-ABOVE = 40.0
+NOTICE_DISTANCE = 40.0
 """Points from the bar to notices, which leaves room for the text under the mouse of the timeline."""
 FADE_SECONDS = 0.4
 """Seconds in which a notice fades."""
@@ -24,7 +24,7 @@ MIN_NAME_WIDTH = 560.0
 
 
 def draw_recording(session: Session) -> float:
-    """Draw "REC" and the time in the upper left corner during a recording; returns its width in points."""
+    """Draw "REC" and the time in the upper left corner during a recording; return its width in points."""
     if session.recording is None:
         return 0.0
     to = imgui.get_background_draw_list()
@@ -57,7 +57,7 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
 
 
 def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
-    """Draw a button for each panel, or one for all, in the upper right corner; returns their left edge."""
+    """Draw a button for each panel, or one for all, in the upper right corner; return their left edge."""
     if display[0] < 130 or display[1] < 200:
         return display[0]
     labels = [panel.label for panel in panels]
@@ -108,7 +108,7 @@ def _flat_button(label: str, *, lit: bool) -> bool:
 def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:
     """Draw the notices, centred above the bar."""
     to = imgui.get_foreground_draw_list()
-    y = display[1] - above - ABOVE
+    y = display[1] - above - NOTICE_DISTANCE
     for notice in reversed(session.notices()):
         alpha = min((notice.until - session.clock()) / FADE_SECONDS, 1.0)
         colour = {"error": theme.ALERT, "warning": theme.WARM}.get(notice.kind, theme.ACCENT)

@@ -104,7 +104,7 @@ class ImguiRenderer:
         self._textures.clear()
 
     def _upload(self, data: imgui.ImDrawData) -> list[tuple[tuple[float, ...], int, int, int]]:
-        """Upload all lists to one pair of buffers; returns (clip, texture, first index, count) to draw.
+        """Upload all lists to one pair of buffers; return (clip, texture, first index, count) to draw.
 
         Neighbours with the same texture and clip rectangle are merged: a call costs more than its triangles.
         """
@@ -186,6 +186,6 @@ class ImguiRenderer:
 
 
 def _view(vector: Any, count: int, dtype: np.dtype[Any]) -> Array:
-    """The memory of an imgui vector as an array, without a copy; valid until the next frame."""
+    """Return the memory of an imgui vector as an array, without a copy; valid until the next frame."""
     memory = (ctypes.c_char * (count * dtype.itemsize)).from_address(vector.data_address())
     return np.frombuffer(memoryview(memory).cast("B"), dtype)

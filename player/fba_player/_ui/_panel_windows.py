@@ -16,7 +16,7 @@ _FLAGS = imgui.WindowFlags_
 FREE = int(_FLAGS.no_saved_settings | _FLAGS.no_collapse)
 DOCKED = int(FREE | _FLAGS.no_resize | _FLAGS.no_bring_to_front_on_focus)
 FOLDED = int(_FLAGS.no_scrollbar | _FLAGS.no_scroll_with_mouse)
-OVER = 0.985
+COVERING_OPACITY = 0.985
 """Opacity of a panel that covers others."""
 
 
@@ -74,13 +74,13 @@ class PanelWindows:
             place = ((display[0] - wide) / 2, TOP + max(room - high, 0.0) / 2)
             imgui.set_next_window_pos(place, imgui.Cond_.always)
             imgui.set_next_window_size((wide, high), imgui.Cond_.always)
-            imgui.set_next_window_bg_alpha(OVER)
+            imgui.set_next_window_bg_alpha(COVERING_OPACITY)
         imgui.set_next_window_size_constraints((min(200, wide), 60), (display[0], max(room, 60)))
         if not self._window(panel, session, FREE, folded=False):
             session.open.discard(panel.name)
 
     def _window(self, panel: Panel, session: Session, flags: int, *, folded: bool) -> bool:
-        """Draw the window of a panel; returns False if the user closed it."""
+        """Draw the window of a panel; return False if the user closed it."""
         imgui.push_style_var(imgui.StyleVar_.window_min_size, (32, 1))
         expanded, stays_open = imgui.begin(f"{panel.title}###{panel.name}", True, flags)
         imgui.pop_style_var()
@@ -114,7 +114,7 @@ class PanelWindows:
 
     @staticmethod
     def _holds_title() -> bool:
-        """Whether the mouse is pressed on the title of the window that is being drawn."""
+        """Return whether the mouse is pressed on the title of the window that is being drawn."""
         x, y = imgui.get_window_pos()
         start_x, start_y = imgui.get_mouse_pos() - imgui.get_mouse_drag_delta(0)
         on_title = y <= start_y <= y + imgui.get_frame_height()

@@ -136,7 +136,7 @@ class Buttons:
 
 
 def snap_speed(speed: float) -> float:
-    """The speed for a position of the slider: one of `SPEEDS` if it is near, else with two digits."""
+    """Return the speed for a position of the slider: one of `SPEEDS` if it is near, else with two digits."""
     speed = min(max(speed, SPEEDS[0]), SPEEDS[-1])
     near = min(SPEEDS, key=lambda step: abs(math.log(step / speed)))
     return near if abs(math.log(near / speed)) < 0.045 else round(speed, 2)

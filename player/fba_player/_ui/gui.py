@@ -149,7 +149,7 @@ class Gui:
         self._open = set(session.open)
 
     def _bar_height(self, display: tuple[float, float]) -> float:
-        """Height of the bar in points; 0 in a window that plays nothing."""
+        """Return the height of the bar in points; 0 in a window that plays nothing."""
         return self.bar.height(display) if self._plays else 0.0
 
     def _hide(self, io: imgui.IO) -> None:

@@ -22,30 +22,30 @@ class Ruler:
     right: float
 
     def x(self, time: float) -> float:
-        """x of a time, limited to left..right."""
+        """Return the x of a time, limited to left..right."""
         share = (time - self.low) / (self.high - self.low) if self.high > self.low else 0.0
         return self.left + min(max(share, 0.0), 1.0) * (self.right - self.left)
 
     def time(self, x: float) -> float:
-        """Time at x, limited to low..high."""
+        """Return the time at x, limited to low..high."""
         wide = self.right - self.left
         share = min(max((x - self.left) / wide, 0.0), 1.0) if wide > 0 else 0.0
         return self.low + share * (self.high - self.low)
 
     def step(self, apart: float) -> float:
-        """Least step in seconds for labels that are at least `apart` from each other."""
+        """Return the least step in seconds for labels that are at least `apart` from each other."""
         wide = max(self.right - self.left, 1e-6)
         least = (self.high - self.low) * apart / wide
         return next((step for step in STEPS if step >= least), max(math.ceil(least / 36000), 1) * 36000.0)
 
     def ticks(self, step: float) -> list[float]:
-        """Multiples of a step from low to high; at most 1001."""
+        """Return the multiples of a step from low to high; at most 1001."""
         first, last = math.ceil(self.low / step - 1e-6), math.floor(self.high / step + 1e-6)
         return [number * step for number in range(first, min(last, first + 1000) + 1)]
 
 
 def label(seconds: float, step: float) -> str:
-    """Label of a time, with the digits that the step needs: "0:05", "0:05.2", "1:00:05"."""
+    """Return the label of a time, with the digits that the step needs: "0:05", "0:05.2", "1:00:05"."""
     digits = 0 if step >= 1 else 1 if step >= 0.1 else 2
     parts = round(abs(seconds) * 10**digits)
     seconds_shown, rest = divmod(parts, 10**digits)

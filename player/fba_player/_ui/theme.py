@@ -31,7 +31,7 @@ FEELINGS: dict[str, Colour] = {
 
 
 def packed(colour: Colour, alpha: float = 1.0) -> int:
-    """A colour as the 32-bit integer that draw lists of imgui take."""
+    """Return a colour as the 32-bit integer that draw lists of imgui take."""
     red, green, blue, opacity = colour
     return (
         int(red * 255 + 0.5)

@@ -15,22 +15,22 @@ from fba.arrays import UInt8
 from fba.atomic import PathLike, atomic_path, write_error
 from fba_player.sound._pyav import import_av
 
-SMOOTH = Fraction(25)
-"""Most frames per second where none are asked for; some browsers slow down above 50."""
+MAX_DEFAULT_RATE = Fraction(25)
+"""Largest default frame rate; some browsers slow down above 50."""
 IN_MEMORY = 64 << 20
-"""Bytes of pictures held in memory until the palette is known; more go to disk."""
-TICKS = 100
+"""Bytes of pictures kept in memory until the palette is made; further ones go to disk."""
+TICKS_PER_SECOND = 100
 """A GIF's times are hundredths of a second."""
 DITHER = "paletteuse=dither=sierra2_4a:diff_mode=rectangle"
 
 
 def gif_rate(rate: Fraction) -> Fraction:
-    """The frame rate of a GIF: that of the film, divided by an integer so that it is at most 25."""
-    return rate / math.ceil(rate / SMOOTH)
+    """Return the frame rate of a GIF: that of the film, divided by an integer so that it is at most 25."""
+    return rate / math.ceil(rate / MAX_DEFAULT_RATE)
 
 
 class Gif:
-    """A `Sink` that writes a GIF which loops for ever. Pictures are stored until the last one is known.
+    """A `Sink` that writes a GIF which loops for ever. Pictures are stored until the last has been added.
 
     The arguments are those of `Recorder`.
     """
@@ -39,8 +39,8 @@ class Gif:
         self._av = import_av()
         if min(size) < 1 or max(size) > 65535:
             raise ValueError(f"a GIF has 1x1 to 65535x65535 pixels, not {size[0]}x{size[1]}")
-        if rate > TICKS:
-            raise ValueError(f"a GIF has at most {TICKS} frames a second, not {rate}")
+        if rate > TICKS_PER_SECOND:
+            raise ValueError(f"a GIF has at most {TICKS_PER_SECOND} frames a second, not {rate}")
         self.stopped = False
         self._path, self._size, self._rate = Path(path), size, rate
         self._numbers: list[int] = []
@@ -59,10 +59,10 @@ class Gif:
         self._numbers.append(number)
 
     def finish(self, count: int) -> Path:
-        """Finish the film, count / rate seconds long; returns its path."""
+        """Finish the film, count / rate seconds long; return its path."""
         self._into[0].push(None)
         palette = self._palette.pull()
-        times = [round(number / self._rate * TICKS) for number in (*self._numbers, count)]
+        times = [round(number / self._rate * TICKS_PER_SECOND) for number in (*self._numbers, count)]
         last = max(times[-1] - times[-2], 1)
         options = {"loop": "0", "final_delay": str(last)}
         try:
@@ -82,9 +82,9 @@ class Gif:
 
     def _encode(self, container: Any, palette: Any, times: list[int]) -> None:
         width, height = self._size
-        stream = container.add_stream("gif", rate=TICKS)
+        stream = container.add_stream("gif", rate=TICKS_PER_SECOND)
         stream.width, stream.height, stream.pix_fmt = width, height, "pal8"
-        stream.codec_context.time_base = Fraction(1, TICKS)
+        stream.codec_context.time_base = Fraction(1, TICKS_PER_SECOND)
         _graph, into, out = self._graph(DITHER, 2)
         into[1].push(palette)
         into[1].push(None)
@@ -100,7 +100,7 @@ class Gif:
             pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 3)
             into[0].push(self._frame(pixels, "rgb24", number))
             reduced = out.pull()
-            reduced.pts, reduced.time_base = time, Fraction(1, TICKS)
+            reduced.pts, reduced.time_base = time, Fraction(1, TICKS_PER_SECOND)
             container.mux(stream.encode(reduced))
         container.mux(stream.encode(None))
 
@@ -110,7 +110,8 @@ class Gif:
         return frame
 
     def _graph(self, description: str, inputs: int) -> tuple[Any, list[Any], Any]:
-        """(graph, inputs, output) of a filter for pictures of the film's size; input 2 is a palette."""
+        """Return (graph, inputs, output) of a filter for pictures of the film's size; input 2 is a
+        palette."""
         name, _, options = description.partition("=")
         graph = self._av.filter.Graph()
         width, height = self._size

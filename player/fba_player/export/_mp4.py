@@ -15,13 +15,17 @@ from fba_player.sound._pyav import av_version, import_av
 from fba_player.sound.soundtrack import FilmedSound, Soundtrack
 
 ENCODERS = ("libx264", "libopenh264", "h264")
-QUALITY, PRESET = "18", "veryfast"
-"""Constant rate factor and speed preset of x264."""
+QUALITY = "18"
+"""Constant rate factor of x264."""
+PRESET = "veryfast"
+"""Speed preset of x264."""
 MOTION = "subme=1:me=dia"
 """Motion search: a third less work than that of the preset, for 5 % more bytes."""
 THREADS = 4
 """Encoder threads, the same on every machine: their number changes the bits."""
-BT709, SRGB_CURVE, STUDIO_RANGE = 1, 13, 1
+BT709 = 1
+SRGB_CURVE = 13
+STUDIO_RANGE = 1
 """Code points of ISO/IEC 23091-2: colours of HD video, the curve of sRGB, and the range 16..235."""
 
 
@@ -88,7 +92,7 @@ class Mp4:
                 self._audio.encode_until(number / self._rate)
 
     def finish(self, count: int) -> Path:
-        """Finish the film, count / rate seconds long; returns its path."""
+        """Finish the film, count / rate seconds long; return its path."""
         with self._convert_errors():
             self._container.mux(self._stream.encode(None))
             if self._audio is not None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-TEXT, FAINT, PAPER = (232, 235, 240), (158, 165, 175), (34, 37, 43)
+TEXT = (232, 235, 240)
+FAINT = (158, 165, 175)
+PAPER = (34, 37, 43)
 """Colours of labels, of notes and between the pictures, sRGB."""
 SPACE = 4
 """Pixels between cells."""

@@ -22,18 +22,24 @@ from fba_player.view.camera import Camera, Subject
 
 TILE = (400, 480)
 """Width and height of one of the two pictures of a frame, in pixels."""
-FINER = 2
+SUPERSAMPLING = 2
 """Everything is painted this many times larger, and then reduced, which smooths edges."""
 HIDDEN_KINDS = ("teeth", "tongue", "lash", "mouth")
 """Parts of a face that are too small to see, or behind the lips."""
 COLOURS = {"l": "#1f77b4", "r": "#d1495b", "": "#4a4e57"}
-PALM, BACK, SOLE = "#f2b880", "#8d6b4f", "#b9bec9"
-PAPER, FLOOR, INK, FAINT = "#f4f5f7", "#dfe2e8", "#20242c", "#6b7280"
+PALM = "#f2b880"
+BACK_OF_HAND = "#8d6b4f"
+SOLE = "#b9bec9"
+PAPER = "#f4f5f7"
+FLOOR = "#dfe2e8"
+INK = "#20242c"
+FAINT = "#6b7280"
 GRADES = {"good": "#2e7d32", "fair": "#a86500", "poor": "#c62828"}
 LIGHT = np.array([0.35, 0.75, 0.56])
-FILL = 0.45
-"""Share of light that reaches what looks away from the lamp."""
-YAW, PITCH = 32.0, 7.0
+FILL_SHARE = 0.45
+"""Share of the light that reaches surfaces facing away from the lamp."""
+YAW = 32.0
+PITCH = 7.0
 """Degrees by which the camera looks from the side, and from above."""
 MARGIN = 0.16
 """Metres around the figures."""
@@ -41,9 +47,9 @@ MARGIN = 0.16
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """A frame to show: its number and time, what is to be seen, and the source as a stick figure.
+    """A frame to show: its number and time, and the source as a stick figure.
 
-    title: in large letters. note: under it. grade: "good", "fair" or "poor". side: "left" or "right" for a
+    title: large text. note: small text below. grade: "good", "fair" or "poor". side: "left" or "right" for a
     camera on that side of the person.
     """
 
@@ -89,7 +95,7 @@ def _draw_pair(view: View, sight: Sight) -> list[Image.Image]:
     triangles, colours = _person(view)
     corners = np.concatenate([sight.stick.corners, triangles.reshape(-1, 3)])
     camera = _camera(corners, triangles, sight)
-    size = (TILE[0] * FINER, TILE[1] * FINER)
+    size = (TILE[0] * SUPERSAMPLING, TILE[1] * SUPERSAMPLING)
     result = []
     for what in ("source", "result"):
         picture = Image.new("RGB", size, PAPER)
@@ -119,17 +125,17 @@ def _camera(corners: Float64, triangles: Float64, sight: Sight) -> Camera:
 
 
 def _left(stick: Stick) -> Float64:
-    """Return the way from the middle of the right to that of the left parts, on the ground."""
+    """Return the horizontal vector from the middle of the right parts to that of the left parts."""
     sides = np.array(stick.sides)
     places = stick.lines.mean(axis=1)
     if not (sides == "l").any() or not (sides == "r").any():
         return np.array([1.0, 0.0, 0.0])
-    # the ends of the first bones of each side, which are at the hips, say it best
+    # the first bones of each side end at the hips: the clearest ends
     begin = [stick.lines[sides == side][0].mean(axis=0) for side in "lr"]
-    way = begin[0] - begin[1]
-    if np.hypot(way[0], way[2]) < 1e-3:
-        way = places[sides == "l"].mean(axis=0) - places[sides == "r"].mean(axis=0)
-    return np.array([way[0], 0.0, way[2]])
+    vector = begin[0] - begin[1]
+    if np.hypot(vector[0], vector[2]) < 1e-3:
+        vector = places[sides == "l"].mean(axis=0) - places[sides == "r"].mean(axis=0)
+    return np.array([vector[0], 0.0, vector[2]])
 
 
 def _project(points: Float64, camera: Camera, size: tuple[int, int]) -> tuple[Float64, Float64]:
@@ -158,7 +164,7 @@ def _person(view: View) -> tuple[Float64, Float64]:
 
 
 SKIN = np.array([0.62, 0.34, 0.23])
-"""Mean colour, linear, of a skin that has a picture."""
+"""Linear colour of skin that has a texture: about its mean."""
 
 
 def _draw_triangles(
@@ -171,7 +177,7 @@ def _draw_triangles(
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     axes = camera.view_matrix()[:3, :3]
-    shade = FILL + (1 - FILL) * np.clip(normals @ axes.T @ LIGHT, 0.0, 1.0)
+    shade = FILL_SHARE + (1 - FILL_SHARE) * np.clip(normals @ axes.T @ LIGHT, 0.0, 1.0)
     shown = (np.clip(colours * shade[:, None], 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)
     chosen = np.flatnonzero(seen)
     for number in chosen[np.argsort(-away[chosen].mean(axis=1))].tolist():
@@ -185,7 +191,7 @@ def _draw_floor(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int]
         for ends in (((step, -1.5), (step, 1.5)), ((-1.5, step), (1.5, step))):
             points = np.array([[middle[0] + x, 0.0, middle[1] + z] for x, z in ends])
             pixels, _ = _project(points, camera, size)
-            draw.line(pixels.ravel().tolist(), FLOOR, FINER)
+            draw.line(pixels.ravel().tolist(), FLOOR, SUPERSAMPLING)
 
 
 def _draw_stick(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick) -> None:
@@ -198,7 +204,7 @@ def _draw_stick(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int]
     for palm in stick.palms:
         pixels, _ = _project(palm, camera, size)
         normal = np.cross(palm[1] - palm[0], palm[3] - palm[0])
-        colour = PALM if normal @ (eye - palm.mean(axis=0)) > 0 else BACK
+        colour = PALM if normal @ (eye - palm.mean(axis=0)) > 0 else BACK_OF_HAND
         draw.polygon(pixels.ravel().tolist(), fill=colour, outline=INK)
 
 
@@ -206,13 +212,21 @@ def _draw_lines(
     draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick, *, thin: bool
 ) -> None:
     pixels, away = _project(stick.lines, camera, size)
-    width = FINER if thin else 4 * FINER
+    width = SUPERSAMPLING if thin else 4 * SUPERSAMPLING
     for number in np.argsort(-away.mean(axis=1)).tolist():
         colour = COLOURS[stick.sides[number]]
         draw.line(pixels[number].ravel().tolist(), colour, width, joint="curve")
         if not thin:
             x, y = pixels[number, 1].tolist()
-            draw.ellipse((x - 2.5 * FINER, y - 2.5 * FINER, x + 2.5 * FINER, y + 2.5 * FINER), colour)
+            draw.ellipse(
+                (
+                    x - 2.5 * SUPERSAMPLING,
+                    y - 2.5 * SUPERSAMPLING,
+                    x + 2.5 * SUPERSAMPLING,
+                    y + 2.5 * SUPERSAMPLING,
+                ),
+                colour,
+            )
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:

@@ -27,8 +27,8 @@ SHEETS = ("faps", "visemes", "expressions", "all", "review")
 COLUMNS = {"faps": 11, "visemes": 7, "expressions": 3, "review": 8}
 TILE = {"faps": (160, 160), "visemes": (220, 220), "expressions": (360, 360), "review": (200, 200)}
 """Columns, and width and height of a picture in pixels."""
-FULL = 63
-"""Intensity of the expressions, the greatest that a stream can state."""
+FULL_INTENSITY = 63
+"""Intensity of the expressions: the largest that a stream can carry."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,9 @@ def contact_sheet(
     """Return a sheet of labelled pictures: uint8 (H, W, 3), sRGB.
 
     what: "faps", each of the 66 at a value and from a side that show it well; "visemes", the 14;
-    "expressions", the 6 at full intensity; "all", one sheet below the other; "review", what shows whether a
-    head was imported well: at rest, the main motions, visemes and expressions. model: the face, by default
-    the built-in head. tile: width and height of one picture in pixels.
+    "expressions", the 6 at full intensity; "all", one sheet below the other; "review", the rest pose, the
+    main motions, visemes and expressions, which show whether a head was imported well. model: the face, by
+    default the built-in head. tile: width and height of one picture in pixels.
 
     Raises ValueError for another name, pictures below 16x16 or a sheet that would be too large, DisplayError
     where there is no OpenGL.
@@ -88,7 +88,9 @@ def tiles(kind: str, scene: Scene) -> list[Tile]:
         rows = zip(VISEMES[1:], definitions.visemes[1:], strict=True)
         return [Tile(name, f"viseme {n}", row, "cheeks") for n, (name, row) in enumerate(rows, start=1)]
     rows = zip(EXPRESSIONS[1:], definitions.expressions[1:], strict=True)
-    return [Tile(name, f"expression {n}, {FULL}", row) for n, (name, row) in enumerate(rows, start=1)]
+    return [
+        Tile(name, f"expression {n}, {FULL_INTENSITY}", row) for n, (name, row) in enumerate(rows, start=1)
+    ]
 
 
 @cache

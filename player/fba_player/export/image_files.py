@@ -26,7 +26,7 @@ NAMES = "%05d.png"
 
 
 def write_picture(path: PathLike, pixels: UInt8, *, transparent: bool = False) -> Path:
-    """Write pixels, uint8 (H, W, 3 or 4), sRGB, as .png or .jpg, atomically; returns the path.
+    """Write pixels, uint8 (H, W, 3 or 4), sRGB, as .png or .jpg, atomically; return the path.
 
     transparent: keeps the fourth channel, the opacity (not premultiplied); PNG only. Raises UnsupportedError
     for another suffix or a transparent JPEG, FormatError if it cannot be written.
@@ -95,11 +95,12 @@ class Numbered:
         self._before, self._after = NUMBER.split(self.name)[0], NUMBER.split(self.name)[-1]
 
     def path(self, number: int) -> Path:
-        """Path of the picture of a frame, counted from 0."""
+        """Return the path of the picture of a frame, counted from 0."""
         return self.folder / f"{self._before}{number:0{self._width}d}{self._after}"
 
     def existing(self) -> list[int]:
-        """Numbers of the pictures that exist, ascending. Raises FormatError for an unreadable folder."""
+        """Return the numbers of the pictures that exist, ascending. Raises FormatError for an unreadable
+        folder."""
         try:
             names = os.listdir(self.folder)
         except FileNotFoundError:
@@ -112,13 +113,14 @@ class Numbered:
 
 
 def is_sequence(path: PathLike) -> bool:
-    """Whether a path stands for numbered pictures: it has a % in its last part, or ends with a slash."""
+    """Return whether a path stands for numbered pictures: it has a % in its last part, or ends with a
+    slash."""
     text = os.fspath(path)
     return text.endswith(("/", os.sep)) or "%" in os.path.basename(text)
 
 
 def is_film(path: PathLike) -> bool:
-    """Whether a path stands for many pictures: a film, or numbered pictures."""
+    """Return whether a path stands for many pictures: a film, or numbered pictures."""
     return os.path.splitext(os.fspath(path))[1].lower() in FILMS or is_sequence(path)
 
 
@@ -161,7 +163,7 @@ class Sequence:
         write_picture(path, pixels, transparent=self._transparent)
 
     def finish(self, count: int) -> Path:
-        """The folder of the pictures."""
+        """Return the folder of the pictures."""
         return self._names.folder
 
     def abort(self) -> None:

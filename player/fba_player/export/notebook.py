@@ -21,8 +21,10 @@ from fba_player.playback.timeline import clock_text
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 
-WIDTH, SHAPE = 480, 4 / 3
-"""Width of the film in pixels, and width / height."""
+WIDTH = 480
+"""Default width of the film in pixels."""
+ASPECT = 4 / 3
+"""Width / height of the film."""
 MAX_FILM_SECONDS = Fraction(15)
 """Longest film: longer ones would make the page large, and the reader wait."""
 RATE = Fraction(30)
@@ -62,7 +64,7 @@ class Preview:
         self._subject = subject
         shown: Any = subject
         self._animation: Animation = subject if isinstance(subject, Animation) else shown.animation
-        self._size = (width // 2 * 2, round(width / SHAPE) // 2 * 2)
+        self._size = (width // 2 * 2, round(width / ASPECT) // 2 * 2)
         self._camera, self._start, self._end = camera, start, end
         self._audio, self._audio_offset = audio, audio_offset
         self._html: str | None = None
@@ -71,7 +73,7 @@ class Preview:
         return f"<preview of {describe(self._animation)}>"
 
     def _repr_html_(self) -> str:
-        """The film as self-contained HTML; made once."""
+        """Return the film as self-contained HTML; made once."""
         if self._html is None:
             self._html = self._make_html()
         return self._html
@@ -147,7 +149,8 @@ def show_animations(shell: Any) -> None:
 
 
 def describe(animation: Animation) -> str:
-    """One line about an animation: its name, frames, duration, rate, and whether it has a face and a body."""
+    """Return one line about an animation: its name, frames, duration, rate, and whether it has a face and a
+    body."""
     parts = [
         name for name, track in (("face", animation.face), ("body", animation.body)) if track is not None
     ]

@@ -69,7 +69,7 @@ class Offscreen:
         self._buffer = bytearray(width * height * 4)
 
     def frame(self, time: float) -> UInt8:
-        """The picture at a time in seconds: uint8 (H, W, 4), sRGB, top row first.
+        """Return the picture at a time in seconds: uint8 (H, W, 4), sRGB, top row first.
 
         It is opaque, unless the scene's background is transparent. The same time gives the same picture.
         Raises ValueError for a time that is not finite, or after `close`.
@@ -77,14 +77,14 @@ class Offscreen:
         return self.draw(time).copy()
 
     def draw(self, time: float) -> UInt8:
-        """The picture at a time, as `frame` returns it, in memory that the next call overwrites."""
+        """Return the picture at a time, as `frame` returns it, in memory that the next call overwrites."""
         if self._target is None:
             raise ValueError("this Offscreen is closed")
         camera = follow_camera(self.camera, self.scene, time, of_head=self._of_head)
         return self._draw_view(self.scene.view_at(time), camera)
 
     def still(self, faps: npt.ArrayLike) -> UInt8:
-        """A picture of the face for FAPs (68,) as `fba.face.resolve` returns them: uint8 (H, W, 4).
+        """Return a picture of the face for FAPs (68,) as `fba.face.resolve` returns them: uint8 (H, W, 4).
 
         It uses `camera`, which may be set before each call. Raises ValueError for another shape, or after
         `close`.
@@ -102,7 +102,8 @@ class Offscreen:
         return self._read(view, camera, self._target)
 
     def _draw_over_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
-        """Both pictures, multisampled: the pass that smooths edges would miss dark ones before black."""
+        """Return both pictures, multisampled: the pass that smooths edges would miss dark ones before
+        black."""
         with self._gl:
             if self._multisampled is None:
                 self._multisampled = Target(self._gl, self.size, max(self._samples, TRANSPARENT_SAMPLES))
@@ -118,7 +119,7 @@ class Offscreen:
         width, height = self.size
         pixels = np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)
         if view.extras is not None:
-            pixels[..., 3] = 255  # extras mark their pixels there for the target
+            pixels[..., 3] = 255  # annotations mark their pixels there for the target
         return pixels[::-1]
 
     def close(self) -> None:
@@ -141,7 +142,8 @@ class Offscreen:
 
 
 def cut_out(black: UInt8, white: UInt8) -> UInt8:
-    """The foreground with alpha, uint8 (H, W, 4), from the same picture before black and before white."""
+    """Return the foreground with alpha, uint8 (H, W, 4), from the same picture before black and before
+    white."""
     dark, light = (picture[..., :3].astype(np.float32) for picture in (black, white))
     opaque = np.clip(1 - (light - dark).mean(axis=2) / 255, 0.0, 1.0)
     foreground = np.empty_like(black)
@@ -151,12 +153,12 @@ def cut_out(black: UInt8, white: UInt8) -> UInt8:
 
 
 def looks_at_head(camera: Camera | str | None) -> bool:
-    """Whether this is the name of a camera that looks at the face alone."""
+    """Return whether this is the name of a camera that looks at the face alone."""
     return isinstance(camera, str) and camera != "body"
 
 
 def follow_camera(camera: Camera, scene: Scene, time: float, *, of_head: bool = False) -> Camera:
-    """The camera, moved along with a figure that walks away. of_head: with its head, wherever that goes."""
+    """Return the camera, moved along with a figure that walks away. of_head: follow its head instead."""
     moved = scene.head_travel(time) if of_head else scene.travel(time)
     if not any(moved):
         return camera

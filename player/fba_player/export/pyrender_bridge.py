@@ -34,15 +34,18 @@ if TYPE_CHECKING:
 
 NUMPY_1 = {"infty": np.inf, "Inf": np.inf, "NaN": np.nan, "float_": np.float64}
 """Names that NumPy 2 has dropped and that pyrender, or trimesh, may use."""
-WHITE, PUPIL = (0.62, 0.58, 0.55), (0.004, 0.004, 0.004)
-"""Colours of an eye, linear."""
+WHITE = (0.62, 0.58, 0.55)
+PUPIL = (0.004, 0.004, 0.004)
+"""Linear colours of an eye."""
 IRIS_LIGHT = 2.2
 """Factor on the colour of the iris, which is that under the cornea: the cornea gathers light on it."""
 WET = 0.15
 """Roughness of a wet eye."""
 EXPOSURE = 0.72
 """Factor on all lights: unlike ours, pyrender's pictures have no tone mapping."""
-EYE_ROWS, EYE_AROUND = 64, 48
+EYE_ROWS = 64
+EYE_AROUND = 48
+"""Vertices of an eyeball from pole to pole, and around."""
 
 
 def to_pyrender(
@@ -55,7 +58,7 @@ def to_pyrender(
     body: BodyModel | None = None,
     axes: str = "iso",
 ) -> Any:
-    """A `pyrender.Scene` of an animation at t seconds: its meshes, our camera and the studio's lights.
+    """Return a `pyrender.Scene` of an animation at t seconds: its meshes, our camera and the studio's lights.
 
     model: the face; None for the built-in head. camera: a `Camera`, the name of a preset, or None for the one
     that suits the content; aspect: width / height of the picture. body, axes: as in `Scene`. Units are
@@ -162,7 +165,7 @@ def _world_attributes(
     triangles: Int32,
     colours: Float32,
 ) -> dict[str, Any]:
-    """Attributes of a pyrender primitive in world coordinates."""
+    """Return the attributes of a pyrender primitive in world coordinates."""
     opaque = np.ones((len(colours), 1))
     return {
         "positions": (positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32),
@@ -173,7 +176,7 @@ def _world_attributes(
 
 
 def _roughness(colours: Float32) -> float:
-    """One roughness for a mesh; the fourth channel of its colours is the gloss of each vertex."""
+    """Return one roughness for a mesh; the fourth channel of its colours is the gloss of each vertex."""
     return float(np.clip(1 - np.median(colours[:, 3]), 0.12, 1.0)) if len(colours) else 1.0
 
 
@@ -207,14 +210,14 @@ def _ambient() -> Float64:
 
 
 def _studio() -> dict[str, tuple[float, float, float]]:
-    """The studio's lights as the shaders define them: linear colours and directions by name."""
+    """Return the studio's lights as the shaders define them: linear colours and directions by name."""
     text = (files("fba_player.gl") / "shaders" / "lighting.glsl").read_text(encoding="utf-8")
     constants = re.findall(r"const vec3 ([A-Z_]+) = (?:normalize\()?vec3\(([^)]*)\)", text)
     return {name: tuple(float(v) for v in values.split(",")) for name, values in constants}  # type: ignore[misc]
 
 
 def _shining_from(direction: Float64) -> Float64:
-    """Pose (4, 4) of a light that shines along its -z, from a direction onto the origin."""
+    """Return the pose (4, 4) of a light that shines along its -z, from a direction onto the origin."""
     back = direction / np.linalg.norm(direction)
     right = np.cross([0.0, 1.0, 0.0], back)
     right /= np.linalg.norm(right)

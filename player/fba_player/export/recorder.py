@@ -28,7 +28,7 @@ MAX_WAITING_BYTES = 96 << 20
 MAX_FILM_RATE = 1000
 """Largest rate of a film in frames per second."""
 FILMS = (".mp4", ".gif")
-TURN = 0.0005
+SWITCH_INTERVAL = 0.0005
 """Seconds after which a running thread yields to a waiting one: a tenth of Python's default."""
 
 
@@ -53,7 +53,7 @@ class PromptThreads:
         with self._lock:
             if not self._users:
                 self._before = self._read()
-                self._change(min(TURN, self._before))
+                self._change(min(SWITCH_INTERVAL, self._before))
             self._users += 1
         return self
 
@@ -78,7 +78,7 @@ class Sink(Protocol):
         """Add a picture, uint8 (H, W, 4) of the film's size, at number / rate seconds."""
 
     def finish(self, count: int) -> Path:
-        """Finish the film, count / rate seconds long; returns its path."""
+        """Finish the film, count / rate seconds long; return its path."""
 
     def abort(self) -> None:
         """Remove unfinished files; safe to call at any time, more than once."""
@@ -115,7 +115,7 @@ class Recorder:
 
     @classmethod
     def into(cls, sink: Sink, path: PathLike, size: tuple[int, int], rate: Fraction) -> Recorder:
-        """A recorder that writes to a sink which is open already. path: for messages."""
+        """Return a recorder that writes to a sink which is open already. path: for messages."""
         self = cls.__new__(cls)
         self.path, self.rate = Path(path), rate
         self._start(sink, size)
@@ -149,7 +149,7 @@ class Recorder:
         return self.frames / self.rate
 
     def wants(self, time: float | Fraction) -> bool:
-        """Whether a picture at a time (seconds from the film's start) would become a new frame.
+        """Return whether a picture at a time (seconds from the film's start) would become a new frame.
 
         Ask before reading a picture back from the graphics card: a window draws more often than its film.
         """
@@ -188,7 +188,7 @@ class Recorder:
         return True
 
     def close(self) -> Path | None:
-        """Finish the film; returns its path, or None if no picture was added.
+        """Finish the film; return its path, or None if no picture was added.
 
         Raises the errors of the encoder; no file is left then. Safe to call twice.
         """
@@ -262,7 +262,7 @@ class Recorder:
 
 
 def exact_rate(rate: Fraction | int | str) -> Fraction:
-    """The frame rate as MP4 can store it. Raises ValueError unless it is above 0 and at most 1000."""
+    """Return the frame rate as MP4 can store it. Raises ValueError unless it is above 0 and at most 1000."""
     exact = Fraction(rate)
     if not 0 < exact <= MAX_FILM_RATE:
         raise ValueError(f"a film's frame rate must lie above 0 and at most at {MAX_FILM_RATE}, not {exact}")
@@ -294,7 +294,7 @@ def _open_sink(
 
 
 def _fit(pixels: UInt8, size: tuple[int, int]) -> UInt8:
-    """The picture scaled to fit, centred, with black bars."""
+    """Return the picture scaled to fit, centred, with black bars."""
     from PIL import Image, ImageOps
 
     picture = Image.fromarray(np.ascontiguousarray(pixels)).convert("RGBA")

@@ -40,8 +40,9 @@ SLACK = 0.001
 """Seconds that a given time may lie outside the animation: people round times."""
 PICTURE_SAMPLES = 4
 """Samples per pixel of a single picture, which need not be fast."""
-SIZE, GIF_SIZE = (1280, 720), (480, 270)
-"""Default sizes; a GIF of full size would be huge."""
+SIZE = (1280, 720)
+GIF_SIZE = (480, 270)
+"""Default sizes in pixels; a GIF of full size would be huge."""
 
 
 def render(
@@ -125,7 +126,7 @@ def record(
     replace: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Write a film, or numbered pictures, at an exact frame rate; returns the path. See `render`.
+    """Write a film, or numbered pictures, at an exact frame rate; return the path. See `render`.
 
     MP4: H.264, yuv420p, and AAC. It needs even sizes: the last column or row of odd ones is cut.
     """
@@ -169,14 +170,14 @@ def record(
 
 
 def picture_size(size: tuple[int, int] | None, path: PathLike) -> tuple[int, int]:
-    """Width and height of a picture or film of that name. size: as given by the user, or None."""
+    """Return the width and height of a picture or film of that name. size: as given by the user, or None."""
     suffix = os.path.splitext(os.fspath(path))[1].lower()
     width, height = size or (GIF_SIZE if suffix == ".gif" else SIZE)
     return (width // 2 * 2, height // 2 * 2) if suffix == ".mp4" else (width, height)
 
 
 def as_scene(subject: Animation | Showable) -> Showable:
-    """A scene of an animation; a scene is returned as it is."""
+    """Return a scene of an animation; a scene is returned as it is."""
     return Scene(subject) if isinstance(subject, Animation) else subject
 
 
@@ -205,7 +206,7 @@ def _check_name(path: PathLike) -> None:
 
 
 def _is_transparent(scene: Showable) -> bool:
-    """Whether the scene's background is switched to transparent."""
+    """Return whether the scene's background is switched to transparent."""
     return scene.switches["background"] == "transparent"
 
 
@@ -257,7 +258,7 @@ def check_inside(scene: Showable, name: str, time: float) -> None:
 def _frame_range(
     scene: Showable, rate: Fraction, start: float | None, end: float | None
 ) -> tuple[Fraction, int]:
-    """Time of the first picture in seconds, exact, and the number of pictures."""
+    """Return the time of the first picture in seconds, exact, and the number of pictures."""
     for name, value in (("start", start), ("end", end)):
         if value is not None:
             check_inside(scene, name, value)

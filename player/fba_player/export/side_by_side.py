@@ -14,9 +14,9 @@ from fba.arrays import UInt8
 from fba.atomic import PathLike
 from fba.errors import UnsupportedError
 from fba_player.export._sheet_layout import PAPER, TEXT, check_tile, lay_out
-from fba_player.export.image_files import write_picture
+from fba_player.export.image_files import PICTURES, write_picture
 from fba_player.export.offscreen import Offscreen
-from fba_player.export.recorder import Recorder
+from fba_player.export.recorder import FILMS, Recorder
 from fba_player.export.render import PICTURE_SAMPLES, as_scene, film_rate
 from fba_player.view._font import label_font, shortened
 from fba_player.view.camera import Camera
@@ -26,7 +26,6 @@ Progress = Callable[[int, int], None]
 
 TILE = (320, 320)
 """Default width and height of one performance in pixels."""
-FILMS, PICTURES = (".mp4", ".gif"), (".png", ".jpg", ".jpeg")
 
 
 def draw_side_by_side(

@@ -30,13 +30,17 @@ from fba_player.view._geometry import world_normals, world_positions
 from fba_player.view._view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend, Lines
 from fba_player.view.camera import Camera
 
-REFERENCE_HEIGHT, MIN_SCALE = 720, 0.35
-CROWDED = 7.0
-"""Lines shorter than this (pixels) are drawn fainter, so that a fine mesh is a tint and no black spot."""
-HIDDEN = 0.2
+REFERENCE_HEIGHT = 720
+"""Pixels: annotations have their nominal size in a picture this high."""
+MIN_SCALE = 0.35
+CROWDED_LENGTH = 7.0
+"""Lines shorter than this (pixels) are drawn fainter, so that a fine mesh is a tint, not a black spot."""
+HIDDEN_OPACITY = 0.2
 """Opacity of a dot behind a surface."""
 MIN_DOT_RADIUS = 0.8
-NAME_SIZE, MIN_NAME_SIZE = 13, 10
+NAME_SIZE = 13
+MIN_NAME_SIZE = 10
+"""Pixels."""
 MIN_LEGEND_SCALE = 0.65
 MARGIN = 14
 CACHED_LABELS = 16
@@ -47,7 +51,8 @@ PROGRAMS = ("line", "dot", "shell", "grid", "label")
 
 
 def project(points: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Float64, Float64]:
-    """Pixels (N, 2) from the upper left and depths (N,), 0..1, of points (N, 3); NaN behind the camera.
+    """Return the pixels (N, 2) from the upper left and depths (N,), 0..1, of points (N, 3); NaN behind the
+    camera.
 
     matrix: (4, 4), world to clip space.
     """
@@ -58,7 +63,7 @@ def project(points: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Fl
 
 
 def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> float:
-    """Pixels per metre at the middle of the dots."""
+    """Return the pixels per metre at the middle of the dots."""
     if not len(dots.positions):
         return 0.0
     away = float(np.linalg.norm(dots.positions.mean(axis=0) - camera.eye))
@@ -66,7 +71,7 @@ def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> floa
 
 
 def _lift(points: Float64, eye: Float64, lift: float) -> Float64:
-    """Points (N, 3) moved by `lift` metres towards the eye."""
+    """Return the points (N, 3) moved by `lift` metres towards the eye."""
     towards = eye - points
     length = np.linalg.norm(towards, axis=1, keepdims=True)
     lifted: Float64 = points + towards * (lift / np.maximum(length, 1e-6))
@@ -133,7 +138,7 @@ class ExtrasRenderer:
         self._programs.clear()
 
     def _fill_buffer(self, name: str, data: Array) -> Any:
-        """The buffer of this name, filled with data; it grows as needed."""
+        """Return the buffer of this name, filled with data; it grows as needed."""
         buffer = self._buffers.get(name)
         if buffer is None or buffer.size < data.nbytes:
             if buffer is not None:
@@ -186,7 +191,7 @@ class ExtrasRenderer:
         program = self._programs["line"]
         set_uniform(program, "width", max(lines.width * scale, 0.8))
         set_uniform(program, "lift", lines.lift)
-        set_uniform(program, "crowded", CROWDED * scale)
+        set_uniform(program, "crowded", CROWDED_LENGTH * scale)
         corners = self._fill_buffer("corners", np.array([0, -1, 1, -1, 0, 1, 1, 1], dtype="f4"))
         ends = self._fill_buffer("ends", lines.ends.astype("f4"))
         names = ("in_from_colour", "in_to_colour")
@@ -211,7 +216,7 @@ class ExtrasRenderer:
             (self._square, "2f", "in_corner"),
             (self._fill_buffer("places", dots.positions.astype("f4")), "3f/i", "in_place"),
         ]
-        for opacity, depth in ((HIDDEN, ">"), (1.0, "<")):
+        for opacity, depth in ((HIDDEN_OPACITY, ">"), (1.0, "<")):
             set_uniform(program, "opacity", opacity)
             gl.depth_func = depth
             self._render("dot", content, len(dots.positions))
@@ -245,7 +250,8 @@ class ExtrasRenderer:
             self._draw_labels(texture, np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
 
     def _depths_of(self, size: tuple[int, int]) -> Float32:
-        """float32 (H, W): depths of the picture, 0..1, bottom row first; read once for each picture."""
+        """Return float32 (H, W): depths of the picture, 0..1, bottom row first; read once for each
+        picture."""
         if self._depths is not None:
             return self._depths
         gl, source, parts = self._gl, self._gl.fbo, []
@@ -261,7 +267,7 @@ class ExtrasRenderer:
         return self._depths
 
     def _label(self, key: Hashable, make: Callable[[], tuple[UInt8, Any]]) -> tuple[Any, Any]:
-        """A texture of labels, cached, and what `make` returned with its picture."""
+        """Return a texture of labels, cached, and what `make` returned with its picture."""
 
         def upload() -> tuple[Any, Any]:
             picture, more = make()

@@ -38,7 +38,7 @@ class Steps:
 
 
 def find_steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Outliner) -> Steps:
-    """The regions along the outlines of faces, and the rectangles that contain everything else.
+    """Return the regions along the outlines of faces, and the rectangles that contain everything else.
 
     matrix: (4, 4), world to clip space. size: of the picture in pixels.
     """
@@ -52,7 +52,8 @@ def find_steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Out
 
 
 def bounding_rectangles(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle]:
-    """Rectangles (left, bottom, width, height), in pixels, that together contain all that is drawn.
+    """Return the rectangles (left, bottom, width, height), in pixels, that together contain all that is
+    drawn.
 
     matrix: (4, 4), world to clip space. None of them lies within another.
     """
@@ -84,7 +85,7 @@ def _face_boxes(face: FaceMesh) -> list[Float64]:
 
 
 def _rectangle(points: Float64, matrix: Float64, size: tuple[int, int]) -> Rectangle:
-    """The part of a picture with points (N, 3) and a margin; all of it if one is behind the camera."""
+    """Return the part of a picture with points (N, 3) and a margin; all of it if one is behind the camera."""
     clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
     if not np.isfinite(clip).all() or (clip[:, 3] < MIN_DEPTH).any():
         return (0, 0, *size)

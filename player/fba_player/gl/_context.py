@@ -22,7 +22,7 @@ OPENGL = ("libEGL.so.1", "libGL.so.1")
 
 
 def import_moderngl() -> Any:
-    """The moderngl module. Raises DisplayError if it cannot be imported."""
+    """Return the moderngl module. Raises DisplayError if it cannot be imported."""
     try:
         import moderngl
     except ImportError as error:
@@ -34,7 +34,7 @@ def import_moderngl() -> Any:
 
 
 def offscreen_context() -> Any:
-    """A moderngl context that needs no display, through EGL or the platform's default.
+    """Return a moderngl context that needs no display, through EGL or the platform's default.
 
     Raises DisplayError without OpenGL 3.3; the message says what to install.
     """
@@ -59,7 +59,8 @@ def offscreen_context() -> Any:
 
 
 def missing_libraries(names: Iterable[str] = OPENGL) -> list[str]:
-    """Those of the named libraries that cannot be loaded; none on other systems than Linux."""
+    """Return those of the named libraries that cannot be loaded; on systems other than Linux, an empty
+    list."""
     if not sys.platform.startswith("linux"):
         return []
     missing = []
@@ -72,7 +73,7 @@ def missing_libraries(names: Iterable[str] = OPENGL) -> list[str]:
 
 
 def how_to_install(names: Iterable[str]) -> str:
-    """A sentence with the commands that install these libraries, which must be in `PACKAGES`."""
+    """Return a sentence with the commands that install these libraries, which must be in `PACKAGES`."""
     debian, fedora = zip(*(PACKAGES[name] for name in names), strict=True)
     return (
         f"Install with: sudo apt-get install {' '.join(debian)} (Debian, Ubuntu), "
@@ -81,7 +82,7 @@ def how_to_install(names: Iterable[str]) -> str:
 
 
 def missing_text(names: Iterable[str]) -> str:
-    """One sentence that names missing libraries, and one with the commands that install them."""
+    """Return one sentence that names missing libraries, and one with the commands that install them."""
     names = list(names)
     kind = "library" if len(names) == 1 else "libraries"
     return f"the system {kind} {' and '.join(names)} cannot be loaded. {how_to_install(names)}"

@@ -18,22 +18,33 @@ from fba.compiled import compiled, is_compiled
 from fba_player._figure.face_light import KEY_DIRECTION
 from fba_player.view._view import FaceMesh, FaceShape
 
-CELLS, CELL = 96, 0.05
-"""The grid: number of cells each way, and their size (m)."""
+CELLS = 96
+"""Number of cells of the grid along each side."""
+CELL = 0.05
+"""Size of a cell, metres."""
 SPACING = 0.036
 """Distance between the points, metres."""
-WITHIN = ("teeth", "tongue", "mouth", "eye")
+INNER_KINDS = ("teeth", "tongue", "mouth", "eye")
 """Kinds of parts that lie inside others and cast no shadow."""
-COARSE = 0.0032
+SAMPLING_ERROR = 0.0032
 """Error (m) up to which surfaces are simplified before points are spread over them."""
-KEY_RAYS, KEY_WIDTH = 12, 0.11
-"""Number of rays of the key light, and its angular radius (rad)."""
-SKY_RAYS, STEEPEST, FLATTEST = 8, 0.97, 0.62
-"""Number of rays of the sky, and the sines of their greatest and least elevation."""
-KEY_SHARE, SKY_SHARE = 0.62, 0.85
-"""Darkness of the ground where all of the key light, or all of the sky, is hidden."""
-KEY_BLUR, SKY_BLUR = 1, 4
-"""Radius, in cells, of the two passes of blur."""
+KEY_RAYS = 12
+"""Number of rays of the key light."""
+KEY_RADIUS = 0.11
+"""Angular radius of the key light, radians."""
+SKY_RAYS = 8
+"""Number of rays of the sky."""
+HIGHEST_SINE = 0.97
+"""Sine of the elevation of the steepest ray of the sky."""
+LOWEST_SINE = 0.62
+"""Sine of the elevation of the flattest ray of the sky."""
+KEY_SHARE = 0.62
+"""Darkness of the ground where all of the key light is hidden."""
+SKY_SHARE = 0.85
+"""Darkness of the ground where all of the sky is hidden."""
+KEY_BLUR = 1
+SKY_BLUR = 4
+"""Radius, in cells, of the two passes of blur of each shadow."""
 MIN_DARKNESS = 3
 """Fainter darkness, of 255, is not drawn."""
 
@@ -101,10 +112,11 @@ class ShadowCaster:
 
 
 def _spread(shape: FaceShape) -> Points | None:
-    """Points spread over a shape's surface in its rest pose; None for a shape that casts no shadow."""
-    if shape.coarser is None or shape.kind in WITHIN:
+    """Return the points spread over a shape's surface in its rest pose; None for a shape that casts no
+    shadow."""
+    if shape.coarser is None or shape.kind in INNER_KINDS:
         return None
-    coarse = shape.coarser.triangles_within(COARSE)
+    coarse = shape.coarser.triangles_within(SAMPLING_ERROR)
     triangles = shape.triangles if coarse is None else coarse
     if not len(triangles):
         return None
@@ -127,7 +139,7 @@ def _spread(shape: FaceShape) -> Points | None:
 
 @cache
 def _rays() -> Float64:
-    """float64 (N, 3): unit vectors towards the key light, then towards the sky."""
+    """Return float64 (N, 3): unit vectors towards the key light, then towards the sky."""
     key = np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION)
     aside = np.cross(key, (0.0, 1.0, 0.0))
     aside /= np.linalg.norm(aside)
@@ -135,10 +147,10 @@ def _rays() -> Float64:
     golden = np.pi * (3 - 5**0.5)
     rays = []
     for k in range(KEY_RAYS):
-        reach = KEY_WIDTH * np.sqrt((k + 0.5) / KEY_RAYS)
+        reach = KEY_RADIUS * np.sqrt((k + 0.5) / KEY_RAYS)
         rays.append(key + reach * (np.cos(golden * k) * aside + np.sin(golden * k) * up))
     for k in range(SKY_RAYS):
-        high = STEEPEST - (STEEPEST - FLATTEST) * (k + 0.5) / SKY_RAYS
+        high = HIGHEST_SINE - (HIGHEST_SINE - LOWEST_SINE) * (k + 0.5) / SKY_RAYS
         flat = np.sqrt(1 - high * high)
         rays.append(np.array([flat * np.cos(golden * k + 1), high, flat * np.sin(golden * k + 1)]))
     unit: Float64 = np.array(rays) / np.linalg.norm(rays, axis=1, keepdims=True)
@@ -157,8 +169,8 @@ def _place_points(
 ) -> int:
     """Write points from row `count` on: column, height (m), row; normal, as long as the area in cells.
 
-    Returns the number of rows written so far. IndexError where rows have no room for all points, or a point
-    is on a vertex that is not there.
+    Returns the number of rows written so far. IndexError if rows have no room for all points, or a point
+    names a vertex that does not exist.
     """
     if count + len(points.corners) > len(rows):
         raise IndexError("no room for the points of a shadow")
@@ -167,7 +179,7 @@ def _place_points(
     for i in range(len(corners)):
         for k in range(3):
             if corners[i, k] >= len(positions):
-                raise IndexError("a point on a vertex that is not there")
+                raise IndexError("a point names a vertex that does not exist")
             x, y, z = positions[corners[i, k], 0], positions[corners[i, k], 1], positions[corners[i, k], 2]
             for axis in range(3):
                 p[k, axis] = matrix[axis, 0] * x + matrix[axis, 1] * y + matrix[axis, 2] * z + matrix[axis, 3]
@@ -191,7 +203,7 @@ def _place_points(
 def _cast_shadow(rows: Float32, rays: Float64, darkness: UInt8) -> tuple[int, int, int, int]:
     """Write the darkness of each cell; return the bounds of the shadow: left, bottom, right, top.
 
-    Bounds: darkness and all layers, made here, are squares of as many cells.
+    Bounds: darkness and all layers, made here, are squares of the same size.
     """
     cells = len(darkness)
     key, sky = np.zeros((cells, cells), dtype=np.float32), np.zeros((cells, cells), dtype=np.float32)
@@ -212,8 +224,8 @@ def _cast_shadow(rows: Float32, rays: Float64, darkness: UInt8) -> tuple[int, in
 def _cover(rows: Float32, rx: float, ry: float, rz: float, layer: Float32) -> None:
     """Add to a layer the share of each cell that the points cover along a ray.
 
-    Bounds: only points from 1 up and below cells - 2, which numbers that are not finite never are, so that
-    the three cells about them are within the layer.
+    Bounds: only points from 1 to below cells - 2 are used, which excludes numbers that are not finite, so the
+    three cells around each are within the layer.
     """
     cells = len(layer)
     limit, half, quarters = np.float32(cells - 2), np.float32(0.5), np.float32(0.75)
@@ -252,7 +264,7 @@ def _cover(rows: Float32, rx: float, ry: float, rz: float, layer: Float32) -> No
 def _blur(grid: Float32, reach: int, room: Float32) -> None:
     """Blur by the mean over 2 reach + 1 cells along rows and columns, twice.
 
-    Bounds: grid and room are squares of as many cells; what is beyond them is left out.
+    Bounds: grid and room are squares of the same size; cells outside are left out.
     """
     cells = len(grid)
     per = np.float32(1.0 / (2 * reach + 1))
@@ -282,9 +294,9 @@ def _blur(grid: Float32, reach: int, room: Float32) -> None:
 
 @compiled
 def _darken(key: Float32, sky: Float32, darkness: UInt8) -> tuple[int, int, int, int]:
-    """Write the darkness of each cell from the hidden rays of both lights; returns as `_cast_shadow`.
+    """Write the darkness of each cell from the hidden rays of both lights; return as `_cast_shadow`.
 
-    Bounds: three squares of as many cells.
+    Bounds: three squares of the same size.
     """
     cells = len(darkness)
     left, bottom, right, top = cells, cells, 0, 0

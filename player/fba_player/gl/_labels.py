@@ -11,15 +11,18 @@ from fba_player.view._view import Legend
 TEXT = (240, 242, 245, 255)
 FAINT = (186, 192, 200, 255)
 SHADE = (18, 21, 26, 190)
-MIN_NAMES_HEIGHT, MIN_LEGEND_HEIGHT = 96, 240
-"""Heights (pixels) below which a picture has no names, and no legend."""
+MIN_NAMES_HEIGHT = 96
+"""Pixels: lower pictures have no names."""
+MIN_LEGEND_HEIGHT = 240
+"""Pixels: lower pictures have no legend."""
 MAX_NAMES = 45
 """If more points are in view, none is named."""
 GAP = 2.0
 
 
 def legend_picture(legend: Legend, scale: float) -> UInt8:
-    """uint8 (H, W, 4): a colour bar with numbers below and a title above. scale: 1 in a picture 720 high."""
+    """Return uint8 (H, W, 4): a colour bar with numbers below and a title above. scale: 1 in a picture 720
+    high."""
     from PIL import Image, ImageDraw
 
     title, small = label_font(round(17 * scale)), label_font(round(14 * scale))
@@ -45,7 +48,8 @@ def legend_picture(legend: Legend, scale: float) -> UInt8:
 
 
 def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
-    """uint8 (H, W, 4): all names below each other; and int64 (N, 4): left, top, width and height of each."""
+    """Return uint8 (H, W, 4): all names below each other; and int64 (N, 4): left, top, width and height of
+    each."""
     from PIL import Image, ImageDraw
 
     font = label_font(pixels)
@@ -62,7 +66,8 @@ def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
 
 
 def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int]) -> tuple[Intp, Float64]:
-    """Indices (M,) of the names for which there is room, and their upper left corners (M, 2), pixels.
+    """Return the indices (M,) of the names for which there is room, and their upper left corners (M, 2),
+    pixels.
 
     dots: (N, 2), pixels from the upper left, NaN for hidden ones. sizes: (N, 2), of the names. Each name is
     beside its dot, or above its point if radius is 0, and none overlaps another. Nothing is drawn if the

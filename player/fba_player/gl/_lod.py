@@ -14,9 +14,9 @@ from fba.compiled import compiled
 from fba_player._mesh.simplify import TOLERANCES
 from fba_player.view._view import FaceMesh, FaceShape
 
-PIXELS = 1.3
+MAX_ERROR_PIXELS = 1.3
 """Largest error of a coarser mesh, in pixels."""
-SAMPLED = 24
+SAMPLED_VERTICES = 24
 """Number of vertices from which the distance to the camera is taken."""
 
 
@@ -37,8 +37,8 @@ class Details:
         self._levels: WeakKeyDictionary[FaceShape, dict[int, _Level | None]] = WeakKeyDictionary()
 
     def choose(self, meshes: list[FaceMesh], eye: npt.ArrayLike, pixel: float) -> list[FaceMesh]:
-        """The meshes at the levels of detail for a camera at `eye` (3,), with pixels of size `pixel` at a
-        distance of 1."""
+        """Return the meshes at the levels of detail for a camera at `eye` (3,), with pixels of size `pixel`
+        at a distance of 1."""
         position = np.asarray(eye, dtype=np.float64)
         return [self._choose(mesh, position, pixel) for mesh in meshes]
 
@@ -47,7 +47,7 @@ class Details:
         if coarser is None or not len(mesh.positions):
             return mesh
         away = distance(mesh, eye)
-        level = self._level(mesh.shape, bisect_right(TOLERANCES, PIXELS * pixel * away))
+        level = self._level(mesh.shape, bisect_right(TOLERANCES, MAX_ERROR_PIXELS * pixel * away))
         if level is None:
             return mesh
         if level.light is None or not share_memory(level.light[0], mesh.light):
@@ -87,8 +87,9 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
 
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
-    """Distance from an eye (3,) to the nearest of some sampled vertices, in the mesh's own unit."""
-    sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED, 1)]
+    """Return the distance from an eye (3,) to the nearest of some sampled vertices, in the mesh's own
+    unit."""
+    sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED_VERTICES, 1)]
     return float(_nearest(sample, mesh.matrix, eye))
 
 
@@ -110,7 +111,7 @@ def _nearest(positions: Float32, matrix: Float64, eye: Float64) -> float:
 
 
 def share_memory(one: Float32, other: Float32) -> bool:
-    """Whether two arrays are equal views of the same memory; both must be alive."""
+    """Return whether two arrays are equal views of the same memory; both must be alive."""
     if one is other:
         return True
     return (

@@ -24,8 +24,9 @@ from fba_player.view._view import FaceMesh, FaceShape
 
 CACHED_SHAPES = 64
 """Number of parts whose buffers are cached; the least recently used goes first."""
-CORE = 0.9
-"""Opacity from which pixels of blended parts are drawn as opaque ones, before all others are blended."""
+CORE_OPACITY = 0.9
+"""Pixels of blended parts with at least this opacity are drawn first, as opaque; then the others are
+blended."""
 MIN_WRINKLE = 0.01
 """Strength from which wrinkles are drawn."""
 MIN_RELIEF = 0.25
@@ -71,7 +72,8 @@ class FaceRenderer:
             gl.enable_only(gl.DEPTH_TEST)
 
     def _draw_cores(self, meshes: list[FaceMesh]) -> None:
-        """Draw what is nearly opaque of blended parts, which then hides what is behind, in any order."""
+        """Draw the nearly opaque pixels of blended parts, which then hide what is behind them, in any
+        order."""
         for mesh in meshes:
             if mesh.shape.alpha == "blend":
                 self._draw(mesh, core=True)
@@ -92,7 +94,7 @@ class FaceRenderer:
         return self._programs[options]
 
     def _array(self, parts: dict[str, Any], options: tuple[str, ...]) -> Any:
-        """The vertex array of a part for a program."""
+        """Return the vertex array of a part for a program."""
         if options not in parts["arrays"]:
             attributes: list[tuple[Any, ...]] = [
                 (parts["positions"], "3f", "in_position"),
@@ -119,7 +121,7 @@ class FaceRenderer:
         set_uniform(program, "pixel", pixel)
 
     def _draw(self, mesh: FaceMesh, *, core: bool = False) -> None:
-        """Draw a part. core: of a blended one, pixels that hide at least `CORE` of what is behind."""
+        """Draw a part. core: of a blended one, pixels that hide at least `CORE_OPACITY` of what is behind."""
         shape = mesh.shape
         if not len(shape.triangles):  # a part so small that no level of detail is left of it from afar
             return
@@ -148,7 +150,7 @@ class FaceRenderer:
         _set_shape(program, shape)
         _set_pose(program, mesh)
         if "CUT" in options:
-            set_uniform(program, "cut", CORE if core else shape.cutoff)
+            set_uniform(program, "cut", CORE_OPACITY if core else shape.cutoff)
         if picture is not None:
             picture.use(0)
         if repeats is not None:
@@ -186,7 +188,7 @@ class FaceRenderer:
         return parts
 
     def _wrinkle_map(self, mesh: FaceMesh, parts: dict[str, Any], wide: float) -> Any:
-        """The map of wrinkles for pixels of this width (m), or None where there is nothing to see."""
+        """Return the map of wrinkles for pixels of this width (m), or None where there is nothing to see."""
         if mesh.wrinkles is None or parts["wrinkles"] is None or mesh.wrinkles.max() < MIN_WRINKLE:
             return None
         halvings = count_halvings(parts["wrinkle_texel"], wide, max(WRINKLE_SHAPE))
@@ -207,7 +209,7 @@ class FaceRenderer:
         return self._wrinkles[halvings]
 
     def _relief_texture(self, wide: float) -> Any:
-        """The skin's relief for pixels of this width (m), or None if it would be too fine to see."""
+        """Return the skin's relief for pixels of this width (m), or None if it would be too fine to see."""
         if self._pixels is None:
             self._pixels = skin_relief()
         size = self._pixels.shape[0]
@@ -267,7 +269,7 @@ def _set_wrinkles(program: Any, mesh: FaceMesh) -> None:
 
 
 def _in_map(shape: FaceShape, positions: Float32) -> tuple[Float32, Float32, Int32]:
-    """A shape's positions, places in the map of wrinkles, and triangles inside of the map."""
+    """Return a shape's positions, places in the map of wrinkles, and triangles inside of the map."""
     assert shape.wrinkle_places is not None
     inside = (np.abs(shape.wrinkle_places[shape.triangles]) < max(WIDTH, TOP)).all(axis=(1, 2))
     return positions, shape.wrinkle_places, shape.triangles[inside]

@@ -14,7 +14,7 @@ Value = TypeVar("Value")
 
 
 def load_program(context: Any, name: str, *defined: str) -> Any:
-    """The program of shaders/NAME.vert and NAME.frag on a moderngl context. defined: names to
+    """Return the program of shaders/NAME.vert and NAME.frag on a moderngl context. defined: names to
     define for the preprocessor."""
     folder = files(__package__) / "shaders"
     lighting = (folder / "lighting.glsl").read_text(encoding="utf-8")
@@ -47,18 +47,19 @@ def set_uniform(program: Any, name: str, value: Any) -> None:
 
 
 def matrix_bytes(matrix: Array) -> bytes:
-    """A matrix as OpenGL stores it: float32, column by column."""
+    """Return a matrix as OpenGL stores it: float32, column by column."""
     return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()
 
 
 def write_buffer(buffer: Any, array: Array) -> None:
-    """Write an array as float32 into a buffer, orphaned first: what draws from it need not be waited for."""
+    """Write an array as float32 into a buffer, orphaned first, so that nothing waits for draws in
+    progress."""
     buffer.orphan()
     buffer.write(np.ascontiguousarray(array, dtype="f4"))
 
 
 def make_texture(context: Any, pixels: UInt8, *, smooth: bool = True) -> Any:
-    """A texture of pixels, uint8 (H, W, components). smooth: whether to interpolate between them."""
+    """Return a texture of pixels, uint8 (H, W, components). smooth: whether to interpolate between them."""
     height, width, components = pixels.shape
     texture = context.texture((width, height), components, np.ascontiguousarray(pixels).tobytes())
     nearest_or_linear = context.LINEAR if smooth else context.NEAREST
@@ -67,7 +68,7 @@ def make_texture(context: Any, pixels: UInt8, *, smooth: bool = True) -> Any:
 
 
 class RecentlyUsed(Generic[Value]):
-    """A cache of the values that were used last. most: their number. release: frees a value that goes."""
+    """Cache of the most recently used values. most: how many it holds. release: frees a dropped value."""
 
     def __init__(self, most: int, release: Callable[[Value], object]) -> None:
         self._most = most
@@ -75,7 +76,7 @@ class RecentlyUsed(Generic[Value]):
         self._values: dict[Hashable, Value] = {}
 
     def get(self, key: Hashable, make: Callable[[], Value]) -> Value:
-        """The value of a key, made if it is not in the cache."""
+        """Return the value of a key, made if it is not in the cache."""
         value = self._values.pop(key) if key in self._values else make()
         self._values[key] = value  # the least recently used stands first
         while len(self._values) > self._most:

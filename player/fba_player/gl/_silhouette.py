@@ -16,7 +16,7 @@ from fba_player.view._view import FaceMesh
 
 TILE = 8
 """Size (pixels) of the tiles that are smoothed if an outline runs through them."""
-BESIDE = 1.5
+MARGIN = 1.5
 """Pixels on each side of an outline that may need smoothing."""
 CACHED_SHAPES = 64
 """Number of shapes whose edges are cached."""
@@ -39,7 +39,7 @@ class Edges:
 
 
 def find_edges(triangles: Int32) -> Edges:
-    """The edges of triangles (F, 3)."""
+    """Return the edges of triangles (F, 3)."""
     corners = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     owner = np.repeat(np.arange(len(triangles), dtype=np.int32), 3)
     ordered = np.sort(corners, axis=1)
@@ -85,7 +85,7 @@ class Outliner:
         """Mark the outlines of a mesh. matrix: (4, 4), world to clip space."""
         if not len(mesh.positions):
             return
-        if len(mesh.positions) != len(mesh.shape.sway):  # which the loops go by
+        if len(mesh.positions) != len(mesh.shape.sway):  # the loops use one index for both
             raise ValueError(
                 f"{len(mesh.positions)} positions for a shape of {len(mesh.shape.sway)} vertices"
             )
@@ -111,7 +111,8 @@ class Outliner:
         )
 
     def tiles(self) -> Float32:
-        """(N, 2) corners of triangles over all tiles with outlines in them, -1..1 across the picture."""
+        """Return (N, 2) corners of triangles over all tiles with outlines in them, -1..1 across the
+        picture."""
         corners = np.empty((6 * _runs(self._marked, self._size, np.empty((0, 2), dtype=np.float32)), 2), "f4")
         _runs(self._marked, self._size, corners)
         return corners
@@ -197,8 +198,8 @@ def _outline(
 ) -> None:
     """Mark the tiles along borders and along edges between a front-facing and a back-facing triangle.
 
-    Bounds: see `_add`. Pixels are limited to 0..size - 1 before they become tiles; those that are no finite
-    numbers end the edge before: no sum of them is below a limit.
+    Bounds: see `_add`. Pixels are clamped to 0..size - 1 before they become tiles; edges with pixels that are
+    not finite are skipped before: no comparison with a limit holds for them.
     """
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -216,27 +217,27 @@ def _outline(
         ax, ay = float(seen[a, 0]), float(seen[a, 1])
         bx, by = float(seen[b, 0]), float(seen[b, 1])
         outside = (
-            max(ax, bx) < -BESIDE
-            or max(ay, by) < -BESIDE
-            or min(ax, bx) > wide + BESIDE
-            or min(ay, by) > high + BESIDE
+            max(ax, bx) < -MARGIN
+            or max(ay, by) < -MARGIN
+            or min(ax, bx) > wide + MARGIN
+            or min(ay, by) > high + MARGIN
         )
         length = max(abs(bx - ax), abs(by - ay))
         near = abs(bx - ax) + abs(by - ay) < 8.0 * (wide + high)
         if outside or not (near and length < 4.0 * (wide + high)):
             continue
-        left, right = int(max(min(ax, bx) - BESIDE, 0.0)), int(min(max(ax, bx) + BESIDE, wide - 1.0))
-        low, top = int(max(min(ay, by) - BESIDE, 0.0)), int(min(max(ay, by) + BESIDE, high - 1.0))
+        left, right = int(max(min(ax, bx) - MARGIN, 0.0)), int(min(max(ax, bx) + MARGIN, wide - 1.0))
+        low, top = int(max(min(ay, by) - MARGIN, 0.0)), int(min(max(ay, by) + MARGIN, high - 1.0))
         if right // TILE - left // TILE <= 1 and top // TILE - low // TILE <= 1:  # short, as most edges are
             for row in range(low // TILE, top // TILE + 1):
                 for column in range(left // TILE, right // TILE + 1):
                     marked[row, column] = 1
             continue
-        steps = int(length / BESIDE) + 1
+        steps = int(length / MARGIN) + 1
         for step in range(steps + 1):
             x, y = ax + (bx - ax) * step / steps, ay + (by - ay) * step / steps
-            left, right = int(max(x - BESIDE, 0.0)) // TILE, int(min(x + BESIDE, wide - 1.0)) // TILE
-            low, top = int(max(y - BESIDE, 0.0)) // TILE, int(min(y + BESIDE, high - 1.0)) // TILE
+            left, right = int(max(x - MARGIN, 0.0)) // TILE, int(min(x + MARGIN, wide - 1.0)) // TILE
+            low, top = int(max(y - MARGIN, 0.0)) // TILE, int(min(y + MARGIN, high - 1.0)) // TILE
             for row in range(low, top + 1):
                 for column in range(left, right + 1):
                     marked[row, column] = 1

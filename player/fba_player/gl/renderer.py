@@ -22,11 +22,11 @@ from fba_player.view.camera import Camera
 
 MAX_BLOBS = 8
 """Largest number of soft shadows on the ground."""
-THROUGH = 0.16
+HIDDEN_OPACITY = 0.16
 """Opacity of a mark behind a surface."""
 MIN_MARK_RADIUS = 0.9
 """Least radius of a mark, pixels."""
-RAISED = 0.003
+MARK_LIFT = 0.003
 """Marks are drawn over surfaces that hide them by less than this (m)."""
 CACHED_SHAPES = 32
 """Number of meshes whose buffers are cached; the least recently used goes first."""
@@ -221,7 +221,7 @@ class Renderer:
         array.render()
 
     def _upload_mesh(self, mesh: Mesh) -> list[Any]:
-        """Buffers of positions and normals, the vertex array, and what belongs to it."""
+        """Return the buffers of positions and normals, the vertex array, and what belongs to it."""
         gl, shape = self._gl, mesh.shape
         positions = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
         normals = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
@@ -253,13 +253,13 @@ class Renderer:
             return
         gl = self._gl
         set_uniform(self._programs["capsule"], "thinnest", MIN_MARK_RADIUS)
-        set_uniform(self._programs["capsule"], "raised", RAISED)
+        set_uniform(self._programs["capsule"], "raised", MARK_LIFT)
         self._draw_capsules(marks)
         gl.enable_only(gl.DEPTH_TEST | gl.BLEND | gl.CULL_FACE)
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
         gl.depth_func = ">"
         gl.fbo.depth_mask = False
-        set_uniform(self._programs["capsule"], "opacity", THROUGH)
+        set_uniform(self._programs["capsule"], "opacity", HIDDEN_OPACITY)
         self._capsules.render(instances=len(marks))
         set_uniform(self._programs["capsule"], "opacity", 1.0)
         set_uniform(self._programs["capsule"], "thinnest", 0.0)

@@ -27,7 +27,7 @@ class Motion:
     loop: bool
 
     def time(self, clock: float) -> float:
-        """Seconds of the animation at a reading of the clock."""
+        """Return the seconds of the animation at a reading of the clock."""
         if not self.playing or clock <= self.since:
             return self.here
         reached = self.here + (clock - self.since) * self.speed
@@ -38,12 +38,12 @@ class Motion:
         return self.rest
 
     def moving(self, clock: float) -> bool:
-        """Whether the time goes on at a reading of the clock."""
+        """Return whether the time goes on at a reading of the clock."""
         repeats = self.loop and self.high > self.low
         return self.playing and clock >= self.since and (repeats or not self.over(clock))
 
     def until_turn(self, clock: float) -> float:
-        """Seconds of the clock until it starts, jumps or stops; infinite if it stands still."""
+        """Return the seconds of the clock until it starts, jumps or stops; infinite if it stands still."""
         if not self.playing:
             return math.inf
         if clock < self.since:
@@ -55,5 +55,5 @@ class Motion:
         return math.inf
 
     def over(self, clock: float) -> bool:
-        """Whether it has reached the end at least once by that reading."""
+        """Return whether it has reached the end at least once by that reading."""
         return self.playing and self.here + (clock - self.since) * self.speed >= self.stop

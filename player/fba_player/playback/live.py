@@ -20,18 +20,18 @@ from fba.errors import BitstreamError, FbaError, FbaWarning
 from fba.formats.step_choice import choose_steps
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
 from fba_player.playback.timeline import Timeline
-from fba_player.playback.transport import BUFFER
+from fba_player.playback.transport import BUFFER_SECONDS
 
-CHUNK = 1 << 16
+CHUNK_BYTES = 1 << 16
 """Bytes read at once, at most."""
-PATIENCE = 0.5
+PATIENCE_SECONDS = 0.5
 """Seconds that `wait` gives a slow stream after its first frame to fill the buffer and to show whether it has
 a face and a body."""
 CHECK_BAP_STEPS_AFTER = 4
 """Seconds of a body after which it is checked, once, whether they look right with these BAP steps."""
 CHOOSE_BAP_STEPS_AFTER = 1.25
-"""Seconds of a body that are held back until the BAP steps are chosen by the way it moves, unless it comes
-faster: a file in a pipe has come to its end, where its mark is, within `PATIENCE`."""
+"""Seconds of a body after which the BAP steps are chosen by how it moves; nothing is shown before. A file in
+a pipe arrives faster: its end, with the mark, comes within `PATIENCE_SECONDS`."""
 
 
 MARK_BYTES = 64
@@ -42,7 +42,7 @@ class Readable(Protocol):
     """A source of bytes: standard input's buffer, a FIFO, a socket's file."""
 
     def read1(self, size: int = -1, /) -> bytes:
-        """At most `size` bytes that have arrived; waits for at least one. b"" at the end."""
+        """Return at most `size` bytes that have arrived, after waiting for at least one; b"" at the end."""
 
 
 class LiveAnimation:
@@ -50,7 +50,7 @@ class LiveAnimation:
 
     source: read by a thread until its end, whatever the player does meanwhile. head: bytes that were already
     read from it. name: of the stream. bap_steps: "iso" or "visage"; or "auto": those that a mark before the
-    object names, or behind it if the end comes within `PATIENCE`; else they are chosen from the first
+    object names, or behind it if the end comes within `PATIENCE_SECONDS`; else they are chosen from the first
     `CHOOSE_BAP_STEPS_AFTER` seconds of a body, for which nothing is shown. at_end: called when nothing more
     is read, to close the source.
 
@@ -83,7 +83,7 @@ class LiveAnimation:
         self._at_end = at_end
         self.bap_steps = BAP_STEPS_DEFAULT if bap_steps == BAP_STEPS_AUTO else bap_steps
         self.steps_explanation = ""
-        # What came until they are chosen:
+        # What arrives before they are chosen:
         self._held: bytearray | None = bytearray() if bap_steps == BAP_STEPS_AUTO else None
         self._held_blocks: list[Block] = []
         self._held_since: float | None = None  # when the first block came
@@ -129,11 +129,12 @@ class LiveAnimation:
         return len(self._now.index)
 
     def snapshot(self) -> Animation:
-        """A copy of what has arrived so far. Raises ValueError before the first frame."""
+        """Return a copy of what has arrived so far. Raises ValueError before the first frame."""
         return self._now.animation(self.name)
 
     def info(self) -> StreamInfo:
-        """Planes that have arrived, their bits and the bit rate; without the list of parameters."""
+        """Return the planes that have arrived, their bits and the bit rate; without the list of
+        parameters."""
         now, size = self._now, self.received
         first, last = (int(now.index[0]), int(now.index[-1])) if len(now.index) else (0, -1)
         return StreamInfo(
@@ -158,7 +159,7 @@ class LiveAnimation:
         return 2 * len(self) + (not self.growing)
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until it can be played: `BUFFER` seconds, or the whole stream, have arrived. timeout: seconds.
+        """Wait until it can be played: `BUFFER_SECONDS`, or the whole stream, have arrived. timeout: seconds.
 
         Returns False after the timeout. Raises BitstreamError or UnsupportedError where the stream ends, or
         is closed, without a frame that can be decoded, OSError where it cannot be read.
@@ -168,7 +169,7 @@ class LiveAnimation:
                 lambda: len(self) or self._held_blocks or not self.growing, timeout
             ):
                 return False
-            self._changed.wait_for(self._enough, PATIENCE)
+            self._changed.wait_for(self._enough, PATIENCE_SECONDS)
             self._choose_bap_steps()
             if not len(self):
                 raise self._failure or BitstreamError("the stream ended before its first I plane", plane=0)
@@ -176,7 +177,7 @@ class LiveAnimation:
         return True
 
     def wait_end(self, timeout: float | None = None) -> bool:
-        """Wait until the stream has ended. timeout: seconds; returns False after it."""
+        """Wait until the stream has ended. timeout: seconds; return False after it."""
         with self._changed:
             return self._changed.wait_for(lambda: not self.growing, timeout)
 
@@ -188,16 +189,16 @@ class LiveAnimation:
     def _enough(self) -> bool:
         now = self._now
         span = int(now.index[-1] - now.index[0]) / now.rate if len(now.index) else 0
-        return not self.growing or span >= BUFFER
+        return not self.growing or span >= BUFFER_SECONDS
 
     def _read(self, head: bytes) -> None:
         try:
-            chunk = head or self._source.read1(CHUNK)
+            chunk = head or self._source.read1(CHUNK_BYTES)
             while chunk and not self._closing:
                 self.received += len(chunk)
                 self._decode(chunk)
                 self._check_bap_steps()
-                chunk = self._source.read1(CHUNK)
+                chunk = self._source.read1(CHUNK_BYTES)
             if not self._closing:
                 with self._changed:
                     self._choose_bap_steps()
@@ -212,7 +213,7 @@ class LiveAnimation:
             self._end()
 
     def _decode(self, chunk: bytes) -> None:
-        """Add what a chunk brings, or hold it back while the BAP steps are not chosen."""
+        """Add what a chunk brings, or withhold it while the BAP steps are not chosen."""
         with self._changed:
             self._checked_bap_steps |= marked_table(chunk) == self.bap_steps
             if self._held is None:
@@ -228,21 +229,22 @@ class LiveAnimation:
             if self._held_blocks:
                 now = wall.monotonic()
                 self._held_since = now if self._held_since is None else self._held_since
-                waited = seconds >= CHOOSE_BAP_STEPS_AFTER and now - self._held_since >= PATIENCE
+                waited = seconds >= CHOOSE_BAP_STEPS_AFTER and now - self._held_since >= PATIENCE_SECONDS
                 if not bodies or waited:
                     self._choose_bap_steps()
             self._changed.notify_all()
 
     def _is_marked(self, new: int) -> bool:
-        """Whether a mark is among what is held back. new: bytes at its end that were not searched yet."""
+        """Return whether the withheld bytes contain a mark. new: number of bytes at their end not searched
+        yet."""
         assert self._held is not None
         begin = max(len(self._held) - new - MARK_BYTES, 0)
         return b"bap_steps=" in self._held[begin:] and marked_table(self._held) is not None
 
     def _choose_bap_steps(self, *, whole: bool = False) -> None:
-        """Choose the BAP steps, if they are not chosen yet, and add what was held back.
+        """Choose the BAP steps, if they are not chosen yet, and add what was withheld.
 
-        whole: the decoder has not read all of it.
+        whole: decode all of it again, as the decoder has not read the last chunk.
         """
         if self._held is None:
             return
@@ -279,7 +281,7 @@ class LiveAnimation:
             self._changed.notify_all()
 
     def _check_mark(self) -> None:
-        """Say if a mark at the end of the stream names other BAP steps than those with which it was shown."""
+        """Report a mark at the end of the stream that names other BAP steps than those shown."""
         named = self._decoder.mark
         if named is None or named == self.bap_steps or self._now.body is None:
             return

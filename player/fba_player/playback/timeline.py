@@ -81,7 +81,8 @@ class Timeline:
         return self.start + self.duration
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """(frame, next frame, weight of the next) at a time in seconds, frames as positions in the animation.
+        """Return (frame, next frame, weight of the next) at a time in seconds, frames as positions in the
+        animation.
 
         Raises ValueError for a time that is not finite, or an animation without frames.
         """
@@ -93,11 +94,12 @@ class Timeline:
         return frame_position(index, self.rate, time)
 
     def time_of(self, frame: int) -> Fraction:
-        """Time of a frame, by its position in the animation: seconds, exact."""
+        """Return the time of a frame, by its position in the animation: seconds, exact."""
         return Fraction(int(self.animation.index[frame])) / self.rate
 
     def faps(self, time: float) -> Float32:
-        """FAPs shown at a time in seconds, float32 (68,); zeros where the animation has no face."""
+        """Return the FAPs shown at a time in seconds, float32 (68,); zeros where the animation has no
+        face."""
         if self.animation.face is None:
             return np.zeros(68, dtype=np.float32)
         before, after, share = self.position(time)
@@ -108,7 +110,7 @@ class Timeline:
         return shown
 
     def baps(self, time: float) -> Float64:
-        """BAPs shown at a time in seconds, float64 (296,); zeros where the animation has no body.
+        """Return the BAPs shown at a time in seconds, float64 (296,); zeros where the animation has no body.
 
         Between two frames each angle takes the shorter way round, so an angle that wraps by a full turn does
         not spin. Angles are interpolated linearly, nearly as by slerp: half way between two frames of twenty
@@ -124,7 +126,7 @@ class Timeline:
         return shown
 
     def many(self, times: npt.ArrayLike) -> tuple[Float32, Float64]:
-        """FAPs, float32 (T, 68), and BAPs, float64 (T, 296), at times (T,) in seconds.
+        """Return the FAPs, float32 (T, 68), and BAPs, float64 (T, 296), at times (T,) in seconds.
 
         Much faster than `faps` and `baps` one by one. Raises ValueError for times that are not finite, and
         for an animation without frames.
@@ -155,7 +157,8 @@ class Timeline:
         resolve_frame: Callable[[int], Array],
         shown: OrderedDict[int, Array],
     ) -> Array:
-        """Rows of many frames. resolve_frame: resolves a frame with its block, which is then in `shown`."""
+        """Return the rows of many frames. resolve_frame: resolves a frame with its block, which is then in
+        `shown`."""
         blocks = frames // self.block
         parts = []
         for block in np.unique(blocks).tolist():
@@ -247,11 +250,12 @@ class CaptureTimes:
         return self.end - self.start
 
     def time_of(self, frame: int) -> Fraction:
-        """Time of a frame, seconds, to a microsecond."""
+        """Return the time of a frame, seconds, to a microsecond."""
         return Fraction(float(self._times[frame])).limit_denominator(1_000_000)
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """(frame, next frame, weight of the next) at a time in seconds; ValueError if it is not finite."""
+        """Return (frame, next frame, weight of the next) at a time in seconds; ValueError if it is not
+        finite."""
         if not math.isfinite(time):
             raise ValueError(f"the time must be a finite number of seconds, not {time}")
         last = len(self._times) - 1
@@ -267,7 +271,7 @@ class CaptureTimes:
 def frame_position(
     index: Int64, rate: Fraction, time: float, rounding: float = FRAME_ROUNDING
 ) -> tuple[int, int, float]:
-    """(frame, next frame, weight of the next) at a time in seconds, as `Timeline.position`.
+    """Return (frame, next frame, weight of the next) at a time in seconds, as `Timeline.position`.
 
     index: (T,), ascending numbers of frames at this rate. rounding: frame periods within which a time
     counts as that of a frame.
@@ -283,7 +287,7 @@ def frame_position(
 
 
 def _shorten_turns(way: Float64) -> Float64:
-    """Changes of BAPs (..., 296), each angle the shorter way round."""
+    """Return the changes of BAPs (..., 296), each angle the shorter way round."""
     if not way.size or max(way.max(), -way.min()) <= TURN / 2:
         return way
     shorter: Float64 = way - TURN * np.rint(way / TURN)
@@ -298,7 +302,7 @@ def _cache_block(shown: OrderedDict[int, Array], block: int, values: Array) -> N
 
 
 def timecode(time: float, rate: Fraction) -> str:
-    """The time code "h:mm:ss:ff" of a time in seconds at a frame rate; see `Transport.timecode`."""
+    """Return the time code "h:mm:ss:ff" of a time in seconds at a frame rate; see `Transport.timecode`."""
     at = time * rate.numerator / rate.denominator
     nearest = round(at)
     index = nearest if abs(at - nearest) < FRAME_ROUNDING else math.floor(at)
@@ -311,7 +315,7 @@ def timecode(time: float, rate: Fraction) -> str:
 
 
 def clock_text(seconds: float | Fraction) -> str:
-    """Seconds as minutes, or hours where there are any: "0:07.040", "1:02:03.500"."""
+    """Return the seconds as minutes, or hours where there are any: "0:07.040", "1:02:03.500"."""
     thousandths = round(float(seconds) * 1000)
     minutes, rest = divmod(thousandths, 60_000)
     hours, minutes = divmod(minutes, 60)

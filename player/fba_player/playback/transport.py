@@ -16,10 +16,10 @@ from fba_player.view.protocols import Times
 
 SPEEDS = (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
 """The steps of `faster` and `slower`."""
-BUFFER = 0.25
+BUFFER_SECONDS = 0.25
 """Seconds of a live stream that must have arrived before it plays, and again after a gap."""
-AT_ONCE = 0.1
-"""Seconds: a mark out set this shortly before the current time is meant to be there."""
+LATE_MARK_SECONDS = 0.1
+"""Seconds: a mark out this shortly before the current time counts as set at it."""
 
 
 class Transport:
@@ -33,7 +33,7 @@ class Transport:
     on the last frame. Marks limit what is played: at `mark_out` it jumps back to `mark_in`, or stops. After a
     seek beyond `mark_out` it plays to the end.
 
-    At the end of what has arrived of a live stream it shows the last frame until `BUFFER` more seconds have
+    At the end of what has arrived of a live stream it shows the last frame until `BUFFER_SECONDS` more have
     arrived, and goes on with the next frame: nothing that arrives late is skipped.
     """
 
@@ -88,7 +88,7 @@ class Transport:
         return self.share_of(self.time)
 
     def share_of(self, time: float) -> float:
-        """A time as a share: 0 at the start, 1 at the last frame or after."""
+        """Return a time as a share: 0 at the start, 1 at the last frame or after."""
         duration = self._last_time() - self.start
         return min(max((time - self.start) / duration, 0.0), 1.0) if duration > 0 else 0.0
 
@@ -165,8 +165,8 @@ class Transport:
         self.seek(self.start)
 
     def last(self) -> None:
-        """Go to the last frame; while a live stream is playing, `BUFFER` seconds before it."""
-        self.seek(self._last_time() - (BUFFER if self._timeline.growing and self._playing else 0.0))
+        """Go to the last frame; while a live stream is playing, `BUFFER_SECONDS` before it."""
+        self.seek(self._last_time() - (BUFFER_SECONDS if self._timeline.growing and self._playing else 0.0))
 
     @property
     def speed(self) -> float:
@@ -231,7 +231,7 @@ class Transport:
         self._mark_out = out = self._checked_mark(time, self.start, self._stop())
         if self._mark_in is not None and out is not None and out <= self._mark_in:
             self._mark_in = None
-        if out is not None and self._playing and out <= here < out + AT_ONCE:
+        if out is not None and self._playing and out <= here < out + LATE_MARK_SECONDS:
             here = out
         self._move(here)
 
@@ -262,7 +262,7 @@ class Transport:
         self._motion = self._motion_from(clock(), here)
 
     def text(self) -> str:
-        """Time, frame and speed as text: "0:01.240 / 0:04.000   frame 31 / 99   1x"."""
+        """Return the time, frame and speed as text: "0:01.240 / 0:04.000 frame 31 / 99 1x"."""
         time = self.time
         parts = [
             f"{clock_text(time - self.start)} / {clock_text(self.duration)}",
@@ -278,9 +278,9 @@ class Transport:
         return f"frame {self.frame} / {self._timeline.frames - 1}"
 
     def timecode(self, time: float | None = None) -> str:
-        """The time code "h:mm:ss:ff" of a time, by default the current one.
+        """Return the time code "h:mm:ss:ff" of a time, by default the current one.
 
-        It is that of the stream, if the stream carries time codes: the times of its frames follow them.
+        If the stream carries time codes, it is theirs: the times of frames follow them.
         Hours, minutes and seconds are those of the time itself at any rate; ff counts the frame periods that
         have begun in that second, from 00.
         """
@@ -290,7 +290,8 @@ class Transport:
         return float(self._timeline.time_of(self._timeline.frames - 1))
 
     def _stop(self) -> float:
-        """Time at which the last frame has been shown; in a live stream, the time of its last frame."""
+        """Return the time at which the last frame has been shown; in a live stream, the time of its last
+        frame."""
         return self._last_time() if self._timeline.growing else self.end
 
     def _low(self) -> float:
@@ -338,7 +339,7 @@ class Transport:
                 self._playing = self._waiting
             self._motion = self._motion_from(now, here)
         elif self._waiting and (
-            not self._timeline.growing or self._last_time() - self._motion.here >= BUFFER
+            not self._timeline.growing or self._last_time() - self._motion.here >= BUFFER_SECONDS
         ):
             self._waiting = False
             self._motion = self._motion_from(now, self._motion.here)

@@ -47,7 +47,7 @@ class Bones:
 
     @classmethod
     def from_skeleton(cls, skeleton: Skeleton) -> Bones:
-        """The bones of a skeleton, as thick as their lengths in the default posture suggest."""
+        """Return the bones of a skeleton, as thick as their lengths in the default posture suggest."""
         centres = np.asarray(skeleton.centres, dtype=np.float64)
         children = np.flatnonzero(np.asarray(skeleton.parents) >= 0)
         parents = np.asarray(skeleton.parents)[children]
@@ -67,7 +67,8 @@ class Bones:
         return cls(parents, children, templates, joint_radii, shadow_joints)
 
     def capsules(self, matrices: Float64) -> Float32:
-        """(2J - 1, 16) capsules for joint matrices (J, 4, 4): the bones, then a sphere at every joint."""
+        """Return (2J - 1, 16) capsules for joint matrices (J, 4, 4): the bones, then a sphere at every
+        joint."""
         positions = matrices[:, :3, 3]
         bones = self.templates.copy()
         bones[:, 0:3] = positions[self.parents]
@@ -76,7 +77,8 @@ class Bones:
         return np.concatenate([bones, spheres(positions, self.joint_radii, JOINT)])
 
     def shadows(self, matrices: Float64) -> Float32:
-        """float32 (K, 4): soft shadows under hips and feet, fainter with height, as in `View.blobs`."""
+        """Return float32 (K, 4): soft shadows under hips and feet, fainter with height, as in
+        `View.blobs`."""
         shadows = []
         for joint, (_, radius, darkness, rest) in zip(self.shadow_joints, SHADOWS, strict=True):
             x, y, z = matrices[joint, :3, 3]
@@ -96,7 +98,7 @@ class Pivots:
         self._scale = scale
 
     def capsules(self, matrix: Float64) -> Float32:
-        """(2N + 1, 16) capsules: a bone from the head's joint to every other, then a sphere at each.
+        """Return (2N + 1, 16) capsules: a bone from the head's joint to every other, then a sphere at each.
 
         matrix: (4, 4), the turned head's frame into the world.
         """
@@ -113,7 +115,7 @@ class Pivots:
 
 
 def find_pivots(model: FaceModel, scale: float = 1.0) -> Pivots:
-    """The centres of all rotations in a face's tables."""
+    """Return the centres of all rotations in a face's tables."""
     head, others = np.zeros(3), []
     for table in model.tables:
         for transform in table.transforms:

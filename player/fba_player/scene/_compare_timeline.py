@@ -76,23 +76,23 @@ class CompareTimeline:
             one.interpolate = interpolate
 
     def own_time(self, number: int, time: float) -> float:
-        """The time of performance `number` at a common time, seconds."""
+        """Return the time of performance `number` at a common time, seconds."""
         return time - float(self.later[number])
 
     def time_of(self, frame: int) -> Fraction:
-        """Exact common time of a frame by its index."""
+        """Return exact common time of a frame by its index."""
         rate, index = self._frames()
         return Fraction(int(index[frame])) / rate
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """(frame, next frame, weight of the next) at a time; ValueError if it is not finite."""
+        """Return (frame, next frame, weight of the next) at a time; ValueError if it is not finite."""
         if not math.isfinite(time):
             raise ValueError(f"the time must be a finite number of seconds, not {time}")
         rate, index = self._frames()
         return frame_position(index, rate, time, FRAME_ROUNDING * float(rate / self.rate))
 
     def times(self) -> Float64:
-        """float64 (T,): times of all frames, seconds."""
+        """Return float64 (T,): times of all frames, seconds."""
         rate, index = self._frames()
         return index * rate.denominator / rate.numerator
 
@@ -100,7 +100,7 @@ class CompareTimeline:
         return zip(self.timelines, self.later, strict=True)
 
     def _frames(self) -> tuple[Fraction, Int64]:
-        """A common rate, and the ascending indices of all frames at that rate."""
+        """Return a common rate, and the ascending indices of all frames at that rate."""
         arrived = self.arrived
         if self._merged is None or self._merged[0] != arrived:
             parts = [one.rate for one in self.timelines] + [1 / later for later in self.later if later]

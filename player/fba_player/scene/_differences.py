@@ -53,7 +53,7 @@ class Differences:
         return [bap.unit for bap in baps()]
 
     def largest(self, count: int = 10) -> list[Largest]:
-        """The `count` parameters with the largest differences in quantiser steps, largest first."""
+        """Return the `count` parameters with the largest differences in quantiser steps, largest first."""
         largest = []
         columns = [("fap", fap.number, fap.name, fap.step) for fap in faps()]
         columns += [("bap", bap.number, bap.name, bap.step_iso) for bap in baps()]
@@ -73,7 +73,8 @@ class Differences:
 
 
 def differences(timeline: CompareTimeline, second: int = 1) -> Differences:
-    """Differences between the first performance and another, by its index. ValueError for an invalid one."""
+    """Return the differences between the first performance and another, by its index. ValueError for an
+    invalid one."""
     if not 0 < second < len(timeline.timelines):
         raise ValueError(f"there is no performance {second} to compare: {len(timeline.timelines)} are shown")
     one, other = timeline.timelines[0], timeline.timelines[second]

@@ -28,9 +28,13 @@ HAIRS = ("lash", "brow")
 INSIDE = (*HAIRS, "teeth", "tongue", "mouth", "eye")
 """Kinds of parts that a transparent body leaves out."""
 DOT: Colour = (0.98, 0.62, 0.20, 1.0)
-DOT_RADIUS, DOT_SIZE = 3.2, 0.0022
-"""Radius in pixels of a picture 720 high, and at most in metres."""
-DOT_LIFT, NAME_LIFT = 0.004, 0.006
+DOT_RADIUS = 3.2
+"""Radius of a dot, pixels in a picture 720 high."""
+MAX_DOT_RADIUS = 0.0022
+"""Largest radius of a dot, metres."""
+DOT_LIFT = 0.004
+NAME_LIFT = 0.006
+"""Depth (m) of skin through which dots and names show."""
 GRID_REACH = 7.0
 """Radius of the grid under a body, in steps."""
 
@@ -66,7 +70,7 @@ class DisplayOptions:
         return known, tuple(np.array(names())[known].tolist())
 
     def apply(self, view: View, switches: Switches, posture: Posture) -> View:
-        """The view with the switches applied."""
+        """Return the view with the switches applied."""
         if not switches.changed:
             return view
         view = self._hide_parts(view, switches)
@@ -120,14 +124,14 @@ class DisplayOptions:
         return view
 
     def _bust_grid(self) -> Grid:
-        """A grid of tenths of a metre below a head alone, larger or smaller with the face."""
+        """Return a grid of tenths of a metre below a head alone, larger or smaller with the face."""
         x, _, z = self._figure.subject.centre
         lowest = float(self._figure.model.vertices[:, 1].min())
         step = 10.0 ** round(np.log10(max(self._scale, 1e-9)) - 1)
         return Grid(lowest, step, (x, z), step * 2 * GRID_REACH)
 
     def _at_full_detail(self, mesh: FaceMesh) -> FaceMesh:
-        """The mesh without levels of detail, as lines lie on all its triangles."""
+        """Return the mesh without levels of detail, as lines lie on all its triangles."""
         if mesh.shape.coarser is None:
             return mesh
         if mesh.shape not in self._full_shapes:
@@ -140,7 +144,7 @@ class DisplayOptions:
         return self._heatmap
 
     def _skeleton(self, posture: Posture) -> Float32:
-        """Capsules of all joints of the body and of the head."""
+        """Return the capsules of all joints of the body and of the head."""
         turned = posture.face @ self._figure.pose(posture.faps).turn
         head = self._pivots.capsules(turned)
         if self._bones is None or posture.joints is None:
@@ -148,7 +152,7 @@ class DisplayOptions:
         return np.concatenate([self._bones.capsules(posture.joints), head])
 
     def _dots(self, posture: Posture, *, over: bool) -> Dots:
-        """Feature points with names. over: whether to draw the dots themselves."""
+        """Return the feature points with names. over: whether to draw the dots themselves."""
         figure, (known, point_names) = self._figure, self._known_points
         points = figure.points(posture.faps, posture.face)[known]
         pose = figure.pose(posture.faps)
@@ -163,10 +167,10 @@ class DisplayOptions:
             (DOT_LIFT if over else NAME_LIFT) * self._scale,
             point_names,
             facing.astype(np.float32),
-            DOT_SIZE * self._scale,
+            MAX_DOT_RADIUS * self._scale,
         )
 
 
 def _body_grid(joints: Float64) -> Grid:
-    """A grid of metres on the floor around the body's root."""
+    """Return a grid of metres on the floor around the body's root."""
     return Grid(0.0, 1.0, (float(joints[0, 0, 3]), float(joints[0, 2, 3])), GRID_REACH)

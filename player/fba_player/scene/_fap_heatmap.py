@@ -18,13 +18,15 @@ from fba_player._mesh.textures import linear_light
 from fba_player.view._geometry import rotation_vector, turn_partly
 from fba_player.view._view import Eye, FaceMesh, FaceShape, Legend, Mesh, MeshShape
 
-STEPS, ANGLE = 100, 10_000
-"""The FAP's value: about a tenth of the unit for distances, 0.1 rad for angles."""
+MEASURED_STEPS = 100
+"""Value of a FAP with a unit of length: about a tenth of the unit."""
+MEASURED_ANGLE = 10_000
+"""Value of a FAP that is an angle: 0.1 rad."""
 GLOSS = 0.15
 SHADES = 33
 """Number of colours in the legend."""
 MIN_MOVEMENT = 1e-6
-"""Movements smaller than this (m) count as none."""
+"""Movements smaller than this (m) count as 0."""
 
 
 class FapHeatmap:
@@ -33,7 +35,7 @@ class FapHeatmap:
     def __init__(self, figure: FaceFigure, number: int) -> None:
         self._figure = figure
         self.fap = faps()[number - 1]
-        self.value = ANGLE if self.fap.unit == "AU" else STEPS
+        self.value = MEASURED_ANGLE if self.fap.unit == "AU" else MEASURED_STEPS
         self._values = np.zeros(FAP_COUNT, dtype=np.float32)
         self._values[number - 1] = self.value
         self._shapes: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
@@ -48,11 +50,11 @@ class FapHeatmap:
         return Legend(self.fap.label, moved, self.most * 1000, stops)  # type: ignore[arg-type]
 
     def paint(self, meshes: list[FaceMesh]) -> list[FaceMesh]:
-        """The meshes in these colours; parts that are not the face's get the colour of 0."""
+        """Return the meshes in these colours; parts that are not the face's get the colour of 0."""
         return [replace(mesh, shape=self._shape(mesh)) for mesh in meshes]
 
     def eyes(self, eyes: list[Eye]) -> list[Mesh]:
-        """Eyeballs as meshes in these colours."""
+        """Return the eyeballs as meshes in these colours."""
         vertices, _ = sphere_mesh()
         meshes = []
         for number, eye in enumerate(eyes):
@@ -87,7 +89,7 @@ class FapHeatmap:
         return self._shapes[shape]
 
     def _part_distances(self, shape: FaceShape, count: int) -> Float32:
-        """float32 (count,): the movement of a part's vertices; 0 for a part that is not the face's."""
+        """Return float32 (count,): the movement of a part's vertices; 0 for a part that is not the face's."""
         try:
             rows = self._figure.rows(shape.name)
         except KeyError:
@@ -96,7 +98,7 @@ class FapHeatmap:
         return own if len(own) == count else np.zeros(count, dtype=np.float32)
 
     def _ball(self, number: int, vertices: Float32) -> MeshShape:
-        """An eyeball coloured by the movement of its points."""
+        """Return an eyeball coloured by the movement of its points."""
         still = self._figure.eyes(np.zeros_like(self._values), np.eye(4))[number].matrix
         moved = self._figure.eyes(self._values, np.eye(4))[number].matrix
         away = np.linalg.norm(vertices @ (moved - still)[:3, :3].T + (moved - still)[:3, 3], axis=1)
@@ -111,7 +113,7 @@ class FapHeatmap:
 
 
 def heat_colours(shares: Floating) -> Float64:
-    """float64 (N, 3): colours (sRGB, 0..1) for shares 0..1 of the largest movement."""
+    """Return float64 (N, 3): colours (sRGB, 0..1) for shares 0..1 of the largest movement."""
     table = _table()
     columns = [np.interp(shares, table[:, 0], table[:, column]) for column in (1, 2, 3)]
     return np.stack(columns, axis=-1)

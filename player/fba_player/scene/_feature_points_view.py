@@ -71,11 +71,11 @@ class PointView:
         return _make_tubes([(kind, RING + 1) for _ in self._figure.eyeballs for kind in ("iris", "pupil")])
 
     def marks(self, faps: Float32, matrix: Float64) -> Float32:
-        """float32 (N, 16): capsules, a sphere at each feature point that the face has."""
+        """Return float32 (N, 16): capsules, a sphere at each feature point that the face has."""
         return spheres(self._figure.points(faps, matrix)[self._known], self._radii, POINT)
 
     def eyeballs(self, faps: Float32, matrix: Float64) -> Float32:
-        """float32 (E, 16): capsules, plain eyeballs."""
+        """Return float32 (E, 16): capsules, plain eyeballs."""
         eyes = self._figure.eyes(faps, matrix)
         if not eyes:
             return spheres(np.zeros((0, 3)), np.zeros(0), EYEBALL)
@@ -83,7 +83,7 @@ class PointView:
         return spheres([eye.matrix[:3, 3] for eye in eyes], radii, EYEBALL)
 
     def dull_face(self, faps: Float32, matrix: Float64, *, on_body: bool = False) -> list[FaceMesh]:
-        """The face in one dull colour."""
+        """Return the face in one dull colour."""
         meshes = []
         for mesh in self._figure.meshes(faps, matrix, on_body=on_body, without=LEFT_OUT):
             if id(mesh.shape) not in self._dull_shapes:
@@ -95,7 +95,7 @@ class PointView:
         return meshes
 
     def meshes(self, faps: Float32, matrix: Float64) -> list[Mesh]:
-        """The lines, and the rims of irises and pupils."""
+        """Return the lines, and the rims of irises and pupils."""
         pose = self._figure.pose(faps)
         meshes = []
         if self._lines:
@@ -109,7 +109,8 @@ class PointView:
         return meshes
 
     def _rings(self, faps: Float32, matrix: Float64) -> tuple[list[Float64], Float64]:
-        """Rims of iris and pupil of each eye in the world, (RING + 1, 3) each, and a point behind them."""
+        """Return the rims of iris and pupil of each eye in the world, (RING + 1, 3) each, and a point behind
+        them."""
         turn = np.linspace(0, 2 * np.pi, RING + 1)
         rings, behind = [], np.zeros(3)
         for eye in self._figure.eyes(faps, matrix):
@@ -131,7 +132,7 @@ class _Tubes:
     shape: MeshShape
 
     def mesh(self, points: Float64, inside: Float64, matrix: Float64) -> Mesh:
-        """Tubes along the points (N, 3) of all lines in turn. inside: a point deep in the head."""
+        """Return the tubes along the points (N, 3) of all lines in turn. inside: a point deep in the head."""
         along = np.concatenate([
             np.gradient(line, axis=0) for line in np.split(points, np.cumsum(self.lengths)[:-1])
         ])  # fmt: skip
@@ -146,7 +147,8 @@ class _Tubes:
 
 
 def _make_tubes(lines: list[tuple[str, int]], raised: float = 0.0) -> _Tubes:
-    """Tubes for lines, each given by its kind and its number of points. raised: as in `MeshShape`."""
+    """Return the tubes for lines, each given by its kind and its number of points. raised: as in
+    `MeshShape`."""
     lengths = tuple(count for _, count in lines)
     radii = np.concatenate([np.zeros(0), *(np.full(count, RADII[kind]) for kind, count in lines)])
     colours = [np.tile([*COLOURS[kind], 0.0], (count * AROUND, 1)) for kind, count in lines]

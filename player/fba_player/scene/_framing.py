@@ -18,7 +18,7 @@ MAX_FIXED_TRAVEL = 4.0
 """The camera follows a performance that moves further than this (m)."""
 MIN_APPROACH = 0.12
 """Movement (m) below which the camera's distance is not enlarged."""
-ARMS = 1.0
+ARM_REACH = 1.0
 """Half the width (m) of a person with stretched arms."""
 LOWER = 0.09
 """Metres below the root of a person who walks away at which the middle of the picture is."""
@@ -54,7 +54,7 @@ HEADROOM = 0.14
 
 
 def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HEADROOM) -> Extent:
-    """The extent of joints at positions (T, J, 3), metres, the root first, over T moments.
+    """Return the extent of joints at positions (T, J, 3), metres, the root first, over T moments.
 
     headroom: metres above the highest joint.
     """
@@ -84,7 +84,7 @@ def _reach(positions: Float64) -> float:
     if not np.isfinite(positions).all():
         return BODY_SUBJECT.half_width
     ways = np.linalg.norm((positions - positions[:, :1])[..., [0, 2]], axis=2)
-    return min(max(float(ways.max()), BODY_SUBJECT.half_width), ARMS)
+    return min(max(float(ways.max()), BODY_SUBJECT.half_width), ARM_REACH)
 
 
 def _head_above(positions: Float64, names: tuple[str, ...], headroom: float) -> float:
@@ -96,6 +96,6 @@ def _head_above(positions: Float64, names: tuple[str, ...], headroom: float) -> 
 
 
 def _aside(low: Float64, high: Float64) -> Float64:
-    """The shift of the floor for a body that does not stand at the origin."""
+    """Return the shift of the floor for a body that does not stand at the origin."""
     middle = (low + high) / 2
     return np.array([middle[0], 0.0, middle[2]])

@@ -15,14 +15,16 @@ Colour = tuple[float, float, float]
 
 JOINT = 1e-3
 """Capsules shorter than this (m) are joints, not bones."""
-BONE_WIDTH, BONE_LIFT = 2.6, 0.3
-"""Bones as lines: width in pixels of a picture 720 high, and depth (m) through which they show."""
+BONE_WIDTH = 2.6
+"""Width of bones drawn as lines, pixels in a picture 720 high."""
+BONE_LIFT = 0.3
+"""Depth (m) through which bones show."""
 LINE_LIFT = 0.02
 """Depth (m) by which another face may hide the lines of a face."""
 
 
 def move_view(view: View, offset: Float64) -> View:
-    """The view with everything moved by offset (3,), metres."""
+    """Return the view with everything moved by offset (3,), metres."""
     if not offset.any():
         return view
     shift = translation(offset)
@@ -40,7 +42,7 @@ def move_view(view: View, offset: Float64) -> View:
 
 
 def join_views(views: Sequence[View]) -> View:
-    """One view of everything in all views, with the background, grid and legend of the first."""
+    """Return one view of everything in all views, with the background, grid and legend of the first."""
     first = views[0]
     extras = [view.extras for view in views if view.extras is not None]
     return replace(
@@ -75,7 +77,7 @@ class Drawing:
         self._shapes: dict[int, tuple[MeshShape, MeshShape]] = {}
 
     def __call__(self, view: View, eyeballs: int) -> View:
-        """The drawing of a view. eyeballs: number of capsules to leave out, the first ones."""
+        """Return the drawing of a view. eyeballs: number of capsules to leave out, the first ones."""
         bones = view.capsules[eyeballs:]
         ends = np.stack([bones[:, 0:3], bones[:, 4:7]], axis=1)
         long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > JOINT
@@ -103,7 +105,7 @@ class Drawing:
 
 
 def make_caption(text: str, position: Float64) -> Dots:
-    """A label at a point."""
+    """Return a label at a point."""
     points = np.asarray(position, dtype=np.float32)[None]
     return Dots(points, (1.0, 1.0, 1.0, 1.0), 0.0, 1.0, (text,), np.zeros((1, 3), np.float32))
 

@@ -26,7 +26,7 @@ from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
 
 HEIGHT = 0.26
-"""Metres that a head of no known unit is shown high."""
+"""Height in metres at which a head of unknown unit is shown."""
 PLACED: Colour = (0.95, 0.62, 0.25, 1.0)
 CURRENT: Colour = (0.25, 0.75, 1.0, 1.0)
 GUESSED: Colour = (0.25, 0.75, 1.0, 0.75)
@@ -40,7 +40,7 @@ LIGHT = (0.75, 0.55, 0.0, 0.5)
 CLAY = (0.42, 0.36, 0.32)
 """Colour of surfaces without one of their own, linear light."""
 MARGIN = 1.25
-"""How much larger than the known points the shown part is, at least."""
+"""The part shown is at least this many times as large as the box of the placed points."""
 
 
 class PlacementScene(Timed[Timeline]):
@@ -61,7 +61,7 @@ class PlacementScene(Timed[Timeline]):
         self.switches.show(name, on)
 
     def view_at(self, time: float) -> View:
-        """The head and its points; at any time the same."""
+        """Return the head and its points; at any time the same."""
         if not math.isfinite(time):
             raise ValueError(f"a time must be finite, not {time}")
         hidden = self.placement.hidden
@@ -69,26 +69,26 @@ class PlacementScene(Timed[Timeline]):
         return View(faces=faces, extras=Extras(dots=self._dots()))
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """The camera of a preset, fitted to the head."""
+        """Return the camera of a preset, fitted to the head."""
         return Camera.preset("front" if preset in (None, "body") else str(preset), self._subject, aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """Zeros: a head does not walk away."""
+        """Return zeros: a head does not walk away."""
         return 0.0, 0.0, 0.0
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Zeros, likewise."""
+        """Return zeros."""
         return 0.0, 0.0, 0.0
 
     def vertex_under(self, camera: Camera, x: float, y: float, size: tuple[int, int]) -> int | None:
-        """The vertex, by its number in the file, of what a pixel of a picture shows, or None."""
+        """Return the vertex, by its number in the file, of what a pixel of a picture shows, or None."""
         placement = self.placement
         shown = np.flatnonzero(~np.isin(placement.surface.part_of, list(placement.hidden)))
         hit = first_hit(*ray_through(camera, x, y, size), self._corners[shown])
         return None if hit is None else placement.nearest_corner(int(shown[hit[0]]), hit[1])
 
     def to_world(self, points: Float64) -> Float64:
-        """Points (N, 3) in the file's axes, in the world."""
+        """Return the points (N, 3) in the file's axes, in the world."""
         matrix = self._matrix
         world: Float64 = points @ matrix[:3, :3].T + matrix[:3, 3]
         return world
@@ -127,7 +127,7 @@ class PlacementScene(Timed[Timeline]):
 
     @cached_property
     def _subject(self) -> Subject:
-        """What the camera is fitted to: the points known at first and what is around them, else all."""
+        """What the camera is fitted to: the points placed at first and their surroundings, else all."""
         corners = self._corners.reshape(-1, 3)
         low, high = corners.min(axis=0), corners.max(axis=0)
         points = self.to_world(self.placement.positions())
@@ -198,7 +198,7 @@ def plain_shape(part: Part) -> FaceShape:
 
 
 def _picture(part: Part) -> FacePicture | None:
-    """The part's texture, or None, with an FbaWarning if it cannot be read."""
+    """Return the part's texture, or None, with an FbaWarning if it cannot be read."""
     if part.material.texture is None:
         return None
     try:
@@ -213,7 +213,7 @@ def _picture(part: Part) -> FacePicture | None:
 
 
 def _stillness() -> Animation:
-    """One neutral frame: the window wants times."""
+    """Return one neutral frame: a window needs times."""
     return Animation(
         Fraction(25), np.zeros(1, np.int64), FaceTrack(np.zeros((1, 68), np.int32), np.zeros((1, 68), bool))
     )

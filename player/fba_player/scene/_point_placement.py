@@ -82,14 +82,14 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         return tuple(name for name in self.missing if name in FAPU_POINTS)
 
     def position(self, name: str) -> Float64 | None:
-        """(3,) position of a point in the file's axes; None if it has no place."""
+        """Return (3,) position of a point in the file's axes; None if it has no place."""
         place = self.places.get(name)
         if place is None:
             return None
         return self.surface.vertices[place] if isinstance(place, int) else np.array(place)
 
     def positions(self) -> Float64:
-        """float64 (84, 3): positions in the file's axes, NaN for points without a place."""
+        """Return float64 (84, 3): positions in the file's axes, NaN for points without a place."""
         points = np.full((len(names()), 3), np.nan)
         for name in self.places:
             points[row_of()[name]] = self.position(name)
@@ -118,7 +118,7 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         return target
 
     def mirror_all(self) -> int:
-        """Place all points without a place whose mates have one, at their mirror images; returns how many."""
+        """Place all points without a place whose mates have one, at their mirror images; return how many."""
         targets = {name: MATES[name] for name in self.missing if MATES.get(name) in self.places}
         mirrored = {name: self._mirrored(mate) for name, mate in targets.items()}
         self._change({**self.places, **mirrored})
@@ -135,7 +135,8 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         write_points(path, GivenPoints(points, vertices), comment)
 
     def guess(self) -> Float64 | None:
-        """(3,) the vertex about where the current point is, from those that have a place; None if too few."""
+        """Return (3,) the vertex about where the current point is, from those that have a place; None if too
+        few."""
         known = [name for name in self.names if name in self.places]
         if len(known) < MIN_POINTS_FOR_GUESS:
             return None
@@ -150,7 +151,7 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         return np.asarray(self.surface.vertices[self._used[int(away.argmin())]])
 
     def nearest_corner(self, triangle: int, shares: Float64) -> int:
-        """The vertex, by its number in the file, that is nearest to a place in a triangle.
+        """Return the vertex, by its number in the file, that is nearest to a place in a triangle.
 
         shares: (3,), of the triangle's corners in that place.
         """
@@ -181,7 +182,7 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         return vertex_normals(self.surface.vertices, self.surface.triangles)
 
     def _mirrored(self, name: str) -> int:
-        """The vertex nearest to the mirror image of a point."""
+        """Return the vertex nearest to the mirror image of a point."""
         position, place = self.position(name), self.places[name]
         assert position is not None
         flip = np.array([-1.0, 1.0, 1.0])
@@ -197,7 +198,7 @@ class PointPlacement(HandEditing[dict[str, Place]]):
 
 
 def describe_point(name: str) -> str:
-    """What a feature point is, and what needs it: "chin, lowest point: FAPs 3, 14, 15"."""
+    """Return what a feature point is, and what needs it: "chin, lowest point: FAPs 3, 14, 15"."""
     point = feature_points()[row_of()[name]]
     uses = []
     if name in FAPU_POINTS:

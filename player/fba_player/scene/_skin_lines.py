@@ -15,7 +15,7 @@ from fba.face.model import point_row
 
 Indices = Intp
 
-FINER = 8
+STEPS_BETWEEN_POINTS = 8
 """Number of steps between two feature points."""
 RINGS = 3
 """Rings of triangles around the shortest path along edges in which a line lies: lips stay apart."""
@@ -31,13 +31,13 @@ class SkinLine:
     shares: Float64
 
     def positions(self, vertices: Float32) -> Float64:
-        """float64 (N, 3): the line's points on moved vertices (V, 3)."""
+        """Return float64 (N, 3): the line's points on moved vertices (V, 3)."""
         positions: Float64 = np.einsum("nk,nkc->nc", self.shares, vertices[self.corners].astype(np.float64))
         return positions
 
 
 def skin_lines(model: FaceModel) -> list[SkinLine]:
-    """The lines of `skin_lines.csv` whose feature points lie on the skin."""
+    """Return the lines of `skin_lines.csv` whose feature points lie on the skin."""
     with (files(__package__) / "skin_lines.csv").open(encoding="utf-8") as file:
         rows = [(row["kind"], row["points"].split()) for row in csv.DictReader(file)]
     skin = _build_skin_graph(model)
@@ -67,7 +67,8 @@ class _SkinGraph:
     used: frozenset[int]
 
     def line(self, through: list[int]) -> tuple[Indices, Float64] | None:
-        """Corners (N, 3) and weights (N, 3) of a smooth line through vertices; None if unconnected."""
+        """Return the corners (N, 3) and weights (N, 3) of a smooth line through vertices; None if
+        unconnected."""
         from scipy.interpolate import CubicSpline
 
         knots = self.vertices[through]
@@ -81,7 +82,7 @@ class _SkinGraph:
             near = self._triangles_along(through[number], through[number + 1])
             if near is None:
                 return None
-            part = np.linspace(0, 1, FINER + 1)[1:-1]
+            part = np.linspace(0, 1, STEPS_BETWEEN_POINTS + 1)[1:-1]
             if curve is None:
                 points = knots[number] + part[:, None] * (knots[number + 1] - knots[number])
             else:
@@ -95,7 +96,8 @@ class _SkinGraph:
         return np.array(corners, dtype=np.intp), np.array(shares)
 
     def _triangles_along(self, start: int, end: int) -> Indices | None:
-        """Triangles (F, 3) along the shortest path between two vertices; None if no path joins them."""
+        """Return the triangles (F, 3) along the shortest path between two vertices; None if no path joins
+        them."""
         from scipy.sparse.csgraph import dijkstra
 
         first, last = int(self.node[start]), int(self.node[end])
@@ -135,7 +137,8 @@ def _build_skin_graph(model: FaceModel) -> _SkinGraph:
 
 
 def _nearest(point: Float64, triangles: Float64) -> tuple[int, Float64]:
-    """Index of the triangle (F, 3, 3) nearest to a point, and the weights (3,) of its corners there."""
+    """Return the index of the triangle (F, 3, 3) nearest to a point, and the weights (3,) of its corners
+    there."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     ab, ac, ap = b - a, c - a, point - a
     d1, d2 = (ab * ap).sum(1), (ac * ap).sum(1)

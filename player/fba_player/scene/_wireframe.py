@@ -32,7 +32,7 @@ class Wireframe:
         self._thinned: WeakKeyDictionary[FaceShape, Intp] = WeakKeyDictionary()
 
     def edges(self, faces: list[FaceMesh], meshes: list[Mesh], eyes: list[Eye], scale: float) -> Lines:
-        """All edges, each once. scale: size of the face, 1 for an adult's."""
+        """Return all edges, each once. scale: size of the face, 1 for an adult's."""
         ends = [np.zeros((0, 2, 3), dtype=np.float32)]
         ends += [world_positions(mesh)[self._unique_edges(mesh.shape)] for mesh in faces]
         ends += [_moved(mesh.positions, mesh.matrix)[self._unique_edges(mesh.shape)] for mesh in meshes]
@@ -40,7 +40,7 @@ class Wireframe:
         return Lines(np.concatenate(ends), WIRE, 1.0, WIRE_LIFT * scale)
 
     def normals(self, faces: list[FaceMesh], scale: float) -> Lines:
-        """A line at each vertex, or at some of many; red, green and blue stand for x, y and z."""
+        """Return a line at each vertex, or at some of many; red, green and blue stand for x, y and z."""
         ends, colours = [np.zeros((0, 2, 3), np.float32)], [np.zeros((0, 2, 4), np.float32)]
         for mesh in faces:
             if mesh.shape not in self._thinned:
@@ -61,7 +61,7 @@ class Wireframe:
 
 
 def unique_edges(triangles: Int32) -> Int32:
-    """int32 (E, 2): the edges of triangles (F, 3), each once, the smaller index first."""
+    """Return int32 (E, 2): the edges of triangles (F, 3), each once, the smaller index first."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     unique: Int32 = np.unique(edges, axis=0).astype(np.int32)
     return unique
@@ -69,13 +69,13 @@ def unique_edges(triangles: Int32) -> Int32:
 
 @cache
 def _eyeball_edges() -> Float32:
-    """float32 (E, 2, 3): the ends of the edges of a unit sphere."""
+    """Return float32 (E, 2, 3): the ends of the edges of a unit sphere."""
     vertices, triangles = sphere_mesh(*RINGS)
     return vertices[unique_edges(triangles)]
 
 
 def _thinned(mesh: FaceMesh, cell: float) -> Intp:
-    """Indices (N,) of the first vertex used by triangles in each cell of this size (m)."""
+    """Return the indices (N,) of the first vertex used by triangles in each cell of this size (m)."""
     used = np.unique(mesh.shape.triangles)
     cells = np.floor(mesh.positions[used] / max(cell, 1e-9)).astype(np.int64)
     first: Intp = np.unique(cells, axis=0, return_index=True)[1]

@@ -29,13 +29,13 @@ ARRANGEMENTS = ("side", "over")
 """Side by side; or over the first, as coloured drawings of feature points and bones."""
 COLOURS = ("#2f9bff", "#ff5a36", "#39c26b", "#c266ff", "#f2b500")
 """Colours (sRGB) of the drawings over the first, in turn."""
-APART = 1.12
+FIGURE_DISTANCE = 1.12
 """Distance between figures side by side, in their widths."""
 FIELD_OF_VIEW = 14.0
 """Field of view (degrees): narrow, from further away, so that all figures are seen from the same side."""
-SHOULDERS = 0.25
+SHOULDER_HALF_WIDTH = 0.25
 """Half the width (m) of a body that is seen from the hips up."""
-ABOVE = 0.96
+CAPTION_HEIGHT = 0.96
 """Height of a caption above the middle of a head, in half heads."""
 
 
@@ -121,7 +121,7 @@ class CompareScene(Timed[CompareTimeline]):
         return any(scene.has_body for scene in self.scenes)
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """A camera that has all figures in view; from now on they stand side by side as it sees them.
+        """Return a camera that has all figures in view; from now on they stand side by side as it sees them.
 
         preset: see `Scene.camera`.
         """
@@ -138,23 +138,23 @@ class CompareScene(Timed[CompareTimeline]):
             self._apart = None
         elif preset is None:
             subjects = [scene.gesture_subject or scene.subject for scene in self.scenes]
-            self._apart = max(SHOULDERS * 1.3, max(one.half_width for one in upper) * 0.8)
+            self._apart = max(SHOULDER_HALF_WIDTH * 1.3, max(one.half_width for one in upper) * 0.8)
         else:
             subjects = [scene.face_subject for scene in self.scenes]
-            self._apart = SHOULDERS
+            self._apart = SHOULDER_HALF_WIDTH
         self._stands = [np.array(one.centre) for one in subjects]
         return camera.fit(self._all(subjects), aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """Offset of a following camera at a time, metres: the first scene's."""
+        """Return the offset of a following camera at a time, metres: the first scene's."""
         return self.scenes[0].travel(self.timeline.own_time(0, time))
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Way of the first scene's head from the start to a time, metres."""
+        """Return the displacement of the first scene's head from the start to a time, metres."""
         return self.scenes[0].head_travel(self.timeline.own_time(0, time))
 
     def view_at(self, time: float) -> View:
-        """Everything to be drawn at a time in seconds; ValueError if it is not finite."""
+        """Return everything to be drawn at a time in seconds; ValueError if it is not finite."""
         times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]
         if self._arrangement == "over":
             return self._over(times)
@@ -169,11 +169,11 @@ class CompareScene(Timed[CompareTimeline]):
         return join_views(views)
 
     def still(self, faps: Float32) -> View:
-        """The first scene alone for FAPs (68,)."""
+        """Return the first scene alone for FAPs (68,)."""
         return self.scenes[0].still(faps)
 
     def differences(self, second: int = 1) -> Differences:
-        """Performance `second` minus the first; cached until more of a performance arrives.
+        """Return the performance `second` minus the first; cached until more of a performance arrives.
 
         Raises ValueError if there is no such performance.
         """
@@ -199,12 +199,12 @@ class CompareScene(Timed[CompareTimeline]):
         return join_views(views)
 
     def _right(self) -> Float64:
-        """(3,): the picture's right, on the ground."""
+        """Return (3,): the picture's right, on the ground."""
         yaw = math.radians(self._yaw)
         return np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
 
     def _shift(self, number: int) -> Float64:
-        """(3,): the shift of a figure in the arrangement."""
+        """Return (3,): the shift of a figure in the arrangement."""
         if self._arrangement == "over":
             return self._height(number)
         widths = [self._half_width(scene) for scene in self.scenes]
@@ -212,19 +212,19 @@ class CompareScene(Timed[CompareTimeline]):
         # Recordings begin anywhere: each figure is brought to where the first one is.
         to_first = (self._stands[0] - self._stands[number]) * (1.0, 0.0, 1.0)
         height = self._height(number) * (0.0, 1.0, 0.0)
-        return np.asarray(self._right() * along * APART + to_first + height)
+        return np.asarray(self._right() * along * FIGURE_DISTANCE + to_first + height)
 
     def _half_width(self, scene: Scene) -> float:
-        """Half the width that a figure takes: of a body its own, of heads that of the widest."""
+        """Return half the width that a figure takes: of a body its own, of heads that of the widest."""
         if self._apart is not None:
             return self._apart
         if scene.has_body:
-            return max(scene.subject.half_width, SHOULDERS)
+            return max(scene.subject.half_width, SHOULDER_HALF_WIDTH)
         heads = max(one.subject.half_width for one in self.scenes if not one.has_body)
-        return max(heads, SHOULDERS) if self.has_body else heads
+        return max(heads, SHOULDER_HALF_WIDTH) if self.has_body else heads
 
     def _height(self, number: int) -> Float64:
-        """(3,): the shift that brings a head alone to the height of heads on bodies."""
+        """Return (3,): the shift that brings a head alone to the height of heads on bodies."""
         scene = self.scenes[number]
         with_body = next((one for one in self.scenes if one.has_body), None)
         if scene.has_body or with_body is None:
@@ -234,15 +234,15 @@ class CompareScene(Timed[CompareTimeline]):
     def _caption_position(self, number: int) -> Float64:
         head = self.scenes[number].face_subject
         x, y, z = head.centre
-        return np.asarray(np.array([x, y + head.half_height * ABOVE, z]) + self._shift(number))
+        return np.asarray(np.array([x, y + head.half_height * CAPTION_HEIGHT, z]) + self._shift(number))
 
     def _all(self, subjects: list[Subject]) -> Subject:
-        """One subject around all subjects in their places."""
+        """Return one subject around all subjects in their places."""
         right = self._right()
         centres = [np.array(one.centre) + self._shift(n) for n, one in enumerate(subjects)]
         along = [float(centre @ right) for centre in centres]
         widths = [
-            max(one.half_width, (self._apart or 0.0) * 0.7, SHOULDERS if self.has_body else 0.0)
+            max(one.half_width, (self._apart or 0.0) * 0.7, SHOULDER_HALF_WIDTH if self.has_body else 0.0)
             for one in subjects
         ]
         low = min(a - width for a, width in zip(along, widths, strict=True))

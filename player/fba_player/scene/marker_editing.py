@@ -72,12 +72,12 @@ class MarkerEditing(HandEditing[MarkerMapping]):
 
     @property
     def placed(self) -> Collection[str]:
-        """Names of the markers that have a virtual one."""
+        """Names of the markers that have a virtual marker."""
         return self.mapping.markers
 
     @property
     def marker(self) -> VirtualMarker | None:
-        """The current marker's virtual one, None if it has none."""
+        """The current marker's virtual marker; None if it has none."""
         return self.mapping.markers.get(self.current)
 
     @property
@@ -97,13 +97,13 @@ class MarkerEditing(HandEditing[MarkerMapping]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The markers of the capture, and the virtual ones that follow some of them."""
+        """The markers of the capture, and the virtual markers that follow some of them."""
         names = self.motion.names
         return (*names, *(name for name in self.mapping.markers if name not in names))
 
     @property
     def source(self) -> str:
-        """The captured marker that the current one is, or follows."""
+        """The captured marker behind the current one: the same, or the one that it follows."""
         follows = "" if self.marker is None else self.marker.follows
         return follows or self.current
 
@@ -138,15 +138,15 @@ class MarkerEditing(HandEditing[MarkerMapping]):
         self._change(self.mapping.changed(self.current, marker))
 
     def assign(self, assignment: str) -> None:
-        """Set to whom vertices belong: "shared" or "exclusive"."""
+        """Set which markers a vertex belongs to: "shared" or "exclusive"."""
         self._change(replace(self.mapping, assignment=assignment))
 
     def add_up(self, overlap: str) -> None:
-        """Set how displacements of shared vertices go together: "match" or "add"."""
+        """Set how displacements of shared vertices combine: "match" or "add"."""
         self._change(replace(self.mapping, overlap=overlap))
 
     def remove(self) -> None:
-        """Take away the current marker's virtual one."""
+        """Remove the current marker's virtual marker."""
         source = self.source
         self._change(self.mapping.changed(self.current, None))
         self.current = source  # a follower is gone
@@ -160,7 +160,7 @@ class MarkerEditing(HandEditing[MarkerMapping]):
     def laid_out(self) -> Float64:
         """float64 (T, M, 3): the capture upright and as large as the head, in its unit, around its middle.
 
-        For a mapping that does not suffice.
+        Shown while the mapping does not suffice.
         """
         positions = self.motion.positions
         if self.motion.up[1:] == "z":
@@ -174,7 +174,7 @@ class MarkerEditing(HandEditing[MarkerMapping]):
 
     @property
     def first_radius(self) -> float:
-        """The radius that a new virtual marker gets, in the head's unit: the middle one of all."""
+        """The radius of a new virtual marker, in the head's unit: the median of all."""
         return usual_radius(self.mapping, self.head)
 
     def _write(self, path: Path) -> None:
@@ -197,7 +197,8 @@ class MarkerEditing(HandEditing[MarkerMapping]):
         return made
 
     def _steady_markers(self) -> SteadyMarkers:
-        """The markers without the head's motion, which depends on what is mapped and what is fixed alone."""
+        """Return the markers without the head's motion, which depends only on what is mapped and what is
+        fixed."""
         key = (tuple(self.mapping.markers), self.mapping.fixed)
         if self._steady is None or self._steady[0] != key:
             self._steady = (key, steady(self.motion, self.mapping, self.neutral))

@@ -28,16 +28,18 @@ FREE: Colour = (0.93, 0.94, 0.96, 0.55)
 CURRENT: Colour = (0.25, 0.75, 1.0, 1.0)
 LINE: Colour = (0.25, 0.75, 1.0, 0.55)
 """Moving, fixed and unmapped markers, the current one, and the line from it to its vertex."""
-RADIUS, CENTRE_RADIUS, CURRENT_RADIUS = 4.2, 2.6, 6.0
-"""Of dots, pixels in a picture 720 high."""
+RADIUS = 4.2
+CENTRE_RADIUS = 2.6
+CURRENT_RADIUS = 6.0
+"""Radii of dots, pixels in a picture 720 high."""
 LIFT = 0.006
 """Metres of skin through which dots are seen."""
 MAX_CLICK_DISTANCE = 10.0
-"""Pixels, in a picture 720 high, from a dot within which a click means it."""
+"""A click this close to a dot, in pixels of a picture 720 high, means the dot."""
 CLOUD_GAP = 0.35
 """Room between cloud and head, as a share of the head's width."""
-ROOM = 1.2
-"""Room beside head and cloud for a head that turns and moves, as a factor of the way between them."""
+ROOM_FACTOR = 1.2
+"""Room beside head and cloud for a head that turns and moves, as a factor on their distance."""
 MIN_FOLLOWED_TRAVEL = 0.3
 """Metres that a head moves before the camera follows it."""
 
@@ -69,7 +71,7 @@ class MarkersScene(Timed[CaptureTimes]):
         self.switches.show(name, on)
 
     def view_at(self, time: float) -> View:
-        """The head and the cloud at a time in seconds."""
+        """Return the head and the cloud at a time in seconds."""
         frame, after, share = self.timeline.position(time)
         vertices, pose = self._moved(frame, after, share)
         faces, eyes = self._figure_meshes(vertices, pose) if self._figure else self._plain(vertices, pose)
@@ -82,11 +84,11 @@ class MarkersScene(Timed[CaptureTimes]):
         )  # fmt: skip
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """The camera of a preset, fitted to the head, and to the cloud if it is beside it."""
+        """Return the camera of a preset, fitted to the head, and to the cloud if it is beside it."""
         return Camera.preset("front" if preset in (None, "body") else str(preset), self._subject, aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """How far the head has gone, metres; zeros for one that stays about where it is."""
+        """Return how far the head has gone, metres; zeros for one that stays about where it is."""
         made = self.editing.performance
         if made is None:
             return 0.0, 0.0, 0.0
@@ -99,13 +101,13 @@ class MarkersScene(Timed[CaptureTimes]):
         return x, y, z
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """The same."""
+        """Return the same as `travel`."""
         return self.travel(time)
 
     def vertex_under(
         self, camera: Camera, x: float, y: float, size: tuple[int, int], time: float
     ) -> int | None:
-        """The vertex of the head that is nearest to what a pixel of a picture shows, or None."""
+        """Return the vertex of the head that is nearest to what a pixel of a picture shows, or None."""
         vertices, pose = self._moved(*self.timeline.position(time))
         triangles = self.editing.head.triangles
         corners = self.to_world(_posed(vertices, pose))[triangles]
@@ -115,7 +117,7 @@ class MarkersScene(Timed[CaptureTimes]):
     def marker_under(
         self, camera: Camera, x: float, y: float, size: tuple[int, int], time: float
     ) -> str | None:
-        """The marker whose dot, in the cloud or on the head, is at a pixel, or near to it; or None."""
+        """Return the marker whose dot, in the cloud or on the head, is at a pixel, or near to it; or None."""
         frame, after, share = self.timeline.position(time)
         vertices, pose = self._moved(frame, after, share)
         names = list(self.editing.motion.names)
@@ -134,13 +136,14 @@ class MarkersScene(Timed[CaptureTimes]):
         return found[int(away.argmin())]
 
     def to_world(self, points: Float64) -> Float64:
-        """Points (..., 3) of the head in the world."""
+        """Return the points (..., 3) of the head in the world."""
         world: Float64 = (points - self._middle) * self.editing.head.metres
         return world
 
     @cached_property
     def _middle(self) -> Float64:
-        """(3,) what is the world's origin, in the head's unit: a face model's own, else the middle."""
+        """The point (3,) at the world's origin, in the head's unit: a face model's origin, else the head's
+        middle."""
         if self.editing.head.model is not None:
             return np.zeros(3)
         used = self.editing.head.vertices[np.unique(self.editing.head.triangles)]
@@ -166,7 +169,7 @@ class MarkersScene(Timed[CaptureTimes]):
 
     @cached_property
     def _beside(self) -> Float64:
-        """(3,) way from the head to the cloud beside it, metres."""
+        """Vector (3,) from the head to the cloud beside it, metres."""
         low, high = self._box
         return np.array([-(1 + CLOUD_GAP) * float(high[0] - low[0]), 0.0, 0.0])
 
@@ -177,21 +180,21 @@ class MarkersScene(Timed[CaptureTimes]):
 
     @cached_property
     def _representatives(self) -> Intp:
-        """(S,) a vertex of the head for each of its skin."""
+        """A vertex of the head for each vertex of its skin, (S,)."""
         skin = self.editing.head.skin
         rows = np.zeros(len(skin), dtype=np.intp)
         rows[skin.number] = np.arange(len(skin.number))
         return rows
 
     def _moved(self, frame: int, after: int, share: float) -> tuple[Float64, Float64]:
-        """The head's vertices, float64 (N, 3), and its motion (4, 4), both in its unit."""
+        """Return the head's vertices, float64 (N, 3), and its motion (4, 4), both in its unit."""
         made = self.editing.performance
         if made is None:
             return self.editing.head.vertices, np.eye(4)
         return made.vertices_between(frame, after, share), made.pose_between(frame, after, share)
 
     def _normal_changes(self, vertices: Float64) -> Float64:
-        """float64 (N, 3): what is added to the normals of the head at rest."""
+        """Return float64 (N, 3): what is added to the normals of the head at rest."""
         skin = self.editing.head.skin
         now = vertex_normals(vertices[self._representatives], skin.triangles)
         changes: Float64 = (now - self._rest_normals).astype(np.float64)[skin.number]
@@ -235,7 +238,7 @@ class MarkersScene(Timed[CaptureTimes]):
         return meshes, []
 
     def _shapes(self, plain: list[FaceShape]) -> list[FaceShape]:
-        """The shapes of all parts, in the colours of the current marker's reach if these are shown."""
+        """Return the shapes of all parts, in the colours of the current marker's reach if these are shown."""
         editing = self.editing
         if not editing.shows_weights or editing.influence is None:
             return plain
@@ -273,7 +276,8 @@ class MarkersScene(Timed[CaptureTimes]):
         return Legend(editing.current, f"share of its way, {count} vertices", 1.0, stops)  # type: ignore[arg-type]
 
     def _cloud(self, frame: int, after: int, share: float) -> Float64:
-        """float64 (M, 3): the markers in the world, beside the head or over it; NaN where one is not seen."""
+        """Return float64 (M, 3): the markers in the world, beside the head or over it; NaN where one is not
+        seen."""
         made = self.editing.performance
         positions = self.editing.laid_out if made is None else made.cloud
         here = positions[frame] if share == 0 else positions[frame] * (1 - share) + positions[after] * share
@@ -329,7 +333,7 @@ class MarkersScene(Timed[CaptureTimes]):
             return subject
         x, y, z = subject.centre
         aside = float(self._beside[0]) / 2
-        return replace(subject, centre=(x + aside, y, z), half_width=subject.half_width - ROOM * aside)
+        return replace(subject, centre=(x + aside, y, z), half_width=subject.half_width - ROOM_FACTOR * aside)
 
 
 def _posed(points: Float64, pose: Float64) -> Float64:
@@ -338,7 +342,7 @@ def _posed(points: Float64, pose: Float64) -> Float64:
 
 
 def _pixels(points: Float64, camera: Camera, size: tuple[int, int]) -> Float64:
-    """float64 (N, 2): pixels from the upper left corner of a picture; NaN behind the camera."""
+    """Return float64 (N, 2): pixels from the upper left corner of a picture; NaN behind the camera."""
     matrix = camera.projection_matrix(size[0] / size[1]) @ camera.view_matrix()
     clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
     clip[clip[:, 3] < 1e-6] = np.nan

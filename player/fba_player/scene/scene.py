@@ -147,7 +147,7 @@ class Scene(Timed[Timeline]):
         return self._face_at(float(self.start))
 
     def _face_at(self, time: float) -> Subject:
-        """The head alone at a time."""
+        """Return the head alone at a time."""
         face = self.figure.subject
         if not self.has_body:
             return face
@@ -157,7 +157,7 @@ class Scene(Timed[Timeline]):
         return Subject((float(x), float(y), float(z)), face.half_height, face.half_width)
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """A camera that has everything in view, for the named preset or for what the content suggests.
+        """Return a camera that has everything in view, for the named preset or for what the content suggests.
 
         "body" fits the whole body; the other presets look at the face, from the front, at three quarters
         or in profile, also where there is a body. ValueError for another name.
@@ -168,18 +168,19 @@ class Scene(Timed[Timeline]):
         return Camera.preset(preset, subject, aspect)
 
     def view_for(self, faps: Float32, baps: Float64) -> View:
-        """The view for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), not the animation's.
+        """Return the view for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), not the
+        animation's.
 
         baps are ignored if the animation has no body.
         """
         return self._make_view(faps, self._poser.pose(baps) if self.has_body else None)
 
     def still(self, faps: Float32) -> View:
-        """The view for FAPs (68,), in the body's pose at the start."""
+        """Return the view for FAPs (68,), in the body's pose at the start."""
         return self._make_view(faps, self._pose_at(float(self.start))[1])
 
     def view_at(self, time: float) -> View:
-        """The view at a time in seconds; before the start or after the end, the first or last frame.
+        """Return the view at a time in seconds; before the start or after the end, the first or last frame.
 
         Raises ValueError if the time is not finite.
         """
@@ -196,7 +197,7 @@ class Scene(Timed[Timeline]):
         return self._options.apply(view, self.switches, Posture(faps, self._face_matrix(joints), joints))
 
     def _person_or_head(self, faps: Float32, joints: Float64 | None) -> View:
-        """The view of a person or a head."""
+        """Return the view of a person or a head."""
         if joints is None:
             world = np.eye(4)
             return View(eyes=self.figure.eyes(faps, world), faces=self.figure.meshes(faps, world))
@@ -209,7 +210,7 @@ class Scene(Timed[Timeline]):
         )
 
     def _points(self, faps: Float32, joints: Float64 | None) -> View:
-        """The view of feature points and bones."""
+        """Return the view of feature points and bones."""
         if self._point_view is None:
             from fba_player.scene._feature_points_view import PointView
 
@@ -227,7 +228,8 @@ class Scene(Timed[Timeline]):
         return replace(view, capsules=capsules, blobs=self._bones.shadows(joints), ground=True)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """Offset (x, y, z) of a following camera at a time, metres; zeros if it does not follow."""
+        """Return the offset (x, y, z) of a following camera at a time, metres; zeros if it does not
+        follow."""
         if not self.has_body or not self._sampled_extent().follows:
             return (0.0, 0.0, 0.0)
         joints = self._pose_at(time)[1]
@@ -236,7 +238,8 @@ class Scene(Timed[Timeline]):
         return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Way (x, y, z) of the head from the start to a time, metres; zeros without a body."""
+        """Return the displacement (x, y, z) of the head from the start to a time, metres; zeros without a
+        body."""
         x, y, z = np.subtract(self._face_at(time).centre, self.face_subject.centre).tolist()
         return (x, y, z)
 
@@ -247,7 +250,7 @@ class Scene(Timed[Timeline]):
         return faps, self._poser.pose(self.timeline.baps(time))
 
     def _face_matrix(self, joints: Float64 | None) -> Float64:
-        """(4, 4): from the face model's frame into the world, without the head's own turn."""
+        """Return (4, 4): from the face model's frame into the world, without the head's own turn."""
         return np.eye(4) if joints is None else self.person.frame(joints)
 
     def _sampled_extent(self) -> Extent:
@@ -262,7 +265,7 @@ class Scene(Timed[Timeline]):
 
 
 def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:
-    """A camera that suits the content.
+    """Return a camera that suits the content.
 
     It shows a whole body; a body from the hips up if its face moves and its legs stand still; a face alone
     slightly from the side.

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from fba_player.playback.transport import Transport
 from fba_player.session._session import Session
 
-SHIFT = 0.02
+SOUND_SHIFT = 0.02
 """Seconds by which one key press shifts the sound."""
 
 
@@ -104,8 +104,8 @@ _ACTIONS: dict[str, Callable[[Session], None]] = {
     "follow": _follow,
     "points": Session.toggle_view,
     "mute": _mute,
-    "sound_earlier": _shift_sound(-SHIFT),
-    "sound_later": _shift_sound(SHIFT),
+    "sound_earlier": _shift_sound(-SOUND_SHIFT),
+    "sound_later": _shift_sound(SOUND_SHIFT),
     "bare": _bare,
     "close": Session.leave,
     "escape": Session.escape,

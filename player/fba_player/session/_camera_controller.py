@@ -11,7 +11,7 @@ from fba.easing import smoothstep
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 
-GLIDE = 0.35
+GLIDE_SECONDS = 0.35
 """Seconds that a glide to another view takes."""
 NOT_SHIFTED = (0.0, 1.0)
 """Shift of the middle as a share of the width, and factor on the distance, where no panels are open."""
@@ -74,7 +74,8 @@ class Viewpoint:
         return self._first_view if isinstance(self._first_view, Camera) else self.fit(self._first_view)
 
     def fit(self, preset: str | None) -> Camera:
-        """The camera of a preset, fitted above what is covered; None: the view that suits the content."""
+        """Return the camera of a preset, fitted above what is covered; None: the view that suits the
+        content."""
         free = 1.0 - min(max(self.covered, 0.0), 0.5)
         camera = self.scene.camera(preset, self.aspect / free)
         camera = camera.zoom(1 / free).pan(0.0, (free - 1) / 2)
@@ -93,7 +94,7 @@ class Viewpoint:
 
     def glide(self, camera: Camera) -> None:
         """Glide to another view."""
-        self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE
+        self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE_SECONDS
 
     def preset(self, name: str) -> None:
         """Glide to a preset. Raises ValueError for an unknown name."""
@@ -101,13 +102,13 @@ class Viewpoint:
         self._preset = name
 
     def uncover(self, left: float, right: float, *, smoothly: bool = True) -> None:
-        """Shift the figure to between panels that hide these shares of the picture's width."""
+        """Shift the figure into the space between panels that hide these shares of the picture's width."""
         if (left, right) == self._sides:
             return
         self._shift_before = self._shift_now()
         self._sides = (left, right)
         self._shift = self._shift_between(left, right)
-        self._shift_until = self._clock() + GLIDE if smoothly else -math.inf
+        self._shift_until = self._clock() + GLIDE_SECONDS if smoothly else -math.inf
 
     def reset(self) -> None:
         """Glide back to the first view."""
@@ -116,11 +117,11 @@ class Viewpoint:
         self._preset = self._first_view if not isinstance(self._first_view, Camera) else ""
 
     def camera_without_panels(self, time: float) -> Camera:
-        """The camera at a time in seconds, for a picture without panels at the sides."""
+        """Return the camera at a time in seconds, for a picture without panels at the sides."""
         return self._follow_travel(self.camera, time, 1.0) if self.follow else self.camera
 
     def camera_at(self, time: float) -> Camera:
-        """The camera at a time in seconds, with the figure between the panels at the sides."""
+        """Return the camera at a time in seconds, with the figure between the panels at the sides."""
         shift, further = self._shift_now()
         if (shift, further) == NOT_SHIFTED:
             return self.camera_without_panels(time)
@@ -135,8 +136,9 @@ class Viewpoint:
         self.follow = not self.follow
 
     def _progress(self, until: float) -> float:
-        """Progress, 0 to 1, of a glide that ends at a reading of the clock; it starts and ends slowly."""
-        return float(smoothstep(1.0 - (until - self._clock()) / GLIDE))
+        """Return the progress, 0 to 1, of a glide that ends at a reading of the clock; it starts and ends
+        slowly."""
+        return float(smoothstep(1.0 - (until - self._clock()) / GLIDE_SECONDS))
 
     def _shift_now(self) -> tuple[float, float]:
         share = self._progress(self._shift_until)
@@ -147,7 +149,7 @@ class Viewpoint:
         return (a, b) if share < 1.0 else self._shift
 
     def _shift_between(self, left: float, right: float) -> tuple[float, float]:
-        """Shift of the middle as a share of the width, and factor on the camera's distance."""
+        """Return the shift of the middle as a share of the width, and factor on the camera's distance."""
         free = max(1.0 - left - right, MIN_FREE_WIDTH)
         if self._preset == "" or free >= 1.0:
             return (left - right) / 2, 1.0

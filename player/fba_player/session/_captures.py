@@ -48,7 +48,7 @@ class Captures:
         return self._recorder is not None
 
     def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
-        """Save a picture, uint8 (H, W, 4), as PNG; returns its path, or None, with a notice, if it fails."""
+        """Save a picture, uint8 (H, W, 4), as PNG; return its path, or None, with a notice, if it fails."""
         path = self._unused_path(f"-{self.session.transport.frame:04d}", ".png")
         try:
             write_picture(path, pixels, transparent=transparent)
@@ -86,17 +86,18 @@ class Captures:
             self._sound.advance(self.session.recording)
 
     def add_picture(self, start: Callable[[], Callable[[], UInt8]]) -> None:
-        """Have the picture drawn since `begin_picture` in the film.
+        """Add the picture drawn since `begin_picture` to the film.
 
-        start: begins to read it, and returns what gives it, uint8 (H, W, 4). That is called when the next
-        picture begins, so that none is waited for. Not called where the film needs no frame.
+        start: begins to read it, and returns a function that gives its pixels, uint8 (H, W, 4), which is
+        called when the next picture begins, so that nothing waits. start is not called if the film needs no
+        frame.
         """
         seconds = self.session.recording
         if self._recorder is not None and seconds is not None and self._recorder.wants(seconds):
             self._read = seconds, start()
 
     def close(self) -> Path | None:
-        """Finish the film; returns its path, None if none is being recorded. Raises FbaError, OSError."""
+        """Finish the film; return its path, None if none is being recorded. Raises FbaError, OSError."""
         self._add_read()
         if self._recorder is None:
             return None
@@ -120,7 +121,8 @@ class Captures:
             self.session.say(f"Recording stopped: {error}", "error", 8.0)
 
     def _open_sound(self) -> FilmSound | None:
-        """The sound for a new film; None without sound, with a notice if the file cannot be used."""
+        """Return the sound for a new film; None without sound, or, with a notice, if the file cannot be
+        used."""
         session = self.session
         if session.sound is None:
             return None
@@ -147,7 +149,7 @@ class Captures:
             self.session.say(f"Saved as {path}")
 
     def _unused_path(self, what: str, suffix: str) -> Path:
-        """The path of a new file, named after the source."""
+        """Return the path of a new file, named after the source."""
         stem = Path(self.session.source.name or "fba").stem
         stem = re.sub(r"[^\w. -]", "_", stem)[:60].strip(" .") or "fba"
         path, number = self.folder / f"{stem}{what}{suffix}", 2
@@ -183,7 +185,7 @@ def draw_screenshot(
 
 
 def read_pixels(framebuffer: Any, size: tuple[int, int]) -> UInt8:
-    """The pixels of a framebuffer: uint8 (H, W, 4), top row first."""
+    """Return the pixels of a framebuffer: uint8 (H, W, 4), top row first."""
     width, height = size
     data = framebuffer.read((0, 0, width, height), components=4, alignment=1)
     return np.frombuffer(data, np.uint8).reshape(height, width, 4)[::-1]

@@ -18,7 +18,7 @@ BAR_MARGIN = 16
 ORBIT_SPEED = 0.35
 """Degrees per pixel."""
 ZOOM_STEP = 0.9
-CLICK = 4.0
+CLICK_DISTANCE = 4.0
 """Pixels, at a display scale of 1, by which the mouse may move in a click on a page."""
 
 
@@ -67,7 +67,7 @@ class Controls:
         """Handle a move of the mouse."""
         right, down = x - self._last[0], y - self._last[1]
         if not self._dragged and page_of(self.session) is not None:
-            self._dragged = math.hypot(right, down) > CLICK * self.session.scale
+            self._dragged = math.hypot(right, down) > CLICK_DISTANCE * self.session.scale
             if not self._dragged:
                 return
         self._last = (x, y)
@@ -100,7 +100,7 @@ class Controls:
         viewpoint.camera = viewpoint.camera.zoom(ZOOM_STEP ** max(min(steps, 10.0), -10.0))
 
     def bar(self) -> tuple[float, float]:
-        """Left and right end of the plain timeline, in pixels."""
+        """Return left and right end of the plain timeline, in pixels."""
         margin = BAR_MARGIN * self.session.scale
         return margin, max(self.session.size[0] - margin, margin + 1)
 

@@ -40,7 +40,8 @@ class Stretch:
 
 
 def read_stretches(animation: Animation, model: FaceSettings | None) -> tuple[Stretch, ...]:
-    """The expressions of an animation, one stretch after the other; none without a face, or if it is long."""
+    """Return the expressions of an animation, one stretch after the other; none without a face, or if it is
+    long."""
     if animation.face is None or len(animation) > MAX_FRAMES:
         return ()
     try:
@@ -51,7 +52,7 @@ def read_stretches(animation: Animation, model: FaceSettings | None) -> tuple[St
 
 
 def stretch_at(stretches: tuple[Stretch, ...], time: float) -> Stretch | None:
-    """The stretch at a time in seconds; None without one."""
+    """Return the stretch at a time in seconds; None without one."""
     return next((one for one in stretches if one.start <= time < one.end), None)
 
 

@@ -33,7 +33,7 @@ class Key:
 
 @cache
 def keys() -> tuple[Key, ...]:
-    """All rows, in the order of the help."""
+    """Return all rows, in the order of the help."""
     return tuple(
         Key(
             keys=tuple(row["keys"].split()),
@@ -49,19 +49,19 @@ def keys() -> tuple[Key, ...]:
 
 @cache
 def mouse() -> tuple[tuple[str, str], ...]:
-    """(mouse gesture, what it does), for the help."""
+    """Return (mouse gesture, what it does), for the help."""
     return tuple((row["mouse"], row["does"]) for row in _rows("mouse.csv"))
 
 
 @cache
 def by_name() -> dict[str, Key]:
-    """Rows by the name of a key in lower case: "space", "shift+f12", "ctrl+s"."""
+    """Return the rows by the name of a key in lower case: "space", "shift+f12", "ctrl+s"."""
     return {name.lower(): row for row in keys() for name in row.keys}
 
 
 @cache
 def key_of(action: str) -> str:
-    """The first key of an action, as shown to users; "" if it has none."""
+    """Return the first key of an action, as shown to users; "" if it has none."""
     return next((_key_text(row.keys[0]) for row in keys() if row.action == action), "")
 
 
@@ -75,7 +75,7 @@ def _rows(name: str) -> list[dict[str, str]]:
 
 
 def tables() -> str:
-    """Markdown: a table for each group of keys, for switches and for the mouse."""
+    """Return a table in Markdown for each group of keys, for switches and for the mouse."""
     lines: list[str] = []
     group = ""
     for row in keys():
@@ -93,7 +93,7 @@ def _table_head(title: str) -> list[str]:
 
 
 def _to_markdown(key: str) -> str:
-    """A key as Markdown: punctuation as code, so that it is not read as Markdown."""
+    """Return a key as Markdown: punctuation as code, so that it is not read as Markdown."""
     return key if re.fullmatch(r"\w+([+]\w+)*", key) else f"`{key}`"
 
 

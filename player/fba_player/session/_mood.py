@@ -60,7 +60,7 @@ class PuppetMood:
         self._mix()
 
     def release(self) -> None:
-        """Take all of it away; sliders that were added stay, at 0."""
+        """Remove all expressions and the point; sliders that were added stay, at 0."""
         self._weights = dict.fromkeys(self._weights, 0.0)
         self._point = None
         self._mix()

@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 Hook = Callable[[Float32, Float64], None]
 
 NOTICE_SECONDS = 4.0
-LEAVING = 6.0
+LEAVING_SECONDS = 6.0
 """Seconds in which closing again discards unsaved work."""
-IDLE_MOUSE = 3.0
+IDLE_MOUSE_SECONDS = 3.0
 """Seconds without input after which a full screen hides the mouse cursor while it plays."""
-NOTICE_FADES = 0.5
+NOTICE_FADE_SECONDS = 0.5
 """Last seconds of a notice, in which it fades."""
 
 
@@ -85,7 +85,7 @@ class Session:
     requests: what the window shall do after this picture, see `request`. recording: seconds of the film so
     far, None if none is being recorded. values: FAPs and BAPs of the last picture, after the hooks. sound:
     path of the sound file; audio: its player, None without a sound device; the sound begins sound_offset
-    seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures all the time.
+    seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures without input.
     unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next, see `drop`.
     popup: whether a list is open over the picture; set to False to close it.
     """
@@ -146,7 +146,7 @@ class Session:
         self._notices.append(Notice(text, kind, self.clock() + seconds, about))
 
     def notices(self) -> list[Notice]:
-        """The current notices, oldest first."""
+        """Return the current notices, oldest first."""
         now = self.clock()
         self._notices = [one for one in self._notices if one.until > now]
         return list(self._notices)
@@ -167,9 +167,9 @@ class Session:
     def leave(self) -> None:
         """Close the window; with unsaved work, warn first and close at the second call."""
         if self.unsaved and self.clock() > self._leave_again_until:
-            self._leave_again_until = self.clock() + LEAVING
+            self._leave_again_until = self.clock() + LEAVING_SECONDS
             what = " and ".join(sorted(self.unsaved))
-            self.say(f"Unsaved: {what}. Close again to discard", "warning", LEAVING, about="leave")
+            self.say(f"Unsaved: {what}. Close again to discard", "warning", LEAVING_SECONDS, about="leave")
             return
         self.closing = True
 
@@ -202,12 +202,12 @@ class Session:
     @property
     def hides_mouse(self) -> bool:
         """Whether a full screen shows no mouse cursor: it plays, and the user leaves the mouse alone."""
-        return self.transport.playing and self.idle > IDLE_MOUSE
+        return self.transport.playing and self.idle > IDLE_MOUSE_SECONDS
 
     @property
     def restless(self) -> bool:
         """Whether the picture changes without input of the user."""
-        fades_from = self.clock() + NOTICE_FADES
+        fades_from = self.clock() + NOTICE_FADE_SECONDS
         return (
             self.transport.playing
             or self.viewpoint.gliding
@@ -223,7 +223,7 @@ class Session:
             self.audio.offset = self.sound_offset
 
     def view(self, time: float) -> View:
-        """What is drawn at a time in seconds, after the hooks of `before_frame`."""
+        """Return what is drawn at a time in seconds, after the hooks of `before_frame`."""
         scene = self.scene
         if not self.before_frame or not isinstance(scene, Scene):
             return scene.view_at(time)
@@ -239,15 +239,15 @@ class Session:
             self.scene.view = "figure" if self.scene.view == "points" else "points"
 
     def switch_key(self, switch: Switch) -> str:
-        """The key of a switch; "" if it has none, or the window uses that key for something else."""
+        """Return the key of a switch; "" if it has none, or the window uses that key for something else."""
         return "" if switch.key.lower() in by_name() else switch.key
 
     def switch_keys(self) -> list[tuple[str, str]]:
-        """(key, label) of all switches that have a key."""
+        """Return (key, label) of all switches that have a key."""
         return [(self.switch_key(one), one.label) for one in SWITCHES.values() if self.switch_key(one)]
 
     def press_switch(self, key: str) -> bool:
-        """Turn the switch with this key to its next value; returns False without one."""
+        """Turn the switch with this key to its next value; return False without one."""
         for name, switch in SWITCHES.items():
             if self.switch_key(switch).lower() == key:
                 self.touched()
@@ -257,5 +257,5 @@ class Session:
         return False
 
     def camera(self, time: float) -> Camera:
-        """The camera at a time in seconds."""
+        """Return the camera at a time in seconds."""
         return self.viewpoint.camera_at(time)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from fba_player.session._timeline_trace import Trace
     from fba_player.view.protocols import Showable
 
-REFRESH = 0.2
+REFRESH_SECONDS = 0.2
 """Seconds between updates of the information about a live stream."""
 
 
@@ -52,7 +52,7 @@ class Source:
         self._live: Callable[[], StreamInfo] | None = None
         if isinstance(animation, LiveAnimation):
             self._live = animation.info
-        self._updated = -REFRESH
+        self._updated = -REFRESH_SECONDS
         self._trace_info: StreamInfo | None = None
         self._trace: Trace | None = None
         self._thread: threading.Thread | None = None
@@ -70,7 +70,7 @@ class Source:
         if self._probed is not None:
             return self._probed
         own, timeline, now = self._scene_info, self._scene.timeline, wall.monotonic()
-        due = not timeline.growing or now - self._updated >= REFRESH
+        due = not timeline.growing or now - self._updated >= REFRESH_SECONDS
         if own is None or (own.frames != timeline.frames and due):
             self._scene_info, self._updated = self._info_of_scene(), now
         assert self._scene_info is not None

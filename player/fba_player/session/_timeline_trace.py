@@ -34,7 +34,7 @@ class Trace:
 
 
 def trace_of_planes(info: StreamInfo) -> Trace | None:
-    """The bits of a stream's planes; None if it has no planes."""
+    """Return the bits of a stream's planes; None if it has no planes."""
     if info.plane_bits is None or info.plane_intra is None or info.frame_index is None:
         return None
     times = (info.frame_index - info.frame_index[0]) / float(info.rate) + float(info.start)
@@ -42,7 +42,7 @@ def trace_of_planes(info: StreamInfo) -> Trace | None:
 
 
 def trace_of_motion(animation: Animation) -> Trace | None:
-    """How much each frame differs from the one before; None if nothing moves.
+    """Return how much each frame differs from the one before; None if nothing moves.
 
     It is the sum over all parameters of the change divided by the range of values in the animation.
     """

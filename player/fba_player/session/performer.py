@@ -87,7 +87,7 @@ class Performer:
         self.session.unsaved.discard(UNSAVED_TAKE)
 
     def save(self, name: str) -> tuple[Path, str]:
-        """Write the last take with the BAP steps of the source; returns and raises as `Takes.save`."""
+        """Write the last take with the BAP steps of the source; return and raises as `Takes.save`."""
         saved = self.takes.save(name, bap_steps=self.session.source.bap_steps)
         self.session.unsaved.discard(UNSAVED_TAKE)
         return saved
@@ -120,7 +120,8 @@ class Performer:
 
 
 def neutral(*, body: bool = False, name: str = "puppet") -> Animation:
-    """A neutral face, with a standing body if `body` is True, for puppeteering: 10 s at 25 frames/s."""
+    """Return a neutral face, with a standing body if `body` is True, for puppeteering: 10 s at 25
+    frames/s."""
     count = 25 * NEUTRAL_SECONDS
     face = FaceTrack(np.zeros((count, 68), np.int32), np.zeros((count, 68), bool))
     stands = BodyTrack(np.zeros((count, 296), np.int32), np.zeros((count, 296), bool)) if body else None

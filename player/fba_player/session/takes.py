@@ -21,12 +21,12 @@ MAX_TAKE_SECONDS = 3600.0
 """Longest duration of a take."""
 HOLD_SECONDS = 0.2
 """Seconds without a picture after which values are held, not interpolated, until the next one."""
-ALWAYS = slice(180, 186)
+ROOT_BAPS = slice(180, 186)
 """BAPs of the root, which a take with a body always sends."""
 
 
 def take_rate(rate: Fraction) -> Fraction:
-    """The frame rate of a take over an animation with this rate."""
+    """Return the frame rate of a take over an animation with this rate."""
     return rate if RATES[0] <= rate <= RATES[1] else RATE
 
 
@@ -72,7 +72,7 @@ class TakeRecorder:
         self.seconds = seconds
 
     def take(self, name: str = "take") -> Animation:
-        """The recording as an animation. Raises ValueError if nothing was recorded.
+        """Return the recording as an animation. Raises ValueError if nothing was recorded.
 
         All FAPs are sent in every frame, because a face fills in those that are not sent. BAPs are 0 unless
         sent, so only those that ever moved are.
@@ -89,7 +89,7 @@ class TakeRecorder:
         if self._body:
             turned = np.rint(np.stack(self._baps)).astype(np.int32)
             sent = np.zeros(BAP_COUNT, bool)
-            sent[ALWAYS] = True
+            sent[ROOT_BAPS] = True
             body = BodyTrack(turned, np.tile(sent | turned.any(axis=0), (count, 1)))
         return Animation(self.rate, np.arange(count), face, body, name)
 
@@ -118,7 +118,8 @@ class Takes:
         return self._takes.pop() if self._takes else None
 
     def path(self, name: str) -> Path:
-        """The path for a name: in the folder, with the suffix .fba. Raises FormatError for an empty name."""
+        """Return the path for a name: in the folder, with the suffix .fba. Raises FormatError for an empty
+        name."""
         name = name.strip()
         if not name or name.endswith(("/", os.sep)) or name in (".", ".."):
             raise FormatError("is not a file name; give one, such as take.fba", path=name or "take")
@@ -126,14 +127,14 @@ class Takes:
         return path if path.suffix.lower() == ".fba" else path.with_name(path.name + ".fba")
 
     def free_name(self, name: str = "take") -> str:
-        """`name`, or `name-2` and so on: the first that no file has yet."""
+        """Return `name`, or `name-2` and so on: the first that no file has yet."""
         number, free = 2, name
         while self.path(free).exists():
             free, number = f"{name}-{number}", number + 1
         return free
 
     def save(self, name: str, *, bap_steps: str = "iso") -> tuple[Path, str]:
-        """Write the last take; returns its path, and the table of BAP steps that readers need.
+        """Write the last take; return its path, and the table of BAP steps that readers need.
 
         If the steps of the standard ("iso") cannot code a turn of a joint, "visage" are used. Raises
         FormatError if a file of that name exists, nothing was recorded or the file cannot be written,

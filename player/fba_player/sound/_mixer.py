@@ -10,11 +10,11 @@ import numpy as np
 from fba.arrays import Float32, Int16
 from fba_player.playback._playhead import Motion
 
-FADE = 0.004
+FADE_SECONDS = 0.004
 """Seconds over which sound fades in, out, and across a jump: without them it would click."""
-ROUNDING = 1e-7
+ROUNDING_SECONDS = 1e-7
 """Seconds: a jump that is at most this far ahead is due now; the rest is rounding."""
-SLIP = 0.002
+SLIP_SECONDS = 0.002
 """Seconds by which the sample due now may differ from the next one in the file without counting as a jump."""
 
 
@@ -41,16 +41,16 @@ class SoundMixer:
         self._cursor: float | None = None  # sample that follows the last; None in silence
         self._speed = 1.0
         self._since_start = math.inf  # samples since the sound began or jumped
-        self._fade = max(round(FADE * rate), 1)
+        self._fade = max(round(FADE_SECONDS * rate), 1)
         self._tail: Float32 = np.zeros((0, 2), dtype=np.float32)  # what is left of the fading end
 
     def fill(self, clock: float, count: int) -> Int16:
-        """Samples int16 (count, 2); the first is heard at this reading of the clock."""
+        """Return the samples int16 (count, 2); the first is heard at this reading of the clock."""
         motion, rate = self._motion(), self._rate
         mixed = np.zeros((count, 2), dtype=np.float32)
         done = 0
         while done < count:
-            now = clock + done / rate + ROUNDING
+            now = clock + done / rate + ROUNDING_SECONDS
             turn = motion.until_turn(now) * rate
             piece = min(count - done, max(math.ceil(turn), 1)) if turn < count else count - done
             due = (motion.time(now) - self.origin) * rate if motion.moving(now) else None
@@ -70,7 +70,11 @@ class SoundMixer:
     def _continue_at(self, due: float | None, speed: float) -> None:
         """Go on with the sample that is due; fade out the last one if this is a jump. None: silence."""
         here = self._cursor
-        if here is not None and due is not None and abs(due - here) <= SLIP * self._rate * max(speed, 1.0):
+        if (
+            here is not None
+            and due is not None
+            and abs(due - here) <= SLIP_SECONDS * self._rate * max(speed, 1.0)
+        ):
             self._speed = speed
             return
         if here is not None:
@@ -87,7 +91,7 @@ class SoundMixer:
         return samples
 
     def _read_at_speed(self, first: float, speed: float, count: int) -> Float32:
-        """Samples float32 (count, 2) of the file from `first` on, resampled by `speed`."""
+        """Return the samples float32 (count, 2) of the file from `first` on, resampled by `speed`."""
         if speed == 1.0:
             return self._take(round(first), count).astype(np.float32)
         low = math.floor(first)

@@ -9,7 +9,8 @@ from fba_player.gl._context import cure
 
 
 def import_av(purpose: str = "films need") -> Any:
-    """The module `av`; DisplayError where it cannot be imported. purpose: the beginning of the message."""
+    """Return the module `av`; DisplayError where it cannot be imported. purpose: the beginning of the
+    message."""
     try:
         import av
     except ImportError as error:
@@ -21,5 +22,5 @@ def import_av(purpose: str = "films need") -> Any:
 
 
 def av_version(av: Any) -> int:
-    """The major version of PyAV."""
+    """Return the major version of PyAV."""
     return int(av.__version__.split(".")[0])

@@ -14,13 +14,13 @@ from fba.errors import FbaError
 from fba_player.playback._playhead import Motion
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 
-SECONDS = 0.5
+BLOCK_SECONDS = 0.5
 """Length of a block, in seconds."""
-AHEAD = 2.5
+AHEAD_SECONDS = 2.5
 """Seconds ahead of now whose samples are decoded in advance."""
 CACHED_BLOCKS = 64
 """Blocks in memory, half a minute: 6 MB at 48 kHz."""
-PAUSE = 0.03
+PAUSE_SECONDS = 0.03
 """Seconds between checks of which samples are wanted."""
 
 
@@ -30,9 +30,9 @@ def samples_ahead(motion: Motion, now: float, origin: float, rate: int) -> Itera
     motion: of the transport. now: seconds of its clock. origin: time at which the sound begins, seconds. The
     last number lies a block behind the present position, for a start after a pause.
     """
-    for ahead in np.arange(0.0, AHEAD + SECONDS / 2, SECONDS):
+    for ahead in np.arange(0.0, AHEAD_SECONDS + BLOCK_SECONDS / 2, BLOCK_SECONDS):
         yield int((motion.time(now + float(ahead)) - origin) * rate)
-    yield int((motion.here - origin + SECONDS) * rate)
+    yield int((motion.here - origin + BLOCK_SECONDS) * rate)
 
 
 class SoundBlocks:
@@ -45,7 +45,7 @@ class SoundBlocks:
     def __init__(self, file: SoundFile, wanted: Callable[[], Iterable[int]]) -> None:
         self._file = file
         self._wanted = wanted
-        self._size = max(round(SECONDS * file.rate), 1)
+        self._size = max(round(BLOCK_SECONDS * file.rate), 1)
         self._blocks: OrderedDict[int, Int16] = OrderedDict()
         self._closing = threading.Event()
         self._lock = threading.Lock()
@@ -54,7 +54,7 @@ class SoundBlocks:
         self._thread.start()
 
     def take(self, start: int, count: int) -> Int16:
-        """Samples int16 (count, 2); zeros outside of the file, and where it is not decoded yet."""
+        """Return the samples int16 (count, 2); zeros outside of the file, and where it is not decoded yet."""
         taken = np.zeros((count, CHANNELS), dtype=np.int16)
         for number in range(max(start, 0) // self._size, (start + count - 1) // self._size + 1):
             block = self._blocks.get(number)
@@ -66,7 +66,7 @@ class SoundBlocks:
         return taken
 
     def load(self) -> bool:
-        """Decode the most urgent block that is not in memory; returns False where all wanted ones are."""
+        """Decode the most urgent block that is not in memory; return False where all wanted ones are."""
         for sample in self._wanted():
             number = sample // self._size
             if number < 0:
@@ -97,4 +97,4 @@ class SoundBlocks:
             with contextlib.suppress(FbaError, OSError):  # a file that went away is silent
                 loaded = self.load()
             if not loaded:
-                self._closing.wait(PAUSE)
+                self._closing.wait(PAUSE_SECONDS)

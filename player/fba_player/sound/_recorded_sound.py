@@ -18,7 +18,7 @@ from fba_player.sound._pyav import import_av
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 from fba_player.sound.soundtrack import AAC_RATES, BLOCK, make_frame
 
-PIECE = 1.0
+PIECE_SECONDS = 1.0
 """Most seconds mixed at once."""
 
 
@@ -59,7 +59,7 @@ class FilmSound:
         self._mixer.muted = self._muted()
         missing = round(seconds * self.rate) - self._done
         while missing > 0:
-            count = min(missing, round(PIECE * self.rate))
+            count = min(missing, round(PIECE_SECONDS * self.rate))
             samples = self._mixer.fill(now - missing / self.rate, count)
             with self._lock:
                 self._mixed.append(samples)
@@ -71,7 +71,8 @@ class FilmSound:
         self._ended = True
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """The next samples, at most as many as are mixed, as `av.AudioFrame`s ("fltp") without times."""
+        """Yield the next samples, at most as many as are mixed, as `av.AudioFrame`s ("fltp") without
+        times."""
         while samples > 0:
             with self._lock:
                 part = self._mixed.popleft() if self._mixed else None
@@ -92,7 +93,7 @@ class FilmSound:
         self._file.close()
 
     def _take(self, start: int, count: int) -> Int16:
-        """Samples int16 (count, 2) of the file; zeros outside."""
+        """Return the samples int16 (count, 2) of the file; zeros outside."""
         taken = np.zeros((count, CHANNELS), dtype=np.int16)
         first = min(max(-start, 0), count)
         samples = self._file.read(start + first, count - first)

@@ -18,9 +18,10 @@ CHANNELS = 2
 RATES = (8000, 192_000)
 """Samples per second, least and most; other rates are resampled to `USUAL_RATE`."""
 USUAL_RATE = 48_000
-MIN_RATE, MAX_RATE = 1000, 1_000_000
-"""Samples per second that are read: resampling takes time and memory in proportion to the change."""
-RUN_UP = 0.5
+MIN_RATE = 1000
+MAX_RATE = 1_000_000
+"""Limits of the samples per second that are read: resampling costs time and memory by the change of rate."""
+RUN_UP_SECONDS = 0.5
 """Seconds decoded before the first sample that is read: MP3 and AAC frames need the ones before them."""
 MIN_GAP_SECONDS = 0.02
 """Seconds by which the times in a file must exceed its count of samples to be taken as a gap."""
@@ -29,7 +30,7 @@ MAX_PACKET_SAMPLES = 1 << 24
 
 
 def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
-    """The opened `av` container and its first audio stream; FormatError if no audio can be decoded."""
+    """Return the opened `av` container and its first audio stream; FormatError if no audio can be decoded."""
     # Tags may be in any encoding. From version 19 on, PyAV takes them as they are and has no argument for it.
     tags = {"metadata_errors": "replace"} if av_version(av) < 19 else {}
     try:
@@ -87,10 +88,14 @@ class SoundFile:
             raise FormatError("holds no sound that can be decoded", path=path)
 
     def read(self, start: int, count: int) -> Int16:
-        """Samples int16 (count, 2) from sample number `start` on; fewer, or none, where the sound ends."""
+        """Return the samples int16 (count, 2) from sample number `start` on; fewer, or none, where the sound
+        ends."""
         start, missing = max(start, 0), max(count, 0)
         at = self._next
-        if at is None or not 0 <= start - at + len(self._rest) <= len(self._rest) + RUN_UP * self.rate:
+        if (
+            at is None
+            or not 0 <= start - at + len(self._rest) <= len(self._rest) + RUN_UP_SECONDS * self.rate
+        ):
             at = self._seek(start)
         pieces: list[Int16] = []
         while missing > 0:
@@ -134,9 +139,9 @@ class SoundFile:
         return rate if fits else USUAL_RATE
 
     def _seek(self, start: int) -> int:
-        """Let `_parts` begin at or before a sample; returns the number of the sample after `_rest`."""
+        """Let `_parts` begin at or before a sample; return the number of the sample after `_rest`."""
         self._rest = self._rest[:0]
-        before = max(start / self.rate - RUN_UP, 0.0)
+        before = max(start / self.rate - RUN_UP_SECONDS, 0.0)
         stream = self._stream
         if self._next is not None or before > 0:  # not for a file that has just been opened
             try:
@@ -150,7 +155,8 @@ class SoundFile:
         return self._first + len(self._rest)
 
     def _decode_parts(self) -> Iterator[Int16]:
-        """Parts (N, 2) from where the container is; sets `_first` to the number of the first sample."""
+        """Yield the parts (N, 2) from where the container is; sets `_first` to the number of the first
+        sample."""
         stream = self._stream
         convert = _Converter(self._av, self.rate, mono=stream.channels == 1)
         begun, at = stream.start_time or 0, None
@@ -179,7 +185,7 @@ class SoundFile:
                 self._warn(error)
 
     def _frames(self) -> Iterator[Any]:
-        """Decoded frames; damaged ones are left out, with a warning the first time."""
+        """Yield the decoded frames; damaged ones are left out, with a warning the first time."""
         error_type = self._av.error.FFmpegError
         packets = self._container.demux(self._stream)
         while True:
@@ -218,7 +224,7 @@ class _Converter:
         self._resampler = self._new_resampler()
 
     def __call__(self, frame: Any) -> list[Int16]:
-        """The samples of a frame; for None, those that the resampler still holds back."""
+        """Return the samples of a frame; for None, those that the resampler still holds back."""
         try:
             pieces = self._resampler.resample(frame)
         except ValueError:  # another format than before

@@ -28,8 +28,10 @@ from fba_player.sound.soundtrack import find_sound_beside
 
 __all__ = ["Audio", "find_sound_beside", "open_audio"]
 
-PERIOD, PERIODS = 0.04, 3
-"""Seconds that a device asks for at a time, and how many such periods it buffers."""
+PERIOD = 0.04
+"""Seconds of sound that a device asks for at a time."""
+PERIODS = 3
+"""Number of periods that a device buffers."""
 CLOCK_GAIN = 0.05
 """Share of the measured error by which each call of the device corrects the clock: calls are irregular."""
 CLOCK_CALLS = 10
@@ -124,7 +126,7 @@ class Audio:
         self.close()
 
     def _device_samples(self) -> Generator[bytes, int, None]:
-        """Samples for the device as bytes; runs in its thread."""
+        """Yield the samples for the device as bytes; runs in its thread."""
         samples = yield b""
         while True:
             first = self.clock.take(samples)
@@ -158,7 +160,7 @@ class SoundClock:
         self._last = -latency
 
     def __call__(self) -> float:
-        """Seconds; 0 when the first sample is heard, before that negative."""
+        """Return the seconds; 0 when the first sample is heard, before that negative."""
         ahead = self._ahead
         if ahead is not None:
             self._last = max(self._last, self._monotonic() + ahead)

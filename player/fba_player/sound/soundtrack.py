@@ -28,14 +28,15 @@ class FilmedSound(Protocol):
     layout: str
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """The next samples, or those of them that are ready, as `av.AudioFrame`s ("fltp") without times."""
+        """Return the next samples, or those of them that are ready, as `av.AudioFrame`s ("fltp") without
+        times."""
 
     def close(self) -> None:
         """Release its resources; safe to call twice."""
 
 
 def find_sound_beside(path: PathLike) -> Path | None:
-    """The WAV file of the same name in the folder of a stream; None if absent."""
+    """Return the WAV file of the same name in the folder of a stream; None if absent."""
     stream = Path(path)
     for suffix in (".wav", ".WAV", ".Wav"):
         sound = stream.with_suffix(suffix)
@@ -72,12 +73,12 @@ class Soundtrack:
         self._container.close()
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """The next samples as `av.AudioFrame`s ("fltp") of at most `BLOCK` samples, without times."""
+        """Yield the next samples as `av.AudioFrame`s ("fltp") of at most `BLOCK` samples, without times."""
         for start in range(0, samples, BLOCK):
             yield make_frame(self._av, self.take(min(BLOCK, samples - start)), self.layout, self.rate)
 
     def take(self, samples: int) -> Float32:
-        """The next samples, float32 (channels, samples), -1..1; zeros after the end of the file."""
+        """Return the next samples, float32 (channels, samples), -1..1; zeros after the end of the file."""
         while self._rest.shape[1] < samples:
             part = next(self._parts, None)
             if part is None:
@@ -111,7 +112,7 @@ class Soundtrack:
 
 
 def make_frame(av: Any, samples: Float32, layout: str, rate: int) -> Any:
-    """An `av.AudioFrame` ("fltp") of samples, float32 (channels, samples), without a time."""
+    """Return an `av.AudioFrame` ("fltp") of samples, float32 (channels, samples), without a time."""
     frame = av.AudioFrame.from_ndarray(samples, format="fltp", layout=layout)
     frame.sample_rate = rate
     return frame

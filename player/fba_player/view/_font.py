@@ -10,12 +10,12 @@ MIN_FONT_SIZE = 6
 
 
 def label_font(size: float) -> Any:
-    """The font at a size in pixels, at least `MIN_FONT_SIZE`."""
+    """Return the font at a size in pixels, at least `MIN_FONT_SIZE`."""
     return _font(max(round(size), MIN_FONT_SIZE))
 
 
 def shortened(draw: Any, text: str, font: Any, width: float) -> str:
-    """The text, cut so that it is at most `width` pixels wide."""
+    """Return the text, cut so that it is at most `width` pixels wide."""
     while len(text) > 1 and draw.textlength(text, font=font) > width:
         text = text[:-1]
     return text

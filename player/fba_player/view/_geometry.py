@@ -8,31 +8,33 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Floating
+from fba.rotations import quaternions
 from fba_player.view._view import FaceMesh
 from fba_player.view.camera import Camera
 
 
 def world_positions(mesh: FaceMesh) -> Float32:
-    """float32 (V, 3): the mesh's positions in the world."""
+    """Return float32 (V, 3): the mesh's positions in the world."""
     turned = turn_partly(mesh.positions, mesh.shape.sway, mesh.turn, mesh.centre)
     world: Float32 = (turned @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]).astype(np.float32)
     return world
 
 
 def world_normals(mesh: FaceMesh) -> Float32:
-    """float32 (V, 3): the mesh's unit normals in the world."""
+    """Return float32 (V, 3): the mesh's unit normals in the world."""
     turned = turn_partly(mesh.normals, mesh.shape.sway, mesh.turn, np.zeros(3)) @ mesh.matrix[:3, :3].T
     return unit_rows(turned).astype(np.float32)
 
 
 def unit_rows(vectors: Float64) -> Float64:
-    """float64 (N, 3): vectors scaled to length 1; those of length 0 stay."""
+    """Return float64 (N, 3): vectors scaled to length 1; those of length 0 stay."""
     unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)
     return unit
 
 
 def turn_partly(positions: Floating, sway: Floating, turn: Float64, centre: Float64) -> Float64:
-    """float64 (V, 3): positions turned about `centre` (3,), each by its share `sway` (V,) of a rotation.
+    """Return float64 (V, 3): positions turned about `centre` (3,), each by its share `sway` (V,) of a
+    rotation.
 
     turn: (3,), the rotation's axis times its angle.
     """
@@ -50,26 +52,8 @@ def turn_partly(positions: Floating, sway: Floating, turn: Float64, centre: Floa
 
 
 def rotation_vector(matrix: Float64) -> Float64:
-    """(3,): the axis of a rotation matrix (3, 3) times its angle, 0..pi."""
-    # Through the quaternion and its largest component, which is exact near half a turn, too.
-    trace = float(np.trace(matrix))
-    squares = np.array([trace, *np.diag(matrix)])
-    largest = int(squares.argmax())
-    if largest == 0:
-        q = np.array([
-            1 + trace,
-            matrix[2, 1] - matrix[1, 2],
-            matrix[0, 2] - matrix[2, 0],
-            matrix[1, 0] - matrix[0, 1],
-        ])  # fmt: skip
-    else:
-        i = largest - 1
-        j, k = (i + 1) % 3, (i + 2) % 3
-        q = np.zeros(4)
-        q[0] = matrix[k, j] - matrix[j, k]
-        q[1 + i] = 1 + 2 * matrix[i, i] - trace
-        q[1 + j], q[1 + k] = matrix[j, i] + matrix[i, j], matrix[k, i] + matrix[i, k]
-    q = q / np.linalg.norm(q)
+    """Return (3,): the axis of a rotation matrix (3, 3) times its angle, 0..pi."""
+    q = quaternions(matrix)  # exact near half a turn, too
     sine = float(np.linalg.norm(q[1:]))
     if sine < 1e-12:
         return np.zeros(3)
@@ -79,14 +63,14 @@ def rotation_vector(matrix: Float64) -> Float64:
 
 
 def translation(offset: npt.ArrayLike) -> Float64:
-    """(4, 4) matrix of a translation by (3,)."""
+    """Return (4, 4) matrix of a translation by (3,)."""
     matrix = np.eye(4)
     matrix[:3, 3] = offset
     return matrix
 
 
 def ray_through(camera: Camera, x: float, y: float, size: tuple[int, int]) -> tuple[Float64, Float64]:
-    """(origin (3,), unit direction (3,)) of the ray through a pixel, in the world.
+    """Return (origin (3,), unit direction (3,)) of the ray through a pixel, in the world.
 
     x, y: in pixels from the upper left corner of a picture of this size.
     """
@@ -98,7 +82,7 @@ def ray_through(camera: Camera, x: float, y: float, size: tuple[int, int]) -> tu
 
 
 def first_hit(origin: Float64, direction: Float64, corners: Float64) -> tuple[int, Float64] | None:
-    """(number of the first triangle that a ray meets, the shares (3,) of its corners there), or None.
+    """Return (number of the first triangle that a ray meets, the shares (3,) of its corners there), or None.
 
     corners: float64 (F, 3, 3). Both sides of a triangle count. After Moeller and Trumbore (1997).
     """

@@ -231,7 +231,8 @@ class View:
 
 
 def spheres(centres: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:
-    """float32 (N, 16): spheres as capsules. centres: (N, 3), and radii (N,), metres. colour: with gloss."""
+    """Return float32 (N, 16): spheres as capsules. centres: (N, 3), and radii (N,), metres. colour: with
+    gloss."""
     starts = np.asarray(centres, dtype=np.float32)
     capsules = np.zeros((len(starts), CAPSULE_FLOATS), dtype=np.float32)
     capsules[:, 0:3] = starts
@@ -245,6 +246,6 @@ def spheres(centres: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, .
 
 
 def srgb(text: str) -> tuple[float, float, float]:
-    """Linear light (3 values, 0..1) of a colour "#rrggbb" in sRGB."""
+    """Return linear light (3 values, 0..1) of a colour "#rrggbb" in sRGB."""
     red, green, blue = linear_light(np.array([int(text[i : i + 2], 16) / 255 for i in (1, 3, 5)])).tolist()
     return red, green, blue

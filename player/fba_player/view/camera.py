@@ -50,7 +50,7 @@ class Camera:
 
     @classmethod
     def preset(cls, name: str, subject: Subject, aspect: float = 16 / 9) -> Camera:
-        """A named view ("front", "three-quarter", "profile", "body") that fits the subject.
+        """Return a named view ("front", "three-quarter", "profile", "body") that fits the subject.
 
         aspect: width / height of the picture. Raises ValueError on another name.
         """
@@ -60,29 +60,29 @@ class Camera:
         return cls(yaw=yaw, pitch=pitch).fit(subject, aspect)
 
     def fit(self, subject: Subject, aspect: float) -> Camera:
-        """The camera, moved along its direction so that the subject fills the picture."""
+        """Return the camera, moved along its direction so that the subject fills the picture."""
         half = max(subject.half_height, subject.half_width / max(aspect, 1e-3))
         distance = half / math.tan(math.radians(self.field_of_view) / 2) + subject.half_depth
         return replace(self, target=subject.centre, distance=_clamped(distance, DISTANCES))
 
     def orbit(self, yaw: float, pitch: float) -> Camera:
-        """The camera, turned about its target by degrees."""
+        """Return the camera, turned about its target by degrees."""
         turned = (self.yaw + yaw + 180.0) % 360.0 - 180.0
         return replace(self, yaw=turned, pitch=_clamped(self.pitch + pitch, (-PITCH_LIMIT, PITCH_LIMIT)))
 
     def zoom(self, factor: float) -> Camera:
-        """The camera, its distance multiplied by `factor`: below 1 comes nearer."""
+        """Return the camera, its distance multiplied by `factor`: below 1 comes nearer."""
         return replace(self, distance=_clamped(self.distance * factor, DISTANCES))
 
     def pan(self, right: float, up: float) -> Camera:
-        """The camera with its target, moved across the view by fractions of the picture's height."""
+        """Return the camera with its target, moved across the view by fractions of the picture's height."""
         size = 2 * self.distance * math.tan(math.radians(self.field_of_view) / 2)
         axes = self._axes()
         moved = np.array(self.target) + (axes[0] * right + axes[1] * up) * size
         return replace(self, target=(float(moved[0]), float(moved[1]), float(moved[2])))
 
     def between(self, other: Camera, share: float) -> Camera:
-        """A camera between this one (share 0) and another (share 1), the shorter way round."""
+        """Return a camera between this one (share 0) and another (share 1), the shorter way round."""
         turn = (other.yaw - self.yaw + 180.0) % 360.0 - 180.0
         x, y, z = (a + (b - a) * share for a, b in zip(self.target, other.target, strict=True))
         return Camera(
@@ -100,7 +100,7 @@ class Camera:
         return eye
 
     def view_matrix(self) -> Float64:
-        """(4, 4) matrix from world to camera space."""
+        """Return (4, 4) matrix from world to camera space."""
         axes = self._axes()
         matrix = np.eye(4)
         matrix[:3, :3] = axes
@@ -108,7 +108,7 @@ class Camera:
         return matrix
 
     def projection_matrix(self, aspect: float) -> Float64:
-        """(4, 4) matrix from camera to clip space, in OpenGL's convention."""
+        """Return (4, 4) matrix from camera to clip space, in OpenGL's convention."""
         near, far = self.distance * 0.05, self.distance * 4 + 60.0
         scale = 1 / math.tan(math.radians(self.field_of_view) / 2)
         matrix = np.zeros((4, 4))

@@ -48,10 +48,10 @@ class Times(Protocol):
         """A counter that changes when frames arrive, and when the last one has."""
 
     def time_of(self, frame: int) -> Fraction:
-        """Exact time of a frame by its index."""
+        """Return exact time of a frame by its index."""
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """(frame, next frame, weight of the next) at a time."""
+        """Return (frame, next frame, weight of the next) at a time."""
 
 
 Own = TypeVar("Own", bound=Times)
@@ -101,13 +101,15 @@ class Showable(Protocol):
         """Set one of `fba_player.view.switches.SWITCHES`; ValueError for an unknown name or value."""
 
     def view_at(self, time: float) -> View:
-        """Everything to be drawn at a time in seconds; ValueError if it is not finite."""
+        """Return everything to be drawn at a time in seconds; ValueError if it is not finite."""
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """A camera for the named preset, or for what the content suggests; ValueError for an unknown name."""
+        """Return a camera for the named preset, or for what the content suggests; ValueError for an unknown
+        name."""
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """Offset of a following camera at a time, metres; zeros if it does not follow."""
+        """Return the offset of a following camera at a time, metres; zeros if it does not follow."""
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Way of the head from the start to a time, metres, for a camera that looks at it."""
+        """Return the displacement of the head from the start to a time, metres, for a camera that looks at
+        it."""

@@ -14,7 +14,8 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
 Value = bool | str | int | None
 """A flag's bool, a choice's word, or a FAP's number (None for none)."""
 
-ON, OFF = ("on", "yes", "true", "1"), ("off", "no", "false", "0", "none")
+ON = ("on", "yes", "true", "1")
+OFF = ("off", "no", "false", "0", "none")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ class Switch:
     description: str
 
     def parse(self, value: object) -> Value:
-        """The switch's value for True, False, None, a word, or a FAP's name or number.
+        """Return the switch's value for True, False, None, a word, or a FAP's name or number.
 
         Raises ValueError for an invalid value, and names the valid ones.
         """
@@ -46,8 +47,8 @@ class Switch:
         return self._fap(value)
 
     def next(self, value: Value) -> Value:
-        """The value after `value` when the key is pressed: a flag turns over, a choice moves on, a FAP turns
-        off, or on to open_jaw."""
+        """Return the value after `value` when the key is pressed: a flag turns over, a choice moves on, a FAP
+        turns off, or on to open_jaw."""
         if self.kind == "flag":
             return not value
         if self.kind == "choice":
@@ -145,7 +146,7 @@ class Switches(Mapping[str, Value]):
         return {name: value for name, value in self._values.items() if value != SWITCHES[name].default}
 
     def text(self, name: str) -> str:
-        """A switch's value as text: "on", "off", a choice's word, or a FAP's name."""
+        """Return a switch's value as text: "on", "off", a choice's word, or a FAP's name."""
         value = self._values[name]
         if SWITCHES[name].kind == "fap":
             return "off" if value is None else faps()[int(value) - 1].name
@@ -153,7 +154,7 @@ class Switches(Mapping[str, Value]):
 
 
 def parse_switch(text: str) -> tuple[str, Value]:
-    """The arguments of `Scene.show` for NAME or NAME=VALUE as written on a command line.
+    """Return the arguments of `Scene.show` for NAME or NAME=VALUE as written on a command line.
 
     Raises ValueError as `Switches.show` does.
     """

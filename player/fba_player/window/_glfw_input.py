@@ -159,7 +159,8 @@ class GlfwInput:
         glfw.set_cursor(self._window, self._cursors.get(shape))
 
     def name(self, key: int, code: int, modifiers: int) -> str | None:
-        """Name of a key as in the table of keys: "space", "l", "shift+left", "ctrl+s"; None without one."""
+        """Return the name of a key as in the table of keys: "space", "l", "shift+left", "ctrl+s"; None
+        without one."""
         glfw = self._glfw
         word = self._key_names.get(key)
         if word is None:
@@ -200,7 +201,7 @@ class GlfwInput:
 
 
 def _imgui_keys(glfw: Any) -> dict[int, Any]:
-    """The keys that imgui needs to edit text, by those of glfw."""
+    """Return the keys that imgui needs to edit text, by those of glfw."""
     from imgui_bundle import imgui
 
     words = {

@@ -18,8 +18,7 @@ from fba_player.gl._context import (
     missing_libraries,
     missing_text,
 )
-from fba_player.gl._framebuffer import Target
-from fba_player.gl._readback import Readback
+from fba_player.gl._framebuffer import Readback, Target
 from fba_player.gl.renderer import Renderer
 from fba_player.playback.live import LiveTimeline
 from fba_player.playback.transport import Transport
@@ -30,8 +29,7 @@ from fba_player.session._session import Session
 from fba_player.session._source import Source
 from fba_player.view.camera import Camera
 from fba_player.window._glfw_input import GlfwInput
-from fba_player.window._opening import draw_opening
-from fba_player.window._plain_overlay import Overlay
+from fba_player.window._plain_overlay import Overlay, draw_opening
 from fba_player.window.display import HOW_WITHOUT, FullScreen, start_glfw
 
 if TYPE_CHECKING:
@@ -48,7 +46,7 @@ MIN_PICTURE_SECONDS = 1 / 250
 """Shortest time from one picture to the next, for displays that do not limit the rate."""
 WARNING_SECONDS = 12.0
 """Seconds for which warnings about the file are shown."""
-SETTLES = 4
+SETTLING_PICTURES = 4
 """Pictures drawn after an input: imgui needs some until the panels have settled."""
 
 
@@ -87,7 +85,7 @@ class Window:
         self._gl: Any = None
         self._window: Any = None
         self._problems: list[str] = []
-        self._pictures_due, self._restless = SETTLES, False
+        self._pictures_due, self._restless = SETTLING_PICTURES, False
         self._timeline = timeline
         self._arrived = timeline.arrived
         self._doubted = False
@@ -241,7 +239,7 @@ class Window:
         self.input = GlfwInput(self._glfw, self._window, session, self.controls, self._gui, self._redraw)
 
     def _redraw(self) -> None:
-        self._pictures_due = SETTLES
+        self._pictures_due = SETTLING_PICTURES
 
     def _reason(self, otherwise: str) -> str:
         return self._problems[-1] if self._problems else otherwise
@@ -251,7 +249,7 @@ class Window:
         return int(width), int(height)
 
     def _scale(self) -> float:
-        """Pixels per point: 1 on normal displays, 2 on high-resolution ones."""
+        """Return the pixels per point: 1 on normal displays, 2 on high-resolution ones."""
         return min(max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5), 8.0)
 
     def _draw_checked(self, size: tuple[int, int]) -> None:

@@ -51,7 +51,7 @@ def start_glfw(problems: list[str], instead: str = HOW_WITHOUT) -> Any:
 
 
 def decode(value: bytes | str) -> str:
-    """Text from glfw, which may be bytes in UTF-8."""
+    """Return the text from glfw, which may be bytes in UTF-8."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
 
 
@@ -96,7 +96,7 @@ class FullScreen:
 
 
 def overlap(first: tuple[int, int, int, int], second: tuple[int, int, int, int]) -> int:
-    """Area of the intersection of two rectangles (x, y, width, height)."""
+    """Return the area of the intersection of two rectangles (x, y, width, height)."""
     wide = min(first[0] + first[2], second[0] + second[2]) - max(first[0], second[0])
     high = min(first[1] + first[3], second[1] + second[3]) - max(first[1], second[1])
     return max(wide, 0) * max(high, 0)

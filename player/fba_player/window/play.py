@@ -53,7 +53,7 @@ def play(
     panels: tuple[str, ...] = (),
     newest: Newest | None = None,
 ) -> tuple[Path, ...]:
-    """Play an animation in a window; returns when it is closed, with the files dropped onto it.
+    """Play an animation in a window; return when it is closed, with the files dropped onto it.
 
     Those files can be read, and the user wants to see them next.
 
@@ -100,7 +100,7 @@ def play(
 
 
 def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
-    """Add a sound to the session; returns None, with a notice, if there is no sound device."""
+    """Add a sound to the session; return None, with a notice, if there is no sound device."""
     from fba_player.sound.player import open_audio
 
     session.audio = open_audio(path, session.transport, offset=offset)
@@ -114,7 +114,7 @@ def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
 
 
 def follow_newest(session: Session, newest: Newest) -> None:
-    """Let pictures show the newest values of a capture, which the stream's last frame has only later.
+    """Let pictures show the newest values of a capture before the stream contains them.
 
     They do while the stream arrives and is played at its end. A user who pauses or seeks back sees the
     stream instead, until it is played to its end again.

@@ -12,7 +12,7 @@ from fba.errors import FbaWarning
 from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.face.checks import check_faps
-from fba.face.checks._lid_rules import GAP, SPLITS, lid_cut, lid_gap
+from fba.face.checks._lid_rules import MAX_GAP, SPLITS, lid_cut, lid_gap
 from fba.face.checks._posing import Poser
 from fba.face.importers import import_model
 
@@ -61,4 +61,4 @@ def test_skin_in_the_corner_of_an_eye_does_not_keep_it_open(shared: Path, tmp_pa
         poser = Poser(import_model(head, points=points))
     for side in ("left", "right"):
         for split in (1024, 768, 512):
-            assert lid_gap(poser, side, split) < GAP
+            assert lid_gap(poser, side, split) < MAX_GAP

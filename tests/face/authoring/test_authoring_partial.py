@@ -188,7 +188,7 @@ def test_edges_of_three_triangles_and_doubled_ones_do_no_harm(
     assert ways(model, 39, "skin")[-1] > 30  # the fin goes with the cheek
 
 
-def test_no_skin_no_face(parts: list[Part], points: np.ndarray) -> None:
+def test_parts_without_skin_are_refused(parts: list[Part], points: np.ndarray) -> None:
     with pytest.raises(ModelError, match=r"a part of kind 'skin'.*'left eye' \(eye, \d+ triangles\)"):
         author(parts[1:], points)
     with pytest.raises(ModelError, match=r"kind 'skin'.*there are none"):

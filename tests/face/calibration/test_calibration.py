@@ -295,7 +295,7 @@ def test_a_pupil_out_of_the_middle_of_the_lids(small: FaceModel) -> None:
         (lambda p: np.where(p == p[5, 1], np.nan, p), "feature point 2.6 .* no usable position"),
     ],
 )
-def test_what_is_no_face_is_refused(small: FaceModel, change: object, text: str) -> None:
+def test_points_that_are_not_those_of_a_face_are_refused(small: FaceModel, change: object, text: str) -> None:
     given = person(small, 13)
     with pytest.raises(ModelError, match=text):
         fit(small, change(given))  # type: ignore[operator]
@@ -355,7 +355,7 @@ def test_points_of_distances_have_these_distances(small: FaceModel) -> None:
     ("distances", "text"),
     [({"ES0": 0}, "ES0"), ({"ES0": 60, "XY": 3}, "XY"), ({"MW0": 50}, "needed"), ({"ES0": np.nan}, "ES0")],
 )
-def test_distances_that_are_none(small: FaceModel, distances: dict[str, float], text: str) -> None:
+def test_unusable_distances_are_refused(small: FaceModel, distances: dict[str, float], text: str) -> None:
     with pytest.raises(ModelError, match=text):
         points_of_distances(small, distances)
 

@@ -197,7 +197,7 @@ def test_teeth_apart_as_meshes(head: FaceModel) -> None:
     assert "2.0 mm apart" in finding_for(findings, "parts upper teeth and lower teeth", "teeth touch").found
 
 
-def test_an_egg_is_no_eyeball(head: FaceModel) -> None:
+def test_an_egg_is_not_an_eyeball(head: FaceModel) -> None:
     eye = head.part("left eye")
     centre = adult_points()[ROW["3.5"]] - (0, 0, EYE_RADIUS)
     egg = replace(eye, vertices=(centre + (eye.vertices - centre) * (1.0, 1.3, 1.0)).astype(np.float32))

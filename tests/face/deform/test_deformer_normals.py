@@ -271,7 +271,7 @@ def test_other_shapes_are_refused(shape: tuple[int, ...]) -> None:
 @pytest.mark.parametrize(
     "faps", [np.zeros(68, complex), ["1"] * 68, [None] * 68, np.zeros(68, "datetime64[s]")]
 )
-def test_what_is_no_number_is_refused(faps: object) -> None:
+def test_faps_that_are_not_numbers_are_refused(faps: object) -> None:
     with pytest.raises(ValueError, match="numbers"):
         lively()(faps)  # type: ignore[arg-type]
 

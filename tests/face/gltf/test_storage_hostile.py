@@ -191,7 +191,7 @@ def test_packed_zeros_cannot_fill_the_memory() -> None:
         read(join_container(json.dumps(root).encode(), binary))
 
 
-def test_files_that_are_no_faces(tmp_path: Path) -> None:
+def test_files_without_a_face_are_refused(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "missing.glb"):
         with pytest.raises(FormatError):
             load(path)

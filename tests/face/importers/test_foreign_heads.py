@@ -375,7 +375,7 @@ def test_lids_that_break_rules_are_those_of_the_other_eye() -> None:
     assert mirror_faulty_lids(base) is base
 
 
-def test_buns_of_hair_are_no_eyes() -> None:
+def test_buns_of_hair_are_not_eyes() -> None:
     """Two round shells on top of a head without names are as much a pair as its eyes."""
     head = small_head(cell=0.006)
     eyes = [part for part in head.parts if part.kind == "eye"]

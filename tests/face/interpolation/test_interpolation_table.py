@@ -171,7 +171,7 @@ def test_what_was_sent_stays_though_others_of_its_set_are_filled() -> None:
     assert found == pytest.approx({"stretch_l_cornerlip": 323 / 205})
 
 
-def test_from_zero_to_fifteen() -> None:
+def test_exponents_from_0_to_15() -> None:
     table = InterpolationTable(
         [Link(("open_jaw",), {"depress_chin": Function([Term(-0.5, {"open_jaw": 15}), Term(3)])})]
     )
@@ -196,7 +196,7 @@ def test_an_empty_numerator_is_zero_and_an_empty_denominator_one() -> None:
         Function([Term(1)], [Term(5e-324)]),
     ],
 )
-def test_what_is_no_value_falls_to_the_next_link(function: Function) -> None:
+def test_a_link_without_a_value_leaves_the_fap_to_the_next(function: Function) -> None:
     first = Link(("open_jaw",), {"depress_chin": function})
     assert values_of(InterpolationTable([first]), {"open_jaw": 0}) == {}
     second = Link(("open_jaw",), {"depress_chin": Function([Term(8)])})
@@ -242,7 +242,7 @@ def test_equal_sets_are_listed_once() -> None:
     assert (node["FAPs"], node["Graph"]) == ([3, -1, 16, -1, 17, -1], [1, 2, 1, 3])
 
 
-def test_json_there_and_back() -> None:
+def test_a_table_survives_json() -> None:
     table = worked_example()
     data = json.loads(json.dumps(table.to_dict()))
     assert InterpolationTable.from_dict(data) == table

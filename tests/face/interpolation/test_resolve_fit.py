@@ -58,7 +58,7 @@ def test_the_table_comes_before_mates_and_mates_follow_it() -> None:
     assert (shown("stretch_l_cornerlip", both), shown("stretch_r_cornerlip", both)) == ([-100], [60])
 
 
-def test_a_fap_that_is_sent_is_interpolated_no_more() -> None:
+def test_a_fap_that_is_sent_is_no_longer_interpolated() -> None:
     faps = resolve(
         track({"open_jaw": 400}, {"open_jaw": 200}, {"stretch_l_cornerlip": 7}, {"open_jaw": 80}),
         Face(CORNERS),

@@ -142,7 +142,7 @@ def test_a_group_says_it_only_for_all_of_its_unsent_faps() -> None:
     assert got.interpolated is None
 
 
-def test_the_option_asks_for_it_where_the_animation_does_not() -> None:
+def test_the_option_unsent_asks_for_interpolation() -> None:
     source = Animation(25, np.arange(1), track([{CORNER_R: 6}], [set()]))
     got = fba.decode(fba.encode(source, fba.EncoderOptions(unsent="interpolate"))).face
     assert got is not None

@@ -12,11 +12,10 @@ import pytest
 from fba.errors import FbaError, ModelError
 from fba.face import FaceModel, InterpolationTable
 from fba.face.deform._deformer import Deformer
-from fba.face.deform.distances import vertex_distances
+from fba.face.deform.displacements import vertex_distances
 from fba.face.interpolation._terms import TERMS_MAX, Function, Link, Term
 from fba.face.learning import learn_fit, send_sources
-from fba.face.learning._moments import measure
-from fba.face.learning._regression import fit_coefficients, make_table
+from fba.face.learning._regression import fit_coefficients, make_table, measure
 from fba.face.resolve import resolve
 from fba.parameters import fap_numbers, faps
 from fba.tracks import FaceTrack

@@ -55,7 +55,7 @@ def test_every_fap_can_be_seen(scene: Scene) -> None:
 
 
 @pytest.mark.usefixtures("opengl")
-def test_all_is_one_below_the_other() -> None:
+def test_the_sheet_of_all_stacks_the_three_sheets() -> None:
     sheets = [contact_sheet(what, tile=(24, 20)) for what in ("faps", "visemes", "expressions", "all")]
     heights = [sheet.shape[0] for sheet in sheets]
     assert heights[3] == sum(heights[:3])
@@ -63,7 +63,7 @@ def test_all_is_one_below_the_other() -> None:
     np.testing.assert_array_equal(sheets[3][: heights[0], : sheets[0].shape[1]], sheets[0])
 
 
-def test_what_there_is_no_sheet_of() -> None:
+def test_unknown_sheets_and_tiny_tiles_are_refused() -> None:
     with pytest.raises(ValueError, match="faps, visemes, expressions, all"):
         contact_sheet("tongues")
     with pytest.raises(ValueError, match="16x16"):

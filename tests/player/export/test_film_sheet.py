@@ -55,7 +55,7 @@ def test_the_sheet_holds_these_frames(uneven: Scene) -> None:
             assert sheet[y + 60 : y + step[1] - 4, x : x + 80].max() > 120  # its time below it
 
 
-def test_sheets_that_cannot_be(uneven: Scene, tmp_path: Path) -> None:
+def test_impossible_sheets_are_refused(uneven: Scene, tmp_path: Path) -> None:
     for count, tile, text in (
         (0, None, "at least one"),
         (2, (8, 8), "16x16"),

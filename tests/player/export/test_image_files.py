@@ -41,12 +41,12 @@ def test_names(path: str, first: str, later: str) -> None:
 
 
 @pytest.mark.parametrize("path", ["a%02d%02d.png", "50%.png", "%s.png", "%5d.png", "f%d/a%d.png", "%%.png"])
-def test_names_that_are_none(path: str) -> None:
+def test_names_without_one_number_are_refused(path: str) -> None:
     with pytest.raises(UnsupportedError, match="%0"):
         Numbered(path)
 
 
-def test_single_pictures_and_films_are_no_sequence() -> None:
+def test_single_pictures_and_films_are_not_sequences() -> None:
     assert not any(is_sequence(path) for path in ("a.png", "100%/a.png", "a.mp4"))
 
 

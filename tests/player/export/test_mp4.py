@@ -178,7 +178,7 @@ def test_sound_is_as_long_as_the_film(tmp_path: Path) -> None:
         assert len(samples) / rate == pytest.approx(1.0, abs=0.03)
 
 
-def test_files_that_are_no_sound(tmp_path: Path) -> None:
+def test_files_without_sound_are_refused(tmp_path: Path) -> None:
     noise, film = tmp_path / "noise.wav", tmp_path / "film.mp4"
     noise.write_bytes(b"RIFF, or so it says")
     with Recorder(film, (16, 16)) as recorder:

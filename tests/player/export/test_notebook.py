@@ -144,7 +144,7 @@ def test_an_empty_clip_is_a_line_and_names_are_only_text(talking: Animation) -> 
     assert "b" not in page.elements
 
 
-def test_where_nothing_is(talking: Animation) -> None:
+def test_ranges_outside_the_animation_and_bad_sizes_are_refused(talking: Animation) -> None:
     assert "start 7 s is outside the animation" in shown(Preview(talking, start=7.0)).text
     with pytest.raises(ValueError, match="16 pixels"):
         Preview(talking, width=8)

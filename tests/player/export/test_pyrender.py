@@ -97,7 +97,7 @@ def test_pyrender_missing_is_named(talking: Animation, monkeypatch: pytest.Monke
     assert set(vars(np)) == before
 
 
-def test_what_numpy_has_dropped_is_lent_and_taken_back() -> None:
+def test_names_of_numpy_1_exist_only_within_the_block() -> None:
     with _numpy_1_names():
         assert np.infty == np.inf  # type: ignore[attr-defined]  # noqa: NPY201
     assert not hasattr(np, "infty")

@@ -62,7 +62,7 @@ def test_a_window_does_not_wait(tmp_path: Path) -> None:
     assert sink.numbers == list(range(MAX_WAITING_PICTURES))
 
 
-def test_whoever_waits_loses_nothing(tmp_path: Path) -> None:
+def test_waiting_adds_every_picture(tmp_path: Path) -> None:
     sink = Slow()
     threading.Timer(0.05, sink.go.set).start()
     with Recorder.into(sink, tmp_path / "x", SIZE, Fraction(10)) as recorder:
@@ -109,7 +109,7 @@ def test_what_the_encoder_met_is_raised_soon_and_at_the_end(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
-def test_given_up_or_failed_it_leaves_the_old_file(tmp_path: Path, name: str) -> None:
+def test_an_aborted_or_failed_film_leaves_the_old_file(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.write_bytes(b"old")
     recorder = Recorder(path, SIZE)
@@ -133,7 +133,7 @@ def test_without_a_picture_there_is_no_film(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
-def test_what_was_recorded_when_a_window_closes_is_a_film(tmp_path: Path, name: str) -> None:
+def test_closing_after_a_picture_makes_a_film(tmp_path: Path, name: str) -> None:
     recorder = Recorder(tmp_path / name, SIZE)
     recorder.add(BLACK, 0)
     assert recorder.close() == tmp_path / name
@@ -142,7 +142,7 @@ def test_what_was_recorded_when_a_window_closes_is_a_film(tmp_path: Path, name: 
     assert (tmp_path / name).stat().st_size > 50
 
 
-def test_places_and_sizes_that_cannot_be(tmp_path: Path) -> None:
+def test_impossible_paths_and_sizes_are_refused(tmp_path: Path) -> None:
     (tmp_path / "folder.mp4").mkdir()
     with pytest.raises(FormatError, match="folder"):
         Recorder(tmp_path / "folder.mp4", SIZE)
@@ -167,7 +167,7 @@ recorder.add(np.zeros((16, 16, 4), dtype=np.uint8))
 """
 
 
-def test_whoever_forgets_to_close_leaves_nothing(tmp_path: Path) -> None:
+def test_a_recorder_left_open_leaves_no_file(tmp_path: Path) -> None:
     script = [sys.executable, "-c", FORGET, str(tmp_path / "a.mp4")]
     done = subprocess.run(script, capture_output=True, text=True, timeout=300, check=True)
     assert done.stderr == ""

@@ -22,7 +22,7 @@ class Interpreter:
         return PromptThreads(lambda: self.turn, change)
 
 
-def test_turns_are_short_until_the_last_user_is_done() -> None:
+def test_the_interval_is_short_until_the_last_user_leaves() -> None:
     python = Interpreter(0.005)
     prompt = python.prompt()
     with prompt:
@@ -34,7 +34,7 @@ def test_turns_are_short_until_the_last_user_is_done() -> None:
         assert python.turn < 0.001
 
 
-def test_an_error_gives_the_old_turns_back() -> None:
+def test_an_error_restores_the_old_interval() -> None:
     python = Interpreter(0.005)
     with pytest.raises(RuntimeError), python.prompt():
         raise RuntimeError
@@ -47,6 +47,6 @@ def test_shorter_turns_stay() -> None:
         assert python.turn == 0.0001
 
 
-def test_it_is_python_s_own_turns() -> None:
+def test_the_switch_interval_is_that_of_the_process() -> None:
     with PROMPT_THREADS:
         assert sys.getswitchinterval() < 0.001

@@ -9,7 +9,7 @@ import pytest
 from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.compiled import is_compiled
-from fba_player._figure.body_light import REACH, build_body_light
+from fba_player._figure.body_light import UNOBSTRUCTED_LIGHT, build_body_light
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
 
@@ -31,7 +31,7 @@ def standing() -> npt.NDArray[np.float64]:
 def test_no_more_light_than_there_is_and_little_lost_in_the_open(standing: npt.NDArray[np.float64]) -> None:
     light, places = shade(standing)
     assert (light >= 0).all()
-    assert (light <= np.array(REACH, dtype=np.float32) + 1e-6).all()
+    assert (light <= np.array(UNOBSTRUCTED_LIGHT, dtype=np.float32) + 1e-6).all()
     shin = (np.abs(places[:, 1] - 0.25) < 0.05) & (places[:, 2] > np.quantile(places[:, 2], 0.6))
     assert np.median(light[shin, 0]) > 0.9
     assert np.median(light[shin, 1]) > 0.8

@@ -115,6 +115,6 @@ def test_what_is_worked_out_coarsely_counts_as_free() -> None:
     np.testing.assert_allclose(found.open[flat], 1.0, atol=1e-3)
 
 
-def test_no_vertices_are_no_trouble() -> None:
+def test_a_mesh_without_vertices_is_baked() -> None:
     found = bake(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
     assert found.open.shape == (0,)

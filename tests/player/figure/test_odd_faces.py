@@ -58,7 +58,7 @@ FACES = {
 @pytest.mark.usefixtures("opengl")
 @pytest.mark.parametrize("body", [False, True], ids=["alone", "on a body"])
 @pytest.mark.parametrize("name", list(FACES))
-def test_they_are_shown_with_a_word(name: str, body: bool) -> None:
+def test_odd_faces_are_shown_with_a_warning(name: str, body: bool) -> None:
     make, said = FACES[name]
     with pytest.warns(FbaWarning) as told:
         scene = Scene(animation(body), make())

@@ -31,7 +31,7 @@ def standing() -> np.ndarray:
     return BapSolver(BodyModel.default().skeleton).pose(np.zeros(296))
 
 
-def test_everything_of_a_person_is_there_once(person: Person, standing: np.ndarray) -> None:
+def test_a_person_has_each_part_once(person: Person, standing: np.ndarray) -> None:
     body, model = BodyModel.default(), FaceModel.default()
     meshes = person.meshes(STILL, person.joints(STILL, standing))
     worn = [part for part in body.parts if part.kind != "neck"]  # the built-in head brings its neck
@@ -96,7 +96,7 @@ def test_a_scene_shows_the_person_or_its_bones(person: Person) -> None:
     assert len(bones.capsules) > 100
 
 
-def test_a_body_of_ones_own() -> None:
+def test_a_scene_shows_the_given_body() -> None:
     body = BodyModel.default()
     scene = Scene(Animation(25, np.arange(1), body=body_track([{}])), body=body)  # type: ignore[arg-type]
     assert scene.person.body is body

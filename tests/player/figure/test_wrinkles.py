@@ -64,14 +64,14 @@ class TestStrengths:
         assert one[0] > 0.9
         assert one[1] == 0.0
 
-    def test_a_face_at_rest_and_one_that_speaks_have_none(self) -> None:
+    def test_rest_and_visemes_make_no_wrinkles(self) -> None:
         definitions = FaceModel.default().definitions
         for faps in (np.zeros(68), *definitions.visemes):
             assert wrinkle_strengths(faps.astype(np.float32)).max() < 0.3
         assert not wrinkle_strengths(np.zeros(68, dtype=np.float32)).any()
 
     @pytest.mark.parametrize("share", [-5.0, 1e6])
-    def test_they_stay_between_none_and_full(self, share: float) -> None:
+    def test_strengths_stay_within_0_to_1(self, share: float) -> None:
         values = wrinkle_strengths(np.full(68, share, dtype=np.float32))
         assert values.shape == (2, 4)
         assert (values >= 0).all()
@@ -112,7 +112,7 @@ class TestPlaces:
         assert behind.any()
         assert (np.abs(places[behind, 0]) > WIDTH).all()
 
-    def test_faces_that_do_not_ask_and_those_without_points_have_none(self) -> None:
+    def test_faces_without_the_wish_or_the_points_have_no_wrinkles(self) -> None:
         model = FaceModel.default()
         assert place_wrinkles(replace(model, wrinkles=False), model.part("skin")) is None
         assert place_wrinkles(model, model.part("teeth_upper")) is None
@@ -138,7 +138,7 @@ class TestMap:
             up, across = TOP - (dark[:, 0] + 0.5) / TEXELS, (dark[:, 1] + 0.5) / TEXELS
             np.testing.assert_allclose((across.mean(), up.mean()), middles[name], atol=0.14)
 
-    def test_its_border_is_plain(self) -> None:
+    def test_the_border_of_the_map_is_plain(self) -> None:
         pixels = wrinkle_map().astype(int)
         for edge in (pixels[0], pixels[-1], pixels[:, -1]):  # beyond it these repeat
             assert abs(edge - PLAIN).max() <= 1
@@ -160,7 +160,7 @@ def test_surprise_darkens_lines_on_the_forehead() -> None:
     assert np.count_nonzero(darker) < 0.05 * darker.size
 
 
-def test_a_model_keeps_the_wish(tmp_path: Path) -> None:
+def test_a_file_keeps_whether_the_model_shows_wrinkles(tmp_path: Path) -> None:
     model = FaceModel.default()
     path = tmp_path / "head.glb"
     assert model.wrinkles

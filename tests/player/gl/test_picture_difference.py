@@ -87,7 +87,7 @@ class TestOfPictures:
             ("points_face", {"faps": ()}),
         ],
     )
-    def test_what_is_wrong_is_seen(self, draw: Drawer, name: str, other: dict[str, Any]) -> None:
+    def test_wrong_pictures_are_recognised(self, draw: Drawer, name: str, other: dict[str, Any]) -> None:
         case: Case = cases()[name]
         found = difference(draw(case), draw(replace(case, **other)))
         assert not found.alike, str(found)

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from fba_player.gl._readback import Readback
+from fba_player.gl._framebuffer import Readback
 from fba_player.session._captures import read_pixels
 
 
-def test_what_is_fetched_is_what_was_there_when_reading_began(context: Any) -> None:
+def test_the_picture_read_is_that_of_the_moment_when_reading_began(context: Any) -> None:
     readback = Readback(context)
     for size in ((6, 4), (6, 4), (3, 5)):
         screen = context.framebuffer([context.renderbuffer(size, 4)])

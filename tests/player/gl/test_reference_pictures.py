@@ -25,7 +25,7 @@ def draw(opengl: None) -> Iterator[Drawer]:
 
 
 @pytest.mark.parametrize("name", list(cases()))
-def test_it_looks_as_it_did(draw: Drawer, name: str, tmp_path: Path) -> None:
+def test_the_picture_equals_its_reference(draw: Drawer, name: str, tmp_path: Path) -> None:
     case = cases()[name]
     drawn = draw(case)
     with Image.open(case.path) as picture:

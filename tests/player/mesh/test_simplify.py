@@ -155,7 +155,7 @@ def test_the_farther_the_coarser() -> None:
     assert distance(mesh, np.array([0.0, 0.0, 6.0])) == pytest.approx(5.9, abs=0.02)
 
 
-def test_views_of_one_array_are_known_as_the_same() -> None:
+def test_equal_views_of_an_array_share_memory() -> None:
     light = np.ones((8, 4), dtype=np.float32)
     assert share_memory(light[2:5], light[2:5])
     assert not share_memory(light[2:5], light[3:6])
@@ -165,9 +165,9 @@ def test_views_of_one_array_are_known_as_the_same() -> None:
 @pytest.mark.parametrize(
     ("poses", "vertex", "message"),
     [
-        (2, 0, "have no 2 poses"),
-        (1, -1, "vertices that there are not"),
-        (1, 8, "vertices that there are not"),
+        (2, 0, "cannot hold 2 poses"),
+        (1, -1, "vertices beyond the 8 that exist"),
+        (1, 8, "vertices beyond the 8 that exist"),
     ],
 )
 def test_meshes_that_do_not_agree_are_refused(poses: int, vertex: int, message: str) -> None:

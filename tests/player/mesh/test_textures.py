@@ -19,7 +19,7 @@ def encoded(pixels: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def test_what_is_seen_are_square_roots_of_light() -> None:
+def test_reduced_pictures_hold_square_roots_of_light() -> None:
     grey = load_picture(encoded(np.full((5, 8, 3), 128, dtype=np.uint8)))
     assert (grey.size, grey.opaque) == ((8, 5), True)
     half = grey.reduced(2)
@@ -35,7 +35,7 @@ def test_one_clear_texel_is_enough() -> None:
     assert not load_picture(encoded(pixels)).opaque
 
 
-def test_a_large_one_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_large_picture_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FBA_CACHE", str(tmp_path))
     noise = np.random.default_rng(5).integers(0, 256, (300, 200, 3), dtype=np.uint8)
     data = encoded(noise)

@@ -30,7 +30,7 @@ from fba.codec import (
 from fba.errors import FbaError
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.playback.timeline import Timeline
-from fba_player.playback.transport import BUFFER, Transport
+from fba_player.playback.transport import BUFFER_SECONDS, Transport
 from fba_player.scene.scene import Scene
 from player_tracks import body_track, face_track
 
@@ -133,7 +133,7 @@ def test_playing_begins_with_the_first_i_plane_and_waits_for_what_is_late(wire: 
     now[0] += 0.1
     assert (player.time, player.waiting) == (pytest.approx(edge + 0.1), False)
     player.last()  # near the newest
-    assert player.behind == pytest.approx(BUFFER) == pytest.approx(0.25)
+    assert player.behind == pytest.approx(BUFFER_SECONDS) == pytest.approx(0.25)
     player.seek(0.1)  # and back, in what has arrived
     now[0] += 0.05
     assert player.time == pytest.approx(0.15)
@@ -377,7 +377,7 @@ def test_how_long_a_slow_stream_is_waited_for(wire: Wire, monkeypatch: pytest.Mo
     first, patience = waits
     assert first is None
     assert patience is not None
-    assert BUFFER < patience <= 1
+    assert BUFFER_SECONDS < patience <= 1
     live.close()
 
 
@@ -437,7 +437,7 @@ def test_a_marked_file_that_comes_through_a_pipe_has_the_right_steps(size: int, 
     assert (live.body.values == values).all()
 
 
-def test_what_a_mark_at_the_end_says_otherwise_is_told() -> None:
+def test_a_mark_at_the_end_that_names_other_steps_is_reported() -> None:
     data = fba.encode(performance(both=True), EncoderOptions(bap_steps="visage", clamp=True))
     with warnings.catch_warnings(record=True):
         warnings.simplefilter("always")

@@ -110,7 +110,7 @@ def test_differences_of_bodies_have_units() -> None:
     assert [one.number for one in found.largest(1)] == [32]
 
 
-def test_differences_of_a_face_and_a_body_are_none() -> None:
+def test_a_face_and_a_body_have_no_differences() -> None:
     found = differences(together(talk([5, 5]), walk([7, 7])))
     assert not found.faps.any()
     assert not found.baps.any()
@@ -210,7 +210,7 @@ def test_bodies_that_were_recorded_anywhere_stand_beside_each_other(preset: str 
     assert depth == pytest.approx(depth[0], abs=0.02)
 
 
-def test_nothing_or_too_few_names_is_refused(pair: CompareScene) -> None:
+def test_no_scene_and_too_few_names_are_refused(pair: CompareScene) -> None:
     with pytest.raises(ValueError, match="no scene"):
         CompareScene([])
     with pytest.raises(ValueError, match="names"):
@@ -219,7 +219,7 @@ def test_nothing_or_too_few_names_is_refused(pair: CompareScene) -> None:
         pair.camera("nowhere")
 
 
-def test_both_are_in_the_picture(pair: CompareScene, opengl: None) -> None:
+def test_both_figures_are_in_the_picture(pair: CompareScene, opengl: None) -> None:
     with Offscreen(pair, (320, 180), "front") as offscreen:
         picture = offscreen.frame(0.0)[..., :3].astype(int)
     red = picture[..., 0] - picture[..., 2] > 25  # skin

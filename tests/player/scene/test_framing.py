@@ -58,14 +58,14 @@ def test_legs_that_step_move() -> None:
 
 
 @pytest.mark.parametrize("away", [(5.0, 0.0, 0.0), (0.0, 0.0, -40.0), (0.0, np.nan, 0.0), (0.0, np.inf, 0.0)])
-def test_who_goes_far_is_followed_from_where_he_begins(away: tuple[float, float, float]) -> None:
+def test_a_far_walk_is_followed_from_its_start(away: tuple[float, float, float]) -> None:
     extent = body_extent(moved({}, {"all": away}), NAMES)
     assert extent.follows
     np.testing.assert_allclose(extent.subject.centre, (0.0, 0.88, 0.0))
     assert extent.subject.half_height == pytest.approx(0.98)
 
 
-def test_who_walks_away_with_a_large_head_is_seen_whole() -> None:
+def test_a_walker_with_a_large_head_is_fully_in_view() -> None:
     """A head that reaches 0.9 m over its joint, which rises by 0.1 m: 2.6 m, and the floor as ever."""
     places = moved({}, {"all": (5.0, 0.0, 0.0)}, {"skullbase": (0.0, 0.1, 0.0)})
     subject = body_extent(places, NAMES, headroom=0.9).subject
@@ -84,7 +84,7 @@ def test_the_upper_half_ends_at_the_hips() -> None:
 
 
 @pytest.mark.parametrize(("preset", "towards"), [("front", (0.0, 0.0, 1.6)), ("profile", (1.6, 0.0, 0.0))])
-def test_who_comes_nearer_stays_in_view(preset: str, towards: tuple[float, float, float]) -> None:
+def test_a_figure_that_comes_nearer_stays_in_view(preset: str, towards: tuple[float, float, float]) -> None:
     """Worked out by rays: joints seen from the camera lie within its opening."""
     places = moved({}, {"all": towards})
     camera = Camera.preset(preset, body_extent(places, NAMES).subject, aspect=16 / 9)

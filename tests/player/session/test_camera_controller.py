@@ -7,7 +7,7 @@ import pytest
 
 from fba.animation import Animation
 from fba_player.scene.scene import Scene
-from fba_player.session._camera_controller import GLIDE, Viewpoint
+from fba_player.session._camera_controller import GLIDE_SECONDS, Viewpoint
 from fba_player.view.camera import PRESETS, Camera
 from set_clock import Clock
 
@@ -33,9 +33,9 @@ def test_it_glides_to_a_preset_and_arrives(talking: Animation, clock: Clock) -> 
     viewpoint.preset("profile")
     assert viewpoint.gliding
     assert viewpoint.camera.yaw == pytest.approx(0)
-    clock.now += GLIDE / 2
+    clock.now += GLIDE_SECONDS / 2
     assert viewpoint.camera.yaw == pytest.approx(45)  # eased, it is half way at half time
-    clock.now += GLIDE / 2
+    clock.now += GLIDE_SECONDS / 2
     assert not viewpoint.gliding
     assert viewpoint.camera == scene.camera("profile", 1.5)
 
@@ -43,7 +43,7 @@ def test_it_glides_to_a_preset_and_arrives(talking: Animation, clock: Clock) -> 
 def test_a_new_glide_begins_where_it_is(clock: Clock) -> None:
     viewpoint = Viewpoint(Walking(), 1.0, Camera(yaw=0), clock=clock)  # type: ignore[arg-type]
     viewpoint.glide(Camera(yaw=80))
-    clock.now += GLIDE / 2
+    clock.now += GLIDE_SECONDS / 2
     viewpoint.glide(Camera(yaw=0))
     assert viewpoint.camera.yaw == pytest.approx(40)
 
@@ -55,7 +55,7 @@ def test_by_hand_it_moves_at_once(clock: Clock) -> None:
     assert viewpoint.camera.yaw == -20
     assert not viewpoint.gliding
     viewpoint.reset()
-    clock.now += GLIDE
+    clock.now += GLIDE_SECONDS
     assert viewpoint.camera == Camera()
 
 
@@ -109,7 +109,7 @@ def test_between_columns_the_face_stands_in_what_is_free(talking: Animation, clo
     viewpoint.uncover(0.4, 0.1)
     assert viewpoint.gliding
     assert across(viewpoint.camera_at(0.0)) == pytest.approx(0.5, abs=0.001)  # it begins where it was
-    clock.now += GLIDE
+    clock.now += GLIDE_SECONDS
     assert not viewpoint.gliding
     assert across(viewpoint.camera_at(0.0)) == pytest.approx(0.65, abs=0.001)
     assert viewpoint.camera_without_panels(0.0) == whole  # as a picture without panels shows it
@@ -121,7 +121,7 @@ def test_between_columns_the_face_stands_in_what_is_free(talking: Animation, clo
     assert viewpoint.camera_at(0.0) == whole
 
 
-def test_a_view_of_ones_own_keeps_its_distance_between_columns(clock: Clock) -> None:
+def test_a_given_camera_keeps_its_distance_between_columns(clock: Clock) -> None:
     viewpoint = Viewpoint(Walking(), 2.0, Camera(distance=5.0), clock=clock)  # type: ignore[arg-type]
     viewpoint.uncover(0.3, 0.0, smoothly=False)
     assert viewpoint.camera_at(0.0).distance == 5.0
@@ -131,7 +131,7 @@ def test_a_named_view_fits_the_picture_again_when_its_shape_changes(talking: Ani
     scene = Scene(talking)
     viewpoint = Viewpoint(scene, 16 / 9, clock=clock)
     viewpoint.preset("front")
-    clock.now += GLIDE
+    clock.now += GLIDE_SECONDS
     viewpoint.aspect = 0.4
     viewpoint.refit()
     assert viewpoint.camera == scene.camera("front", 0.4)

@@ -9,7 +9,7 @@ import pytest
 
 from fba.animation import Animation
 from fba_player.scene.scene import SWITCHES, Scene
-from fba_player.session._camera_controller import GLIDE
+from fba_player.session._camera_controller import GLIDE_SECONDS
 from fba_player.session._controls import Controls
 from fba_player.session._keys import by_name
 from fba_player.session._session import Session
@@ -135,10 +135,10 @@ def test_the_mouse_moves_the_camera(talking: Animation) -> None:
     assert viewpoint.camera.distance == pytest.approx(before.distance * 0.9)
     controls.key("r")
     assert viewpoint.camera != before  # on its way
-    now[0] += GLIDE
+    now[0] += GLIDE_SECONDS
     assert viewpoint.camera == before
     controls.key("3")
-    now[0] += GLIDE
+    now[0] += GLIDE_SECONDS
     assert viewpoint.camera.yaw == 90
 
 

@@ -20,7 +20,7 @@ def played() -> tuple[np.ndarray, np.ndarray]:
     return np.arange(1001, 1069, dtype=np.float32), np.arange(2001, 2297, dtype=np.float64)
 
 
-def test_untouched_it_changes_nothing() -> None:
+def test_an_untouched_puppet_changes_nothing() -> None:
     puppet = Puppet()
     faps, baps = played()
     puppet(faps, baps)

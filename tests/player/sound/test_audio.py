@@ -87,7 +87,7 @@ def test_any_stretch_is_found_to_the_sample(
             assert np.corrcoef(heard, samples[start : start + 2000])[0, 1] > close - 1e-4
 
 
-def test_the_end_is_where_it_is(tmp_path: Path) -> None:
+def test_reading_stops_at_the_last_sample(tmp_path: Path) -> None:
     samples = tone(5000)
     with SoundFile(write_wav(tmp_path / "a.wav", samples)) as file:
         assert len(file.read(4000, 5000)) == 1000
@@ -225,7 +225,7 @@ def test_a_broken_file_is_an_error_with_or_without_a_device(tmp_path: Path) -> N
         Audio(path, transport(), backend="null")
 
 
-def test_beside_a_stream(tmp_path: Path) -> None:
+def test_a_sound_beside_a_stream_is_found(tmp_path: Path) -> None:
     write_wav(tmp_path / "talk.wav", tone(10))
     assert find_sound_beside(tmp_path / "talk.fba") == tmp_path / "talk.wav"
     assert find_sound_beside(tmp_path / "walk.fba") is None

@@ -89,7 +89,7 @@ def test_a_jump_while_playing_is_heard_as_a_jump(filmed: Callable[[], Filmed]) -
     assert click_time(one.film()) == pytest.approx(0.4 + CLICK - 0.3, abs=EXACT)
 
 
-def test_other_speeds_are_heard_as_they_were(filmed: Callable[[], Filmed]) -> None:
+def test_a_film_has_the_sound_at_the_speed_played(filmed: Callable[[], Filmed]) -> None:
     one = filmed()
     one.session.transport.set_speed(0.5)
     one.session.transport.play()
@@ -123,7 +123,7 @@ def test_sound_that_cannot_be_read_leaves_the_film_silent_and_says_so(tmp_path: 
         assert not film.streams.audio
 
 
-def test_muted_it_is_silent(tmp_path: Path) -> None:
+def test_a_muted_film_is_silent(tmp_path: Path) -> None:
     wav = write_click(tmp_path / "talk.wav", 0.1)
     animation = Animation(Fraction(25), np.arange(75), face=face_track([{3: 1}] * 75))
     clock = Clock(0.0)

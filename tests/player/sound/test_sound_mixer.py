@@ -11,11 +11,11 @@ from fba.animation import Animation
 from fba_player.playback._playhead import Motion
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import Transport
-from fba_player.sound._mixer import FADE, SoundMixer
+from fba_player.sound._mixer import FADE_SECONDS, SoundMixer
 from player_tracks import face_track
 
 RATE = 1000
-FADED = round(FADE * RATE)
+FADED = round(FADE_SECONDS * RATE)
 
 
 def ramp(start: int, count: int) -> np.ndarray:

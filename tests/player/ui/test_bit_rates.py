@@ -39,7 +39,7 @@ def test_frames_that_were_skipped_take_time_and_no_bits() -> None:
     assert found.rate[-2:] == pytest.approx([0.1, 0.3])
 
 
-def test_a_single_plane_and_none() -> None:
+def test_rates_of_one_plane_and_of_none() -> None:
     found = measure_rates(info([1000], [0]))
     assert found is not None
     assert found.rate.tolist() == [1.0]

@@ -50,15 +50,15 @@ def long_face(frames: int) -> Animation:
 def test_an_hour_is_worked_out_piece_by_piece() -> None:
     courses = Courses(Timeline(long_face(3 * BLOCK + 5)))
     assert courses.advance()
-    assert 0.3 < courses.known < 0.34
+    assert 0.3 < courses.resolved_share < 0.34
     assert len(courses.course("fap", 3).values) == BLOCK
     complete(courses)
-    assert courses.known == 1.0
+    assert courses.resolved_share == 1.0
     course = courses.course("fap", 3)
     np.testing.assert_array_equal(course.values, np.arange(3 * BLOCK + 5) % 1001)
 
 
-def test_frames_that_arrive_later_are_there_later() -> None:
+def test_courses_grow_as_frames_arrive() -> None:
     whole = long_face(100)
     timeline = Timeline(whole[:40])
     courses = complete(Courses(timeline, later=2.0))
@@ -85,7 +85,7 @@ def test_amounts_are_written_for_people() -> None:
     assert amount("bap", 181, 30.0) == ("30", "mm")
 
 
-def test_few_frames_are_all_there() -> None:
+def test_of_few_frames_each_is_a_point() -> None:
     times = np.arange(10) / 10
     drawn = envelope(times, times * 2, times > 0.35, 0.2, 0.6, 100)
     assert drawn.x == pytest.approx([-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25])
@@ -132,7 +132,7 @@ def test_zooming_keeps_the_time_under_the_mouse() -> None:
     assert time_zoom.shows_all
 
 
-def test_all_of_a_stream_stays_all_of_it_while_it_arrives() -> None:
+def test_the_full_range_stays_full_while_a_stream_arrives() -> None:
     time_zoom = TimeZoom()
     time_zoom.bound(0.0, 10.0)
     time_zoom.bound(0.0, 12.0)
@@ -158,6 +158,6 @@ def test_searching(query: str, check: Callable[[list[tuple[str, int]]], bool]) -
     assert check([(kind, number) for kind, number, _ in search_parameters(query, face=True, body=True)])
 
 
-def test_only_what_there_is_can_be_found() -> None:
+def test_only_parameters_of_the_scene_are_listed() -> None:
     assert {kind for kind, _, _ in search_parameters("", face=True, body=False)} == {"fap"}
     assert {kind for kind, _, _ in search_parameters("", face=False, body=True)} == {"bap"}

@@ -76,7 +76,7 @@ def test_a_long_curve_keeps_its_peaks() -> None:
     assert thin_curve(short, short, 3)[0] is short
 
 
-def test_the_second_ones_curves_are_shown_on_demand(studio: Studio) -> None:
+def test_curves_of_the_second_performance_are_shown_on_demand(studio: Studio) -> None:
     session = studio.session
     session.selection.faps = [3]
     session.open.add("curves")
@@ -88,7 +88,7 @@ def test_the_second_ones_curves_are_shown_on_demand(studio: Studio) -> None:
     assert panel._lanes[0].course.values.tolist() == [0, 10, 90, 30]
 
 
-def test_each_file_is_told_of(studio: Studio) -> None:
+def test_the_file_panel_describes_each_file(studio: Studio) -> None:
     from fba_player._ui.panels._file_panel import _sections
 
     told = _sections(studio.session, studio.session.source.info)

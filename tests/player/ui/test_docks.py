@@ -7,9 +7,9 @@ import pytest
 from fba_player._ui._docks import (
     EDGE,
     GAP,
-    MIDDLE,
     MIN_COLUMN,
     MIN_MIDDLE,
+    MIN_MIDDLE_SHARE,
     TITLE,
     Dock,
     DockRequest,
@@ -39,7 +39,7 @@ def apart(docks: dict[str, Dock]) -> bool:
     )
 
 
-def test_one_has_what_it_likes_at_its_side() -> None:
+def test_a_single_panel_gets_the_size_it_asks_for_at_its_side() -> None:
     docks = Docks()
     assert docks.arrange([request("a")], 1280, TOP, 530) == {"a": Dock(EDGE, TOP, 400, 250)}
     docks = Docks()
@@ -48,7 +48,7 @@ def test_one_has_what_it_likes_at_its_side() -> None:
     }
 
 
-def test_what_does_not_fit_as_it_likes_goes_to_the_other_side() -> None:
+def test_a_panel_without_room_at_its_side_goes_to_the_other() -> None:
     found = Docks().arrange([request("a"), request("b"), request("c")], 1280, TOP, 530)
     assert (found["a"].left, found["b"].left) == (EDGE, EDGE)
     assert found["b"].top == TOP + 250 + GAP
@@ -69,7 +69,7 @@ def test_where_both_sides_are_full_they_share_the_height() -> None:
     assert not any(dock.folded for dock in found.values())
 
 
-def test_the_one_used_longest_ago_is_folded() -> None:
+def test_the_least_recently_used_panel_is_folded() -> None:
     requests = [request(name, height=400, least=200) for name in "abcdef"]
     docks = Docks()
     found = docks.arrange(requests, 1280, TOP, 530)
@@ -99,7 +99,7 @@ def test_closing_one_gives_its_room_to_the_others() -> None:
 def test_the_middle_stays_free(wide: float) -> None:
     found = Docks().arrange([request("a", width=430), request("b", "right", width=380)], wide, TOP, 410)
     left, right = free_middle(found.values(), wide)
-    assert (1 - left - right) * wide >= max(MIDDLE * wide, MIN_MIDDLE) - 1e-6
+    assert (1 - left - right) * wide >= max(MIN_MIDDLE_SHARE * wide, MIN_MIDDLE) - 1e-6
     assert min(dock.width for dock in found.values()) >= MIN_COLUMN
 
 

@@ -94,7 +94,7 @@ def test_scrubbing_follows_the_mouse_and_goes_on_playing(studio: Studio, clock: 
     assert studio.session.viewpoint.camera == camera  # nothing of it turned the view
 
 
-def test_dragged_beyond_its_ends_it_stays_within(studio: Studio) -> None:
+def test_dragging_beyond_the_timeline_stops_at_its_ends(studio: Studio) -> None:
     drag(studio, place(studio, 0.5), (SIZE[0] + 50, 20))
     assert studio.session.transport.frame == 9
     drag(studio, place(studio, 0.5), (-40, 20))
@@ -182,7 +182,7 @@ def test_the_bar_hides_itself_while_playing_and_comes_back(studio: Studio, clock
     assert studio.gui.shown == 1.0
 
 
-def test_that_it_records_is_seen_when_the_bar_is_hidden(studio: Studio, clock: Clock) -> None:
+def test_recording_is_shown_while_the_bar_is_hidden(studio: Studio, clock: Clock) -> None:
     session = studio.session
     session.transport.loop = True
     session.transport.play()
@@ -205,7 +205,7 @@ def test_bare_shows_the_picture_alone(studio: Studio) -> None:
     np.testing.assert_array_equal(studio.draw(3)[..., :3], wanted[..., :3])
 
 
-def test_a_word_comes_and_goes(studio: Studio, clock: Clock) -> None:
+def test_a_notice_appears_and_disappears(studio: Studio, clock: Clock) -> None:
     before = studio.draw(1).astype(int)
     studio.session.say("Saved as talk-0000.png")
     during = studio.draw(1).astype(int)

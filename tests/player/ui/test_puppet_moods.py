@@ -23,7 +23,7 @@ from studio_hand import StudioHand, panel_of
 
 graphics.imported("imgui_bundle")
 
-from fba_player._ui.panels._puppet_emotion import DOT, LABEL, place_labels  # noqa: E402 - needs imgui
+from fba_player._ui.panels._puppet_emotion import EMOTION_RADIUS, EMOTION_TEXT, place_labels  # noqa: E402 - needs imgui
 from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 BROW = 30
@@ -149,11 +149,13 @@ def test_the_whole_tab_is_seen_and_no_label_covers_another(studio: Studio, size:
     assert set(tab.sliders) == set(COMMON)
     labels = list(tab.labels.items())
     for number, (name, box) in enumerate(labels):
-        assert box[3] - box[1] == LABEL
+        assert box[3] - box[1] == EMOTION_TEXT
         assert tab.plane[0] - 10 <= box[0] < box[2] <= tab.plane[2] + 10, name
         for other in known_points():
             x, y = place(studio, other)
-            assert not overlap(box, (x - DOT, y - DOT, x + DOT, y + DOT)), (name, other)
+            assert not overlap(
+                box, (x - EMOTION_RADIUS, y - EMOTION_RADIUS, x + EMOTION_RADIUS, y + EMOTION_RADIUS)
+            ), (name, other)
         for other, area in labels[number + 1 :]:
             assert not overlap(box, area), (name, other)
 

@@ -317,7 +317,9 @@ def test_a_take_is_shown_once(opened: Opened, talking: Animation, clock: Clock) 
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (900, 600)])
-def test_all_together_none_covers_another(opened: Opened, walking: Animation, size: tuple[int, int]) -> None:
+def test_open_panels_do_not_cover_each_other(
+    opened: Opened, walking: Animation, size: tuple[int, int]
+) -> None:
     studio = opened(walking, "curves", "rate", "puppet", size=size)
     imgui.set_current_context(studio.gui._context)
     boxes = []

@@ -83,7 +83,7 @@ def test_an_eyeball_is_found_under_its_cornea() -> None:
     assert ball.side == 0
 
 
-def test_what_is_no_ball_is_drawn_as_it_is() -> None:
+def test_an_eye_that_is_not_round_is_drawn_as_a_mesh() -> None:
     model = FaceModel.default()
     vertices = sphere_mesh(20, 32)[0].astype(float)
     assert find_eyeball(eye_part(vertices * (0.012, 0.012, 0.004)), model) is None
@@ -109,7 +109,7 @@ def test_hairs_know_their_sides_and_their_tip() -> None:
         np.testing.assert_array_equal(rows[4, :7], 0)
 
 
-def test_broad_strips_are_no_hairs() -> None:
+def test_broad_strips_are_not_hairs() -> None:
     vertices = np.array([[0, 0, 0], [0.02, 0, 0], [0, 0.01, 0], [0.02, 0.01, 0]])
     assert find_hairs(Part("strip", "lash", vertices, np.array([[0, 1, 2], [1, 3, 2]]))) is None
     assert find_hairs(Part("nothing", "lash", vertices, np.zeros((0, 3), dtype=int))) is None

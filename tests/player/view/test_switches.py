@@ -286,13 +286,13 @@ class TestNames:
             for b in boxes[i + 1 :]:
                 assert not (a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3])
 
-    def test_without_a_dot_it_stands_above_its_place(self) -> None:
+    def test_a_name_without_a_dot_stands_above_its_point(self) -> None:
         sizes = np.array([[30, 12]])
         for x, left in ((100.0, 85.0), (4.0, 0.0), (197.0, 170.0)):  # the last two would leave the picture
             _, corners = place_names(np.array([[x, 50.0]]), sizes, 0.0, (200, 100))
             assert corners.tolist() == [[left, 38.0]]
 
-    def test_where_many_are_in_view_none_is_named(self) -> None:
+    def test_with_many_points_in_view_none_is_named(self) -> None:
         dots = np.stack(np.meshgrid(np.arange(10) * 40.0, np.arange(10) * 40.0), axis=-1).reshape(-1, 2)
         assert len(place_names(dots, np.full((100, 2), 10), 3.0, (400, 400))[0]) == 0
 
@@ -315,7 +315,7 @@ def pictures(subject: Animation, *switches: dict[str, Any], **more: Any) -> list
 @pytest.mark.usefixtures("opengl")
 class TestPictures:
     @pytest.mark.parametrize("subject", [face({3: 200}), whole({3: 200}, {32: 50000})], ids=["face", "whole"])
-    def test_all_at_once_and_none_again(self, subject: Animation) -> None:
+    def test_all_switches_on_and_off_again(self, subject: Animation) -> None:
         on: dict[str, Any] = dict.fromkeys(FLAGS_ON, True) | {"influence": 3, "background": "grey"}
         before, full, after = pictures(subject, {}, on, {})
         np.testing.assert_array_equal(before, after)

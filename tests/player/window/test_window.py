@@ -176,7 +176,7 @@ def test_minimised_it_waits_and_goes_on(window: Window, monkeypatch: pytest.Monk
     assert window.pictures == before + 1
 
 
-def test_a_lost_context_ends_with_a_word(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lost_context_ends_with_an_explanation(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
     class Lost:
         error = "GL_UNKNOWN_ERROR"
 

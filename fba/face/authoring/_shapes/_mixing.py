@@ -13,7 +13,12 @@ from fba.face._tables import FaceDefTables
 from fba.face.authoring._shapes._shapes import Shapes
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion, build_tables, fap_limits, split_by_part
-from fba.face.authoring.surface._motion_limits import EASE, MODERATE, coupled_motions, linear_motion
+from fba.face.authoring.surface._motion_limits import (
+    EASE,
+    MODERATE_VALUE,
+    coupled_motions,
+    linear_motion,
+)
 from fba.face.authoring.surface._unfold import ease_field
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import Surface
@@ -87,18 +92,19 @@ class Mixer:
         return self.shapes.displacements_at(self.vertices)
 
     def step(self, fap: int) -> Float64:
-        """(3,) displacement, metres, of the point of a FAP by one unit of its value."""
+        """Return (3,) displacement, metres, of the point of a FAP by one unit of its value."""
         entry = faps()[fap - 1]
         return np.asarray(np.array(DIRECTIONS[entry.positive]) * self.base.fapu[entry.unit])
 
     def weight(self, fap: int) -> Float64:
-        """(V,) share of the motion of its point that each vertex makes for small values of a FAP."""
+        """Return (V,) share of the motion of its point that each vertex makes for small values of a FAP."""
         field = first_steps(self.base, fap, 1.0)
         entry = faps()[fap - 1]
         return np.asarray(field @ np.array(DIRECTIONS[entry.positive]) / self.base.fapu[entry.unit])
 
     def tables(self, group: tuple[int, ...]) -> tuple[dict[int, FaceDefTables], set[str]]:
-        """(tables of a group of FAPs made from shapes, names of the shapes); empty without fitting shapes."""
+        """Return (tables of a group of FAPs made from shapes, names of the shapes); empty without fitting
+        shapes."""
         group = tuple(fap for fap in group if fap in self.base.table_of)
         group = tuple(fap for fap in group if faps()[fap - 1].feature_points[0] in self.points)
         details: dict[float, Float64] = {}
@@ -142,7 +148,7 @@ class Mixer:
         inner: tuple[Float64, Float64],
         outer: tuple[Float64, Float64],
     ) -> dict[int, FaceDefTables]:
-        """Tables of both FAPs of a lip, limited where the skin would fold; together they go on.
+        """Return the tables of both FAPs of a lip, limited where the skin would fold; together they go on.
 
         inner, outer: (V, 3) metres a step, below and above 0.
         """
@@ -164,7 +170,8 @@ class Mixer:
         return made
 
     def _points_moved_together(self, group: tuple[int, ...]) -> dict[str, int]:
-        """Points that shapes move together, with their FAPs: those of a group and of its inner lip mates."""
+        """Return the points that shapes move together, with their FAPs: those of a group and of its inner lip
+        mates."""
         points = {faps()[fap - 1].feature_points[0]: fap for fap in group}
         for fap in group:
             mate = faps()[fap - 1].lip_mate
@@ -180,7 +187,8 @@ class Mixer:
         return float(morph_values()[fap])
 
     def _steps(self, group: tuple[int, ...]) -> Float64:
-        """(P, 3) displacement of each point by one step of all FAPs of a group and of their inner mates."""
+        """Return (P, 3) displacement of each point by one step of all FAPs of a group and of their inner
+        mates."""
         wanted = np.zeros((len(self.points), 3))
         names = list(self.points)
         for name, fap in self._points_moved_together(group).items():
@@ -188,7 +196,7 @@ class Mixer:
         return wanted
 
     def _solve_weights(self, group: tuple[int, ...], sign: float) -> Float64 | None:
-        """(H,) weights of the halves that bring the points of a group one step in its direction."""
+        """Return (H,) weights of the halves that bring the points of a group one step in its direction."""
         from scipy.optimize import lsq_linear
 
         value = self._value(group[0])
@@ -214,7 +222,8 @@ class Mixer:
         return np.asarray(solution / (shares.mean() * value) * sign)
 
     def _correct_at_points(self, group: tuple[int, ...], step: Float64) -> Float64:
-        """(V, 3) a group's step, faded out outside its region and corrected to be exact at all points."""
+        """Return (V, 3) a group's step, faded out outside its region and corrected to be exact at all
+        points."""
         region = next(region for region in REGIONS if group[0] in region)
         inside = [number for number, owner in enumerate(self.points.values()) if owner in region]
         step = step * smoothstep(np.abs(self.weights[:, inside]).max(axis=1) / FULL_WEIGHT)[:, None]
@@ -224,7 +233,7 @@ class Mixer:
         return np.asarray(step + self.weights @ rest)
 
     def replacement_tables(self, fap: int, shapes: list[str]) -> FaceDefTables | None:
-        """Tables of a FAP for which the mesh alone gives none, linear along shapes, or None."""
+        """Return the tables of a FAP for which the mesh alone gives none, linear along shapes, or None."""
         entry = faps()[fap - 1]
         name = entry.feature_points[0]
         vertex = int(self.base.bound[row_of()[name]])
@@ -239,7 +248,7 @@ class Mixer:
 
 
 def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
-    """(V, 3) metres a step: displacements by a FAP next to 0, above (sign 1) or below (-1) it."""
+    """Return (V, 3) metres a step: displacements by a FAP next to 0, above (sign 1) or below (-1) it."""
     unit = model.fapu[faps()[fap - 1].unit]
     field = np.zeros((len(model.vertices), 3))
     for mesh in model.table_of[fap].meshes:
@@ -250,7 +259,8 @@ def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
 
 
 def fold_limited_tables(shapes: Shapes, fap: int, down: Float64, up: Float64) -> FaceDefTables | None:
-    """Tables of a FAP of the shapes' model, limited where the skin would fold, or None where nothing moves.
+    """Return the tables of a FAP of the shapes' model, limited where the skin would fold, or None where
+    nothing moves.
 
     down, up: (V, 3), metres a step below and above 0.
     """
@@ -281,7 +291,8 @@ def _tables(
     down: Float64,
     up: Float64,
 ) -> FaceDefTables | None:
-    """Tables of a motion of the skin, which teeth, brows and lashes follow; None where nothing moves.
+    """Return the tables of a motion of the skin, which teeth, brows and lashes follow; None where nothing
+    moves.
 
     share: (K,) steps that the skin has gone at each value of the motion. down, up: (V, 3), metres a step.
     """
@@ -299,25 +310,25 @@ def _tables(
 
 
 def _pinned(surface: Surface, model: FaceModel) -> Bool:
-    """(N,) mask of the vertices of the surface that feature points stand on."""
+    """Return (N,) mask of the vertices of the surface that feature points stand on."""
     bound = surface.find(model.bound)
     return surface.mask(bound[bound >= 0])
 
 
 def _on_surface(surface: Surface, moves: Float64) -> Float64:
-    """(N, 3) displacements of a surface, of those (V, 3) of all vertices of the model."""
+    """Return (N, 3) displacements of a surface, of those (V, 3) of all vertices of the model."""
     field = np.zeros((len(surface), 3))
     field[surface.number] = moves[surface.pool]
     return field
 
 
 def _goal(end: float) -> float:
-    """The value that a motion with an end of its range there should reach."""
-    return float(np.sign(end)) * min(MODERATE / EASE[0], abs(end))
+    """Return the value that a motion with an end of its range there should reach."""
+    return float(np.sign(end)) * min(MODERATE_VALUE / EASE[0], abs(end))
 
 
 def _one_way(surface: Surface, field: Float64, end: float, pinned: Bool) -> Motion:
-    """The linear motion from 0 to one end, limited where triangles would fold. field: (N, 3)."""
+    """Return the linear motion from 0 to one end, limited where triangles would fold. field: (N, 3)."""
     limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
     if not field.any() or not end:
         return Motion(np.array(sorted((0.0, end or 1.0))), np.zeros(0, dtype=np.intp), np.zeros((2, 0, 3)))
@@ -327,7 +338,7 @@ def _one_way(surface: Surface, field: Float64, end: float, pinned: Bool) -> Moti
 
 
 def _progress(side: Motion, value: float) -> float:
-    """Number of unlimited steps to which a motion at a value corresponds."""
+    """Return the number of unlimited steps to which a motion at a value corresponds."""
     first = side.values[side.values * value > 0]
     if not value or not side.shifts.size or not len(first):
         return float(value)

@@ -68,11 +68,11 @@ class Shapes:
         return halves
 
     def field(self, half: Half) -> Float64:
-        """(V, 3) displacements of all vertices of the model by half a shape, metres."""
+        """Return (V, 3) displacements of all vertices of the model by half a shape, metres."""
         return self.displacements(half.shape) * self._side(half.side)[:, None]
 
     def displacements(self, shape: str) -> Float64:
-        """(V, 3) displacements of all vertices of the model by a shape, metres."""
+        """Return (V, 3) displacements of all vertices of the model by a shape, metres."""
         field = np.zeros((len(self.model.vertices), 3))
         for part, moved in self.morphs[shape].items():
             start = self.model.starts[part]
@@ -80,7 +80,7 @@ class Shapes:
         return field
 
     def mix(self, weights: npt.ArrayLike) -> Float64:
-        """(V, 3) sum of all halves, each times its weight, metres."""
+        """Return (V, 3) sum of all halves, each times its weight, metres."""
         field = np.zeros((len(self.model.vertices), 3))
         for half, weight in zip(self.halves, np.asarray(weights, dtype=np.float64), strict=True):
             if weight:
@@ -88,14 +88,14 @@ class Shapes:
         return field
 
     def displacements_at(self, vertices: npt.ArrayLike) -> Float64:
-        """(H, N, 3): displacements of the given vertices by each half."""
+        """Return (H, N, 3): displacements of the given vertices by each half."""
         rows = np.asarray(vertices, dtype=np.intp)
         fields = [self.field(half)[rows] for half in self.halves]
         return np.array(fields).reshape(len(fields), len(rows), 3)
 
 
 def check_shapes(model: FaceModel, morphs: Morphs) -> Shapes:
-    """The shapes of a model: displacements (V, 3) at weight 1, metres, by shape and part.
+    """Return the shapes of a model: displacements (V, 3) at weight 1, metres, by shape and part.
 
     Raises ModelError where a part does not exist, has another number of vertices, or moves by numbers that
     are not finite.
@@ -104,7 +104,7 @@ def check_shapes(model: FaceModel, morphs: Morphs) -> Shapes:
 
 
 def _check_shape(parts: Sequence[Part], shape: str, moved: Mapping[str, Floating]) -> dict[str, Float32]:
-    """The displacements of one shape, checked against the parts."""
+    """Return the displacements of one shape, checked against the parts."""
     counts = {part.name: len(part.vertices) for part in parts}
     result = {}
     for name, array in moved.items():

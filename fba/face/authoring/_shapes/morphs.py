@@ -88,7 +88,7 @@ def add_shapes(base: FaceModel, morphs: Morphs) -> FaceModel:
 
 
 def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
-    """The face with tables from ARKit's shapes."""
+    """Return the face with tables from ARKit's shapes."""
     mixer = Mixer(base, shapes)
     tables: dict[int, FaceDefTables] = dict(base.table_of)
     used: set[str] = set()
@@ -120,7 +120,7 @@ def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
 
 
 def _from_faps(base: FaceModel, shapes: Shapes, by_fap: Mapping[int, str]) -> FaceModel:
-    """The face with tables from shapes that show one FAP each, at its value in `morph_values`."""
+    """Return the face with tables from shapes that show one FAP each, at its value in `morph_values`."""
     from fba.face.gltf.morphs import morph_values
 
     tables: dict[int, FaceDefTables] = dict(base.table_of)

@@ -29,10 +29,8 @@ from fba.face.feature_points import MIRRORED
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
-SMOOTHINGS = 5
+SMOOTHING_ROUNDS = 5
 """Rounds of averaging the motion of surfaces behind the skin."""
-HEM = 0.006
-"""Shares of a motion below this are set to 0."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +38,9 @@ class Region:
     """Points that pull at the same skin.
 
     points: that pull. still, contours: points and contours that stay. reach: of the motion, in ES0. share: of
-    the way to fixed vertices that moves. slack: distance in ES0
-    beyond which the skin does not overshoot. through: depth in ES0 to which surfaces behind the skin move
-    with it, or 0. behind: these surfaces, the inside of the "mouth" or "all".
+    the distance to fixed vertices that moves. slack: distance in ES0 beyond which the skin does not
+    overshoot. through: depth in ES0 to which surfaces behind the skin move with it, or 0. behind: these
+    surfaces, the inside of the "mouth" or "all".
     """
 
     name: str
@@ -68,7 +66,7 @@ class Handle:
 
 @cache
 def regions() -> dict[str, Region]:
-    """The regions by name."""
+    """Return the regions by name."""
     return {
         row["region"]: Region(
             row["region"],
@@ -87,7 +85,7 @@ def regions() -> dict[str, Region]:
 
 @cache
 def handles() -> tuple[Handle, ...]:
-    """The handles of all FAPs, right mates included."""
+    """Return the handles of all FAPs, right mates included."""
     result = []
     mirror = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
     for row in _rows("handles.csv"):
@@ -102,7 +100,7 @@ def handles() -> tuple[Handle, ...]:
 
 
 def brow_cheek_nose_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
-    """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
+    """Return (motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
     lost = {handle.fap: reason for handle in handles() if (reason := marks.missing_point(handle.fap))}
     motions: dict[int, Motion] = {}
     for area in regions().values():
@@ -115,7 +113,8 @@ def brow_cheek_nose_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[in
 
 
 def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64, Bool]:
-    """((N, H) share of each handle's motion at each vertex, (N,) mask of vertices whose share is given)."""
+    """Return ((N, H) share of each handle's motion at each vertex, (N,) mask of vertices whose share is
+    given)."""
     surface, es = marks.surface, marks.fapu.ES * 1024
     points = [name for name in area.points if marks.has(name)]
     pulled = marks.vertices_of(points)
@@ -137,10 +136,10 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64,
         targets = np.setdiff1d(np.flatnonzero(behind), pulled)  # points stay where they are given
         for k in range(len(own)):
             lifted = carry_through(surface, solved[:, k], targets, area.through * es)
-            for _ in range(SMOOTHINGS):
+            for _ in range(SMOOTHING_ROUNDS):
                 lifted[targets] = average_with_neighbours(surface, lifted, 1)[targets]
             solved[:, k] = lifted
-    return trim_small(solved, HEM), surface.mask(fixed)
+    return trim_small(solved), surface.mask(fixed)
 
 
 def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, pinned: Bool) -> Motion:

@@ -1,4 +1,5 @@
-"""The ears: FAPs 65-68. Raised, an ear moves as one about its soft root; pulled, its rim moves furthest."""
+"""The ears: FAPs 65-68. A raised ear moves rigidly about its soft root; of a pulled ear, the rim moves
+furthest."""
 
 from __future__ import annotations
 
@@ -26,20 +27,18 @@ RIGID_WIDTH = 0.55
 """Share of the ear's width from its rim up to which it moves as a whole."""
 ROOT_WIDTH = 1.15
 """Share of the ear's width from its rim beyond which it does not move."""
-AROUND = (1.1, 1.7)
+FADE_RADII = (1.1, 1.7)
 """Multiples of the ear's size between which the motion of the head around it fades out."""
-WIDER = 1.2
+DEPTH_FACTOR = 1.2
 """The ear is taken to be deeper, front to back, than its points say by this factor."""
 LEAST_PULL = 0.1
 """Share of a pull that the root of the ear makes."""
-SMOOTHINGS = 6
+SMOOTHING_ROUNDS = 6
 """Rounds of averaging shares with those of neighbours."""
-HEM = 0.006
-"""Shares of a motion below this are set to 0."""
 
 
 def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
-    """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
+    """Return (motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
     motions: dict[int, Motion] = {}
     lost: dict[int, str] = {}
     for fap, side in (RAISE | PULL).items():
@@ -55,7 +54,7 @@ def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
 
 
 def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
-    """(N,) share of the ear's motion at each vertex."""
+    """Return (N,) share of the ear's motion at each vertex."""
     names = EARS[side]
     surface = marks.surface
     top, back, lobe, below, above = (marks.point_or_average(name) for name in names.values())
@@ -64,20 +63,20 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
     rim = _rim(marks, names)
     away = surface.distances(rim, 1.5 * width) / width
     share = 1 - smoothstep((np.nan_to_num(away, posinf=9.0) - RIGID_WIDTH) / (ROOT_WIDTH - RIGID_WIDTH))
-    share = average_with_neighbours(surface, share, SMOOTHINGS)
+    share = average_with_neighbours(surface, share, SMOOTHING_ROUNDS)
     centre = ((top + lobe) / 2 + (back + root) / 2) / 2
-    half = np.array([np.inf, np.linalg.norm(top - lobe) / 2, abs(back[2] - root[2]) / 2 * WIDER])
+    half = np.array([np.inf, np.linalg.norm(top - lobe) / 2, abs(back[2] - root[2]) / 2 * DEPTH_FACTOR])
     beside = np.linalg.norm((surface.vertices - centre) / half, axis=1)
-    share *= 1 - smoothstep((beside - AROUND[0]) / (AROUND[1] - AROUND[0]))
+    share *= 1 - smoothstep((beside - FADE_RADII[0]) / (FADE_RADII[1] - FADE_RADII[0]))
     if pull:
         out = root - back
         far = 1 - ((surface.vertices - back) @ out) / (out @ out)
         share = share * (LEAST_PULL + (1 - LEAST_PULL) * np.clip(far, 0.0, 1.2))
     own = marks.vertex[names["back" if pull else "top"]]
-    return trim_small(share / max(share[own], 1e-9), HEM)
+    return trim_small(share / max(share[own], 1e-9))
 
 
 def _rim(marks: Landmarks, names: dict[str, str]) -> Intp:
-    """Vertices around the ear, from its upper end at the face over the back to the lobe."""
+    """Return the vertices around the ear, from its upper end at the face over the back to the lobe."""
     known = marks.vertices_of(names[key] for key in ("top", "back", "lobe"))
     return np.unique(np.concatenate([known, *(marks.surface.path(a, b) for a, b in pairwise(known))]))

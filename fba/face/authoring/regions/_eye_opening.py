@@ -29,9 +29,9 @@ class Opening:
 
 
 def measure_opening(marks: Landmarks, eye: Eye) -> Opening | None:
-    """The columns of an eye's opening, or None where its lids are not one above the other.
+    """Return the columns of an eye's opening, or None where its lids are not one above the other.
 
-    Nor are there any where a margin is not on the skin, as where a feature point of it is missing.
+    None also if a margin is not on the skin, as when one of its feature points is missing.
     """
     lines = []
     for lid in ("upper", "lower"):
@@ -66,7 +66,8 @@ def slide_lid(
     *,
     columns: Float64 | None = None,
 ) -> Float64:
-    """(K, N, 3) shifts of points (N, 3), metres, when a lid has made shares (K,) of the way to the other.
+    """Return (K, N, 3) shifts of points (N, 3), metres, when a lid has moved by shares (K,) of the distance
+    to the other.
 
     share: (N,), share of the margin's motion in each point's column. columns: (N,), x of the columns, where
     they are not the points' own, as of a lash that goes with its root.

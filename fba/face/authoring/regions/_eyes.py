@@ -59,7 +59,8 @@ class Eye:
 
 
 def find_eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
-    """Both eyes; without an eyeball, the sphere that lids need is estimated from the feature points."""
+    """Return both eyes; without an eyeball, the sphere that lids need is estimated from the feature
+    points."""
     iris = marks.fapu.IRISD * 1024
     pupils = {side: marks.point_or_average(name) for side, name in (("left", "3.5"), ("right", "3.6"))}
     middle = float((pupils["left"][0] + pupils["right"][0]) / 2)
@@ -87,14 +88,15 @@ def _middle(part: Part) -> Float64:
 
 
 def eye_transforms(fap: int, eye: Eye) -> list[FaceDefTransform]:
-    """The rotations (FAPs 23-26) or translations (27, 28) of an eye's parts for one FAP."""
+    """Return the rotations (FAPs 23-26) or translations (27, 28) of an eye's parts for one FAP."""
     centre = tuple(eye.centre.tolist())
     kind, amount = TRANSFORMS[fap]
     return [FaceDefTransform(name, kind, amount, centre) for name in eye.parts]
 
 
 def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -> dict[str, Motion]:
-    """Motions by part that move the pupil's rim along the eyeball and compress the iris around it."""
+    """Return the motions by part that move the pupil's rim along the eyeball and compress the iris around
+    it."""
     unit = marks.fapu.IRISD
     iris = unit * 1024 / 2
     pupil = iris * PUPIL_OF_IRIS
@@ -128,7 +130,7 @@ def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -
 
 
 def _depth(distance: Float64, along: Float64, wanted: Float64) -> Float64:
-    """Depth along the gaze of an eye's surface at the wanted distances from its axis.
+    """Return the depth along the gaze of an eye's surface at the wanted distances from its axis.
 
     distance, along: of its vertices, from the axis and along it, metres.
     """

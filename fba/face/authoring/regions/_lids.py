@@ -33,7 +33,7 @@ from fba.face.authoring.surface.surface import weld_parts
 from fba.face.model import Part
 
 STEP = 128
-"""Values between two borders of the tables: an eighth of the way from open to closed."""
+"""FAP units between two borders of the tables: an eighth of the motion from open to closed."""
 REACH = 0.6
 """Largest reach of a lid's motion into the skin around it, in ES0."""
 CREASE = 0.11
@@ -46,37 +46,36 @@ FOLD = {
 }
 """The feature points on the creases."""
 AT_CREASE = 0.25
-"""Share of the margin's way that the crease makes."""
-ENDS = 3.5
+"""Share of the margin's motion that the crease makes."""
+MOTION_END = 3.5
 """Multiple of the crease's distance beyond which the skin does not move."""
 EDGE = 0.4
-"""Share of the distance to the crease up to which the lid's edge moves as one..."""
+"""Share of the distance to the crease up to which the lid's edge moves rigidly."""
 MOST_EDGE = 0.8
-"""... and up to which it does at most where lashes or a liner are painted on it: only bare skin stretches."""
-FURTHER = 0.2
+"""The same, at most, for a lid with painted lashes or a liner: only bare skin stretches."""
+MAX_OVERHANG = 0.2
 """Share by which the front edge of a lid may move further than the margin."""
 OWN_SIDE = 0.6
 """Share of the distance between the lids: vertices that are nearer to the other lid follow less."""
-NARROW = 0.4
+CORNER_FACTOR = 0.4
 """Factor of distances at the corners of the eye."""
-SMOOTHINGS = 4
+SMOOTHING_ROUNDS = 4
 """Rounds of averaging shares with those of neighbours."""
 UNMOVED_POINTS = {
     "left": ("4.1", "4.3", "4.5", "9.7", "9.13", "5.3", "9.12"),
     "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
 }
-WIDE = 0.35
-"""Columns of the eye's opening this high, as a share of the highest, show how far a shape moves a margin."""
+MIN_MEASURED_HEIGHT = 0.35
+"""Only columns of the eye's opening at least this high, as a share of the highest, show how far a shape moves
+a margin."""
 LEAST_SCULPTED = 0.08
 """Least share of the opening by which a shape moves a margin that it shows how to move."""
 LEAST_TURN = 0.3
 """Least motion of a margin, as a share of its largest, against which that of other vertices is measured."""
-HEM = 0.006
-"""Shares of a motion below this are set to 0."""
-SUNK = 0.03
+MAX_SUNK = 0.03
 """Shortfall of a margin from the clearance of moved lids, in radii of the eyeball, above which both margins
 meet where they are, as a gap would be seen otherwise."""
-CORNER = 0.12
+CORNER_WIDTH = 0.12
 """Distance from the corners, as a share of the eye's width, within which folds do not stop a lid."""
 
 
@@ -88,10 +87,10 @@ def lid_motion(
     parts: Sequence[Part],
     sculpted: Float64 | None = None,
 ) -> Motion | str:
-    """The motion of the surface for a lid's FAP, or the reason why it cannot be made.
+    """Return the motion of the surface for a lid's FAP, or the reason why it cannot be made.
 
     sculpted: (N, 3) displacements of the surface by which somebody closed this eye, metres: then each vertex
-    makes the share of the margin's way that it makes there, and folds that are in it are no reason to stop.
+    makes the share of the margin's motion that it makes there, and folds in it are no reason to stop.
     """
     side, lid = LIDS[fap]
     own, other = marks.contour(f"{side} {lid} lid"), marks.contour(f"{side} {_other(lid)} lid")
@@ -118,7 +117,7 @@ def lid_motion(
     else:
         profile = measure_profile(eye, parts, edge_length(marks, own, other))
         # margins that lie in the eyeball, or close to it, meet where they are
-        sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > SUNK * profile.size
+        sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > MAX_SUNK * profile.size
         shifts = push_vertices_outside(profile, points, shifts, values, pinned[vertices] if sunk else None)
         motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
         points = marks.surface.vertices[motion.vertices]
@@ -130,11 +129,11 @@ def lid_motion(
     # in the corners of the eye, skin closes on itself, behind its margins too
     ends = marks.surface.vertices[own[[0, -1]]]
     near = np.linalg.norm(marks.surface.vertices[:, None] - ends, axis=2).min(axis=1)
-    corners = np.flatnonzero(near < CORNER * np.linalg.norm(ends[1] - ends[0]))
+    corners = np.flatnonzero(near < CORNER_WIDTH * np.linalg.norm(ends[1] - ends[0]))
     limited = stop_at_folds(limiter.without(corners), motion, turning=True)
     if not follows and _moving_range(limited)[1] >= CLOSED:
         return limited
-    # an eye closes although its lids' edges roll in; the way up is no sculptor's
+    # an eye closes although its lids' edges roll in; no sculptor made the motion upwards
     closing = stop_at_folds(sculptors.without(np.union1d(margins, corners)), motion, turning=True)
     up, down = limited.values < 0, closing.values >= 0
     return Motion(
@@ -145,7 +144,8 @@ def lid_motion(
 
 
 def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift: Float64) -> Float64 | None:
-    """(N,) share of the margin's motion at each vertex in a shape; None where that moves this lid little.
+    """Return (N,) share of the margin's motion at each vertex in a shape; None where that moves this lid
+    little.
 
     shift: (N, 3) displacements of the surface by the shape, metres.
     """
@@ -159,23 +159,23 @@ def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift
     gap = np.interp(arms[line, 0] + eye.centre[0], opening.x, opening.upper[:, 0] - opening.lower[:, 0])
     most = float(gap.max())
     # towards the corners, where both margins are close together, shares of little are no measure
-    wide = gap > WIDE * most
+    wide = gap > MIN_MEASURED_HEIGHT * most
     if wide.sum() < 2 or np.median(turn[line][wide] * eye.radius / gap[wide]) < LEAST_SCULPTED:
         return None
     at_margin = np.interp(arms[:, 0], arms[line, 0][wide], turn[line][wide])
     at_margin = np.maximum(at_margin, LEAST_TURN * float(turn[line].max()))
     out = np.interp(arms[:, 0], arms[line, 0], np.hypot(arms[line, 1], arms[line, 2]))
     away = np.hypot(arms[:, 1], arms[:, 2]) / np.maximum(out, 1e-12)
-    share = np.clip(turn * np.maximum(away, 1.0) / at_margin, 0.0, 1 + FURTHER)
+    share = np.clip(turn * np.maximum(away, 1.0) / at_margin, 0.0, 1 + MAX_OVERHANG)
     reach = REACH * marks.fapu.ES * 1024
     share *= smoothstep(2 - 2 * np.minimum(marks.surface.distances(own, reach), reach) / reach)
     share[own] = 1.0
     share[np.setdiff1d(other, own)] = 0.0
-    return trim_small(share, HEM)
+    return trim_small(share)
 
 
 def _folded_vertices(limiter: Limiter, shift: Float64) -> Intp:
-    """Vertices of the triangles that a shape folds. shift: (N, 3)."""
+    """Return the vertices of the triangles that a shape folds. shift: (N, 3)."""
     patch = limiter.patch(np.flatnonzero(np.abs(shift).max(axis=1) > 0))
     if not len(patch.triangles):
         return np.zeros(0, dtype=np.intp)
@@ -183,7 +183,7 @@ def _folded_vertices(limiter: Limiter, shift: Float64) -> Intp:
 
 
 def lid_values(fap: int) -> Float64:
-    """(K,) rising borders over the FAP's range, extended to where the lid meets the other one."""
+    """Return (K,) rising borders over the FAP's range, extended to where the lid meets the other one."""
     low, high = fap_limits(fap)
     high = max(high, float(CLOSED))
     between = np.arange(np.ceil(low / STEP) * STEP, high + 1, STEP)
@@ -203,7 +203,7 @@ def _share(
     other: Intp,
     parts: Sequence[Part],
 ) -> Float64:
-    """(N,) share of the margin's motion at each vertex of a column.
+    """Return (N,) share of the margin's motion at each vertex of a column.
 
     1 on the lid's edge, a quarter at the crease, 0 well before the brow; towards the corners, where the
     crease is closer, within a shorter distance. parts: of the face; what is painted on their skin widens the
@@ -218,9 +218,9 @@ def _share(
         crease = float(np.clip(away[marks.vertex[FOLD[side, lid]]], 0.8 * crease, 1.5 * crease))
     gap = np.maximum(opening.upper[:, 0] - opening.lower[:, 0], 0.0)
     high = np.interp(surface.vertices[:, 0], opening.x, gap / gap.max())
-    end = max(min(ENDS, 0.85 * float(away[still].min(initial=np.inf)) / crease), EDGE + 0.3)
+    end = max(min(MOTION_END, 0.85 * float(away[still].min(initial=np.inf)) / crease), EDGE + 0.3)
     painted = painted_width(marks, opening, eye, lid, parts, crease)
-    near = np.maximum(crease * (NARROW + (1 - NARROW) * high), painted / MOST_EDGE)
+    near = np.maximum(crease * (CORNER_FACTOR + (1 - CORNER_FACTOR) * high), painted / MOST_EDGE)
     edge = np.maximum(painted / near, EDGE)
     folds = away / near
     inner = np.where(folds < edge, folds * EDGE / edge, EDGE + (folds - edge) * (1 - EDGE) / (1 - edge))
@@ -237,12 +237,13 @@ def _share(
     share[own] = 1.0
     share[stays] = 0.0
     pinned |= (away < painted) & (opposite > away)
-    share = np.where(pinned, share, average_with_neighbours(surface, share, SMOOTHINGS))
-    return trim_small(share, HEM)
+    share = np.where(pinned, share, average_with_neighbours(surface, share, SMOOTHING_ROUNDS))
+    return trim_small(share)
 
 
 def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: float) -> Float64:
-    """(N,) share by which the front edge of a lid must move further than the margin to meet the other's.
+    """Return (N,) share by which the front edge of a lid must move further than the margin to meet the
+    other's.
 
     The margin lies on the eyeball; the front edge before it is further away from the other lid.
     """
@@ -251,12 +252,12 @@ def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: flo
     gap = np.interp(points[:, 0], opening.x, opening.upper[:, 0] - opening.lower[:, 0])
     before = points[:, 2] - eye.centre[2] > depth
     back = np.maximum(sign * (points[:, 1] - eye.centre[1] - height), 0.0)
-    further = np.clip(2 * back / np.maximum(gap, 0.2 * widest), 0.0, FURTHER)
+    further = np.clip(2 * back / np.maximum(gap, 0.2 * widest), 0.0, MAX_OVERHANG)
     return np.where(before, further, 0.0)
 
 
 def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, skin: Motion) -> Motion:
-    """The motion of a part's lashes for a lid's FAP: each vertex turns as its root on the margin does.
+    """Return the motion of a part's lashes for a lid's FAP: each vertex turns as its root on the margin does.
 
     skin: the motion of the surface for that FAP.
     """
@@ -289,7 +290,7 @@ def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, skin: Motion) 
 
 
 def _moving_range(skin: Motion) -> tuple[float, float]:
-    """(lowest, highest) value at which a motion still goes on."""
+    """Return (lowest, highest) value at which a motion still goes on."""
     moved = np.abs(np.diff(skin.shifts, axis=0)).max(axis=(1, 2)) > 0
     used = np.flatnonzero(moved)
     return (float(skin.values[used[0]]), float(skin.values[used[-1] + 1])) if len(used) else (0.0, 0.0)

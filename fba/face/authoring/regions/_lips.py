@@ -62,8 +62,6 @@ UNMOVED_POINTS = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.
 """Feature points that the lips do not move."""
 SLACK = 0.25
 """Distance in ES0 beyond which the skin does not overshoot."""
-HEM = 0.006
-"""Shares of a motion below this are set to 0."""
 TANGENT = 1.0
 """Slope of the curve at its points: with 1, straight lines through the points stay straight; with 0, shares
 never get negative."""
@@ -78,7 +76,7 @@ class _Lips:
 
 
 def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
-    """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
+    """Return (motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
     numbers = [fap.number for fap in faps() if fap.group in (2, 8) and fap.number not in (3, 14, 15, 18)]
     lost = {number: reason for number in numbers if (reason := _missing_reason(marks, number))}
     if len(lost) == len(numbers):
@@ -109,7 +107,7 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
 
 
 def _missing_reason(marks: Landmarks, number: int) -> str:
-    """Why the lips cannot follow a FAP; empty where they can."""
+    """Return why the lips cannot follow a FAP; empty where they can."""
     if reason := marks.missing_point(number):
         return reason
     point = faps()[number - 1].feature_points[0]
@@ -131,7 +129,8 @@ def _missing_reason(marks: Landmarks, number: int) -> str:
 
 
 def _twin(marks: Landmarks, point: str) -> str:
-    """The corner or middle of a lip on whose vertex a point between them stands; empty where none is."""
+    """Return the corner or middle of a lip on whose vertex a point between them stands; empty where none
+    is."""
     ends = ENDS.get(point, ())
     return next(
         (end for end in ends if marks.has(end, point) and marks.vertex[end] == marks.vertex[point]), ""
@@ -139,7 +138,7 @@ def _twin(marks: Landmarks, point: str) -> str:
 
 
 def _fap_field(lips: _Lips, number: int) -> Float64:
-    """(N,) share of a FAP's motion at each vertex, of both contours."""
+    """Return (N,) share of a FAP's motion at each vertex, of both contours."""
     along = ALONG.get(number) or ALONG.get(faps()[number - 1].lip_mate or 0)
     point = faps()[number - 1].feature_points[0]
     own = next(name for name, pair in HANDLES.items() if point in pair)
@@ -150,7 +149,7 @@ def _fap_field(lips: _Lips, number: int) -> Float64:
 
 
 def _fields(marks: Landmarks) -> _Lips:
-    """The motion of each handle spread along the contours and into the skin around them."""
+    """Return the motion of each handle spread along the contours and into the skin around them."""
     names = list(HANDLES)
     size = len(marks.surface)
     values = np.full((size, len(names)), np.nan)
@@ -176,12 +175,12 @@ def _fields(marks: Landmarks) -> _Lips:
     free = reachable_region(near, far, REACH * es)
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
     solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
-    field = {name: trim_small(solved[:, k], HEM) for k, name in enumerate(names)}
+    field = {name: trim_small(solved[:, k]) for k, name in enumerate(names)}
     return _Lips(field, _inward(marks))
 
 
 def _inward(marks: Landmarks) -> Float64:
-    """(N,) 1 on the inner contour and behind it, 0 on the outer contour and beyond, smooth between."""
+    """Return (N,) 1 on the inner contour and behind it, 0 on the outer contour and beyond, smooth between."""
     inner = marks.on_inner_lips | marks.inside_mouth
     outer = marks.on_contours("upper outer lip", "lower outer lip") & ~marks.on_inner_lips
     for inner_point, outer_point in HANDLES.values():
@@ -200,7 +199,7 @@ def _inward(marks: Landmarks) -> Float64:
 
 
 def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) -> Float64:
-    """(M, K) weights of the vertices of a walk for the K nodes along it, with a sum of 1 everywhere.
+    """Return (M, K) weights of the vertices of a walk for the K nodes along it, with a sum of 1 everywhere.
 
     A weight is 1 at its own node, 0 at the others, and smooth between.
 
@@ -231,7 +230,7 @@ def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) 
 
 
 def _cardinal(x: Float64, count: int) -> Float64:
-    """(M, count) weights of values at 0, 1, ... in the smooth curve through them, at x."""
+    """Return (M, count) weights of values at 0, 1, ... in the smooth curve through them, at x."""
     k = np.clip(np.floor(x).astype(np.intp), 0, count - 2)
     t = x - k
     start, end = 2 * t**3 - 3 * t**2 + 1, -2 * t**3 + 3 * t**2

@@ -18,14 +18,14 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 GAMMA = 2.2
 """Exponent from pictures' values to the linear light of vertices' colours, near enough to compare them."""
 STRIPS = 8
-"""Strips of the lid, side by side, each of which is looked at by itself."""
+"""Number of strips, side by side, into which a lid is cut; each is measured separately."""
 STEPS = 24
-"""Distances from the margin at which each is looked at, up to `FURTHEST`."""
-FURTHEST = 2.0
+"""Number of distances from the margin, up to `MAX_DISTANCE`, at which a strip is measured."""
+MAX_DISTANCE = 2.0
 """Distance from the margin, in distances of the crease, up to which paint is looked for; skin begins at 1."""
-DARK = 0.5
+DARK_SHARE = 0.5
 """Brightness, as a share of that of the skin beside, below which paint begins."""
-BRIGHT = 0.7
+BRIGHT_SHARE = 0.7
 """Brightness, as a share of that of the skin beside, above which paint ends."""
 SAMPLES = 12
 """Points across each edge of a triangle at which its colour is read."""
@@ -34,14 +34,15 @@ SAMPLES = 12
 def painted_width(
     marks: Landmarks, opening: Opening, eye: Eye, lid: str, parts: Sequence[Part], crease: float
 ) -> float:
-    """Distance from a lid's margin along the skin, metres, up to which it is painted dark; 0 without paint.
+    """Return the distance from a lid's margin along the skin, metres, up to which it is painted dark; 0
+    without paint.
 
     crease: distance of the lid's crease from the margin, metres. The colour is that of the skin's texture and
     of its vertices; a picture that cannot be read is taken for plain.
     """
-    away, column, brightness = _samples(marks, opening, eye, lid, parts, FURTHEST * crease)
+    away, column, brightness = _samples(marks, opening, eye, lid, parts, MAX_DISTANCE * crease)
     strip = np.floor((column - opening.x[0]) / (opening.x[-1] - opening.x[0]) * STRIPS)
-    step = np.minimum(away / (FURTHEST * crease) * STEPS, STEPS - 1).astype(np.intp)
+    step = np.minimum(away / (MAX_DISTANCE * crease) * STEPS, STEPS - 1).astype(np.intp)
     widths = []
     for number in range(STRIPS):
         here = strip == number
@@ -50,9 +51,9 @@ def painted_width(
         seen = np.flatnonzero(np.isfinite(line))
         if len(seen) and skin > 0:
             line = np.interp(np.arange(STEPS), seen, line[seen]) / skin
-            ends = np.flatnonzero(line > BRIGHT)
-            dark = line[0] < DARK and len(ends) > 0
-            widths.append(ends[0] * FURTHEST * crease / STEPS if dark else 0.0)
+            ends = np.flatnonzero(line > BRIGHT_SHARE)
+            dark = line[0] < DARK_SHARE and len(ends) > 0
+            widths.append(ends[0] * MAX_DISTANCE * crease / STEPS if dark else 0.0)
     return float(np.median(widths)) if widths else 0.0
 
 
@@ -63,7 +64,7 @@ def _median(values: Float64) -> float:
 def _samples(
     marks: Landmarks, opening: Opening, eye: Eye, lid: str, parts: Sequence[Part], reach: float
 ) -> tuple[Float64, Float64, Float64]:
-    """Distance from the margin (M,), x (M,) and brightness (M,) of points on a lid's outside."""
+    """Return the distance from the margin (M,), x (M,) and brightness (M,) of points on a lid's outside."""
     surface = marks.surface
     far = surface.distances(marks.contour(f"{eye.side} {lid} lid"), reach)
     margin = opening.upper if lid == "upper" else opening.lower
@@ -93,7 +94,7 @@ def _samples(
 
 
 def _barycentric() -> Float64:
-    """(S, 3) weights of a triangle's corners at points spread over it."""
+    """Return (S, 3) weights of a triangle's corners at points spread over it."""
     first, second = np.meshgrid(np.arange(SAMPLES), np.arange(SAMPLES))
     inside = first + second < SAMPLES
     a, b = (first[inside] + 1 / 3) / SAMPLES, (second[inside] + 1 / 3) / SAMPLES
@@ -101,7 +102,7 @@ def _barycentric() -> Float64:
 
 
 def _brightness(part: Part, triangles: Integer, weights: Float64) -> Float64:
-    """(F * S,) brightness of points on a part's triangles, 1 where it is plain white."""
+    """Return (F * S,) brightness of points on a part's triangles, 1 where it is plain white."""
     bright = np.ones(len(triangles) * len(weights))
     if part.colours is not None:
         light = np.einsum("sc,fc->fs", weights, part.colours[triangles, :3] @ LUMINANCE).reshape(-1)

@@ -22,7 +22,7 @@ ROLL_STEPS = 8
 
 
 def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
-    """The motion of the tongue's part for a FAP, or the reason why it cannot be made."""
+    """Return the motion of the tongue's part for a FAP, or the reason why it cannot be made."""
     missing = [name for name in POINTS[fap] if np.isnan(marks.point(name)).any()]
     if missing:
         return f"feature point {missing[0]} is unknown"
@@ -51,7 +51,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
 
 
 def _roll(marks: Landmarks, points: Float64) -> Motion:
-    """The motion that turns the sides up about the middle line, more further out: a U in section."""
+    """Return the motion that turns the sides up about the middle line, more further out: a U in section."""
     middle, left, right = (marks.point(name) for name in ("6.2", "6.3", "6.4"))
     unit = marks.fapu.AU
     low, high = fap_limits(TONGUE_ROLL)

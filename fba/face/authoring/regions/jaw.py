@@ -22,28 +22,28 @@ UNMOVED_POINTS = (*EARS, "3.9", "3.10", "5.3", "5.4", "8.1", "9.1", "9.2", "9.3"
 """Feature points that the jaw does not move."""
 REACH = 1.5
 """Reach of the jaw's motion into cheeks and neck, in ES0."""
-NECK = 0.1
+NECK_DISTANCE = 0.1
 """Open edges of the skin further below the chin than this, in ES0, are where the neck was cut."""
-CORNER = 0.6
+CORNER_SHARE = 0.6
 """Share of the jaw's rotation that the skin over its corners makes."""
 MAX_OPENING = np.radians(30.0)
 """Radians by which the jaw opens at most."""
-SLIDE = (0.35, 0.1)
+HINGE_SLIDE = (0.35, 0.1)
 """Motion of the hinge forwards and down per radian, in ES0: some 11 mm when wide open."""
-INTERVAL = np.radians(3.0)
+MAX_INTERVAL = np.radians(3.0)
 """Longest interval into which the arc is cut, radians."""
 LIP_RIDE = 0.5
 """Share of a sliding jaw's motion that the lower lip makes. An opening jaw does not move the lip, which has
 FAPs of its own."""
 SLACK = 0.2
 """Distance in ES0 beyond which the skin does not overshoot."""
-HEM = 0.004
+MIN_SHARE = 0.004
 """Shares of a motion below this are set to 0."""
 TEETH_MARGIN = 0.12
 """Height about the teeth's edge over which the jaw's share goes from 0 to 1, in MNS0."""
 CHEEK_MARGIN = 0.4
 """Height above and below the teeth's edge over which the inside of the mouth may stretch, in MNS0."""
-MIXED = 0.15
+ONE_JAW_MARGIN = 0.15
 """Teeth of which half plus this share lies on one side of their common edge belong to one jaw."""
 LIP_DEPTH = 0.16
 """Distance from the lips beyond which the inside of the mouth moves as the jaws do, in ES0."""
@@ -66,7 +66,7 @@ class Jaw:
 
 
 def find_jaw(marks: Landmarks) -> Jaw | str:
-    """The jaw of a face, or the reason why it has none."""
+    """Return the jaw of a face, or the reason why it has none."""
     if reason := marks.missing_point(OPEN_JAW):
         return reason
     ears = np.array([marks.point_or_average(name) for name in EARS])
@@ -79,14 +79,14 @@ def find_jaw(marks: Landmarks) -> Jaw | str:
 
 
 def opening_angles(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
-    """(values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
+    """Return (values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
     low, high = fap_limits(OPEN_JAW)
     fine = np.linspace(0, MAX_OPENING, 400)
     sunk = -opening_shifts(jaw.chin[None], jaw, fine)[:, 0, 1]
     fine = fine[: int(sunk.argmax()) + 1]
     sunk = np.maximum.accumulate(sunk[: len(fine)])
     deepest = min(float(sunk[-1]) / unit, high)
-    count = max(5, int(np.ceil(fine[-1] / INTERVAL)))
+    count = max(5, int(np.ceil(fine[-1] / MAX_INTERVAL)))
     values = np.unique(np.round(np.linspace(0, deepest, count + 1)))
     angles = np.interp(values * unit, sunk, fine)
     if values[-1] < high:
@@ -96,7 +96,7 @@ def opening_angles(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
 
 
 def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
-    """(K, N, 3) shifts of points (N, 3), metres, when the jaw opens by angles (K,), radians.
+    """Return (K, N, 3) shifts of points (N, 3), metres, when the jaw opens by angles (K,), radians.
 
     The jaw turns about the hinge, +z down, while the hinge itself slides forwards and a little down, as the
     joint of a human jaw does.
@@ -104,12 +104,12 @@ def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
     y, z = points[:, 1] - jaw.hinge[0], points[:, 2] - jaw.hinge[1]
     cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
     zero = np.zeros((len(angles), len(points)))
-    forward, down = (step * jaw.size * angles[:, None] for step in SLIDE)
+    forward, down = (step * jaw.size * angles[:, None] for step in HINGE_SLIDE)
     return np.stack([zero, y * cos - z * sin - y - down, y * sin + z * cos - z + forward], axis=-1)
 
 
 def bite_height(marks: Landmarks) -> float:
-    """Height (y, metres) at which upper and lower teeth meet."""
+    """Return the height (y, metres) at which upper and lower teeth meet."""
     known: list[float] = []
     for pair in (("9.10", "9.11"), ("2.2", "2.3")):
         known = known or [height for name in pair if np.isfinite(height := marks.point(name)[1])]
@@ -117,7 +117,7 @@ def bite_height(marks: Landmarks) -> float:
 
 
 def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
-    """(N,) metres below the plane through the hinge and the teeth's edge."""
+    """Return (N,) metres below the plane through the hinge and the teeth's edge."""
     front = marks.point_or_average("9.10")
     reach = max(front[2] - hinge[1], 1e-6)
     ahead = np.clip((points[:, 2] - hinge[1]) / reach, 0.2, None)
@@ -127,7 +127,7 @@ def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
 
 
 def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
-    """(V,) share of the jaw's turn at each vertex of a part inside the mouth.
+    """Return (V,) share of the jaw's turn at each vertex of a part inside the mouth.
 
     A connected piece on one side of the teeth's edge moves as one, as teeth do not bend.
     """
@@ -141,11 +141,11 @@ def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
         if row is not None:
             return np.full(len(part.vertices), row)
         # decided for the whole row first, then for each piece: an overbite must not move upper teeth
-        if abs(float(each.mean()) - 0.5) > MIXED:
+        if abs(float(each.mean()) - 0.5) > ONE_JAW_MARGIN:
             return np.full(len(part.vertices), float(each.mean() > 0.5))
         count = np.bincount(shape.component)
         mean = np.bincount(shape.component, each) / count
-        in_one_jaw = np.abs(mean - 0.5) > MIXED
+        in_one_jaw = np.abs(mean - 0.5) > ONE_JAW_MARGIN
         each = np.where(in_one_jaw[shape.component], (mean > 0.5)[shape.component], each)
     result: Float64 = each[shape.number]
     return result
@@ -156,7 +156,7 @@ ROWS = {0.0: "upper", 1.0: "lower"}
 
 
 def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
-    """1 for the lower teeth, 0 for the upper, where the feature points of only one row are on a part."""
+    """Return 1 for the lower teeth, 0 for the upper, if the feature points of only one row are on a part."""
     close: dict[float, bool] = {}
     for row, names in ((0.0, ("9.8", "9.10")), (1.0, ("9.9", "9.11"))):
         known = [point for name in names if np.isfinite(point := marks.point(name)).all()]
@@ -174,18 +174,18 @@ def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
 
 
 def _share(marks: Landmarks, hinge: Float64) -> Float64:
-    """(N,) share of the opening at each vertex of the surface."""
+    """Return (N,) share of the opening at each vertex of the surface."""
     surface, es = marks.surface, marks.fapu.ES * 1024
     line = marks.contour("jaw line")
     values: dict[int, float] = {}
     if len(line):
         values |= dict(zip(line.tolist(), _along_jaw(marks, line).tolist(), strict=True))
-    values |= dict.fromkeys(marks.vertices_of(("2.13", "2.14")).tolist(), CORNER)
+    values |= dict.fromkeys(marks.vertices_of(("2.13", "2.14")).tolist(), CORNER_SHARE)
     values |= dict.fromkeys(marks.vertices_of(CHIN).tolist(), 1.0)
     source = np.array(sorted(values))
     lips = marks.on_contours(*LIP_CONTOURS) | marks.lips
     # the neck's lower end joins a body that does not move
-    end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - NECK * es)
+    end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - NECK_DISTANCE * es)
     still = np.union1d(np.flatnonzero(lips | end), marks.vertices_of(UNMOVED_POINTS))
     inside = marks.inside_mouth
     near, far = surface.distances(source, REACH * es), surface.distances(still, 3 * REACH * es)
@@ -202,22 +202,23 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
         free |= inside
     order = np.unique(fixed, return_index=True)[1]
     field = solve_smooth_field(surface, free, fixed[order], given[order][:, None], slack=SLACK * es)
-    return trim_small(np.clip(field[:, 0], 0.0, 1.0), HEM)
+    return trim_small(np.clip(field[:, 0], 0.0, 1.0), MIN_SHARE)
 
 
 def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
-    """(M,) shares along the jaw line: 1 between the corners of the chin, less towards those of the jaw."""
+    """Return (M,) shares along the jaw line: 1 between the corners of the chin, less towards those of the
+    jaw."""
     chin = np.flatnonzero(np.isin(line, marks.vertices_of(CHIN)))
     steps = np.linalg.norm(np.diff(marks.surface.vertices[line], axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(steps)])
     first, last = length[chin[0]], length[chin[-1]]
     left = np.where(length < first, (first - length) / max(first, 1e-9), 0.0)
     right = np.where(length > last, (length - last) / max(length[-1] - last, 1e-9), 0.0)
-    return 1 - (1 - CORNER) * smoothstep(np.maximum(left, right))
+    return 1 - (1 - CORNER_SHARE) * smoothstep(np.maximum(left, right))
 
 
 def _with_lip(marks: Landmarks, share: Float64) -> Float64:
-    """(N,) shares of a sliding jaw's motion: half on the lower lip, none on the upper one."""
+    """Return (N,) shares of a sliding jaw's motion: half on the lower lip, none on the upper one."""
     upper = marks.on_contours("upper outer lip", "upper inner lip")
     lower = marks.on_contours("lower outer lip", "lower inner lip") & ~upper
     if not lower.any():
@@ -232,11 +233,11 @@ def _with_lip(marks: Landmarks, share: Float64) -> Float64:
     given[upper] = 0.0
     given[lower] = LIP_RIDE * along
     field = solve_smooth_field(surface, close, fixed, given[fixed][:, None], slack=SLACK * es)[:, 0]
-    return trim_small(np.clip(field, 0.0, 1.0), HEM)
+    return trim_small(np.clip(field, 0.0, 1.0), MIN_SHARE)
 
 
 def _from_corners(marks: Landmarks, vertices: Intp) -> Float64:
-    """(M,) 0 about the corners of the mouth, where the lips touch, 1 in its middle."""
+    """Return (M,) 0 about the corners of the mouth, where the lips touch, 1 in its middle."""
     x = marks.surface.vertices[vertices, 0]
     left, right = marks.point_or_average("2.4")[0], marks.point_or_average("2.5")[0]
     across = (x - right) / (left - right)

@@ -14,16 +14,17 @@ from fba.rotations import cross, dot, lengths
 LEAST_AREA = 0.12
 """Least share of its area that a triangle keeps, seen along its neutral normal."""
 MOST_STRETCH = 5.0
-"""Largest length of an edge, in multiples of its neutral length..."""
+"""Largest length of an edge, in multiples of its neutral length."""
 TINY_EDGE = 0.25
-"""... or, for short edges, of this share of the typical edge length among the moving triangles."""
-FOLDED = -0.3
+"""Share of the typical edge length among the moving triangles, which stands for shorter neutral lengths
+there."""
+FOLDED_COSINE = -0.3
 """A triangle is folded if its normal has a smaller cosine than this with that of its neighbours."""
-SPECK = 0.0015
+MAX_FOLDED_SHARE = 0.0015
 """Share of the moving area that may be folded where skin closes on itself."""
 FEW_VERTICES = 0.1
 """Up to this share of all vertices, triangles are looked up vertex by vertex, which is faster."""
-DEGENERATE = 1e-5
+DEGENERATE_AREA = 1e-5
 """Triangles of less than this share of the typical area count as lines, which cannot fold."""
 
 
@@ -39,17 +40,17 @@ class Limiter:
 
     @classmethod
     def from_mesh(cls, vertices: Float64, triangles: Intp) -> Limiter:
-        """The limiter of a mesh; triangles without area are left out: they cannot fold."""
+        """Return the limiter of a mesh; triangles without area are left out: they cannot fold."""
         areas = Patch(vertices, triangles).areas
         typical = float(np.median(areas)) if len(areas) else 0.0
-        return cls(vertices, triangles[areas > DEGENERATE * typical])
+        return cls(vertices, triangles[areas > DEGENERATE_AREA * typical])
 
     def without(self, vertices: Intp) -> Limiter:
-        """A limiter that ignores the triangles around the given vertices."""
+        """Return a limiter that ignores the triangles around the given vertices."""
         return Limiter(self.vertices, self.triangles[~np.isin(self.triangles, vertices).any(axis=1)])
 
     def spread(self, vertices: Intp, shifts: Float64) -> Float64:
-        """(N, 3) shifts of all vertices: the given ones (M, 3) at some vertices (M,), 0 elsewhere."""
+        """Return (N, 3) shifts of all vertices: the given ones (M, 3) at some vertices (M,), 0 elsewhere."""
         result = np.zeros((len(self.vertices), 3))
         result[vertices] = shifts
         return result
@@ -62,7 +63,7 @@ class Limiter:
         return np.concatenate([[0], np.cumsum(count)]), order // 3
 
     def patch(self, vertices: Intp) -> Patch:
-        """The triangles with a vertex among those given (K,)."""
+        """Return the triangles with a vertex among those given (K,)."""
         if len(vertices) > FEW_VERTICES * len(self.vertices):
             moving = np.zeros(len(self.vertices), dtype=bool)
             moving[vertices] = True
@@ -136,7 +137,8 @@ class Patch:
         return corners
 
     def _facing_neighbours(self, normals: Float64) -> Float64:
-        """(M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any vertex."""
+        """Return (M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any
+        vertex."""
         around = self._sum_around(normals) - 3 * normals
         product = lengths(around) * lengths(normals)
         result: Float64 = dot(around, normals) / np.maximum(product, 1e-30)
@@ -144,7 +146,7 @@ class Patch:
         return result
 
     def _sum_around(self, normals: Float64) -> Float64:
-        """(M, 3) sums of the normals (M, 3) of all triangles at the corners of each, itself thrice."""
+        """Return (M, 3) sums of the normals (M, 3) of all triangles at the corners of each, itself thrice."""
         corners = self._local_corners
         if not len(corners):
             return np.zeros((0, 3))
@@ -166,7 +168,8 @@ class Patch:
         return tuple((square, MOST_STRETCH**2 * np.maximum(square, shortest) - square) for square in squares)
 
     def reach(self, field: Float64) -> Float64:
-        """(M,) for each triangle the largest s at which vertices + s * field (N, 3) keeps it unfolded."""
+        """Return (M,) for each triangle the largest s at which vertices + s * field (N, 3) keeps it
+        unfolded."""
         a, b, c = self.triangles.T
         first = field[a]
         d1, d2 = field[b] - first, field[c] - first
@@ -181,21 +184,21 @@ class Patch:
         return result
 
     def least_reach(self, field: Float64) -> float:
-        """The largest s at which vertices + s * field (N, 3) folds no triangle; inf without any."""
+        """Return the largest s at which vertices + s * field (N, 3) folds no triangle; inf without any."""
         return float(self.reach(field).min(initial=np.inf))
 
     def is_sound(self, shifts: Float64, *, turning: bool = False) -> bool:
-        """Whether no triangle folds or tears at vertices + shifts (N, 3).
+        """Return whether no triangle folds or tears at vertices + shifts (N, 3).
 
-        turning: as in `soundness`; then tiny folds (`SPECK`) in the corners of eyes and mouth are allowed.
+        turning: as in `soundness`; then tiny folds (`MAX_FOLDED_SHARE`) at eyes and mouth are allowed.
         """
         fine = self.soundness(shifts, turning=turning)
         if not turning or fine.all():
             return bool(fine.all())
-        return float(self.areas[~fine].sum()) <= SPECK * float(self.areas.sum())
+        return float(self.areas[~fine].sum()) <= MAX_FOLDED_SHARE * float(self.areas.sum())
 
     def soundness(self, shifts: Float64, *, turning: bool = False) -> Bool:
-        """(M,) mask of the triangles that neither fold nor tear under shifts (N, 3).
+        """Return (M,) mask of the triangles that neither fold nor tear under shifts (N, 3).
 
         turning: the skin may rotate, as a lid does about the eyeball; then a triangle counts as folded if it
         faces away from its neighbours, not if it faces away from its neutral direction.
@@ -206,7 +209,7 @@ class Patch:
         f1, f2 = second - first, third - first
         after = cross(f1, f2)
         if turning:
-            fine: Bool = (self._facing_neighbours(after) >= FOLDED) | self._folded_before
+            fine: Bool = (self._facing_neighbours(after) >= FOLDED_COSINE) | self._folded_before
         else:
             fine = dot(self._normals, after) >= 0.8 * LEAST_AREA * self._square_areas
         for edge, most in zip((f1, f2, f2 - f1), self._most_lengths, strict=True):
@@ -215,7 +218,8 @@ class Patch:
 
 
 def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:
-    """Smallest positive x with square x² + linear x + constant = 0, inf without one; constant > 0."""
+    """Return the smallest positive x with square x² + linear x + constant = 0, inf without one; constant >
+    0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         below = linear**2 - 4 * square * constant
         root = np.sqrt(np.maximum(below, 0.0))

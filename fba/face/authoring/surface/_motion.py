@@ -13,7 +13,7 @@ from fba.face.authoring.surface.surface import Surface, positions_in
 from fba.parameters import faps
 
 UNMOVED_DISTANCE = 2e-6
-"""Metres up to which a vertex moves that is left out of the tables."""
+"""Vertices that move by at most this (m) are left out of the tables."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Motion:
     shifts: Float64
 
     def shifts_at(self, value: float) -> Float64:
-        """(N, 3) shifts at a value, metres; constant beyond the outermost values."""
+        """Return (N, 3) shifts at a value, metres; constant beyond the outermost values."""
         x = float(np.clip(value, self.values[0], self.values[-1]))
         k = int(np.clip(np.searchsorted(self.values, x) - 1, 0, len(self.values) - 2))
         share = (x - self.values[k]) / (self.values[k + 1] - self.values[k])
@@ -38,7 +38,7 @@ class Motion:
 
 
 def fap_limits(fap: int) -> tuple[float, float]:
-    """Smallest and largest value that a stream can carry with the finest quantiser step."""
+    """Return the smallest and largest value that a stream can carry with the finest quantiser step."""
     entry = faps()[fap - 1]
     assert entry.i_limits is not None
     low, high = entry.i_limits
@@ -46,7 +46,7 @@ def fap_limits(fap: int) -> tuple[float, float]:
 
 
 def split_by_part(surface: Surface, motion: Motion) -> dict[str, Motion]:
-    """A motion of the surface as motions of its parts, by name of the part."""
+    """Return a motion of the surface as motions of its parts, by name of the part."""
     row = positions_in(motion.vertices, len(surface))
     result = {}
     for name, number in surface.members.items():
@@ -59,7 +59,7 @@ def split_by_part(surface: Surface, motion: Motion) -> dict[str, Motion]:
 def build_tables(
     fap: int, unit: float, motions: Mapping[str, Motion], transforms: Iterable[FaceDefTransform] = ()
 ) -> FaceDefTables:
-    """FaceDefTables of one FAP. unit: metres a step. motions: by name of the part."""
+    """Return the FaceDefTables of one FAP. unit: metres a step. motions: by name of the part."""
     meshes = [mesh for name, motion in motions.items() if (mesh := _mesh(name, motion, unit)) is not None]
     return FaceDefTables(fap, tuple(meshes), tuple(transforms))
 

@@ -17,7 +17,7 @@ from fba.face.authoring.surface.surface import Surface
 
 EASE = (0.75, 1.25)
 """Shares of the largest value without folds at which a motion slows to half speed, and at which it stops."""
-MODERATE = 320.0
+MODERATE_VALUE = 320.0
 """Value (or limit of the FAP, if lower) up to which motions are kept linear by easing the skin around."""
 HALVINGS = 7
 """Steps of bisection for the point at which a motion must stop."""
@@ -26,7 +26,7 @@ LEAST_REACH = 0.98
 
 
 def soft_limit(value: float, most: float) -> float:
-    """The value, growing at half speed near `most` and no more soon beyond it (`EASE`)."""
+    """Return the value, growing at half speed near `most` and no more soon beyond it (`EASE`)."""
     size = abs(value)
     slow, stop = EASE[0] * most, EASE[1] * most
     result = min(size, slow) + 0.5 * max(min(size, stop) - slow, 0.0)
@@ -34,12 +34,12 @@ def soft_limit(value: float, most: float) -> float:
 
 
 def knots(most: float, limit: float) -> list[float]:
-    """The values between 0 and the limit at which the slope of `soft_limit` changes."""
+    """Return the values between 0 and the limit at which the slope of `soft_limit` changes."""
     return [round(share * most) for share in EASE if 1 <= share * most + 0.5 < limit]
 
 
 def values_between(low: float, high: float, *bends: float) -> Float64:
-    """Rising whole values: low, high, 0 and the given bends between them."""
+    """Return the rising whole values: low, high, 0 and the given bends between them."""
     inner = {0, *(round(bend) for bend in bends if low < round(bend) < high)}
     return np.array(sorted({round(low), round(high)} | inner), dtype=np.float64)
 
@@ -55,14 +55,15 @@ def _human_ranges() -> dict[int, tuple[float, float]]:
 
 
 def human_range(fap: int) -> tuple[float, float]:
-    """Sizes of the smallest and largest value of a FAP on human faces, with a margin; inf if not listed."""
+    """Return the sizes of the smallest and largest value of a FAP on human faces, with a margin; inf if not
+    listed."""
     return _human_ranges().get(fap, (np.inf, np.inf))
 
 
 def eased_linear_motion(
     surface: Surface, limiter: Limiter, vertices: Intp, field: Float64, fap: int, pinned: Bool
 ) -> Motion:
-    """The motion of a FAP by value x field (N, 3) metres, limited where triangles would fold.
+    """Return the motion of a FAP by value x field (N, 3) metres, limited where triangles would fold.
 
     vertices: (N,), of the surface. pinned: mask of the surface's vertices whose motion must not change; that
     of others is eased where triangles would fold early.
@@ -73,9 +74,11 @@ def eased_linear_motion(
 
 
 def values_to_reach(fap: int) -> list[float]:
-    """Values that a FAP should be able to reach."""
+    """Return the values that a FAP should be able to reach."""
     return [
-        float(np.sign(end)) * min(MODERATE / EASE[0], abs(end)) for end in fap_limits(fap) if abs(end) > 1
+        float(np.sign(end)) * min(MODERATE_VALUE / EASE[0], abs(end))
+        for end in fap_limits(fap)
+        if abs(end) > 1
     ]
 
 
@@ -87,7 +90,8 @@ def linear_motion(
     high: float,
     most: tuple[float, float] = (np.inf, np.inf),
 ) -> Motion:
-    """The motion by value x field (N, 3) metres between two values, limited where triangles would fold.
+    """Return the motion by value x field (N, 3) metres between two values, limited where triangles would
+    fold.
 
     low, high: the range of values. most: sizes of the values, below 0 and above, that it never exceeds.
     The field is not eased.
@@ -107,7 +111,7 @@ def linear_motion(
 def coupled_motions(
     limiter: Limiter, inner: tuple[Float64, Float64], outer: tuple[Float64, Float64], fap: int
 ) -> tuple[Motion, Motion]:
-    """(inner, outer) motions of a pair of FAPs whose sum stays linear although each alone is limited.
+    """Return (inner, outer) motions of a pair of FAPs whose sum stays linear although each alone is limited.
 
     A contour that gets as close to the other as the skin between them allows goes on with the other one.
 
@@ -144,13 +148,14 @@ def coupled_motions(
 
 
 def _largest_value(patch: Patch, field: Float64, limit: float) -> float:
-    """Value that a linear motion (N, 3) reaches without folds, at least 1; inf from `LEAST_REACH` on."""
+    """Return the value that a linear motion (N, 3) reaches without folds, at least 1; inf from `LEAST_REACH`
+    on."""
     reach = patch.least_reach(field)
     return np.inf if LEAST_REACH * reach >= limit else max(reach, 1.0)
 
 
 def stop_at_folds(limiter: Limiter, motion: Motion, *, turning: bool = False) -> Motion:
-    """The motion, stopped on each side of 0 where it would fold triangles.
+    """Return the motion, stopped on each side of 0 where it would fold triangles.
 
     turning: as in `Patch.soundness`.
     """
@@ -169,7 +174,7 @@ def stop_at_folds(limiter: Limiter, motion: Motion, *, turning: bool = False) ->
 def _stop_one_side(
     motion: Motion, side: range, is_sound: Callable[[Float64], bool]
 ) -> list[tuple[float, Float64]]:
-    """(value, shifts) outwards from 0 up to where a triangle folds, constant from there on."""
+    """Return (value, shifts) outwards from 0 up to where a triangle folds, constant from there on."""
     steps: list[tuple[float, Float64]] = []
     value, shifts = 0.0, np.zeros_like(motion.shifts[0])
     for k in side:
@@ -191,7 +196,7 @@ def _stop_one_side(
 
 
 def _last_sound_share(start: Float64, end: Float64, is_sound: Callable[[Float64], bool]) -> float:
-    """Share of the way between two shifts at which no triangle has folded yet, by bisection."""
+    """Return the largest share between two shifts at which no triangle has folded yet, by bisection."""
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = (low + high) / 2

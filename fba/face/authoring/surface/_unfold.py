@@ -24,7 +24,7 @@ ROUNDS = 2
 
 
 def unfold(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool) -> Motion:
-    """The motion with the surroundings of folded triangles stretched evenly.
+    """Return the motion with the surroundings of folded triangles stretched evenly.
 
     pinned: (N,) mask of vertices whose shifts must not change. turning: as in `Patch.soundness`. Folds
     remain where this does not help.
@@ -55,7 +55,7 @@ def unfold(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, tur
 def ease_field(
     surface: Surface, limiter: Limiter, field: Float64, goals: Sequence[float], pinned: Bool
 ) -> Float64:
-    """A linear motion (N, 3) per unit of value, eased to reach the goals without folds if possible."""
+    """Return a linear motion (N, 3) per unit of value, eased to reach the goals without folds if possible."""
     result = field
     reached = _reachable_shares(limiter, field, goals)
     for share in STAGES:
@@ -76,13 +76,13 @@ def ease_field(
 
 
 def _reachable_shares(limiter: Limiter, field: Float64, goals: Sequence[float]) -> list[float]:
-    """Shares of some values that a linear motion (N, 3) reaches without folds, at most 1."""
+    """Return the shares of some values that a linear motion (N, 3) reaches without folds, at most 1."""
     patch = limiter.patch(np.flatnonzero(field.any(axis=1)))
     return [min(patch.least_reach(field * goal), 1.0) for goal in goals]
 
 
 def _connected_groups(triangles: Intp) -> list[Intp]:
-    """Triangles (M, 3) in groups that share vertices."""
+    """Return the triangles (M, 3) in groups that share vertices."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -99,7 +99,8 @@ def _connected_groups(triangles: Intp) -> list[Intp]:
 def _ease_around(
     surface: Surface, limiter: Limiter, shifts: Float64, folded: Intp, pinned: Bool, turning: bool
 ) -> Float64:
-    """Shifts (N, 3) eased about folded triangles (M, 3), in the smallest region that unfolds most of them."""
+    """Return the shifts (N, 3) eased about folded triangles (M, 3), in the smallest region that unfolds most
+    of them."""
     best, fewest = shifts, len(folded)
     core = np.unique(folded)
     # second start: the triangles move as one, with their pinned vertices if there are any
@@ -125,7 +126,8 @@ def _ease_around(
 
 
 def _solve_harmonic(surface: Surface, shifts: Float64, free: Intp) -> Float64:
-    """Shifts (N, 3) with those of `free` vertices replaced by the harmonic interpolation of the others."""
+    """Return the shifts (N, 3) with those of `free` vertices replaced by the harmonic interpolation of the
+    others."""
     if not len(free):
         return shifts
     size = len(free)
@@ -149,7 +151,8 @@ def _solve_harmonic(surface: Surface, shifts: Float64, free: Intp) -> Float64:
 
 
 def _solve_dense(rows: Intp, columns: Intp, values: Float64, right: Float64) -> Float64 | None:
-    """Solution (N, 3) of the system whose matrix has these entries, each once; None if it is singular."""
+    """Return the solution (N, 3) of the system whose matrix has these entries, each once; None if it is
+    singular."""
     system = np.zeros((len(right), len(right)))
     system[rows, columns] = values
     try:
@@ -159,7 +162,7 @@ def _solve_dense(rows: Intp, columns: Intp, values: Float64, right: Float64) -> 
 
 
 def _solve_sparse(rows: Intp, columns: Intp, values: Float64, right: Float64) -> Float64 | None:
-    """What `_solve_dense` returns, for large systems."""
+    """Return what `_solve_dense` returns, for large systems."""
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 

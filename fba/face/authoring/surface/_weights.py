@@ -8,11 +8,14 @@ from fba.arrays import Bool, Float64, Intp
 from fba.errors import ModelError
 from fba.face.authoring.surface.surface import Surface
 
+MIN_SHARE = 0.006
+"""Shares of a motion below this are set to 0."""
+
 
 def solve_smooth_field(
     surface: Surface, free: Bool, fixed: Intp, values: Float64, *, slack: float, harmonic: bool = False
 ) -> Float64:
-    """(N, K) fields that interpolate given values as smoothly as a bent plate.
+    """Return (N, K) fields that interpolate given values as smoothly as a bent plate.
 
     free: (N,) mask of vertices whose value is sought; all others that are not fixed keep 0, and the field
     fades towards them without a kink. fixed: (M,) vertices with given values (M, K). slack: metres; over
@@ -51,7 +54,8 @@ def solve_smooth_field(
 
 
 def reachable_region(near: Float64, far: Float64, reach: float, share: float = 0.8) -> Bool:
-    """(N,) mask of vertices within `reach` and at most `share` of the way to vertices that must stay.
+    """Return (N,) mask of vertices within `reach` and at most `share` of the distance to vertices that must
+    stay.
 
     near, far: (N,) distances from moved and from fixed vertices, metres.
     """
@@ -59,14 +63,15 @@ def reachable_region(near: Float64, far: Float64, reach: float, share: float = 0
         return (near < reach) & (near < share * (near + far))
 
 
-def trim_small(field: Float64, hem: float) -> Float64:
-    """A field with values below `hem` set to 0 and 1 staying 1, so that vertices that barely move rest."""
-    result: Float64 = np.sign(field) * np.maximum(np.abs(field) - hem, 0.0) / (1 - hem)
+def trim_small(field: Float64, least: float = MIN_SHARE) -> Float64:
+    """Return a field with values below `least` set to 0 and 1 staying 1, so that vertices that barely move
+    rest."""
+    result: Float64 = np.sign(field) * np.maximum(np.abs(field) - least, 0.0) / (1 - least)
     return result
 
 
 def average_with_neighbours(surface: Surface, field: Float64, rounds: int) -> Float64:
-    """A field (N,) averaged half and half with its neighbours', `rounds` times."""
+    """Return a field (N,) averaged half and half with its neighbours', `rounds` times."""
     graph = surface.graph.astype(bool).astype(np.float64)
     count = np.maximum(graph.sum(axis=1), 1)
     result = field
@@ -76,7 +81,8 @@ def average_with_neighbours(surface: Surface, field: Float64, rounds: int) -> Fl
 
 
 def carry_through(surface: Surface, field: Float64, targets: Intp, length: float) -> Float64:
-    """A field (N,) that target vertices take over from skin up to `length` metres away in a straight line.
+    """Return a field (N,) that target vertices take over from skin up to `length` metres away in a straight
+    line.
 
     Surfaces behind moving skin, such as the inside of a nostril, move with it.
     """

@@ -36,7 +36,8 @@ class Anchors:
     distance: Float64
 
     def carry(self, motion: Motion) -> Motion:
-        """The motion of the part for a motion of the surface: vertices move and turn with their triangles."""
+        """Return the motion of the part for a motion of the surface: vertices move and turn with their
+        triangles."""
         neutral = self.surface.vertices
         corners = self.surface.triangles[self.triangles]
         moving = np.flatnonzero(self.surface.mask(motion.vertices)[corners].any(axis=1))
@@ -56,7 +57,8 @@ class Anchors:
 
 
 def attach(surface: Surface, part: Part) -> Anchors:
-    """The attachment of a part to the nearest triangles of the skin; lashes hang on it by their roots."""
+    """Return the attachment of a part to the nearest triangles of the skin; lashes hang on it by their
+    roots."""
     from scipy.spatial import cKDTree
 
     shape = weld_parts([part])
@@ -74,7 +76,7 @@ def attach(surface: Surface, part: Part) -> Anchors:
 
 
 def hair_roots(shape: Surface, away: Float64) -> Intp:
-    """(N,) for each vertex of hairs the root vertex that it grows from, along the hair.
+    """Return (N,) for each vertex of hairs the root vertex that it grows from, along the hair.
 
     away: (N,) distances from the skin; roots are the nearest vertices of each connected piece.
     """
@@ -90,7 +92,7 @@ def hair_roots(shape: Surface, away: Float64) -> Intp:
 
 
 def _closest_triangles(corners: Float64, near: Intp, points: Float64) -> tuple[Intp, Float64, Float64]:
-    """(triangle, barycentric shares, distance) of the nearest of some candidate triangles (N, K)."""
+    """Return (triangle, barycentric shares, distance) of the nearest of some candidate triangles (N, K)."""
     best = near[:, 0].copy()
     shares = np.full((len(points), 3), 1 / 3)
     distance = np.full(len(points), np.inf)
@@ -105,7 +107,7 @@ def _closest_triangles(corners: Float64, near: Intp, points: Float64) -> tuple[I
 
 
 def _barycentric(triangles: Float64, points: Float64) -> Float64:
-    """(N, 3) barycentric coordinates of points (N, 3) in the planes of triangles (N, 3, 3)."""
+    """Return (N, 3) barycentric coordinates of points (N, 3) in the planes of triangles (N, 3, 3)."""
     e1, e2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     arm = points - triangles[:, 0]
     a, b, c = (e1 * e1).sum(axis=1), (e1 * e2).sum(axis=1), (e2 * e2).sum(axis=1)
@@ -116,7 +118,8 @@ def _barycentric(triangles: Float64, points: Float64) -> Float64:
 
 
 def _frames(triangles: Float64) -> Float64:
-    """(N, 3, 3) an orthonormal frame on each triangle, columns along an edge, across it and upright."""
+    """Return (N, 3, 3) an orthonormal frame on each triangle, columns along an edge, across it and
+    upright."""
     along = triangles[:, 1] - triangles[:, 0]
     up = np.cross(along, triangles[:, 2] - triangles[:, 0])
     along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-30)

@@ -27,7 +27,7 @@ SURFACE_KINDS = ("skin", "mouth")
 TOLERANCE = 0.15
 """A point may lie this far from its part, as a share of the face's size."""
 LIP_SLACK = 0.02
-"""How much further away than the nearest lip a point's own lip may be, as a share of the face's size."""
+"""A point's own lip may be further away than the nearest lip by this share of the face's size."""
 JAW_OF_TEETH = {"9.8": 1, "9.10": 1, "9.9": -1, "9.11": -1}
 UPPER_LIP = ("2.2", "2.6", "2.7")
 LOWER_LIP = ("2.3", "2.8", "2.9")
@@ -47,7 +47,7 @@ class Binding:
 
 
 def face_size(points: Float64) -> float:
-    """Size of the face, metres: half the diagonal of the box around its known feature points."""
+    """Return the size of the face, metres: half the diagonal of the box around its known feature points."""
     known = points[np.isfinite(points).all(axis=1)]
     if len(known) < 2:
         raise ModelError(
@@ -58,7 +58,7 @@ def face_size(points: Float64) -> float:
 
 
 def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | None) -> Binding:
-    """Feature points (84, 3) bound to the nearest vertices of the parts that they belong to.
+    """Return the feature points (84, 3) bound to the nearest vertices of the parts that they belong to.
 
     bound: (84,) vertices set by the caller, -1 for the nearest. Raises ModelError where most points are far
     from the mesh, or a vertex does not exist.
@@ -102,7 +102,8 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
 
 
 def _bound_to(vertex: Int32, points: Float64, vertices: Float64, far: dict[str, float]) -> Binding:
-    """The binding of points (84, 3) to vertices by number (84,); free ones (-1) stay where they are."""
+    """Return the binding of points (84, 3) to vertices by number (84,); free ones (-1) stay where they
+    are."""
     points = points.copy()
     is_bound = vertex >= 0
     points[is_bound] = vertices[vertex[is_bound]]
@@ -112,7 +113,7 @@ def _bound_to(vertex: Int32, points: Float64, vertices: Float64, far: dict[str, 
 def separate_lips(
     surface: Surface, parts: Sequence[Part], points: Float64, binding: Binding, size: float
 ) -> Binding:
-    """The binding with points that were bound to the wrong lip moved to the right one.
+    """Return the binding with points that were bound to the wrong lip moved to the right one.
 
     Lips touch, so the nearest vertex may be on the wrong one; the distance along the surface to the outer
     lip points (8.1, 8.2) tells them apart.
@@ -140,7 +141,7 @@ def separate_lips(
 
 
 def _connected_pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
-    """(V,) number of the connected piece of each vertex of the parts of some kinds."""
+    """Return (V,) number of the connected piece of each vertex of the parts of some kinds."""
     labels, count = [np.zeros(0, dtype=np.intp)], 0
     for part in parts:
         if part.kind in kinds:
@@ -151,7 +152,8 @@ def _connected_pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
 
 
 def _nearest_in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, slack: float) -> int:
-    """The nearest vertex in one jaw, among those at most `slack` metres further than the nearest of all.
+    """Return the nearest vertex in one jaw, among those at most `slack` metres further than the nearest of
+    all.
 
     Teeth touch, so the nearest vertex may be in the wrong jaw. jaw: 1 upper, -1 lower.
     """
@@ -162,7 +164,8 @@ def _nearest_in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, sla
 
 
 def lip_sides(surface: Surface, parts: Sequence[Part], bound: Int32) -> Intp | None:
-    """(V,) for the skin's vertices: 1 on the upper edge of the mouth, 2 on the lower, 0 elsewhere, or None.
+    """Return (V,) for the skin's vertices: 1 on the upper edge of the mouth, 2 on the lower, 0 elsewhere, or
+    None.
 
     None unless the mouth is a slit whose two edges coincide and were joined like a seam.
     """
@@ -188,7 +191,7 @@ def lip_sides(surface: Surface, parts: Sequence[Part], bound: Int32) -> Intp | N
 
 
 def kinds_for_point(name: str) -> tuple[str, ...]:
-    """Kinds of parts that a feature point can stand on."""
+    """Return the kinds of parts that a feature point can stand on."""
     if name in KINDS_OF_POINT:
         return KINDS_OF_POINT[name]
     return KINDS_OF_GROUP.get(int(name.split(".", maxsplit=1)[0]), SURFACE_KINDS)

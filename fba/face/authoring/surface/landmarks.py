@@ -34,7 +34,7 @@ LIP_CONTOURS = tuple(name for name in CONTOURS if name.endswith("lip"))
 LIP_ROOM = 0.03
 """Distance from the inner contour of the lips, in ES0, that the outer contour keeps where it can."""
 CLOSE_COST = 4.0
-"""Factor of lengths within that distance."""
+"""Factor on the lengths of edges within `LIP_ROOM` of the inner contour."""
 OPENINGS = {name for name in CONTOURS if name.endswith(" lid") or "inner" in name}
 """Contours around an opening of the face, which in many meshes is a hole."""
 
@@ -54,31 +54,33 @@ class Landmarks:
     _contours: dict[str, Intp] = field(default_factory=dict)
 
     def point(self, name: str) -> Float64:
-        """(3,) position of a feature point, metres; NaN where unknown."""
+        """Return (3,) position of a feature point, metres; NaN where unknown."""
         position: Float64 = self.points[row_of()[name]]
         return position
 
     def has(self, *wanted: str) -> bool:
-        """Whether all these feature points stand on the surface."""
+        """Return whether all these feature points stand on the surface."""
         return all(name in self.vertex for name in wanted)
 
     def vertices_of(self, wanted: Iterable[str]) -> Intp:
-        """(M,) vertices of those of the feature points that stand on the surface."""
+        """Return (M,) vertices of those of the feature points that stand on the surface."""
         return np.array([self.vertex[name] for name in wanted if name in self.vertex], dtype=np.intp)
 
     def step(self, fap: int) -> Float64:
-        """(3,) displacement, metres, of the point of a FAP by one unit of its value."""
+        """Return (3,) displacement, metres, of the point of a FAP by one unit of its value."""
         entry = faps()[fap - 1]
         step: Float64 = np.array(DIRECTIONS[entry.positive]) * self.fapu[entry.unit]
         return step
 
     def missing_point(self, fap: int) -> str:
-        """Why the surface cannot follow a FAP, if the FAP's feature point is not on it; otherwise empty."""
+        """Return why the surface cannot follow a FAP, if the FAP's feature point is not on it; otherwise
+        empty."""
         point = faps()[fap - 1].feature_points[0]
         return "" if self.has(point) else f"feature point {point} is not on the skin"
 
     def contour(self, name: str) -> Intp:
-        """Vertices along a contour, corner to corner; empty unless both ends and one point between exist."""
+        """Return the vertices along a contour, corner to corner; empty unless both ends and one point between
+        exist."""
         if name not in self._contours:
             around = None
             if "outer lip" in name:
@@ -87,7 +89,7 @@ class Landmarks:
         return self._contours[name]
 
     def _walk(self, through: tuple[str, ...], *, rim: bool, around: Intp | None = None) -> Intp:
-        """around: vertices that the walk keeps away from where it can."""
+        """Return the vertices of a walk through feature points. around: vertices that it avoids if it can."""
         known = [self.vertex[name] for name in through if name in self.vertex]
         if len(known) < 3 or not self.has(through[0], through[-1]):
             return np.zeros(0, dtype=np.intp)
@@ -122,11 +124,11 @@ class Landmarks:
         return self.on_contours("upper inner lip", "lower inner lip")
 
     def on_contours(self, *contours: str) -> Bool:
-        """(N,) mask of the vertices of the given contours."""
+        """Return (N,) mask of the vertices of the given contours."""
         return self.surface.mask(np.concatenate([self.contour(name) for name in contours]))
 
     def _cut_off(self, contours: tuple[str, ...]) -> Bool:
-        """(N,) mask of vertices that contours separate from the outer face; none if one is missing."""
+        """Return (N,) mask of vertices that contours separate from the outer face; none if one is missing."""
         loop = np.unique(np.concatenate([self.contour(name) for name in contours]))
         outside = self.vertices_of(("9.3", "9.15", "2.1", "2.10", "11.1", "4.1"))
         if not len(outside) or any(not len(self.contour(name)) for name in contours):
@@ -153,13 +155,13 @@ class Landmarks:
         return result
 
     def point_or_average(self, name: str) -> Float64:
-        """(3,) position of a feature point; if unknown, as on an average adult head."""
+        """Return (3,) position of a feature point; if unknown, as on an average adult head."""
         position: Float64 = self.points_or_average[row_of()[name]]
         return position
 
 
 def find_landmarks(surface: Surface, points: Float64, bound: Int32) -> Landmarks:
-    """The feature points and contours of a face on its surface.
+    """Return the feature points and contours of a face on its surface.
 
     points: (84, 3), metres. bound: (84,), vertices counted through all parts, -1 where free.
     """
@@ -169,7 +171,8 @@ def find_landmarks(surface: Surface, points: Float64, bound: Int32) -> Landmarks
 
 
 def weld_skin(parts: Sequence[Part], bound: Int32) -> Surface:
-    """Skin and inner mouth as one surface; a mouth that is a slit, its edges on each other, stays open.
+    """Return skin and inner mouth as one surface; a mouth that is a slit, its edges on each other, stays
+    open.
 
     bound: (84,), vertices of the feature points counted through all parts, -1 where free.
     """

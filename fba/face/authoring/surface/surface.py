@@ -41,13 +41,14 @@ class Surface:
         return len(self.vertices)
 
     def find(self, vertices: Integer) -> Intp:
-        """(M,) vertices of the surface that vertices counted through all parts became; -1 for others."""
+        """Return (M,) vertices of the surface that vertices counted through all parts became; -1 for
+        others."""
         table = np.full(int(max(self.pool.max(initial=-1), vertices.max(initial=-1))) + 2, -1, dtype=np.intp)
         table[self.pool] = self.number
         return table[vertices]
 
     def mask(self, vertices: npt.ArrayLike) -> Bool:
-        """(N,) mask of the given vertices."""
+        """Return (N,) mask of the given vertices."""
         mask = np.zeros(len(self), dtype=bool)
         mask[np.asarray(vertices, dtype=np.intp)] = True
         return mask
@@ -74,7 +75,7 @@ class Surface:
         return self._edge_matrix(open_edges=1.0)
 
     def neighbours(self, vertices: Intp) -> Intp:
-        """The vertices at the other ends of the edges of some vertices (M,), in rising order."""
+        """Return the vertices at the other ends of the edges of some vertices (M,), in rising order."""
         positions, _ = positions_in_rows(self.graph.indptr, vertices)
         found: Intp = np.unique(self.graph.indices[positions])
         return found
@@ -113,7 +114,7 @@ class Surface:
         return self.mask(edges[count == 1])
 
     def distances(self, sources: npt.ArrayLike, limit: float = np.inf) -> Float64:
-        """(N,) distance along edges from the nearest source, metres; inf beyond the limit."""
+        """Return (N,) distance along edges from the nearest source, metres; inf beyond the limit."""
         from scipy.sparse.csgraph import dijkstra
 
         start = np.unique(np.asarray(sources, dtype=np.intp))
@@ -123,7 +124,8 @@ class Surface:
         return away
 
     def path(self, start: int, end: int, *, rim: bool = False, costs: Float64 | None = None) -> Intp:
-        """The vertices of the shortest path along edges, both ends included; empty if no path joins them.
+        """Return the vertices of the shortest path along edges, both ends included; empty if no path joins
+        them.
 
         rim: prefer open edges, as of a mouth that is a slit or eyes that are holes. costs: (N,), factors of
         the lengths of edges at each vertex, 1 or more; the larger one of both ends counts.
@@ -155,7 +157,7 @@ class Surface:
         return np.array(walk[::-1], dtype=np.intp)
 
     def pieces_without(self, removed: Intp) -> Intp:
-        """(N,) number of the connected piece of each vertex once some are removed; -1 for those."""
+        """Return (N,) number of the connected piece of each vertex once some are removed; -1 for those."""
         from scipy.sparse.csgraph import connected_components
 
         rest = np.setdiff1d(np.arange(len(self)), removed)
@@ -191,7 +193,7 @@ class Surface:
 
 
 def vertices_of_kinds(parts: Sequence[Part], kinds: Sequence[str]) -> Intp:
-    """(V,) vertices of the parts of some kinds, counted through all parts."""
+    """Return (V,) vertices of the parts of some kinds, counted through all parts."""
     mine = np.repeat([part.kind in kinds for part in parts], [len(part.vertices) for part in parts])
     return np.flatnonzero(mine)
 
@@ -199,7 +201,7 @@ def vertices_of_kinds(parts: Sequence[Part], kinds: Sequence[str]) -> Intp:
 def weld_parts(
     parts: Sequence[Part], kinds: Sequence[str] = PART_KINDS, *, sides: Intp | None = None
 ) -> Surface:
-    """The parts of some kinds as one surface, open edges that coincide joined.
+    """Return the parts of some kinds as one surface, open edges that coincide joined.
 
     sides: (V,), vertices of different sides stay apart.
     """
@@ -224,14 +226,14 @@ def weld_parts(
 
 
 def positions_in(vertices: Intp, count: int) -> Intp:
-    """(count,) position of each vertex in a list of vertices; -1 for those not in it."""
+    """Return (count,) position of each vertex in a list of vertices; -1 for those not in it."""
     result = np.full(count, -1)
     result[vertices] = np.arange(len(vertices))
     return result
 
 
 def positions_in_rows(starts: Integer, rows: Intp) -> tuple[Intp, Intp]:
-    """((K,) positions of the entries of some rows (M,), row by row; (M,) how many each row has).
+    """Return ((K,) positions of the entries of some rows (M,), row by row; (M,) how many each row has).
 
     starts: (N + 1,) where each row begins in the list of all entries, as in a sparse matrix.
     """
@@ -243,7 +245,8 @@ def positions_in_rows(starts: Integer, rows: Intp) -> tuple[Intp, Intp]:
 
 
 def _count_edges(triangles: Intp) -> tuple[Intp, Intp]:
-    """((E, 2) each edge once, lower vertex first, in rising order; (E,) how many triangles share it)."""
+    """Return ((E, 2) each edge once, lower vertex first, in rising order; (E,) how many triangles share
+    it)."""
     sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     size = int(sides.max(initial=0)) + 1
     # One number an edge: rows of two numbers take np.unique thirty times as long.
@@ -252,7 +255,7 @@ def _count_edges(triangles: Intp) -> tuple[Intp, Intp]:
 
 
 def _join_seams(vertices: Float64, triangles: Intp, sides: Intp | None) -> Intp:
-    """(N,) for each vertex the lowest number of those that it is joined with."""
+    """Return (N,) for each vertex the lowest number of those that it is joined with."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree

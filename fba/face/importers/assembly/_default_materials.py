@@ -27,12 +27,13 @@ LOOKS = {
 WHITE = (0.80, 0.78, 0.75)
 IRIS = (0.16, 0.09, 0.05)
 PUPIL = (0.004, 0.004, 0.004)
-GREY = 0.03
+MAX_GREY_DIFFERENCE = 0.03
 """Light colours whose channels differ by less are programs' defaults, and are replaced."""
 
 
 def apply_default_materials(pieces: Sequence[Piece], points: Float64) -> list[Piece]:
-    """The pieces, with default materials for those without texture and colours, and irises on white eyes.
+    """Return the pieces, with default materials for those without texture and colours, and irises on white
+    eyes.
 
     points: (84, 3), in the same frame.
     """
@@ -49,11 +50,12 @@ def apply_default_materials(pieces: Sequence[Piece], points: Float64) -> list[Pi
 
 
 def _is_grey(material: Material) -> bool:
-    return max(material.colour) - min(material.colour) < GREY and min(material.colour) > 0.5
+    return max(material.colour) - min(material.colour) < MAX_GREY_DIFFERENCE and min(material.colour) > 0.5
 
 
 def _with_iris(part: Part, points: Float64) -> Part:
-    """The eye with the standard's neutral iris: as wide as the lids are apart, its pupil a third of it."""
+    """Return the eye with the standard's neutral iris: as wide as the lids are apart, its pupil a third of
+    it."""
     side = "left" if "left" in part.name else "right"
     pupil = points[row_of()[PUPIL_POINT[side]]]
     upper, lower = (float(points[row_of()[name], 1]) for name in LID_POINTS[side])

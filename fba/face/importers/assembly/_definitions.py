@@ -42,7 +42,7 @@ WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 
 def define_by_shapes(model: FaceModel, morphs: Mapping[str, Mapping[str, Floating]]) -> FaceModel:
-    """The model whose visemes and expressions are those that shapes of these names show; others stay.
+    """Return the model whose visemes and expressions are those that shapes of these names show; others stay.
 
     morphs: displacements (V, 3) at weight 1, metres, by shape and part. Both sides get the mean of both, so
     that a symmetric head stays so. What no FAP moves, and teeth and tongue, do not count.
@@ -71,7 +71,7 @@ def define_by_shapes(model: FaceModel, morphs: Mapping[str, Mapping[str, Floatin
 
 
 def named_shapes(names: Iterable[str]) -> dict[tuple[str, int], str]:
-    """The first shape named after each viseme and expression: (kind, select) -> name."""
+    """Return the first shape named after each viseme and expression: (kind, select) -> name."""
     result: dict[tuple[str, int], str] = {}
     for name in names:
         key = _synonyms().get(_words(name)) or _synonyms().get(_words(re.split(r"[.:|/]", name)[-1]))
@@ -83,7 +83,8 @@ def named_shapes(names: Iterable[str]) -> dict[tuple[str, int], str]:
 def _measure(
     model: FaceModel, deform: Deformer, shape: Mapping[str, Floating], numbers: tuple[int, ...]
 ) -> Float64 | None:
-    """(68,) values of some FAPs that move their points as a shape does; None where it moves hardly any."""
+    """Return (68,) values of some FAPs that move their points as a shape does; None where it moves hardly
+    any."""
     apart = model.fapu.ES * 1024
     moved = np.full((len(model.points), 3), np.nan)
     for part, field in shape.items():
@@ -124,7 +125,7 @@ def _measure(
 
 
 def _even(values: Float64) -> Float64:
-    """The values (68,) with the mean of both sides on each."""
+    """Return the values (68,) with the mean of both sides on each."""
     result = values.copy()
     for entry in faps():
         if entry.left_right_mate is not None:
@@ -133,7 +134,7 @@ def _even(values: Float64) -> Float64:
 
 
 def _within_limits(values: Float64) -> Float64:
-    """The values (68,), none larger than on human faces, jaw and lids within their ranges."""
+    """Return the values (68,), none larger than on human faces, jaw and lids within their ranges."""
     result = values.copy()
     for entry in faps():
         low, high = human_range(entry.number)

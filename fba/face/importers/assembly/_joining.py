@@ -152,12 +152,12 @@ def make_atlas(parts: Sequence[Part]) -> Atlas | None:
 
 
 def _plain_tile() -> _Tile:
-    """A white tile."""
+    """Return a white tile."""
     return _Tile(np.zeros(2), np.ones(2), np.full((PLAIN_PIXELS, PLAIN_PIXELS, 4), 255, dtype=np.uint8))
 
 
 def _tile(texture: bytes, texcoords: Sequence[Float32], most: int) -> _Tile | None:
-    """What texture coordinates, arrays (V, 2), show of a texture, at most `size` pixels each way.
+    """Return what texture coordinates, arrays (V, 2), show of a texture, at most `most` pixels wide and high.
 
     None where that cannot be cut out.
     """
@@ -177,7 +177,7 @@ def _tile(texture: bytes, texcoords: Sequence[Float32], most: int) -> _Tile | No
 
 
 def _encode(pixels: UInt8) -> bytes:
-    """A picture as JPEG, or as PNG where it is not opaque."""
+    """Return a picture as JPEG, or as PNG where it is not opaque."""
     from PIL import Image
 
     stream = io.BytesIO()

@@ -28,40 +28,40 @@ from fba.face.points import EYEBALL_PER_IRIS
 from fba.face.shape_names import canonical_names, fap_of
 from fba.parameters import faps
 
-OUTSIDE = 0.2
+MIN_OUTSIDE_Z = 0.2
 """Skin whose normal has a smaller z than this is the inside of the mouth, or an ear."""
 MAX_IN_COLUMN = 3000
 """Number of vertices, at most, of one column of the face that are compared with each other."""
-PARTED = 0.25
-"""Share of the jaw's way by which lips part at least."""
+MIN_PARTED_SHARE = 0.25
+"""Lips part by at least this share of the jaw's motion."""
 MAX_HALF_MOUTH = 0.7
 """Width that half a mouth has at most, in distances of the eyes."""
 SLIT_STEP = 0.02
 """Width of a step along the line between the lips, in distances of the eyes."""
 SLIT_END = 0.2
-"""Share of what lips part in the middle by which they still part at the corner."""
+"""Lips still part at the corner by this share of their gap in the middle."""
 MIN_LOOP_VERTICES = 6
 """Number of vertices that the opening of an eye has around it at least."""
 FRONT_TEETH = 0.12
 """Distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils."""
 CORNER_WIDTH = 0.055
 """Distance of the outer corner of the lips from the inner one, as a share of that of the pupils."""
-UNLIKE = 1.3
+MAX_RADIUS_RATIO = 1.3
 """Ratio of the radii above which two shells are not a pair of eyes."""
-IN_FRONT = 0.7
+MIN_PUPIL_DISTANCE = 0.7
 """Distance that a pupil is in front of its eyeball's centre at least, in radii."""
 RIGHT_LID = ("3.2", "3.4", "3.8", "3.12")
 """Points of the right lids' margins and of the corners between them."""
-LIDS_ALIKE = 0.02
+MAX_OPENING_DIFFERENCE = 0.02
 """Share by which the heights of both eyes' openings differ, at most, where lids stay as located."""
 MIN_FAPS = 20
-"""Number of shapes named after FAPs from which points are where these move most."""
+"""With at least this many shapes named after FAPs, points are where these move most."""
 
 
 def find_points(
     pieces: Sequence[Piece], path: str, *, symmetric: bool = False, exactly: bool = False
 ) -> Float64:
-    """Feature points (84, 3) of a head, in its own unit; +y up, looking to +z.
+    """Return the feature points (84, 3) of a head, in its own unit; +y up, looking to +z.
 
     symmetric: the points of the right side are the mirror images of those of the left. exactly: those of the
     margin of the lids too, whose rows of vertices otherwise need not be the same.
@@ -90,15 +90,15 @@ def find_points(
 
 
 def _open_alike(points: Mapping[str, Float64]) -> bool:
-    """Whether both eyes are open equally far, as the one unit of their lids' FAPs needs."""
+    """Return whether both eyes are open equally far, as the one unit of their lids' FAPs needs."""
     if any(name not in points for pair in LID_POINTS.values() for name in pair):
         return False
     left, right = (float(points[upper][1] - points[lower][1]) for upper, lower in LID_POINTS.values())
-    return abs(right - left) < LIDS_ALIKE * left
+    return abs(right - left) < MAX_OPENING_DIFFERENCE * left
 
 
 def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
-    """The pupils and lids (84, 3) of a head whose eyes can be found, NaN for all other points.
+    """Return the pupils and lids (84, 3) of a head whose eyes can be found, NaN for all other points.
 
     Shells that cannot be two eyes, such as a bun of hair, give nothing: they overlap, or differ in size.
     """
@@ -108,12 +108,12 @@ def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
     except ModelError:
         return points
     (left, size_left, _), (right, size_right, _) = eyes["left"], eyes["right"]
-    alike = max(size_left, size_right) < UNLIKE * min(size_left, size_right)
+    alike = max(size_left, size_right) < MAX_RADIUS_RATIO * min(size_left, size_right)
     if not alike or left[0] - right[0] < size_left + size_right:
         return points
     found = _lids_by_loops(pieces, eyes)
     for side, (centre, radius, pupil) in eyes.items():
-        if pupil[2] - centre[2] > IN_FRONT * radius:
+        if pupil[2] - centre[2] > MIN_PUPIL_DISTANCE * radius:
             found[PUPIL_POINT[side]] = pupil
     for name, position in found.items():
         points[row_of()[name]] = position
@@ -121,7 +121,8 @@ def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
 
 
 def _tongue(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str, Float64]:
-    """Tip, middle and borders of a tongue; the last a third of the pupils' distance behind the tip."""
+    """Return the tip, middle and borders of a tongue; the last a third of the pupils' distance behind the
+    tip."""
     tongues = [piece.part.vertices for piece in pieces if piece.part.kind == "tongue"]
     if not tongues:
         return {}
@@ -140,7 +141,7 @@ def _tongue(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str
 
 
 def _teeth(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str, Float64]:
-    """Edges of the upper and the lower front teeth, in the middle of the row."""
+    """Return the edges of the upper and the lower front teeth, in the middle of the row."""
     left, right = float(located["3.5"][0]), float(located["3.6"][0])
     apart, middle = left - right, (left + right) / 2
     points = {}
@@ -156,7 +157,7 @@ def _teeth(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str,
 
 
 def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, float, Float64]]:
-    """Centre, radius and pupil of the left and right eyeball."""
+    """Return the centre, radius and pupil of the left and right eyeball."""
     eyes = {}
     for piece in pieces:
         if piece.part.kind == "eye":
@@ -173,7 +174,10 @@ def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, fl
                 away = np.hypot(vertices[:, 0] - centre[0], vertices[:, 1] - centre[1])
                 ahead = vertices[:, 2] - centre[2]
                 # the flat back of half a ball has a vertex on the axis, too
-                away[ahead < (IN_FRONT * radius if ahead.max() > IN_FRONT * radius else 0.0)] = np.inf
+                away[
+                    ahead
+                    < (MIN_PUPIL_DISTANCE * radius if ahead.max() > MIN_PUPIL_DISTANCE * radius else 0.0)
+                ] = np.inf
                 eyes[side] = (centre, radius, vertices[int(away.argmin())])
     missing = [f"the {side} eye" for side in ("left", "right") if side not in eyes]
     if missing:
@@ -193,7 +197,7 @@ POINTS = Remedy(
 
 
 def _from_faps(vertices: Float64, by_fap: Mapping[int, Float32]) -> dict[str, Float64]:
-    """Points of the skin, each where the shape named after its FAP moves it furthest."""
+    """Return the points of the skin, each where the shape named after its FAP moves it furthest."""
     points: dict[str, Float64] = {}
     for fap in faps():
         morph = by_fap.get(fap.number)
@@ -213,7 +217,7 @@ def _from_arkit(
     eyes: Mapping[str, tuple[Float64, float, Float64]],
     path: str,
 ) -> dict[str, Float64]:
-    """Points of the lids and the mouth, by shapes named as ARKit's."""
+    """Return the points of the lids and the mouth, by shapes named as ARKit's."""
     moving = [name for name, morph in skin.morphs.items() if np.abs(morph).max(initial=0.0) > 0]
     shapes = {shape: skin.morphs[name].astype(np.float64) for shape, name in canonical_names(moving).items()}
     points = _lids_by_loops(pieces, eyes)
@@ -227,7 +231,7 @@ def _from_arkit(
             f"(2.2, 2.3, 8.3, 8.4) would be found{has}"
         ).with_remedies(POINTS)
     assert skin.part.normals is not None
-    facing = skin.part.normals[:, 2].astype(np.float64) > OUTSIDE
+    facing = skin.part.normals[:, 2].astype(np.float64) > MIN_OUTSIDE_Z
     for side in lidless:
         points |= _lids(vertices, shapes[f"eyeBlink{side.title()}"], eyes[side], side)
     return points | _mouth(skin.part, facing, shapes, eyes, path)
@@ -236,7 +240,8 @@ def _from_arkit(
 def _lids(
     vertices: Float64, blink: Float64, eye: tuple[Float64, float, Float64], side: str
 ) -> dict[str, Float64]:
-    """Middles of the lids' margins, what a blink lowers most and what it then meets, and their corners."""
+    """Return the middles of the lids' margins, what a blink lowers most and what it then meets, and their
+    corners."""
     centre, radius, _ = eye
     distance = np.linalg.norm(vertices - centre, axis=1)
     near = distance < 1.3 * radius
@@ -274,7 +279,7 @@ def _lids(
 def _lids_by_loops(
     pieces: Sequence[Piece], eyes: Mapping[str, tuple[Float64, float, Float64]]
 ) -> dict[str, Float64]:
-    """Middles of the lids and corners of the eyes, on the loops of edges around their openings."""
+    """Return the middles of the lids and corners of the eyes, on the loops of edges around their openings."""
     surface = weld_parts([piece.part for piece in pieces], SURFACE_KINDS)
     points: dict[str, Float64] = {}
     for side, (centre, radius, pupil) in eyes.items():
@@ -299,7 +304,8 @@ def _mouth(
     eyes: Mapping[str, tuple[Float64, float, Float64]],
     path: str,
 ) -> dict[str, Float64]:
-    """Middles of the lips, corners of the mouth, and points between. facing: vertices that face forwards."""
+    """Return the middles of the lips, corners of the mouth, and points between. facing: vertices that face
+    forwards."""
     vertices = skin.vertices.astype(np.float64)
     left, right = eyes["left"][0], eyes["right"][0]
     apart = left[0] - right[0]
@@ -354,7 +360,7 @@ def _mouth(
 def _end_of_slit(
     vertices: Float64, drop: Float64, near: Bool, middle: float, sign: int, apart: float
 ) -> int | None:
-    """The vertex at a corner of the mouth: beyond the last at which an opening jaw parts the lips.
+    """Return the vertex at a corner of the mouth: beyond the last at which an opening jaw parts the lips.
 
     near: vertices that may be of the lips. middle: the x of the midline. sign: +1 for the left corner. None
     where the lips lie too far apart at rest for that.
@@ -369,7 +375,7 @@ def _end_of_slit(
         parted = np.where(between < 0.04 * apart, drop[column][None] - drop[column][:, None], 0.0)
         above = np.unravel_index(int(parted.argmax()), parted.shape)[0]
         first = max(first, float(parted.max()))
-        if not first > PARTED * float(drop.max()):
+        if not first > MIN_PARTED_SHARE * float(drop.max()):
             return None
         if parted.max() > SLIT_END * first:
             last = int(column[above])
@@ -384,7 +390,8 @@ def _end_of_slit(
 def _lip_pair(
     vertices: Float64, drop: Float64, ahead: Bool, x: float, apart: float
 ) -> tuple[int, int] | None:
-    """Upper and lower lip at some x: vertices close together that an opening jaw parts the furthest."""
+    """Return the upper and lower lip at some x: vertices close together that an opening jaw parts the
+    furthest."""
     column = np.flatnonzero((np.abs(vertices[:, 0] - x) < 0.04 * apart) & ahead)
     if not len(column) or not drop[column].max() > 0:
         return None
@@ -396,7 +403,7 @@ def _lip_pair(
     for reach in (0.04, 0.08, 0.16):
         near = np.where(between < reach * apart, differs, -np.inf)
         above, below = np.unravel_index(int(near.argmax()), near.shape)
-        if near[above, below] > PARTED * falls.max():
+        if near[above, below] > MIN_PARTED_SHARE * falls.max():
             break
     else:
         return None

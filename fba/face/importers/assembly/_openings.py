@@ -18,7 +18,7 @@ VISIBLE_DEPTH = 0.02
 HIDDEN_DEPTH = 0.08
 """Depth beyond which a vertex is surely hidden: eyeballs are not quite round, and some lids cut into them."""
 MAX_LENGTH_RATIO = 1.1
-"""Length up to which a loop is taken that is seen all around, in those of the shortest loop of any."""
+"""A loop that is visible all around may be this many times as long as the shortest loop."""
 MAX_STARTS = 60
 """Number of edges, at most, from which loops are sought."""
 MIN_LOOP_VERTICES = 8

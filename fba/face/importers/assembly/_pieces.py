@@ -22,24 +22,24 @@ from fba.mesh import UniqueNames
 
 DROPPED = "none"
 """Kind of parts that are left out: transparent shells in front of the eye, which would hide it."""
-FREE = ("7.1", "11.5")
+FREE_POINTS = ("7.1", "11.5")
 """Feature points that stand on no surface."""
 EYE_ROUND = 0.1
 """Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
 MIN_SINGLE_TEETH = 6
 """Number of pieces from which they are single teeth rather than rows."""
-FRONT = 0.25
+FRONT_SHARE = 0.25
 """Share of the depth of a row of teeth in which the front teeth lie."""
-SAME_HEIGHT = 0.6
+MAX_HEIGHT_DIFFERENCE = 0.6
 """Share of their height by which the middles of front teeth of one jaw differ at most."""
-PAIR = 1.7
+MIN_PAIR_ASPECT = 1.7
 """Two eyes are together at least this many times as wide as tall; one eye is round."""
 WHITE = re.compile("white|sclera", re.IGNORECASE)
-"""In the names of the whites of eyes."""
-AROUND = (0.7, 2.0)
-"""Least and greatest distance, in radii, at which the lids around an eyeball have vertices..."""
+"""Part of the names of the whites of eyes."""
+LID_RADII = (0.7, 2.0)
+"""Least and greatest distance, in radii, at which the lids around an eyeball have vertices."""
 SIDES_OF_EYE = 3
-"""... on at least this many of its four sides."""
+"""Lids have vertices on at least this many of an eyeball's four sides."""
 EYE_SIZES = (0.02, 0.12)
 """Radius of an eyeball by the height of the mesh, head alone to head and shoulders."""
 
@@ -47,7 +47,8 @@ EYE_SIZES = (0.02, 0.12)
 def assemble(
     pieces: Sequence[Piece], kinds: Mapping[str, str] | None = None, *, middle: float | None = None
 ) -> tuple[Piece, ...]:
-    """Parts of a face: kinds from names, all skin in one, each eyeball in one, teeth upper and lower.
+    """Return the parts of a face: kinds from names, all skin in one, each eyeball in one, teeth upper and
+    lower.
 
     kinds: what the user says, by the name of a group, object, mesh or material. middle: the x of the
     plane between left and right, by default between the eyes. Where names do not say, round shells in pairs
@@ -78,36 +79,40 @@ def assemble(
 
 
 def _is_white(piece: Piece, kind: str | None, pieces: Sequence[tuple[Piece, str | None]]) -> bool:
-    """Whether a piece is the white of drawn eyes, which stays while their irises turn."""
+    """Return whether a piece is the white of drawn eyes, which stays while their irises turn."""
     whites = [
         own for own, each in pieces if each == "eye" and WHITE.search(f"{own.part.name} {own.material}")
     ]
     if kind != "eye" or piece not in whites or len(whites) == sum(each == "eye" for _, each in pieces):
         return False
     size, middle = np.ptp(piece.part.vertices, axis=0), _centre([piece.part.vertices])
-    of_one = [piece] if size[0] < PAIR * size[1] else _side([piece], lambda centres: centres[:, 0] > middle)
+    of_one = (
+        [piece]
+        if size[0] < MIN_PAIR_ASPECT * size[1]
+        else _side([piece], lambda centres: centres[:, 0] > middle)
+    )
     return all(flat_width(eye.part) is not None for eye in of_one)
 
 
 def _middle(pieces: Sequence[tuple[Piece, str | None]]) -> float:
-    """The x between the eyes; where there are not two, of the middle of the skin."""
+    """Return the x between the eyes; where there are not two, of the middle of the skin."""
     eyes = [piece.part.vertices for piece, kind in pieces if kind == "eye"]
     if eyes:
         size = np.ptp(np.concatenate(eyes), axis=0)
-        if size[0] > PAIR * size[1]:
+        if size[0] > MIN_PAIR_ASPECT * size[1]:
             return _centre(eyes)
     skin = [piece.part.vertices for piece, kind in pieces if kind == "skin"]
     return _centre(skin) if skin else 0.0
 
 
 def _centre(vertices: Sequence[Float32]) -> float:
-    """The x of the middle between the outermost of some vertices, arrays (V, 3)."""
+    """Return the x of the middle between the outermost of some vertices, arrays (V, 3)."""
     across = np.concatenate(vertices)[:, 0]
     return float(across.min() + across.max()) / 2
 
 
 def shift_piece(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
-    """The piece scaled, then shifted."""
+    """Return the piece scaled, then shifted."""
     vertices = piece.part.vertices.astype(np.float64) * scale + np.asarray(shift)
     part = replace(piece.part, vertices=vertices.astype(np.float32))
     return replace(piece, part=part, morphs={name: m * np.float32(scale) for name, m in piece.morphs.items()})
@@ -116,7 +121,7 @@ def shift_piece(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
 def _with_eyes(
     pieces: Sequence[Piece], kinds: Mapping[int, str | None], middle: float | None
 ) -> list[tuple[Piece, str | None]]:
-    """The pieces, with mirrored pairs of round components split off as eyes.
+    """Return the pieces, with mirrored pairs of round components split off as eyes.
 
     middle: the x of the mirror; without it, that of x = 0 and that in the middle of the pieces are tried.
     """
@@ -161,16 +166,18 @@ def _with_eyes(
 
 
 def _is_set_in(vertices: Float32, centre: Float64, radius: float) -> bool:
-    """Whether vertices (N, 3) lie around a ball on most sides, as lids do, but none around a bun of hair."""
+    """Return whether vertices (N, 3) lie around a ball on most sides, as lids do, but none around a bun of
+    hair."""
     x, y, z = ((vertices - centre) / radius).T
     far = np.hypot(x, y)
-    near = (far > AROUND[0]) & (far < AROUND[1]) & (np.abs(z) < AROUND[1])
+    near = (far > LID_RADII[0]) & (far < LID_RADII[1]) & (np.abs(z) < LID_RADII[1])
     sides = (y > np.abs(x), -y > np.abs(x), x >= np.abs(y), -x >= np.abs(y))
     return sum(bool((near & side).any()) for side in sides) >= SIDES_OF_EYE
 
 
 def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[Piece, ...]:
-    """One piece each for skin, eyes, brows, lashes, rows of teeth, tongue and mouth; others as they are."""
+    """Return one piece each for skin, eyes, brows, lashes, rows of teeth, tongue and mouth; others as they
+    are."""
     result: list[Piece] = []
 
     def add(kind: str, name: str, own: Sequence[Piece]) -> None:
@@ -207,7 +214,7 @@ def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[P
 
 
 def _are_one_row(teeth: Sequence[Piece]) -> bool:
-    """Whether teeth are of one jaw only: then those in front lie at one height."""
+    """Return whether teeth are of one jaw only: then those in front lie at one height."""
     lows, highs, fronts = [], [], []
     for piece in teeth:
         vertices = piece.part.vertices
@@ -220,13 +227,13 @@ def _are_one_row(teeth: Sequence[Piece]) -> bool:
     if len(lows) < MIN_SINGLE_TEETH:
         return False
     low, high, front = np.array(lows), np.array(highs), np.array(fronts)
-    foremost = front > front.max() - FRONT * (front.max() - front.min())
+    foremost = front > front.max() - FRONT_SHARE * (front.max() - front.min())
     middles = (low + high)[foremost] / 2
-    return bool(np.ptp(middles) < np.median((high - low)[foremost]) * SAME_HEIGHT)
+    return bool(np.ptp(middles) < np.median((high - low)[foremost]) * MAX_HEIGHT_DIFFERENCE)
 
 
 def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], Bool]) -> list[Piece]:
-    """The components of each piece whose centre lies on the wanted side.
+    """Return the components of each piece whose centre lies on the wanted side.
 
     wanted: takes centres (N, 3), returns bool (N,).
     """
@@ -245,7 +252,7 @@ def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], Bool]) -> list[Pi
 
 
 def _cut(piece: Piece, mask: Bool, name: str) -> Piece:
-    """The vertices of a mask, with the triangles that have all corners among them."""
+    """Return the vertices of a mask, with the triangles that have all corners among them."""
     part = piece.part
     number = np.cumsum(mask) - 1
     triangles = number[part.triangles[mask[part.triangles].all(axis=1)]].astype(np.int32)
@@ -265,7 +272,7 @@ def _cut(piece: Piece, mask: Bool, name: str) -> Piece:
 
 
 def part_names(taken: Iterable[str] = ()) -> UniqueNames:
-    """Names for the parts of a face; "head" is reserved: it stands for all parts."""
+    """Return the names for the parts of a face; "head" is reserved: it stands for all parts."""
     return UniqueNames(("head", *taken))
 
 
@@ -276,7 +283,7 @@ def _words() -> tuple[tuple[str, str], ...]:
 
 
 def guess_kind(*names: str) -> str | None:
-    """The kind of a part by its names, the most specific first; None where no name is known.
+    """Return the kind of a part by its names, the most specific first; None where no name is known.
 
     The first word of `kinds.csv` that is in a name decides; "ear" and "hat" must be words of their own,
     as they are inside "pearl" and "that".
@@ -291,13 +298,14 @@ def guess_kind(*names: str) -> str | None:
 
 
 def kind_of(piece: Piece, given: Mapping[str, str]) -> str | None:
-    """The kind of a piece that a user gave by its name or material, else that of its names, or None."""
+    """Return the kind of a piece that a user gave by its name or material, else that of its names, or
+    None."""
     kind = given.get(piece.part.name, given.get(piece.material))
     return guess_kind(piece.part.name, piece.material) if kind is None else kind
 
 
 def check_kinds(kinds: Mapping[str, str] | None) -> dict[str, str]:
-    """The kinds that a user gave by name; OptionError for one that does not exist."""
+    """Return the kinds that a user gave by name; OptionError for one that does not exist."""
     for name, kind in (kinds or {}).items():
         if kind not in PART_KINDS and kind != DROPPED:
             raise OptionError(f"kind of {name!r}: {kind!r} is not one of {', '.join((*PART_KINDS, DROPPED))}")

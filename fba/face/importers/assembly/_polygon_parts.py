@@ -37,7 +37,7 @@ def make_piece(
     scale: float = 1.0,
     material: Material | None = None,
 ) -> Piece:
-    """One piece of some polygons (mask (F,)); vertices with several texture coordinates are split.
+    """Return one piece of some polygons (mask (F,)); vertices with several texture coordinates are split.
 
     Splitting keeps position and normal, so that seams do not show. scale: metres per unit of the file.
     Raises ModelError where no triangle is left.
@@ -74,7 +74,8 @@ def make_piece(
 
 
 def polygon_components(polygons: Polygons) -> tuple[Intp, Intp]:
-    """The connected component of each vertex, (V,), and of each polygon, (F,), by lowest vertex number."""
+    """Return the connected component of each vertex, (V,), and of each polygon, (F,), by lowest vertex
+    number."""
     sizes = np.diff(polygons.starts)
     first = np.repeat(polygons.corners[polygons.starts[:-1]], sizes)
     label = _connected(first, polygons.corners, len(polygons.vertices))
@@ -82,7 +83,8 @@ def polygon_components(polygons: Polygons) -> tuple[Intp, Intp]:
 
 
 def vertex_components(triangles: Int32, count: int, vertices: Float32) -> Intp:
-    """(count,) connected component of each vertex; vertices at one position (texture seams) count as one."""
+    """Return (count,) connected component of each vertex; vertices at one position (texture seams) count as
+    one."""
     _, same = np.unique(vertices, axis=0, return_inverse=True)
     position = same.reshape(-1)
     a, b, c = position[triangles].T if len(triangles) else (position[:0],) * 3
@@ -91,7 +93,7 @@ def vertex_components(triangles: Int32, count: int, vertices: Float32) -> Intp:
 
 
 def _connected(a: Integer, b: Integer, count: int) -> Intp:
-    """(count,) component of each vertex, for edges between vertices a (E,) and b (E,)."""
+    """Return (count,) component of each vertex, for edges between vertices a (E,) and b (E,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -13,15 +13,16 @@ from fba.face.model import Part
 STEPS = 400
 """Number of heights at which the profile is sampled."""
 FLAT_LIP = 0.48
-"""Share of the way from the line of the lips to the tip of the nose beyond which no lip is foremost."""
-NOSE = 0.01
+"""Beyond this share of the height from the line of the lips to the tip of the nose, no lip is foremost."""
+MIN_NOSE_DEPTH = 0.01
 """Least depth of the bottom of a nose behind the line from its tip to the lip, in distances of the pupils."""
-CHIN = 0.3
+MIN_CHIN_DISTANCE = 0.3
 """Distance of the chin from the lower lip at least, by that of the lips from the eyes; nearer is the lip."""
 
 
 def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Float64]:
-    """9.3, 9.15, 8.1, 8.2, 2.10 and 2.1 on the profile of a skin, and 11.4, 11.6, 10.3, 10.4 of the head.
+    """Return 9.3, 9.15, 8.1, 8.2, 2.10 and 2.1 on the profile of a skin, and 11.4, 11.6, 10.3, 10.4 of the
+    head.
 
     located: at least the pupils (3.5, 3.6) and the lips (2.2, 2.3). Points that do not show clearly are
     left out.
@@ -55,11 +56,12 @@ def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Floa
         along = (heights - heights[start]) / (heights[tip] - heights[start])
         behind = front[start] + along * (front[tip] - front[start]) - front
         between = (np.arange(STEPS) > start) & (np.arange(STEPS) < tip) & np.isfinite(front)
-        if between.any() and float(np.nanmax(behind[between])) > NOSE * apart:
+        if between.any() and float(np.nanmax(behind[between])) > MIN_NOSE_DEPTH * apart:
             result |= {"8.1": point(upper)} if has_lip else {}
             result["9.15"] = point(int(np.where(between, behind, -np.inf).argmax()))
     chin = _hill(
-        front, (heights > located["2.3"][1] - 0.8 * tall) & (heights < located["2.3"][1] - CHIN * tall)
+        front,
+        (heights > located["2.3"][1] - 0.8 * tall) & (heights < located["2.3"][1] - MIN_CHIN_DISTANCE * tall),
     )
     if chin is None:
         return result
@@ -80,7 +82,7 @@ def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Floa
 
 
 def _front(skin: Part, x: float, heights: Float64) -> Float64:
-    """For each height the foremost z where the skin cuts the plane at x; NaN where it does not."""
+    """Return the foremost z at each height where the skin cuts the plane at x; NaN where it does not."""
     vertices = skin.vertices.astype(np.float64)
     # a plane through vertices cuts twice or not at all; one beside them cuts once
     beside = x + 1e-5 * float(np.ptp(vertices[:, 0]))
@@ -106,14 +108,14 @@ def _front(skin: Part, x: float, heights: Float64) -> Float64:
 
 
 def _hill(front: Float64, inside: Bool) -> int | None:
-    """Index of the foremost local maximum of the profile within a stretch, or None."""
+    """Return the index of the foremost local maximum of the profile within a stretch, or None."""
     around = np.stack([np.roll(front, shift) for shift in (-6, -3, -1, 1, 3, 6)])
     hills = inside & np.isfinite(front) & (front[None] >= np.nan_to_num(around, nan=-np.inf)).all(axis=0)
     return int(np.where(hills, front, -np.inf).argmax()) if hills.any() else None
 
 
 def _head(vertices: Float64, pupils: Float64, apart: float) -> dict[str, Float64]:
-    """Crown and back of a whole head, and the ears where they stand out."""
+    """Return crown and back of a whole head, and the ears where they stand out."""
     result: dict[str, Float64] = {}
     crown = vertices[int(vertices[:, 1].argmax())]
     if abs(crown[0] - pupils[0]) < 0.3 * apart and crown[1] > pupils[1] + apart:

@@ -18,18 +18,18 @@ from fba.face.model import FaceModel
 from fba.face.points import DILATE_PUPIL
 from fba.parameters import faps
 
-EDGE = (0.75, 0.97)
+FADE_SHARES = (0.75, 0.97)
 """Shares of the reach of a region between which a motion that leaves it is faded out."""
 FALSE_PUPIL = 0.5
 """Relative deviation of a pupil's size from the usual size above which it is not a pupil."""
 MESH = ("mesh", "shapes break the standard's rules for {}: made from the mesh")
 """Name and text of the note about FAPs whose tables were replaced."""
-STOPS = (0.85, 0.7, 0.55, 0.4)
+STOP_SHARES = (0.85, 0.7, 0.55, 0.4)
 """Shares of the range of a motion at which it is made to stop, until its triangles are sound."""
 
 
 def repair_tables(model: FaceModel, plain: FaceModel, *, note: tuple[str, str] = MESH) -> FaceModel:
-    """The model with sound tables for FAPs whose own break the rules of `check_faps`.
+    """Return the model with sound tables for FAPs whose own break the rules of `check_faps`.
 
     Tried are the same motion faded out at the edge of its region, or with an earlier stop, and the table of
     `plain`, such as the face made from the mesh alone, whose use the note tells; the one with the fewest
@@ -66,7 +66,7 @@ def repair_tables(model: FaceModel, plain: FaceModel, *, note: tuple[str, str] =
 
 
 def drop_false_pupils(model: FaceModel) -> FaceModel:
-    """The model without the FAPs of pupils that the mesh of the eyeball does not have."""
+    """Return the model without the FAPs of pupils that the mesh of the eyeball does not have."""
     lost = dict(model.lost)
     for side, eye in eyeballs(model).items():
         size, wanted = pupil_diameter(model, eye), model.fapu.IRISD * 1024 * PUPIL_OF_IRIS
@@ -77,7 +77,8 @@ def drop_false_pupils(model: FaceModel) -> FaceModel:
 
 
 def _count_errors(poser: Poser, fap: int) -> int:
-    """Errors of one FAP; of a lid, with the other of its eye: one that stops early does not close it."""
+    """Return the errors of one FAP; of a lid, with the other of its eye: one that stops early does not close
+    it."""
     pair = [each for each, (side, _) in LIDS.items() if fap in LIDS and side == LIDS[fap][0]] or [fap]
     found = check_posed(poser, pair, combined=len(pair) > 1)
     return sum(finding.severity == "error" for finding in found)
@@ -88,7 +89,7 @@ def _candidates(
 ) -> Iterator[FaceDefTables]:
     if table.fap in region_table():
         yield _within_region(model, table)
-    for share in STOPS:
+    for share in STOP_SHARES:
         for sides in ((-1,), (1,), (-1, 1)):
             yield FaceDefTables(
                 table.fap, tuple(_stopped(mesh, share, sides) for mesh in table.meshes), table.transforms
@@ -98,7 +99,7 @@ def _candidates(
 
 
 def _within_region(model: FaceModel, table: FaceDefTables) -> FaceDefTables:
-    """The motion of a table, faded out towards the edge of the region of its FAP."""
+    """Return the motion of a table, faded out towards the edge of the region of its FAP."""
     names, reach = region_table()[table.fap]
     points = model.points[[row_of()[name] for name in names]]
     points = points[np.isfinite(points).all(axis=1)]
@@ -108,14 +109,14 @@ def _within_region(model: FaceModel, table: FaceDefTables) -> FaceDefTables:
     for mesh in table.meshes:
         vertices = model.part(mesh.part).vertices[mesh.vertices].astype(np.float64)
         away = np.linalg.norm(vertices[:, None] - points, axis=2).min(axis=1) / (reach * model.fapu.ES * 1024)
-        share = smoothstep((EDGE[1] - away) / (EDGE[1] - EDGE[0]))[:, None, None]
+        share = smoothstep((FADE_SHARES[1] - away) / (FADE_SHARES[1] - FADE_SHARES[0]))[:, None, None]
         moves = (mesh.displacements * share).astype(np.float32)
         meshes.append(FaceDefMesh(mesh.part, mesh.borders, mesh.vertices, moves))
     return FaceDefTables(table.fap, tuple(meshes), table.transforms)
 
 
 def _stopped(mesh: FaceDefMesh, share: float, sides: tuple[int, ...]) -> FaceDefMesh:
-    """The motion of a mesh with a stop at a share of its range. sides: -1 below 0, 1 above."""
+    """Return the motion of a mesh with a stop at a share of its range. sides: -1 below 0, 1 above."""
     borders, moves = mesh.borders.astype(np.int64), mesh.displacements
     moving = np.flatnonzero(np.abs(moves).max(axis=(0, 2), initial=0.0) > 0)
     if not len(moving):

@@ -18,15 +18,15 @@ from fba.parameters import faps
 from fba.rotations import between
 
 MIRRORED_POINTS = 0.02
-"""Asymmetry, up to which 98 % of a face's vertices are off the mirror image, in distances of the eyes, below
-which points are mirrored."""
+"""Points are mirrored below this asymmetry: the 98th percentile of the vertices' distances from the mirror
+image, by the distance of the eyes."""
 MIRRORED_TABLES = 0.006
-"""Asymmetry below which tables are mirrored, too, but those of the lids."""
+"""Below this asymmetry, tables are mirrored, too, except those of the lids."""
 MIRRORED_LIDS = 0.003
-"""Asymmetry below which the tables of the lids are mirrored, too."""
+"""Below this asymmetry, the tables of the lids are mirrored, too."""
 LIDS = ((19, 20), (21, 22))
 """FAPs of the lids, left and right: their rows of vertices are the first that differ."""
-BETTER = 0.5
+MAX_REMAINING_SHARE = 0.5
 """A head is turned if this share of the distances from the mirror image remains at most."""
 ANGLES = np.radians((0.2, 15.0))
 """Angles between the plane of symmetry and the upright one within which a head is turned."""
@@ -34,18 +34,18 @@ POINT_ANGLES = np.radians((2.0, 40.0))
 """The same for points that are given, which are no more exact than a hand."""
 MIN_PAIRS = 4
 """Number of pairs of points, left and right, from which they tell how a head is turned."""
-AROUND = 1.6
+FACE_RADIUS = 1.6
 """Distance from the middle of the eyes, in those of the eyes, within which vertices belong to the face."""
-TOUCHING = 0.1
-"""Share of the way to the neighbours that counts, beside the position, when mirror images are sought."""
-CENTRAL = (3, 4, 5, 14, 16, 17, 18, 51, 52, 63)
+NEIGHBOUR_WEIGHT = 0.1
+"""Weight of the vector to the neighbours, beside the position, when mirror images are sought."""
+CENTRAL_FAPS = (3, 4, 5, 14, 16, 17, 18, 51, 52, 63)
 """FAPs that move both sides alike."""
 
 
 def stand_upright(
     pieces: Sequence[Piece], left: Float64, right: Float64, assembled: Sequence[Piece]
 ) -> tuple[list[Piece], float]:
-    """(pieces turned so that a symmetric head's plane of symmetry is upright, the angle in radians).
+    """Return (pieces turned so that a symmetric head's plane of symmetry is upright, the angle in radians).
 
     left, right: (3,) centres of the eyes. assembled: the same pieces as parts of a face. The angle is 0 where
     nothing was turned.
@@ -59,13 +59,14 @@ def stand_upright(
     before, after = (
         float(np.median(_mirror_distances(vertices, middle, axis))) for axis in (np.eye(3)[0], normal)
     )
-    if after > BETTER * before or after > MIRRORED_POINTS * float(np.linalg.norm(left - right)):
+    if after > MAX_REMAINING_SHARE * before or after > MIRRORED_POINTS * float(np.linalg.norm(left - right)):
         return list(pieces), 0.0
     return _turned(pieces, between(normal, np.eye(3)[0]), middle), angle
 
 
 def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[list[Piece], Float64, float]:
-    """(pieces and their feature points (84, 3) turned so that both sides are level, the angle in radians).
+    """Return (pieces and their feature points (84, 3) turned so that both sides are level, the angle in
+    radians).
 
     The angle is 0 where nothing was turned: where points of both sides say nothing, or not the same.
     """
@@ -81,14 +82,14 @@ def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[l
     before, after = (
         float(np.linalg.norm(ways - wide[:, None] * axis, axis=1).sum()) for axis in (np.eye(3)[0], normal)
     )
-    if not POINT_ANGLES[0] < angle < POINT_ANGLES[1] or after > BETTER * before:
+    if not POINT_ANGLES[0] < angle < POINT_ANGLES[1] or after > MAX_REMAINING_SHARE * before:
         return list(pieces), points, 0.0
     turn, middle = between(normal, np.eye(3)[0]), pairs.mean(axis=(0, 1))
     return _turned(pieces, turn, middle), (points - middle) @ turn.T + middle, angle
 
 
 def _turned(pieces: Sequence[Piece], turn: Float64, middle: Float64) -> list[Piece]:
-    """The pieces turned by a matrix (3, 3) about a point."""
+    """Return the pieces turned by a matrix (3, 3) about a point."""
     result = []
     for piece in pieces:
         part = piece.part
@@ -101,7 +102,7 @@ def _turned(pieces: Sequence[Piece], turn: Float64, middle: Float64) -> list[Pie
 
 
 def asymmetry(pieces: Sequence[Piece], left: Float64, right: Float64) -> float:
-    """How far 98 % of the face's skin is from its mirror image at most, in distances of the eyes.
+    """Return the 98th percentile of the skin's distances from its mirror image, by the distance of the eyes.
 
     left, right: (3,) centres of the eyes.
     """
@@ -113,7 +114,8 @@ def asymmetry(pieces: Sequence[Piece], left: Float64, right: Float64) -> float:
 
 
 def mirror_points(points: dict[str, Float64], middle: float, own: Collection[str] = ()) -> dict[str, Float64]:
-    """Located points with those of the right side, and those of the midline, from the left and the middle.
+    """Return the located points with those of the right side, and those of the midline, from the left and the
+    middle.
 
     middle: the x of the plane of symmetry. own: points of the right side that stay where they were located.
     """
@@ -130,7 +132,7 @@ def mirror_points(points: dict[str, Float64], middle: float, own: Collection[str
 
 
 def mirror_tables(model: FaceModel, *, lids: bool = True) -> FaceModel:
-    """The model with the tables of each pair of FAPs mirror images, and those of the middle symmetric.
+    """Return the model with the tables of each pair of FAPs mirror images, and those of the middle symmetric.
 
     The side is kept on which FAPs reach further. The face must be symmetric. lids: those of the lids, too.
     """
@@ -149,7 +151,7 @@ def mirror_tables(model: FaceModel, *, lids: bool = True) -> FaceModel:
     kept = int(reach[1] > reach[0])
     made = dict(model.table_of)
     lost = dict(model.lost)
-    for fap in CENTRAL:
+    for fap in CENTRAL_FAPS:
         if fap in made:
             made[fap] = _average(model, made[fap], _mirrored(model, made[fap], fap, other))
     for pair in pairs:
@@ -161,7 +163,8 @@ def mirror_tables(model: FaceModel, *, lids: bool = True) -> FaceModel:
 
 
 def mirror_faulty_lids(model: FaceModel) -> FaceModel:
-    """The model; where the lids of one eye break more rules than those of the other, these are mirrored.
+    """Return the model; where the lids of one eye break more rules than those of the other, these are
+    mirrored.
 
     That is undone where the mirror images break as many.
     """
@@ -185,17 +188,17 @@ def _count_errors(poser: Poser, lids: list[int]) -> int:
 
 
 def _face(pieces: Sequence[Piece], left: Float64, right: Float64) -> Float64:
-    """(N, 3) vertices of the skin around the eyes."""
+    """Return (N, 3) vertices of the skin around the eyes."""
     skin = [piece.part.vertices for piece in pieces if piece.part.kind == "skin"]
     if not skin:
         return np.zeros((0, 3))
     vertices = np.concatenate(skin).astype(np.float64)
-    reach = AROUND * float(np.linalg.norm(left - right))
+    reach = FACE_RADIUS * float(np.linalg.norm(left - right))
     return np.asarray(vertices[np.linalg.norm(vertices - (left + right) / 2, axis=1) < reach])
 
 
 def _mirror_distances(vertices: Float64, middle: Float64, normal: Float64) -> Float64:
-    """(N,) distances of mirrored vertices from the nearest."""
+    """Return (N,) distances of mirrored vertices from the nearest."""
     from scipy.spatial import cKDTree
 
     mirrored = vertices - 2 * ((vertices - middle) @ normal)[:, None] * normal
@@ -204,13 +207,13 @@ def _mirror_distances(vertices: Float64, middle: Float64, normal: Float64) -> Fl
 
 
 def _counterparts(model: FaceModel) -> Intp:
-    """(V,) for each vertex that of the same kind of part nearest to its mirror image."""
+    """Return (V,) for each vertex that of the same kind of part nearest to its mirror image."""
     from scipy.spatial import cKDTree
 
     pupils = model.points[[row_of()["3.5"], row_of()["3.6"]], 0]
     middle = float(pupils.mean()) if np.isfinite(pupils).all() else 0.0
-    # lips that touch have vertices at one place: the way to their neighbours tells which is of which lip
-    arms = TOUCHING * _neighbour_arms(model)
+    # vertices of touching lips coincide: the vector to their neighbours tells the lips apart
+    arms = NEIGHBOUR_WEIGHT * _neighbour_arms(model)
     vertices = np.hstack([model.vertices.astype(np.float64) - (middle, 0.0, 0.0), arms])
     mirrored = vertices * (-1.0, 1.0, 1.0, -1.0, 1.0, 1.0)
     kinds = np.concatenate([[part.kind] * len(part.vertices) for part in model.parts])
@@ -226,7 +229,7 @@ def _counterparts(model: FaceModel) -> Intp:
 
 
 def _neighbour_arms(model: FaceModel) -> Float64:
-    """(V, 3) from each vertex to the middle of its triangles."""
+    """Return (V, 3) from each vertex to the middle of its triangles."""
     arms = []
     for part in model.parts:
         vertices = part.vertices.astype(np.float64)
@@ -239,7 +242,7 @@ def _neighbour_arms(model: FaceModel) -> Float64:
 
 
 def _fields(model: FaceModel, table: FaceDefTables) -> dict[tuple[int, ...], Float64]:
-    """Displacements (V, K - 1, 3) of all vertices, by the borders of the table's meshes."""
+    """Return the displacements (V, K - 1, 3) of all vertices, by the borders of the table's meshes."""
     fields: dict[tuple[int, ...], Float64] = {}
     for mesh in table.meshes:
         key = tuple(mesh.borders.tolist())
@@ -268,7 +271,7 @@ def _table(model: FaceModel, fap: int, fields: dict[tuple[int, ...], Float64]) -
 
 
 def _mirrored(model: FaceModel, table: FaceDefTables, fap: int, other: Intp) -> FaceDefTables:
-    """The tables of a FAP as the mirror image of those of another."""
+    """Return the tables of a FAP as the mirror image of those of another."""
     fields = {borders: field[other] * (-1.0, 1.0, 1.0) for borders, field in _fields(model, table).items()}
     return _table(model, fap, fields)
 
@@ -281,7 +284,7 @@ def _average(model: FaceModel, table: FaceDefTables, mirrored: FaceDefTables) ->
 
 
 def _reach(table: FaceDefTables) -> float:
-    """How far a FAP moves its vertices at both ends of its range, summed over all."""
+    """Return how far a FAP moves its vertices at both ends of its range, summed over all."""
     total = 0.0
     for mesh in table.meshes:
         widths = np.diff(mesh.borders.astype(np.float64))

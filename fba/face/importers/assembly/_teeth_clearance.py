@@ -26,25 +26,25 @@ STRETCH = (6, 7, 53, 54)
 """FAPs of the corners of the mouth, inner and outer."""
 KNOTS = (-20.0, -80.0, -140.0, -200.0, -260.0, -320.0)
 """Values at which the clearance is measured. Up to the first one, the corners move straight."""
-CELL = 0.0005
+CELL_SIZE = 0.0005
 """Metres: spacing of the picture of the teeth's depth."""
 MAX_CELLS = 1 << 20
 CLOSED_GAP = 0.002
 """Metres up to which gaps between teeth are closed; their arch is smoothed by half of it."""
-GAP = 0.0008
+CLEARANCE = 0.0008
 """Metres of skin that stay in front of the arch; skin that is nearer at rest keeps its distance."""
-BEHIND = 0.004
+MAX_DEPTH_BEHIND = 0.004
 """Metres: skin further behind the arch at rest is that of the mouth's inside, and stays as it is."""
-WITHIN = ((1.0, 0.0, 0.0), (0.5, 0.5, 0.0), (0.0, 0.5, 0.5), (0.5, 0.0, 0.5), (1 / 3, 1 / 3, 1 / 3))
+SAMPLE_SHARES = ((1.0, 0.0, 0.0), (0.5, 0.5, 0.0), (0.0, 0.5, 0.5), (0.5, 0.0, 0.5), (1 / 3, 1 / 3, 1 / 3))
 """Shares of the corners of a triangle at which it has to clear the teeth."""
-BRIDGINGS = 3
+BRIDGING_PASSES = 3
 """Passes, as what is between vertices needs more than they do."""
 TRIALS = ((0.7, 1.0), (0.45, 1.0), (0.3, 1.0), (0.7, 0.7), (0.45, 0.7), (0.45, 0.4))
-"""How much less the skin comes forward for each metre from where it has to, and share of the way it goes:
-the first pair that turns nothing over is taken."""
+"""Slope at which the forward motion falls off around the teeth, and share of the motion that is made: the
+first pair that turns nothing over is taken."""
 NEED_SQUARE = 0.001
 """Metres, side of a square; of the needs in it, the largest counts."""
-FULL = 0.15
+FULL_SHARE = 0.15
 """Share of the largest motion above which skin comes forward in full."""
 MIN_OVERLAP = 2e-4
 """Metres below which skin may get into the teeth without being pushed."""
@@ -62,7 +62,7 @@ class Arch:
     depth: Float64
 
     def depth_at(self, points: Float64) -> Float64:
-        """(N,) z of the teeth at the x and y of points (N, 3); far back or -inf beside them."""
+        """Return (N,) z of the teeth at the x and y of points (N, 3); far back or -inf beside them."""
         from scipy.ndimage import map_coordinates
 
         cells = ((points[:, :2] - self.corner) / self.cell - 0.5).T[::-1]
@@ -72,9 +72,9 @@ class Arch:
 
 
 def clear_teeth(model: FaceModel) -> FaceModel:
-    """The model, whose skin slides over the teeth where the corners of the mouth move inwards.
+    """Return the model, whose skin slides over the teeth where the corners of the mouth move inwards.
 
-    Where that would turn triangles over, the skin around comes along further, or the way is shorter.
+    Where that would turn triangles over, more of the skin around moves, or the motion is shorter.
     """
     arch = _measure_arch(model)
     stretch = [fap for fap in STRETCH if fap in model.table_of]
@@ -101,7 +101,7 @@ def _count_errors(poser: Poser, stretch: list[int]) -> int:
 def _with_pushes(
     model: FaceModel, surface: Surface, poser: Poser, stretch: list[int], pushes: list[Float64]
 ) -> FaceModel:
-    """The model whose skin comes forward by (N,) metres at each of the `KNOTS` but the first."""
+    """Return the model whose skin comes forward by (N,) metres at each of the `KNOTS` but the first."""
     tables = [
         _with_push(model, table, _divide(poser, surface, stretch, fap, pushes), surface)
         if fap in stretch
@@ -112,7 +112,7 @@ def _with_pushes(
 
 
 def _measure_arch(model: FaceModel) -> Arch | None:
-    """The arch of all rows of teeth, seen from the front; None without teeth."""
+    """Return the arch of all rows of teeth, seen from the front; None without teeth."""
     from scipy.ndimage import gaussian_filter, grey_closing
 
     rows = [part for part in model.parts if part.kind == "teeth" and len(part.triangles)]
@@ -120,7 +120,7 @@ def _measure_arch(model: FaceModel) -> Arch | None:
         return None
     corners = np.concatenate([part.vertices.astype(np.float64)[part.triangles] for part in rows])
     low, high = corners.min(axis=(0, 1))[:2] - 3 * CLOSED_GAP, corners.max(axis=(0, 1))[:2] + 3 * CLOSED_GAP
-    cell = max(CELL, float(np.sqrt(np.prod(high - low) / MAX_CELLS)))
+    cell = max(CELL_SIZE, float(np.sqrt(np.prod(high - low) / MAX_CELLS)))
     size = np.ceil((high - low) / cell).astype(np.intp) + 1
     depth = np.full((size[1], size[0]), -np.inf)
     longest = float(np.linalg.norm(np.ptp(corners[:, :, :2], axis=1), axis=1).max())
@@ -140,32 +140,32 @@ def _measure_arch(model: FaceModel) -> Arch | None:
 
 
 def _shifts(poser: Poser, surface: Surface, stretch: list[int], value: float) -> Float64:
-    """(N, 3) displacements of the surface by some FAPs at one value."""
+    """Return (N, 3) displacements of the surface by some FAPs at one value."""
     shifts = np.zeros((len(surface), 3))
     shifts[surface.number] = poser.shift(dict.fromkeys(stretch, value))[surface.pool]
     return shifts
 
 
 def _push(surface: Surface, arch: Arch, shifts: Float64, slope: float) -> Float64:
-    """(N,) metres by which the surface, moved by some shifts (N, 3), has to come forward.
+    """Return (N,) metres by which the surface, moved by some shifts (N, 3), has to come forward.
 
     Lips keep their thickness: what lies one behind the other comes forward alike, and around it, ever less:
     by `slope` metres for each metre.
     """
     way = np.linalg.norm(shifts, axis=1)
-    share = smoothstep(way / max(FULL * float(way.max()), 1e-9))
+    share = smoothstep(way / max(FULL_SHARE * float(way.max()), 1e-9))
     triangles = surface.triangles[(share[surface.triangles] > 0).any(axis=1)]
     push = np.zeros(len(surface))
     needs = np.zeros((0, 3))
-    for _ in range(BRIDGINGS):
+    for _ in range(BRIDGING_PASSES):
         moved = surface.vertices + shifts + push[:, None] * (0.0, 0.0, 1.0)
-        for shares in WITHIN:
+        for shares in SAMPLE_SHARES:
             mix = np.array(shares)
             rest = np.einsum("k,fkc->fc", mix, surface.vertices[triangles])
             points = np.einsum("k,fkc->fc", mix, moved[triangles])
             gap = rest[:, 2] - arch.depth_at(rest)
-            short = arch.depth_at(points) + np.minimum(gap, GAP) - points[:, 2]
-            wanted = np.flatnonzero(np.isfinite(short) & (short > 0) & (gap > -BEHIND))
+            short = arch.depth_at(points) + np.minimum(gap, CLEARANCE) - points[:, 2]
+            wanted = np.flatnonzero(np.isfinite(short) & (short > 0) & (gap > -MAX_DEPTH_BEHIND))
             total = short[wanted] + push[triangles[wanted]] @ mix
             needs = _thin(np.concatenate([needs, np.c_[rest[wanted, :2], total]]))
         moving = np.flatnonzero(share > 0)
@@ -174,7 +174,7 @@ def _push(surface: Surface, arch: Arch, shifts: Float64, slope: float) -> Float6
 
 
 def _thin(needs: Float64) -> Float64:
-    """The largest of the needs, rows x, y, metres, of each square of 1 mm."""
+    """Return the largest of the needs, rows x, y, metres, of each square of 1 mm."""
     order = np.argsort(-needs[:, 2], kind="stable")
     cells = np.floor(needs[order, :2] / NEED_SQUARE).astype(np.intp)
     _, first = np.unique(cells, axis=0, return_index=True)
@@ -182,7 +182,7 @@ def _thin(needs: Float64) -> Float64:
 
 
 def _envelope(points: Float64, needs: Float64, slope: float) -> Float64:
-    """(N,) the largest need, rows x, y, metres, less `slope` of its distance, at points (N, 2)."""
+    """Return (N,) the largest need, rows x, y, metres, less `slope` of its distance, at points (N, 2)."""
     result = np.zeros(len(points))
     for x, y, need in needs:
         away = np.hypot(points[:, 0] - x, points[:, 1] - y)
@@ -193,7 +193,7 @@ def _envelope(points: Float64, needs: Float64, slope: float) -> Float64:
 def _divide(
     poser: Poser, surface: Surface, stretch: list[int], fap: int, pushes: list[Float64]
 ) -> dict[float, Float64]:
-    """(N,) metres that one FAP brings the surface forward by value: that of its side, half of it each.
+    """Return (N,) metres that one FAP brings the surface forward by value: that of its side, half of it each.
 
     By half, and not by its share in the sideways motion: an inner contour that came forward alone would turn
     the skin between it and the outer one over.
@@ -210,7 +210,7 @@ def _divide(
 def _with_push(
     model: FaceModel, table: FaceDefTables, push: Mapping[float, Float64], surface: Surface
 ) -> FaceDefTables:
-    """The table of a FAP with a forward motion of the surface, (N,) metres by value."""
+    """Return the table of a FAP with a forward motion of the surface, (N,) metres by value."""
     unit = model.fapu[faps()[table.fap - 1].unit]
     meshes = {mesh.part: mesh for mesh in table.meshes}
     for part, number in surface.members.items():
@@ -221,7 +221,8 @@ def _with_push(
 
 
 def _add_forward(mesh: FaceDefMesh, push: Mapping[float, Float64], unit: float) -> FaceDefMesh:
-    """A mesh's motion with one along z, (V,) metres of each vertex of the part by value; constant beyond."""
+    """Return a mesh's motion with one along z, (V,) metres of each vertex of the part by value; constant
+    beyond."""
     values = np.array(sorted(push))
     pushed = np.flatnonzero(np.max([push[value] for value in values], axis=0) > UNMOVED_DISTANCE)
     vertices = np.union1d(mesh.vertices, pushed).astype(np.int32)
@@ -241,7 +242,7 @@ def _add_forward(mesh: FaceDefMesh, push: Mapping[float, Float64], unit: float) 
 
 
 def _interpolate(values: Float64, ways: Float64, value: float) -> Float64:
-    """(V,) ways (K, V) at rising values (K,), linear between them and constant beyond."""
+    """Return (V,) ways (K, V) at rising values (K,), linear between them and constant beyond."""
     x = float(np.clip(value, values[0], values[-1]))
     k = int(np.clip(np.searchsorted(values, x) - 1, 0, len(values) - 2))
     share = (x - values[k]) / (values[k + 1] - values[k])

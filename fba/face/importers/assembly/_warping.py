@@ -8,14 +8,14 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
-from fba.face.importers.assembly._pieces import FREE
+from fba.face.importers.assembly._pieces import FREE_POINTS
 from fba.face.importers.assembly._polygon_parts import Piece
 
 ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
 """Parts that points of the teeth stand on."""
-LOCAL = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12", "6.1", "6.2", "6.3", "6.4")
+UNWARPED_POINTS = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12", "6.1", "6.2", "6.3", "6.4")
 """Points that are not used for the warp."""
-FOLD = 0.08
+FOLD_DISTANCE = 0.08
 """Usual distance of the fold of a lid from its margin, in distances of the pupils."""
 SMOOTHING = 0.1
 """Smoothing of the warp: points that coincide on the adult head may be apart on another."""
@@ -28,7 +28,7 @@ def warp_points(
     symmetric: bool = False,
     own: Collection[str] = (),
 ) -> Float64:
-    """(84, 3) the adult head's points, warped to those located and moved onto parts of their kind.
+    """Return (84, 3) the adult head's points, warped to those located and moved onto parts of their kind.
 
     symmetric: points of the right side stand on the vertices that mirror those of the left. own: those of the
     right side that stay where they were located.
@@ -46,7 +46,7 @@ def warp_points(
             present, absent = (left, right) if left in known else (right, left)
             known[absent] = known[present] * (-1, 1, 1) + (2 * middle, 0, 0)
     # pupils may lie behind the lids or in front of them; they do not determine the skin
-    used = [name for name in known if name not in LOCAL]
+    used = [name for name in known if name not in UNWARPED_POINTS]
     scale = float(known["3.5"][0] - known["3.6"][0]) / float(adult[row["3.5"], 0] - adult[row["3.6"], 0])
     source = np.array([adult[row[name]] for name in used])
     target = np.array([known[name] for name in used]) / scale
@@ -63,7 +63,7 @@ def warp_points(
         if name in mirrored and np.isfinite(points[row[mirrored[name]]]).all():
             # left points come first and stand on their vertices by now
             points[row[name]] = points[row[mirrored[name]]] * (-1, 1, 1) + (2 * middle, 0, 0)
-        if name in FREE:
+        if name in FREE_POINTS:
             continue
         # located points are vertices, or lie on the profile between some
         key = (*kinds_for_point(name), ROWS.get(name, ""), str(name in known))
@@ -96,14 +96,15 @@ def _put_folds_beyond_lids(pieces: Sequence[Piece], points: Float64) -> None:
         edge = points[row[margin]]
         if way * (points[row[fold], 1] - edge[1]) > 0 or not np.isfinite(edge).all():
             continue
-        away = np.linalg.norm(vertices - edge - (0.0, way * FOLD * apart, 0.0), axis=1)
-        away[way * (vertices[:, 1] - edge[1]) < FOLD / 2 * apart] = np.inf
+        away = np.linalg.norm(vertices - edge - (0.0, way * FOLD_DISTANCE * apart, 0.0), axis=1)
+        away[way * (vertices[:, 1] - edge[1]) < FOLD_DISTANCE / 2 * apart] = np.inf
         if np.isfinite(away).any():
             points[row[fold]] = vertices[int(away.argmin())]
 
 
 def _outside(piece: Piece, centre: Float64) -> Float64:
-    """(N, 3) vertices of a part that face away from the head's centre: not those of sockets and throat."""
+    """Return (N, 3) vertices of a part that face away from the head's centre: not those of sockets and
+    throat."""
     vertices = piece.part.vertices.astype(np.float64)
     if piece.part.kind != "skin" or piece.part.normals is None:
         return vertices

@@ -14,7 +14,7 @@ from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly._default_materials import apply_default_materials
 from fba.face.importers.assembly._definitions import define_by_shapes
-from fba.face.importers.assembly._pieces import FREE, assemble, shift_piece
+from fba.face.importers.assembly._pieces import FREE_POINTS, assemble, shift_piece
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.importers.assembly._repair import drop_false_pupils, repair_tables
 from fba.face.importers.assembly._symmetry import stand_upright_by_points
@@ -22,12 +22,12 @@ from fba.face.importers.assembly._teeth_clearance import clear_teeth
 from fba.face.model import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
 
-PUPILS = 0.062
+ADULT_PUPIL_DISTANCE = 0.062
 """Metres between the pupils of an adult."""
-USUAL = (0.04, 0.08)
+PUPIL_DISTANCES = (0.04, 0.08)
 """Limits of the distance between the pupils of a real head, metres."""
 UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
-HEAD = 2.5
+HEAD_RADIUS = 2.5
 """Distance from the middle of the head within which skin is that of the head, in distances of the pupils."""
 AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
 """Rotations to +x left, +y up, +z forward, by the vertical axis of a file; faces with z up look to -y."""
@@ -47,7 +47,7 @@ class ImportOptions:
 
 
 def turn_upright(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piece], Float64]:
-    """Pieces and points of a file whose vertical axis is "y" or "z", with y up."""
+    """Return the pieces and points of a file whose vertical axis is "y" or "z", with y up."""
     if up not in AXES:
         raise OptionError(f"up must be one of {', '.join(AXES)}, not {up!r}")
     if up == "y":
@@ -72,7 +72,7 @@ def finish_import(
     *,
     given: bool = True,
 ) -> FaceModel:
-    """A face from the pieces of a file and its feature points (84, 3), both in the file's unit.
+    """Return a face from the pieces of a file and its feature points (84, 3), both in the file's unit.
 
     vertices: numbers of the vertices in the file that points stand on. given: the points were given, not
     found, and tell whether the head is turned aside or tilted. The face is converted to
@@ -96,7 +96,7 @@ def finish_import(
     # a point in the middle of the head, behind the pupils or the lids
     eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
     apart = pupil_distance(points) * size
-    parts, turned = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * apart), HEAD * apart)
+    parts, turned = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * apart), HEAD_RADIUS * apart)
     points = (points - origin) * size
     parts = apply_default_materials(parts, points)
     bound = bind_by_number(parts, vertices)
@@ -111,7 +111,8 @@ def finish_import(
 def author_pieces(
     pieces: Sequence[Piece], points: Float64, bound: Int32, *, name: str, notes: Mapping[str, str]
 ) -> FaceModel:
-    """The face of finished pieces, its tables made from their shapes if there are any, else from the mesh."""
+    """Return the face of finished pieces, its tables made from their shapes if there are any, else from the
+    mesh."""
     parts = tuple(piece.part for piece in pieces)
     # without any vertex, `author` binds points to the nearest, and separates upper and lower lip
     known = bound if (bound >= 0).any() else None
@@ -133,7 +134,7 @@ def author_pieces(
 
 
 def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:
-    """int32 (84,): vertex of each feature point counted through the pieces, -1 for those without one.
+    """Return int32 (84,): vertex of each feature point counted through the pieces, -1 for those without one.
 
     vertices: their numbers in the file, by point.
     """
@@ -147,13 +148,13 @@ def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int3
                 first.setdefault(number, start + vertex)
         start += len(piece.part.vertices)
     for name, vertex in vertices.items():
-        if name not in FREE and vertex in first:
+        if name not in FREE_POINTS and vertex in first:
             bound[row_of()[name]] = first[vertex]
     return bound
 
 
 def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, str]:
-    """(metres per unit of the mesh, how that was found out, in words).
+    """Return metres per unit of the mesh, and in words how they were determined.
 
     points: (84, 3). unit: given by the user, used unchanged. Otherwise the unit with which the pupils
     (3.5, 3.6; without them the eyes) stand as far apart as on a real head; where none does, as with
@@ -165,13 +166,17 @@ def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, 
         return float(unit), f"1 unit is {unit:g} m, as given"
     apart = pupil_distance(points)
     for name, size in UNITS.items():
-        if USUAL[0] <= apart * size <= USUAL[1]:
+        if PUPIL_DISTANCES[0] <= apart * size <= PUPIL_DISTANCES[1]:
             return size, f"in {name}: the pupils are {apart * size * 1000:.1f} mm apart"
-    return PUPILS / apart, f"of no known unit: scaled so that the pupils are {PUPILS * 1000:.0f} mm apart"
+    return (
+        ADULT_PUPIL_DISTANCE / apart,
+        f"of no known unit: scaled so that the pupils are {ADULT_PUPIL_DISTANCE * 1000:.0f} mm apart",
+    )
 
 
 def pupil_distance(points: Float64) -> float:
-    """Distance of the pupils, or of the middles between the eye corners; ModelError where unknown."""
+    """Return the distance of the pupils, or of the middles between the eye corners; ModelError where
+    unknown."""
     row = row_of()
     for left, right in ((("3.5",), ("3.6",)), (("3.7", "3.11"), ("3.8", "3.12")), (("3.1",), ("3.2",))):
         ends = [points[[row[name] for name in names]].mean(axis=0) for names in (left, right)]
@@ -217,13 +222,13 @@ def _flip(triangles: Int32, wrong: Bool) -> Int32:
 
 
 def _facing(vertices: Float64, triangles: Int32, centre: Float64) -> Float64:
-    """(F,) positive for triangles that face away from a centre, in proportion to their areas."""
+    """Return (F,) positive for triangles that face away from a centre, in proportion to their areas."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), (a + b + c) / 3 - centre))
 
 
 def _opposing(triangles: Int32) -> Bool:
-    """bool (F,): triangles to turn so that neighbours agree, at most half of each connected piece."""
+    """Return bool (F,): triangles to turn so that neighbours agree, at most half of each connected piece."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 

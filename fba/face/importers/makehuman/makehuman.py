@@ -71,7 +71,7 @@ class MakeHumanHead:
 
 
 def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
-    """The head of a MakeHuman base mesh, its origin between the pupils.
+    """Return the head of a MakeHuman base mesh, its origin between the pupils.
 
     path: its `base.obj`, or the folder that holds it. Raises ModelError where the file is missing, damaged,
     or not the base mesh hm08.
@@ -102,7 +102,7 @@ def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
 
 
 def base_file(path: str | os.PathLike[str]) -> Path:
-    """The base mesh in a folder, or the file itself; ModelError if it is missing."""
+    """Return the base mesh in a folder, or the file itself; ModelError if it is missing."""
     path = Path(path)
     for name in ("base.obj", "3dobjs/base.obj", "data/3dobjs/base.obj"):
         if (path / name).is_file():
@@ -119,7 +119,8 @@ def _rows(name: str, key: str) -> dict[str, tuple[int, ...]]:
 
 
 def _head(base: Polygons) -> tuple[Bool, Bool]:
-    """(faces of the body that are the head, those of them that are the inside of the mouth), masks (F,).
+    """Return (faces of the body that are the head, those of them that are the inside of the mouth), masks
+    (F,).
 
     The head is what can be reached from the crown, the mouth what can be reached from the palate, without
     crossing a loop of `makehuman_cuts.csv`.
@@ -158,7 +159,7 @@ def _head(base: Polygons) -> tuple[Bool, Bool]:
 
 
 def _skin(base: Polygons) -> Piece:
-    """The skin, darker and redder inside the mouth."""
+    """Return the skin, darker and redder inside the mouth."""
     head, mouth = _head(base)
     colours = np.tile(np.array([*LOOKS["skin"].colour, 0.4], dtype=np.float32), (len(base.vertices), 1))
     colours[base.used(mouth)] = (*LOOKS["mouth"].colour, 0.6)
@@ -167,7 +168,7 @@ def _skin(base: Polygons) -> Piece:
 
 
 def _eyes(file: Path, base: Polygons) -> list[Piece]:
-    """Left and right eyeball: the fitted eyes, else those of the base mesh."""
+    """Return left and right eyeball: the fitted eyes, else those of the base mesh."""
     clothes = find_beside(file, EYES)
     if clothes is None:
         sides = (("left eye", "helper-l-eye"), ("right eye", "helper-r-eye"))
@@ -179,7 +180,7 @@ def _eyes(file: Path, base: Polygons) -> list[Piece]:
 
 
 def eye_pieces(clothes: Path, base: Float64) -> list[Piece]:
-    """Left and right eyeball of the eyes in an .mhclo file, fitted to a base mesh (V, 3)."""
+    """Return left and right eyeball of the eyes in an .mhclo file, fitted to a base mesh (V, 3)."""
     eyes = fit_clothes(clothes, base)
     picture = find_beside(clothes, "brown_eye.png")
     material = (
@@ -193,7 +194,8 @@ def eye_pieces(clothes: Path, base: Float64) -> list[Piece]:
 
 
 def _eyeball(eyes: Polygons, side: float) -> Bool:
-    """The faces of one eyeball, without the transparent cornea in front of it, which is a mesh of its own."""
+    """Return the faces of one eyeball, without the transparent cornea in front of it, which is a mesh of its
+    own."""
     of_vertex, of_face = polygon_components(eyes)
     used = np.unique(eyes.corners)
     component, vertices = of_vertex[used], eyes.vertices[used]
@@ -210,7 +212,7 @@ def _eyeball(eyes: Polygons, side: float) -> Bool:
 
 
 def _feature_points(base: Polygons, pieces: list[Piece]) -> tuple[Float64, Int32]:
-    """(points (84, 3) in metres, origin as in the base mesh; vertices (84,) they are bound to)."""
+    """Return (points (84, 3) in metres, origin as in the base mesh; vertices (84,) they are bound to)."""
     points = np.full((len(row_of()), 3), np.nan)
     rows = _rows("makehuman.csv", "point")
     for name, vertices in rows.items():
@@ -229,7 +231,7 @@ def _feature_points(base: Polygons, pieces: list[Piece]) -> tuple[Float64, Int32
 
 
 def _front(vertices: Float32) -> int:
-    """The foremost vertex of an eyeball: of its front half, the one nearest to its axis."""
+    """Return the foremost vertex of an eyeball: of its front half, the one nearest to its axis."""
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     away = np.hypot(vertices[:, 0] - middle[0], vertices[:, 1] - middle[1])
     away[vertices[:, 2] < middle[2]] = np.inf
@@ -237,7 +239,7 @@ def _front(vertices: Float32) -> int:
 
 
 def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -> FaceModel:
-    """The head of MakeHuman's base mesh with tables; ModelError as `read_makehuman`."""
+    """Return the head of MakeHuman's base mesh with tables; ModelError as `read_makehuman`."""
     from fba.face.authoring import author
 
     head = read_makehuman(path)
@@ -294,7 +296,7 @@ def _vertex(token: str, base: Float64, where: str) -> int:
 
 
 def _position(tokens: list[str], base: Float64, scale: Float64, where: str) -> Float64:
-    """(3,) position of the vertex of one line."""
+    """Return (3,) position of the vertex of one line."""
     if len(tokens) == 1:
         return np.asarray(base[_vertex(tokens[0], base, where)])
     if len(tokens) < 6:

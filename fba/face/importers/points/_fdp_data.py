@@ -62,7 +62,8 @@ class Fdp:
 
 
 def repair_sides_with_warning(points: Float64, path: str, *, stacklevel: int = 2) -> Float64:
-    """Points (84, 3) with left and right repaired as `repair_sides` does; an FbaWarning names the changes."""
+    """Return the points (84, 3) with left and right repaired as `repair_sides` does; an FbaWarning names the
+    changes."""
     right, swaps, mirrored = repair_sides(points)
     changed = [f"{a} and {b} have changed places" for a, b in swaps]
     changed += [f"{name} is on the other side" for name in mirrored]
@@ -77,7 +78,8 @@ def repair_sides_with_warning(points: Float64, path: str, *, stacklevel: int = 2
 
 
 def repair_sides(points: Float64) -> tuple[Float64, list[tuple[str, str]], list[str]]:
-    """(points (84, 3) on their own sides of the face, pairs that were swapped, points that were mirrored).
+    """Return (points (84, 3) on their own sides of the face, pairs that were swapped, points that were
+    mirrored).
 
     Unchanged where most pairs do not lie left and right in x: then the axes are not the standard's.
     """

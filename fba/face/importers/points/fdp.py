@@ -20,7 +20,7 @@ from fba.text_files import parse_integer, parse_number, read_bytes, read_words
 
 
 def read_fdp(path: str | os.PathLike[str]) -> Float64:
-    """Feature points of an FDP file: float64 (84, 3), in the file's unit, NaN for those not in it.
+    """Return the feature points of an FDP file: float64 (84, 3), in the file's unit, NaN for those not in it.
 
     A point on the wrong side of the face, or eye corners that are swapped, are corrected with an
     FbaWarning. An Xface file names vertices of mesh files; the points are looked up there. Raises
@@ -33,7 +33,8 @@ def read_fdp(path: str | os.PathLike[str]) -> Float64:
 
 
 def load_fdp(path: str | os.PathLike[str]) -> Fdp:
-    """The content of an FDP file, points repaired as by `read_fdp`. Raises ModelError if it is damaged."""
+    """Return the content of an FDP file, points repaired as by `read_fdp`. Raises ModelError if it is
+    damaged."""
     name = os.fspath(path)
     if read_bytes(name)[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         return load_xface(name)

@@ -40,7 +40,7 @@ class GivenPoints:
 
 
 def given_points(points: object) -> GivenPoints:
-    """Feature points from the argument `points` of an importer.
+    """Return the feature points from the argument `points` of an importer.
 
     points: the path of a file, an array (84, 3) with NaN where unknown, or a mapping from names to a
     position (x, y, z) or a vertex number. Raises ModelError for anything else.
@@ -63,7 +63,8 @@ def given_points(points: object) -> GivenPoints:
 
 
 def points_beside(path: Path, endings: Sequence[str]) -> GivenPoints | None:
-    """Feature points from the first file beside a mesh that has its name and one of the endings, or None."""
+    """Return the feature points from the first file beside a mesh that has its name and one of the endings,
+    or None."""
     for ending in endings:
         candidate = path.with_name(path.stem + ending)
         if candidate.is_file():
@@ -72,7 +73,7 @@ def points_beside(path: Path, endings: Sequence[str]) -> GivenPoints | None:
 
 
 def read_points(path: str | os.PathLike[str]) -> GivenPoints:
-    """Feature points from a file.
+    """Return the feature points from a file.
 
     CSV: lines `name,x,y,z` or `name,vertex`, vertices counted from 0 as in the mesh file; commas,
     semicolons, tabs or blanks between; a line of titles, empty lines and `#` comments are skipped. JSON:
@@ -166,7 +167,7 @@ def _from_mapping(content: Mapping[Any, Any], where: str) -> GivenPoints:
 
 
 def _short(value: object) -> str:
-    """A value as the text of an error shows it."""
+    """Return a value as the text of an error shows it."""
     try:
         text = str(value)
     except ValueError:  # Python writes no number of more than 4300 digits
@@ -182,7 +183,7 @@ def _from_fdp(path: str) -> GivenPoints:
 
 
 def _check_given(given: GivenPoints, where: str) -> GivenPoints:
-    """The points, if there are any; ModelError otherwise, and for a negative vertex."""
+    """Return the points, if there are any; ModelError otherwise, and for a negative vertex."""
     if not given:
         raise ModelError(f"{where}: contains no feature points")
     for name, vertex in given.vertices.items():

@@ -21,7 +21,8 @@ NEUTRAL = "Rest"
 
 
 def load_xface(path: str) -> Fdp:
-    """An Xface file; positions are NaN until `xface_points` looks them up. ModelError where damaged."""
+    """Return an Xface file; positions are NaN until `xface_points` looks them up. ModelError where
+    damaged."""
     data = read_bytes(path)
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise ModelError(f"{path}: declares a DOCTYPE or entities, which Xface files do not need")
@@ -75,7 +76,7 @@ def load_xface(path: str) -> Fdp:
 
 
 def xface_submeshes(fdp: Fdp) -> dict[str, tuple[Path, int]]:
-    """Mesh file and index in it of each submesh ("alice.wrl_3": the fourth shape of alice.wrl).
+    """Return the mesh file and index in it of each submesh ("alice.wrl_3": the fourth shape of alice.wrl).
 
     Raises ModelError that says which mesh files are missing.
     """
@@ -99,7 +100,7 @@ def xface_submeshes(fdp: Fdp) -> dict[str, tuple[Path, int]]:
 
 
 def xface_points(fdp: Fdp) -> Float64:
-    """Positions (84, 3) of the points of an Xface file, from its mesh files, in their unit."""
+    """Return the positions (84, 3) of the points of an Xface file, from its mesh files, in their unit."""
     submeshes = xface_submeshes(fdp)
     files = {path: read_vrml(path) for path in {path for path, _ in submeshes.values()}}
     points = np.full((len(names()), 3), np.nan)

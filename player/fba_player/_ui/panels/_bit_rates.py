@@ -45,7 +45,7 @@ class Rates:
 
 
 def measure_rates(info: StreamInfo) -> Rates | None:
-    """The bit rates of a stream; None if it has no planes."""
+    """Return the bit rates of a stream; None if it has no planes."""
     if info.plane_bits is None or info.plane_intra is None or info.frame_index is None or not info.frames:
         return None
     times = (info.frame_index - info.frame_index[0]) / float(info.rate) + float(info.start)
@@ -66,7 +66,7 @@ def measure_rates(info: StreamInfo) -> Rates | None:
 
 
 def probe_encoded(animation: Animation) -> StreamInfo | None:
-    """Information about an animation as if encoded; None if it is too long or cannot be encoded."""
+    """Return information about an animation as if encoded; None if it is too long or cannot be encoded."""
     tracks = [track for track in (animation.face, animation.body) if track is not None]
     if not len(animation) or sum(int(track.mask.sum()) for track in tracks) > MAX_VALUES:
         return None
@@ -82,7 +82,8 @@ def probe_encoded(animation: Animation) -> StreamInfo | None:
 def bars_of_planes(
     times: Float64, bits: Float64, intra: Bool, low: float, high: float, count: int
 ) -> tuple[Float64, Bool]:
-    """Bits (count,) of the largest plane in each equal part of low..high, and whether it has an I plane.
+    """Return the bits (count,) of the largest plane in each equal part of low..high, and whether it has an I
+    plane.
 
     Parts without a plane have 0.
     """

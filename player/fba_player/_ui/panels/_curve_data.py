@@ -17,8 +17,10 @@ BLOCK = 512
 """Frames of a face resolved at once: about two milliseconds."""
 FILLED_IN_WEIGHT = 0.5
 """Weight of a FAP that is only filled in, where 1 is that of a FAP that is sent."""
-TYPICAL_ANGLE, TYPICAL_SHIFT = 45.0, 300.0
-"""Degrees and millimetres of a BAP that count as much as the typical motion of a FAP."""
+TYPICAL_ANGLE = 45.0
+"""Degrees of a BAP that count as much as the typical motion of a FAP."""
+TYPICAL_SHIFT = 300.0
+"""Millimetres of a BAP that count as much."""
 
 MIN_SHOWN_SECONDS = 0.05
 """Shortest range of time that is shown."""
@@ -69,15 +71,15 @@ class Courses:
         return self._timeline.animation.body is not None
 
     @property
-    def known(self) -> float:
+    def resolved_share(self) -> float:
         """Share of the frames whose FAPs have been resolved."""
         return self._done / max(self._timeline.frames, 1) if self.has_face else 1.0
 
     def advance(self, blocks: int = 1) -> bool:
-        """Resolve the next blocks of frames; returns whether there are more. Fast enough for each picture."""
+        """Resolve the next blocks of frames; return whether there are more. Fast enough for each picture."""
         timeline = self._timeline
         frames, animation = timeline.frames, timeline.animation
-        if frames == len(self._times) and self.known >= 1.0:
+        if frames == len(self._times) and self.resolved_share >= 1.0:
             return False
         if frames != len(self._times):
             index = np.asarray(animation.index[:frames])
@@ -98,14 +100,15 @@ class Courses:
         return bool(self._done < frames)
 
     def course(self, kind: str, number: int) -> Course:
-        """The course of a parameter as far as it is resolved; the same object until more is."""
+        """Return the course of a parameter as far as it is resolved; the same object until more is."""
         key = (kind, number)
         if key not in self._courses:
             self._courses[key] = self._fap(number) if kind == "fap" else self._bap(number)
         return self._courses[key]
 
     def movers(self, count: int) -> list[tuple[str, int]]:
-        """(kind, number) of the parameters that move most, relative to their typical motion; the most first.
+        """Return (kind, number) of the parameters that move most, relative to their typical motion; the most
+        first.
 
         Of FAPs that mirror each other, only one.
         """
@@ -153,12 +156,12 @@ class Courses:
 
 
 def parameter(kind: str, number: int) -> Fap | Bap:
-    """The table row of a parameter. kind: "fap" or "bap"."""
+    """Return the table row of a parameter. kind: "fap" or "bap"."""
     return faps()[number - 1] if kind == "fap" else baps()[number - 1]
 
 
 def amount(kind: str, number: int, value: float) -> tuple[str, str]:
-    """(number, unit) of a value as text: angles in degrees, others as coded."""
+    """Return (number, unit) of a value as text: angles in degrees, others as coded."""
     row = parameter(kind, number)
     if row.unit in ("AU", "1e-5 rad"):
         return f"{np.degrees(value * 1e-5):.1f}", "deg"
@@ -166,7 +169,7 @@ def amount(kind: str, number: int, value: float) -> tuple[str, str]:
 
 
 def bap_reach(number: int) -> float:
-    """Typical strong motion of a BAP, in its unit."""
+    """Return the typical strong motion of a BAP, in its unit."""
     shift = baps()[number - 1].unit == "mm"
     root = number >= bap_numbers()["HumanoidRoot_tr_vertical"]
     if shift:
@@ -175,7 +178,7 @@ def bap_reach(number: int) -> float:
 
 
 def _is_mate(kind: str, number: int, others: list[tuple[str, int]]) -> bool:
-    """Whether a FAP is the mate of one of these, on the other side or on the other lip contour."""
+    """Return whether a FAP is the mate of one of these, on the other side or on the other lip contour."""
     if kind != "fap":
         return False
     fap = faps()[number - 1]
@@ -197,13 +200,13 @@ class Envelope:
     sent: Bool
 
     def runs(self) -> list[tuple[int, int]]:
-        """(first, last + 1) of each run of points that were sent."""
+        """Return (first, last + 1) of each run of points that were sent."""
         edges = np.flatnonzero(np.diff(np.r_[False, self.sent, False].astype(np.int8)))
         return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: float, columns: int) -> Envelope:
-    """A curve between two times with as many points as pixel columns can show.
+    """Return a curve between two times with as many points as pixel columns can show.
 
     times: ascending. With few frames, each is a point, and also the one before and the one after the range;
     with many, each column has its least and its largest value.

@@ -23,13 +23,19 @@ COLOURS: tuple[theme.Colour, ...] = (
 LABEL_HEIGHT = 19.0
 """Height in points of the name and values above a curve."""
 CURVE = 36.0
+"""Height in points of a curve."""
 GAP = 7.0
+"""Points between two curves."""
 AXIS = 22.0
 """Height in points of the time labels below the curves."""
-APART = 74.0
-THIN, THICK = 1.0, 1.6
-"""Thickness in points of parts of a curve that were not sent, and that were."""
+LABEL_DISTANCE = 74.0
+"""Least distance in points between time labels."""
+FILLED_IN_WIDTH = 1.0
+"""Width in points of a curve where its values were not sent."""
+SENT_WIDTH = 1.6
+"""Width in points of a curve where its values were sent."""
 ZOOM = 0.8
+"""Factor on the time shown for a step of the wheel."""
 
 
 @dataclass(frozen=True)
@@ -121,11 +127,11 @@ class Lanes:
         to.push_clip_rect((left, top - 1), (right, top + CURVE + 1), True)
         colour = _darken(lane.colour) if lines.dense else lane.colour
         if lines.all_sent:
-            _line(to, lines.points, corner, colour, 1.0, THICK)
+            _line(to, lines.points, corner, colour, 1.0, SENT_WIDTH)
         else:
-            _line(to, lines.points, corner, colour, 0.5, THIN)
+            _line(to, lines.points, corner, colour, 0.5, FILLED_IN_WIDTH)
             for run in lines.runs:
-                _line(to, run, corner, colour, 1.0, THICK)
+                _line(to, run, corner, colour, 1.0, SENT_WIDTH)
         to.pop_clip_rect()
         at = ruler.x(session.transport.time)
         if time_zoom.low <= session.transport.time <= time_zoom.high:
@@ -169,7 +175,7 @@ class Lanes:
     def _axis(self, ruler: Ruler, y: float) -> None:
         key = (ruler.low, ruler.high, ruler.left, ruler.right)
         if self._ticks[0] != key:
-            step = ruler.step(APART)
+            step = ruler.step(LABEL_DISTANCE)
             self._ticks = (key, step, [(ruler.x(t), label(t, step)) for t in ruler.ticks(step)])
         to, font, colour = imgui.get_window_draw_list(), imgui.get_font(), theme.packed(theme.FAINT)
         for x, text in self._ticks[2]:
@@ -228,13 +234,13 @@ def _make_lines(curve: Envelope, key: tuple[object, ...], low: float, high: floa
 
 
 def _darken(colour: theme.Colour) -> theme.Colour:
-    """A darker colour, for a curve so dense that it fills its lane."""
+    """Return a darker colour, for a curve so dense that it fills its lane."""
     red, green, blue, alpha = colour
     return red * 0.6, green * 0.6, blue * 0.6, alpha
 
 
 def _widen(points: list[imgui.ImVec2]) -> list[imgui.ImVec2]:
-    """A run of points; a single point becomes a visible dash."""
+    """Return a run of points; a single point becomes a visible dash."""
     if len(points) > 1:
         return points
     x, y = points[0].x, points[0].y

@@ -43,7 +43,7 @@ class CurvesPanel(Panel):
         self.chooser = Chooser()
 
     def available(self, session: Session) -> bool:
-        """Whether the scene has FAPs or BAPs."""
+        """Return whether the scene has FAPs or BAPs."""
         return _timeline(session) is not None
 
     def draw(self, session: Session) -> None:
@@ -51,18 +51,18 @@ class CurvesPanel(Panel):
         names = session.scene.names if isinstance(session.scene, CompareScene) else ()
         if len(names) > 1:
             self.which = choose_name("##which", names, min(self.which, len(names) - 1))
-        known = self._update_courses(session)
+        all_courses = self._update_courses(session)
         transport = session.transport
         self.time_zoom.bound(
             transport.start, float(session.scene.timeline.time_of(session.scene.timeline.frames - 1))
         )
-        self._tools(session, known)
+        self._tools(session, all_courses)
         chosen = [("fap", n) for n in session.selection.faps] + [("bap", n) for n in session.selection.baps]
         if not chosen:
             imgui.dummy((0, 6))
             imgui.text_colored(theme.FAINT, "Choose FAPs or BAPs, or show those that move most.")
             return
-        courses = [known.course(kind, number) for kind, number in chosen]
+        courses = [all_courses.course(kind, number) for kind, number in chosen]
         if [lane.course for lane in self._lanes] != courses:
             self._lanes = [_lane(course, number) for number, course in enumerate(courses)]
         self.lanes.draw(session, self._lanes, self.time_zoom, _now(session, chosen, self.which))
@@ -84,24 +84,24 @@ class CurvesPanel(Panel):
             session.rolling.add(self.name)
         else:
             session.rolling.discard(self.name)
-        if not self._movers_chosen and self._courses.known >= 1.0:
+        if not self._movers_chosen and self._courses.resolved_share >= 1.0:
             self._movers_chosen = True
             if not (session.selection.faps or session.selection.baps):
                 _choose(session, self._courses.movers(BEGINS_WITH))
         return self._courses
 
-    def _tools(self, session: Session, known: Courses) -> None:
-        self.chooser.draw(session, face=known.has_face, body=known.has_body)
+    def _tools(self, session: Session, courses: Courses) -> None:
+        self.chooser.draw(session, face=courses.has_face, body=courses.has_body)
         imgui.same_line()
         if imgui.button("Most moving"):
-            _choose(session, known.movers(MOVERS))
+            _choose(session, courses.movers(MOVERS))
         tooltip(f"the {MOVERS} that move most")
         imgui.same_line()
         if imgui.button("None"):
             _choose(session, [])
-        if known.known < 1.0:
+        if courses.resolved_share < 1.0:
             imgui.same_line()
-            imgui.text_colored(theme.FAINT, f"{known.known:.0%}")
+            imgui.text_colored(theme.FAINT, f"{courses.resolved_share:.0%}")
         elif not self.time_zoom.shows_all:
             imgui.same_line()
             if imgui.button("Show all"):
@@ -110,7 +110,7 @@ class CurvesPanel(Panel):
 
 
 def _timeline(session: Session, which: int = 0) -> Any:
-    """The timeline of the scene, or of one of several animations that are compared."""
+    """Return the timeline of the scene, or of one of several animations that are compared."""
     scene = session.scene
     if isinstance(scene, CompareScene):
         return scene.scenes[which].timeline
@@ -129,7 +129,7 @@ def _lane(course: Any, number: int) -> Lane:
 
 
 def _now(session: Session, chosen: list[tuple[str, int]], which: int) -> dict[tuple[str, int], float]:
-    """Current values of parameters, after the hooks."""
+    """Return the current values of parameters, after the hooks."""
     kinds = {kind for kind, _ in chosen}
     if session.before_frame:
         faps, baps = session.values

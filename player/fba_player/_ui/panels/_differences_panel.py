@@ -36,7 +36,7 @@ class DifferencesPanel(Panel):
         self._curve: tuple[object, Float64, Float64] | None = None
 
     def available(self, session: Session) -> bool:
-        """Whether several animations are compared."""
+        """Return whether several animations are compared."""
         return isinstance(session.scene, CompareScene) and len(session.scene.scenes) > 1
 
     def draw(self, session: Session) -> None:
@@ -125,7 +125,7 @@ class DifferencesPanel(Panel):
 
 
 def _why_nothing_differs(scene: Any, second: int, differences: Differences) -> str:
-    """The text shown where nothing differs: the reason."""
+    """Return the text shown where nothing differs: the reason."""
     one, other = (scene.scenes[number].animation for number in (0, second))
     both_faces = one.face is not None and other.face is not None
     both_bodies = one.body is not None and other.body is not None
@@ -135,7 +135,7 @@ def _why_nothing_differs(scene: Any, second: int, differences: Differences) -> s
 
 
 def thin_curve(times: Float64, values: Float64, most: int) -> tuple[Float64, Float64]:
-    """A curve of at most `most` points: of each part, the value furthest from 0 at its time."""
+    """Return a curve of at most `most` points: of each part, the value furthest from 0 at its time."""
     if len(times) <= most:
         return times, values
     borders = np.linspace(0, len(times), most + 1).astype(int)

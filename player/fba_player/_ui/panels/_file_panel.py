@@ -49,7 +49,7 @@ class FilePanel(Panel):
 
 
 def _sections(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, str]]]]:
-    """(heading, rows) of each section of the panel."""
+    """Return (heading, rows) of each section of the panel."""
     if isinstance(session.scene, CompareScene):
         return _sections_of_several(session.scene)
     parts = [("", _about_file(session, info))]
@@ -62,7 +62,7 @@ def _sections(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[
 
 
 def _sections_of_several(scene: Any) -> list[tuple[str, list[tuple[str, str]]]]:
-    """(heading, rows) of each of several animations that are compared."""
+    """Return (heading, rows) of each of several animations that are compared."""
     parts = []
     for number, (name, one) in enumerate(zip(scene.names, scene.scenes, strict=True)):
         times, animation = one.timeline, one.animation
@@ -118,7 +118,7 @@ def _part(part: PartInfo, name: str, frames: int) -> list[tuple[str, str]]:
 
 
 def _ranges(numbers: tuple[int, ...]) -> str:
-    """Ascending numbers with runs shortened: "3..42, 48"."""
+    """Return the ascending numbers with runs shortened: "3..42, 48"."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][1] + 1:

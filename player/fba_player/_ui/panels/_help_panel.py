@@ -9,9 +9,9 @@ from fba_player._ui.panels.panel import Panel, heading
 from fba_player.session._keys import keys, mouse
 from fba_player.session._session import Session
 
-WIDE = 296.0
+MIN_COLUMN_WIDTH = 296.0
 """Least width of a column in points."""
-KEY = 104.0
+KEY_WIDTH = 104.0
 """Width of the keys in a column, in points."""
 
 
@@ -25,7 +25,7 @@ class HelpPanel(Panel):
     def draw(self, session: Session) -> None:
         """Draw the content."""
         groups = _groups(session)
-        columns = min(int(imgui.get_content_region_avail().x // WIDE), 4)
+        columns = min(int(imgui.get_content_region_avail().x // MIN_COLUMN_WIDTH), 4)
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
         if columns > 1 and imgui.begin_table("columns", columns):
             imgui.table_next_row()
@@ -41,7 +41,7 @@ class HelpPanel(Panel):
 
 
 def _columns(count: int) -> list[list[str]]:
-    """Names of the groups in each of `count` columns, 2 to 4."""
+    """Return the names of the groups in each of `count` columns, 2 to 4."""
     if count == 2:
         return [["Play", "Save", "Window"], ["View", "Switches", "Mouse"]]
     if count == 3:
@@ -50,7 +50,7 @@ def _columns(count: int) -> list[list[str]]:
 
 
 def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
-    """(keys, what they do) by name of the group."""
+    """Return (keys, what they do) by name of the group."""
     groups: dict[str, list[tuple[str, str]]] = {}
     for row in keys():
         groups.setdefault(row.group, []).append((row.shown, row.does))
@@ -64,7 +64,7 @@ def _group(name: str, rows: list[tuple[str, str]]) -> None:
         return
     heading(name)
     imgui.begin_table(name, 2, imgui.TableFlags_.sizing_fixed_fit)
-    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY)
+    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY_WIDTH)
     imgui.table_setup_column("does", imgui.TableColumnFlags_.width_stretch)
     for key, does in rows:
         _line(key, does)

@@ -14,8 +14,9 @@ from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.session._marking import KEYS, MARKING
 from fba_player.session._session import Session
 
-MIN_REACH, MAX_REACH = 0.02, 2.0
-"""Smallest and largest radius and depth that can be set, in multiples of a new virtual marker's radius."""
+MIN_REACH = 0.02
+MAX_REACH = 2.0
+"""Limits of the radius and the depth that can be set, in multiples of a new virtual marker's radius."""
 ASSIGNMENT_TEXTS = {"shared": "several markers", "exclusive": "the nearest alone"}
 OVERLAP_TEXTS = {"match": "meet their markers", "add": "are added"}
 
@@ -66,7 +67,8 @@ def _current(session: Session, editing: MarkerEditing) -> None:
 
 
 def _reach(editing: MarkerEditing) -> None:
-    """Sliders of radius and depth, in the head's unit; both go together until the depth is changed alone."""
+    """Draw sliders of radius and depth, in the head's unit; both move together until the depth is moved
+    alone."""
     marker = editing.marker
     is_placed = marker is not None and marker.vertex is not None
     imgui.begin_disabled(not is_placed)
@@ -134,7 +136,7 @@ def _choose(names: Sequence[str], texts: Mapping[str, str], current: str) -> str
 
 
 def _state(editing: MarkerEditing) -> None:
-    """What keeps the head from moving, or what is odd."""
+    """Draw what keeps the head from moving, or what is odd."""
     made = editing.performance
     imgui.push_text_wrap_pos(0.0)
     if made is None:

@@ -64,7 +64,7 @@ def _state(placement: PointPlacement, name: str) -> str:
 
 
 def _parts(placement: PointPlacement) -> None:
-    """A tick for each part, where there are several: hair may hide the ears."""
+    """Draw a tick box for each of several parts: hair may hide the ears."""
     parts = placement.surface.parts
     if len(parts) < 2 or not imgui.collapsing_header(f"Shown parts ({len(parts)})"):
         return

@@ -13,17 +13,22 @@ from fba_player._ui import theme
 from fba_player._ui.panels.panel import choose_name, heading, shorten, tooltip
 from fba_player.session._mood import PuppetMood
 
-MAX_PLANE_HEIGHT, MIN_PLANE_HEIGHT = 240.0, 130.0
-"""Height of the plane in points, at most and at least; between them it leaves room for what is below it."""
-WIDE = 300.0
+MAX_PLANE_HEIGHT = 240.0
+MIN_PLANE_HEIGHT = 130.0
+"""Limits of the plane's height in points; within them it leaves room for what is below it."""
+TWO_COLUMNS_WIDTH = 300.0
 """Width in points from which the sliders stand in two columns."""
-TITLE = 130.0
+MAX_TITLE_WIDTH = 130.0
 """Width in points of a slider's title, at most."""
-DOT, HANDLE = 2.5, 7.0
-"""Radii of a named emotion and of the point, in points."""
-LABEL, CAPTION = 12.0, 11.0
-"""Sizes of letters in points: names of emotions, and the ends of the axes."""
-SIDE = 10.0
+EMOTION_RADIUS = 2.5
+"""Radius of the dot of a named emotion, in points."""
+HANDLE_RADIUS = 7.0
+"""Radius of the point that the mouse drags, in points."""
+EMOTION_TEXT = 12.0
+"""Size of the names of emotions, in points."""
+AXIS_TEXT = 11.0
+"""Size of the names at the ends of the axes, in points."""
+SIDE_SPACE = 10.0
 """Space around the plane for the dots at its edge, in points."""
 
 
@@ -46,7 +51,7 @@ class EmotionTab:
     def draw(self, mood: PuppetMood) -> None:
         """Draw the content."""
         heading("Activation and evaluation")
-        columns = 2 if imgui.get_content_region_avail().x >= WIDE else 1
+        columns = 2 if imgui.get_content_region_avail().x >= TWO_COLUMNS_WIDTH else 1
         self._plane(mood, self._height_below(mood, columns))
         heading("Moods")
         self.sliders = {}
@@ -72,7 +77,7 @@ class EmotionTab:
         self.hidden = imgui.get_scroll_max_y()
 
     def _height_below(self, mood: PuppetMood, columns: int) -> float:
-        """Points that a heading, the sliders, the row of buttons and two lines of text take."""
+        """Return the points that a heading, the sliders, the row of buttons and two lines of text take."""
         rows = -(-len(mood.weights) // columns) + 1
         return rows * imgui.get_frame_height_with_spacing() + 3.5 * imgui.get_text_line_height_with_spacing()
 
@@ -84,7 +89,7 @@ class EmotionTab:
         wide, room = imgui.get_content_region_avail()
         high = min(max(min(MAX_PLANE_HEIGHT, room - below), MIN_PLANE_HEIGHT), wide * 0.8)
         x, y = imgui.get_cursor_screen_pos()
-        self.plane = (x + SIDE, y + SIDE, x + wide - SIDE, y + high - SIDE)
+        self.plane = (x + SIDE_SPACE, y + SIDE_SPACE, x + wide - SIDE_SPACE, y + high - SIDE_SPACE)
         imgui.invisible_button("plane", (max(wide, 1), high))
         if imgui.is_item_active():
             mood.move_point(*self._value(*imgui.get_io().mouse_pos))
@@ -100,34 +105,34 @@ class EmotionTab:
             ("active", middle_x + 4, y + 2),
             ("passive", middle_x + 4, y + high - 14),
             ("negative", x + 6, y + high - 14),
-            ("positive", x + wide - _width("positive", CAPTION) - 6, y + high - 14),
+            ("positive", x + wide - _width("positive", AXIS_TEXT) - 6, y + high - 14),
         )
         for text, at, above in ends:
-            to.add_text(font, CAPTION, (at, above), theme.packed(theme.FAINT), text)
-        taken = [(at, above, at + _width(text, CAPTION), above + CAPTION) for text, at, above in ends]
+            to.add_text(font, AXIS_TEXT, (at, above), theme.packed(theme.FAINT), text)
+        taken = [(at, above, at + _width(text, AXIS_TEXT), above + AXIS_TEXT) for text, at, above in ends]
         places = {name: self._place(*point) for name, point in known_points().items()}
         self.labels = place_labels(
             places,
-            {name: (_width(name, LABEL), LABEL) for name in places},
+            {name: (_width(name, EMOTION_TEXT), EMOTION_TEXT) for name in places},
             (x, y, x + wide, y + high),
             taken,
         )
         for name, place in places.items():
-            to.add_circle_filled(place, DOT, theme.packed(theme.WARM))
-            to.add_text(font, LABEL, self.labels[name][:2], theme.packed(theme.TEXT, 0.8), name)
+            to.add_circle_filled(place, EMOTION_RADIUS, theme.packed(theme.WARM))
+            to.add_text(font, EMOTION_TEXT, self.labels[name][:2], theme.packed(theme.TEXT, 0.8), name)
         if mood.point is not None:
             point = self._place(*mood.point)
-            to.add_circle_filled(point, HANDLE, theme.packed(theme.ACCENT))
-            to.add_circle(point, HANDLE, theme.packed(theme.TEXT), thickness=1.5)
+            to.add_circle_filled(point, HANDLE_RADIUS, theme.packed(theme.ACCENT))
+            to.add_circle(point, HANDLE_RADIUS, theme.packed(theme.TEXT), thickness=1.5)
 
     def _place(self, activation: float, evaluation: float) -> tuple[float, float]:
-        """Where a point of the plane is drawn: evaluation to the right, activation upwards."""
+        """Return where a point of the plane is drawn: evaluation to the right, activation upwards."""
         left, top, right, bottom = self.plane
         along, up = ((value - SCALE_MIN) / (SCALE_MAX - SCALE_MIN) for value in (evaluation, activation))
         return left + along * (right - left), bottom - up * (bottom - top)
 
     def _value(self, x: float, y: float) -> tuple[float, float]:
-        """Activation and evaluation at a place, in points; `PuppetMood.move_point` limits them."""
+        """Return the activation and evaluation at a place, in points; `PuppetMood.move_point` limits them."""
         left, top, right, bottom = self.plane
         along, up = (x - left) / max(right - left, 1.0), (bottom - y) / max(bottom - top, 1.0)
         return SCALE_MIN + up * (SCALE_MAX - SCALE_MIN), SCALE_MIN + along * (SCALE_MAX - SCALE_MIN)
@@ -135,7 +140,7 @@ class EmotionTab:
     def _slider(self, mood: PuppetMood, name: str, intensity: float, wide: float) -> None:
         x, y = imgui.get_cursor_screen_pos()
         start = imgui.get_cursor_pos_x()
-        title = min(TITLE, wide * 0.45)
+        title = min(MAX_TITLE_WIDTH, wide * 0.45)
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.TEXT if intensity else theme.FAINT, shorten(name, title - 6))
         imgui.same_line()
@@ -162,12 +167,12 @@ def place_labels(
     within: Box,
     taken: Sequence[Box] = (),
 ) -> dict[str, Box]:
-    """Places for the names of dots where they cover no dot and no other name, the nearest first.
+    """Return the places for the names of dots where they cover no dot and no other name, the nearest first.
 
     dots: x and y by name. sizes: width and height of each name. taken: boxes that are to stay free as well.
     Where there is no free place, the one that covers least is taken.
     """
-    clear = DOT + 2
+    clear = EMOTION_RADIUS + 2
     points = [(x - clear, y - clear, x + clear, y + clear) for x, y in dots.values()]
     used = [*taken, *points]
     placed: dict[str, Box] = {}
@@ -190,12 +195,12 @@ def place_labels(
 
 
 def _overlap(one: Box, other: Box) -> float:
-    """Area that two boxes share."""
+    """Return the area that two boxes share."""
     wide = min(one[2], other[2]) - max(one[0], other[0])
     high = min(one[3], other[3]) - max(one[1], other[1])
     return max(wide, 0.0) * max(high, 0.0)
 
 
 def _width(text: str, size: float) -> float:
-    """Width of a text in letters of a size, in points."""
+    """Return the width of a text in letters of a size, in points."""
     return float(imgui.calc_text_size(text).x * size / imgui.get_font_size())

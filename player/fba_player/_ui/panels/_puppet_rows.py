@@ -11,10 +11,10 @@ import numpy as np
 
 from fba.parameters import bap_numbers, baps, fap_numbers, faps
 
-BEYOND = 1.5
+RANGE_FACTOR = 1.5
 """Range of a FAP's slider relative to the value that the gallery shows."""
 DEGREES = float(np.degrees(1e-5))
-SHIFT = 1000.0
+SHIFT_RANGE = 1000.0
 """Millimetres that the body moves to either side."""
 
 
@@ -60,7 +60,7 @@ class Group:
 
 @cache
 def groups() -> tuple[Group, ...]:
-    """All groups: those of the face, then those of the body."""
+    """Return all groups: those of the face, then those of the body."""
     text = (files(__package__) / "puppet.csv").read_text(encoding="utf-8")
     groups = []
     for line in csv.DictReader(text.splitlines()):
@@ -72,7 +72,7 @@ def groups() -> tuple[Group, ...]:
 
 @cache
 def reach(number: int) -> float:
-    """Amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
+    """Return the amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
     text = (files("fba_player.export") / "contact_sheet.csv").read_text(encoding="utf-8")
     return next(
         abs(float(row["value"])) for row in csv.DictReader(text.splitlines()) if int(row["fap"]) == number
@@ -86,7 +86,7 @@ def _fap_rows(names: list[str]) -> tuple[Row, ...]:
         fap = faps()[number - 1]
         unit = "deg" if fap.unit == "AU" else fap.unit
         scale = DEGREES if unit == "deg" else 1.0
-        most = float(np.ceil(reach(number) * BEYOND * scale / 5) * 5)
+        most = float(np.ceil(reach(number) * RANGE_FACTOR * scale / 5) * 5)
         words = fap.name.split("_")
         side = next((word[0] for word in words if word in ("l", "r", "lm", "rm")), "")
         mate = fap.left_right_mate
@@ -114,7 +114,7 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
         else:
             number = bap_numbers()[word]
             numbers, unit = (number,), baps()[number - 1].unit
-            low, high = -SHIFT, SHIFT
+            low, high = -SHIFT_RANGE, SHIFT_RANGE
             if unit != "mm":
                 (low, high), unit = widest_limits()[number - 1].tolist(), "deg"
         if unit == "deg":
@@ -130,7 +130,7 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
 
 
 def _codable_degrees(numbers: tuple[int, ...], end: int) -> float:
-    """Largest (end 1) or smallest (end 0) angle that a stream can code, in whole degrees."""
+    """Return the largest (end 1) or smallest (end 0) angle that a stream can code, in whole degrees."""
     degrees = 0.0
     for number in numbers:
         bap = baps()[number - 1]
@@ -140,7 +140,7 @@ def _codable_degrees(numbers: tuple[int, ...], end: int) -> float:
 
 
 def _is_flipped(number: int) -> bool:
-    """Whether the BAP of the other side needs the opposite sign for the mirrored motion.
+    """Return whether the BAP of the other side needs the opposite sign for the mirrored motion.
 
     Mirroring left and right keeps rotations about X and reverses those about Y and Z.
     """
@@ -158,7 +158,7 @@ def _other_side(name: str) -> str:
 
 
 def _title(name: str) -> str:
-    """The title of a FAP: "raise inner eyebrow L" for "raise_l_i_eyebrow".
+    """Return the title of a FAP: "raise inner eyebrow L" for "raise_l_i_eyebrow".
 
     It omits the outer contour of the lips, which is in the name of the group.
     """
@@ -172,7 +172,7 @@ def _title(name: str) -> str:
 
 
 def _body_title(name: str) -> str:
-    """The title of a limit or a BAP, such as "upper arm flexion L"."""
+    """Return the title of a limit or a BAP, such as "upper arm flexion L"."""
     for word, short in (("HumanoidRoot_tr_", ""), ("HumanoidRoot_rt_", ""), ("spine 3", "upper spine"),
                         ("spine 2", "middle spine"), ("spine 1", "lower spine")):  # fmt: skip
         name = name.replace(word, short)

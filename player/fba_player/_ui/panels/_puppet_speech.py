@@ -55,7 +55,7 @@ def draw_expressions(performer: Performer) -> None:
 
 
 def _release(what: str, *, enabled: bool) -> bool:
-    """Draw a button, disabled unless `enabled`, so that nothing moves under the mouse; returns a press."""
+    """Draw a button, disabled unless `enabled`, so that nothing moves under the mouse; return a press."""
     imgui.begin_disabled(not enabled)
     pressed = imgui.button(f"Release##{what}")
     imgui.end_disabled()

@@ -51,7 +51,7 @@ class RatePanel(Panel):
         """Left, top, right, bottom of the bars in points; for tests."""
 
     def available(self, session: Session) -> bool:
-        """Whether a single animation is shown."""
+        """Return whether a single animation is shown."""
         return not isinstance(session.scene, CompareScene)
 
     def draw(self, session: Session) -> None:
@@ -85,7 +85,7 @@ class RatePanel(Panel):
         session.rolling.discard(self.name)
 
     def _stream(self, session: Session) -> tuple[StreamInfo | None, str]:
-        """(stream to measure, note about it); without a stream, the note is the text to show."""
+        """Return (stream to measure, note about it); without a stream, the note is the text to show."""
         info = session.source.info
         if info.plane_bits is not None:
             return info, ""
@@ -139,7 +139,7 @@ class RatePanel(Panel):
             to.add_line((at, top), (at, top + BARS), theme.packed(theme.TEXT, 0.8))
 
     def _bar_boxes(self, rates: Rates, wide: float) -> list[tuple[float, float, float, bool]]:
-        """(left, right, height, I plane) of the bars; cached until something changes."""
+        """Return (left, right, height, I plane) of the bars; cached until something changes."""
         time_zoom = self.time_zoom
         made_for = (rates, time_zoom.low, time_zoom.high, wide)
         if self._bars[0] == made_for:
@@ -169,7 +169,7 @@ def _lanes(rates: Rates, note: str) -> list[Lane]:
 
 
 def _row(rates: Rates, time: float) -> int:
-    """Position of the plane shown at a time."""
+    """Return the position of the plane shown at a time."""
     return int(np.clip(np.searchsorted(rates.times, time + 1e-6, side="right") - 1, 0, len(rates.times) - 1))
 
 

@@ -44,7 +44,7 @@ class Panel:
         raise NotImplementedError
 
     def available(self, session: Session) -> bool:
-        """Whether the panel is of use for this scene; else it has no button."""
+        """Return whether the panel is of use for this scene; else it has no button."""
         return True
 
     def closed(self, session: Session) -> None:
@@ -81,7 +81,7 @@ def heading(text: str, *, exact: bool = False) -> None:
 
 
 def shorten(text: str, wide: float) -> str:
-    """The text, cut with "..." to a width in points."""
+    """Return the text, cut with "..." to a width in points."""
     if imgui.calc_text_size(text).x <= wide:
         return text
     while text and imgui.calc_text_size(text + "...").x > wide:
@@ -90,7 +90,7 @@ def shorten(text: str, wide: float) -> str:
 
 
 def choose_name(label: str, names: Sequence[str], now: int, width: float = -1) -> int:
-    """Draw a list of names, of which number `now` is chosen; returns the new choice. width: points."""
+    """Draw a list of names, of which number `now` is chosen; return the new choice. width: points."""
     imgui.set_next_item_width(width)
     if imgui.begin_combo(label, names[now]):
         for number, name in enumerate(names):
@@ -119,7 +119,7 @@ def icon_button(
     colour: theme.Colour | None = None,
     filled: bool = False,
 ) -> bool:
-    """Draw a square button with an icon; returns whether it is pressed. lit: whether its state is on."""
+    """Draw a square button with an icon; return whether it is pressed. lit: whether its state is on."""
     x, y = imgui.get_cursor_screen_pos()
     pressed = imgui.invisible_button(name, (size, size))
     to, held, hovered = imgui.get_window_draw_list(), imgui.is_item_active(), imgui.is_item_hovered()

@@ -17,7 +17,9 @@ from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
 from fba_player.session.performer import Performer
 
-TITLE, VALUE, RELEASE = 148.0, 68.0, 18.0
+TITLE_WIDTH = 148.0
+VALUE_WIDTH = 68.0
+RELEASE_WIDTH = 18.0
 """Widths in points of the title of a row, its value, and its release button."""
 MIN_SLIDER = 84.0
 """Least width of a slider in points: titles are cut first."""
@@ -44,11 +46,11 @@ class PuppetPanel(Panel):
         """Centres of buttons and tabs by name, in points; for tests."""
 
     def available(self, session: Session) -> bool:
-        """Whether a single animation is shown."""
+        """Return whether a single animation is shown."""
         return isinstance(session.scene, Scene)
 
     def performer(self, session: Session) -> Performer:
-        """The performer of the session, made when it is first needed."""
+        """Return the performer of the session, made when it is first needed."""
         if self._performer is None or self._performer.session is not session:
             self._performer = Performer(session)
         return self._performer
@@ -178,14 +180,14 @@ class PuppetPanel(Panel):
         if self.together and row.mirror is not None:
             title = title.removesuffix(" L").removesuffix(" R")
         width = imgui.get_content_region_avail().x
-        name_wide = min(TITLE, max(width - RELEASE - VALUE - MIN_SLIDER, MIN_TITLE))
+        name_wide = min(TITLE_WIDTH, max(width - RELEASE_WIDTH - VALUE_WIDTH - MIN_SLIDER, MIN_TITLE))
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.TEXT if touched else theme.FAINT, shorten(title, name_wide - 6))
         if imgui.is_item_hovered():
             tooltip(_parameter_names(row))
         imgui.same_line(name_wide)
-        right = x + width - RELEASE
-        wide = max(width - name_wide - RELEASE - VALUE, 16.0)
+        right = x + width - RELEASE_WIDTH
+        wide = max(width - name_wide - RELEASE_WIDTH - VALUE_WIDTH, 16.0)
         imgui.set_next_item_width(wide)
         if touched:
             imgui.push_style_color(imgui.Col_.slider_grab, theme.ACCENT)
@@ -223,7 +225,7 @@ class PuppetPanel(Panel):
             tooltip("release: follow the animation again")
 
     def _both(self, group: Group, row: Row) -> list[tuple[Row, float]]:
-        """The rows that a slider moves, each with its sign."""
+        """Return the rows that a slider moves, each with its sign."""
         if not self.together or row.mirror is None:
             return [(row, 1.0)]
         return [(row, 1.0), (group.rows[row.mirror], -1.0 if row.flipped else 1.0)]
@@ -249,7 +251,7 @@ def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None
 
 
 def _parameter_names(row: Row) -> str:
-    """The parameters that a row moves, as text."""
+    """Return the parameters that a row moves, as text."""
     names = [parameter(row.kind, number).name for number in row.numbers]
     pairs = zip(row.numbers, names, strict=True)
     return f"{row.kind.upper()} " + ", ".join(f"{number} {name}" for number, name in pairs)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fba_conformance.stream_writer import WIDEST, Header, Plane, write_stream
-from fba_conformance.suite._definitions._targets import (
+from tools.vectors.definitions._targets import (
     FEW_BAPS,
     FEW_FAPS,
     LOW_LEVEL,
@@ -16,7 +15,8 @@ from fba_conformance.suite._definitions._targets import (
     faces,
     script,
 )
-from fba_conformance.suite._definitions.case import Case
+from tools.vectors.definitions.case import Case
+from tools.vectors.stream_writer import WIDEST, Header, Plane, write_stream
 
 _NONE = Header(lists="0000")
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from fba_conformance.stream_writer import PLANE, WIDEST, Header, Plane, Values, write_stream
-from fba_conformance.suite._definitions._targets import (
+from tools.vectors.definitions._targets import (
     FEW_BAPS,
     FEW_FAPS,
     LOW_LEVEL,
@@ -20,7 +19,8 @@ from fba_conformance.suite._definitions._targets import (
     noise,
     script,
 )
-from fba_conformance.suite._definitions.case import Case
+from tools.vectors.definitions.case import Case
+from tools.vectors.stream_writer import PLANE, WIDEST, Header, Plane, Values, write_stream
 
 _FAR = 2**40
 _STEPS = {3: 4, 4: 2, 5: 2}

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from fba_conformance.stream_writer import PLANE, write_stream
-from fba_conformance.suite._definitions._targets import FEW_BAPS, FEW_FAPS, bodies, edited, faces, script
-from fba_conformance.suite._definitions.case import Case
+from tools.vectors.definitions._targets import FEW_BAPS, FEW_FAPS, bodies, edited, faces, script
+from tools.vectors.definitions.case import Case
+from tools.vectors.stream_writer import PLANE, write_stream
 
 _SKIPS = (0, 1, 2, 14, 15, 16, 29, 30, 31, 200)
 _LONG_SKIP = 15 * 3000 + 7

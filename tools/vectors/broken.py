@@ -1,25 +1,27 @@
-"""Decoders with one mistake each, and the vectors that find them: `python -m fba_conformance.suite.broken`.
+"""Decoders with one mistake each, and the vectors that find them: `python -m tools.vectors.broken`.
 
-Each is the independent decoder with a line changed (`_mistakes`). The suite is worth what it finds: every
-mistake must make at least one vector fail.
+Each is the independent decoder with a line changed, as mistakes.toml says. The suite is worth what it finds:
+every mistake must make at least one vector fail. `python -m tools.vectors.broken NAME IN OUT [BAP_STEPS]`
+decodes a stream with a mistake, as a program that `fba conformance --decoder` can test.
 """
 
 from __future__ import annotations
 
 import sys
+import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import CodeType, ModuleType
+from typing import NamedTuple
 
 from fba.errors import FbaError, FbaWarning
 from fba_conformance import trace
 from fba_conformance._values import Listing, PlaneValues, trace_values
-from fba_conformance.suite._judgement import find_fault
-from fba_conformance.suite._mistakes import Mistake, mistakes
 from fba_conformance.suite.index import Vector, read_vectors
+from fba_conformance.suite.programs import find_fault
 from fba_conformance.suite.runner import expected_listing
 
 SHOWN = 4
@@ -32,6 +34,27 @@ _MODULES = ("_textbook", "_reader", "_part", "listing", "trace")
 _KEPT = "_KEPT"
 """A dictionary that a mistake may use, empty at the beginning of a stream."""
 Decoder = Callable[[bytes, str], Listing]
+
+
+class Mistake(NamedTuple):
+    """What a decoder with a mistake does, and the text in one of its modules that is replaced by another.
+
+    found_by: a vector that must find it.
+    """
+
+    name: str
+    does: str
+    found_by: str
+    module: str
+    old: str
+    new: str
+
+
+@cache
+def mistakes() -> tuple[Mistake, ...]:
+    """Return all mistakes, from mistakes.toml."""
+    text = Path(__file__).with_name("mistakes.toml").read_text(encoding="utf-8")
+    return tuple(Mistake(**row) for row in tomllib.loads(text)["mistake"])
 
 
 @contextmanager
@@ -105,7 +128,14 @@ def find(mistake: Mistake, vectors: Iterable[tuple[Vector, Listing]]) -> list[st
 
 
 def main() -> None:
-    """Print what finds each mistake; exit status 1 if nothing finds one."""
+    """Decode a file with a mistake; without arguments, print what finds each, and exit with 1 for gaps."""
+    if len(sys.argv) > 1:
+        name, stream, values, bap_steps = [*sys.argv[1:], "iso"][:4]
+        warnings.simplefilter("ignore", FbaWarning)
+        with broken_decoder(next(mistake for mistake in mistakes() if mistake.name == name)) as decode:
+            listing = decode(Path(stream).read_bytes(), bap_steps)
+        Path(values).write_text(listing.text(), encoding="utf-8")
+        return
     vectors = [(vector, expected_listing(vector)) for vector in read_vectors()]
     unfound = 0
     for mistake in mistakes():

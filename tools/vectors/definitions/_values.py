@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from functools import partial
 
 from fba.parameters import BAP_STEP_TABLES, EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX
-from fba_conformance.stream_writer import WIDEST, Header, Plane, Values, write_stream
-from fba_conformance.suite._definitions._targets import (
+from tools.vectors.definitions._targets import (
     EXTENSION_BAPS,
     FEW_BAPS,
     FEW_FAPS,
@@ -17,7 +16,8 @@ from fba_conformance.suite._definitions._targets import (
     faces,
     script,
 )
-from fba_conformance.suite._definitions.case import Case
+from tools.vectors.definitions.case import Case
+from tools.vectors.stream_writer import WIDEST, Header, Plane, Values, write_stream
 
 _FAR = 2**40
 """A value that no range reaches: the nearest is coded."""

@@ -19,7 +19,7 @@ from fba.parameters import (
     baps,
     faps,
 )
-from fba_conformance.stream_writer import Header, Plane, Values
+from tools.vectors.stream_writer import Header, Plane, Values
 
 LOW_LEVEL = tuple(range(3, FAP_COUNT + 1))
 STANDARD_BAPS = tuple(range(1, BAP_STANDARD_COUNT + 1))

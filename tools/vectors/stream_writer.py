@@ -15,8 +15,10 @@ from fba.parameters import Bap, Fap, baps, faps
 from fba_conformance._part import LISTS, MARKER_EVERY, RANGE_UNIT, HighLevel, Part, Slot
 from fba_conformance._textbook import FrequencyTable, encode_segment
 
-OBJECT, OLD_OBJECT = 0x1BA, 0x101
-PLANE, OLD_PLANE = 0x1BB, 0x103
+OBJECT = 0x1BA
+OLD_OBJECT = 0x101
+PLANE = 0x1BB
+OLD_PLANE = 0x103
 END = 0x1B1
 
 WIDEST = 31

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fba.parameters import BAP_GROUP_COUNT, FAP_GROUP_COUNT, bap_groups, fap_groups
-from fba_conformance.stream_writer import Header, Plane, Values, write_stream
-from fba_conformance.suite._definitions._targets import (
+from tools.vectors.definitions._targets import (
     EXTENSION_BAPS,
     FEW_BAPS,
     FEW_FAPS,
@@ -19,7 +18,8 @@ from fba_conformance.suite._definitions._targets import (
     only,
     script,
 )
-from fba_conformance.suite._definitions.case import Case
+from tools.vectors.definitions.case import Case
+from tools.vectors.stream_writer import Header, Plane, Values, write_stream
 
 
 def mask_cases() -> Iterator[Case]:

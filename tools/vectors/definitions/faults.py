@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from typing import Any
 
-from fba_conformance.stream_writer import PLANE, Header, Plane, write_stream
-from fba_conformance.suite._definitions._targets import RATE_25, bodies, edited, faces, script
-from fba_conformance.suite._definitions.case import Fault
 from fba_conformance.trace import Element, trace
+from tools.vectors.definitions._targets import RATE_25, bodies, edited, faces, script
+from tools.vectors.definitions.case import Fault
+from tools.vectors.stream_writer import PLANE, Header, Plane, write_stream
 
 _PERIOD = 5
 _PLANES = 15

@@ -1,4 +1,4 @@
-"""Write the test vectors: `python -m fba_conformance.suite.generate [FOLDER]`.
+"""Write the test vectors: `python -m tools.vectors.generate [FOLDER]`.
 
 The streams come from `cases` and `stream_writer`. The independent decoder reads each, and the digest of its
 values goes into the index: the tested codec has no part in what is right. A valid stream is an error here
@@ -7,20 +7,19 @@ unless readers that look for start codes at byte boundaries find the same planes
 
 from __future__ import annotations
 
-import json
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba_conformance._values import Listing, PlaneValues, trace_values
-from fba_conformance.suite._definitions.case import Case, Fault
-from fba_conformance.suite._definitions.cases import cases
-from fba_conformance.suite._definitions.faults import faults
-from fba_conformance.suite.index import OWN
+from fba_conformance.suite.index import SHIPPED_VECTORS, index_text
 from fba_conformance.trace import Walker, planes
+from tools.vectors.definitions.case import Case, Fault
+from tools.vectors.definitions.cases import cases
+from tools.vectors.definitions.faults import faults
 
 Made = tuple[dict[str, Any], bytes, Listing]
 """The entry of a vector in the index, the stream, and the values that a decoder must find."""
@@ -38,12 +37,6 @@ def write_vectors(folder: Path, vectors: Iterable[Made]) -> int:
         entries.append(entry)
     (folder / "index.json").write_text(index_text(entries), encoding="utf-8", newline="\n")
     return len(entries)
-
-
-def index_text(entries: Sequence[dict[str, Any]]) -> str:
-    """Return the content of index.json."""
-    lines = ",\n".join(json.dumps(entry) for entry in entries)
-    return f"[\n{lines}\n]\n"
 
 
 def made_vectors() -> Iterator[Made]:
@@ -118,6 +111,6 @@ def _planes_of_aligned_reader(data: bytes, bap_steps: str) -> int | None:
 
 
 if __name__ == "__main__":
-    target = Path(sys.argv[1]) if len(sys.argv) > 1 else OWN
+    target = Path(sys.argv[1]) if len(sys.argv) > 1 else SHIPPED_VECTORS
     count = write_vectors(target, made_vectors())
     sys.stdout.write(f"{count} vectors in {target}\n")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fba_conformance.suite._definitions import _coder, _masks, _ranges, _start_codes, _times, _values
-from fba_conformance.suite._definitions.case import Case
+from tools.vectors.definitions import _coder, _masks, _ranges, _start_codes, _times, _values
+from tools.vectors.definitions.case import Case
 
 
 def cases() -> Iterator[tuple[str, Case]]:

@@ -7,7 +7,17 @@ from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 
-from fba_conformance.stream_writer import (
+from tools.vectors.definitions._targets import (
+    FEW_BAPS,
+    FEW_FAPS,
+    RATE_25,
+    bodies,
+    edited,
+    faces,
+    script,
+)
+from tools.vectors.definitions.case import Case
+from tools.vectors.stream_writer import (
     END,
     OBJECT,
     OLD_OBJECT,
@@ -19,16 +29,6 @@ from fba_conformance.stream_writer import (
     StreamWriter,
     write_stream,
 )
-from fba_conformance.suite._definitions._targets import (
-    FEW_BAPS,
-    FEW_FAPS,
-    RATE_25,
-    bodies,
-    edited,
-    faces,
-    script,
-)
-from fba_conformance.suite._definitions.case import Case
 
 _SEQUENCE, _VISUAL_OBJECT, _SEQUENCE_END, _USER_DATA = 0x1B0, 0x1B5, 0x1B7, 0x1B2
 _LIBERAL = (

@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.animation import Animation, FaceTrack
 from fba.codec import EncoderOptions, encode, write_mark, write_opening
-from fba_conformance import _motion as motion
+from tools import synthetic_motion as motion
 
 _END_CODE = b"\0\0\1\xb1"
 

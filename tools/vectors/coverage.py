@@ -1,4 +1,4 @@
-"""Which vectors reach what: `python -m fba_conformance.suite.coverage` prints it, and exits with 1 for gaps.
+"""Which vectors reach what: `python -m tools.vectors.coverage` prints it, and exits with 1 for gaps.
 
 Two lists: the points of the syntax (every element with the values that matter, every parameter, every code),
 and both outcomes of every branch of the independent decoder, observed while it reads the vectors.
@@ -12,10 +12,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 
 from fba.errors import FbaError, FbaWarning
-from fba_conformance.suite._branches import all_branches, observed
-from fba_conformance.suite._points import all_points, points
 from fba_conformance.suite.index import Vector, read_vectors
 from fba_conformance.trace import Element, trace
+from tools.vectors._branches import all_branches, observed
+from tools.vectors._points import all_points, points
 
 OBSERVED = 200
 """Last planes of a stream whose branches are observed, which takes ten times as long as reading them."""

@@ -1,0 +1,1 @@
+"""Definitions of the test vectors: which planes, with which values, and which damage."""
