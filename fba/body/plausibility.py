@@ -30,7 +30,7 @@ from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
 from fba.body.solve.pose_loops import MILLIMETRE, UNIT
-from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
+from fba.parameters import BAP_STEP_TABLES, BapTable, bap_numbers, bap_steps
 from fba.tracks import BodyTrack, batches
 
 SAMPLES = 32
@@ -105,8 +105,8 @@ class Doubt:
     used, likely: names of the tables. findings: what is wrong, in words.
     """
 
-    used: str
-    likely: str
+    used: BapTable
+    likely: BapTable
     findings: tuple[str, ...]
 
     def __str__(self) -> str:
@@ -116,7 +116,7 @@ class Doubt:
         )
 
 
-def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str) -> Doubt | None:
+def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: BapTable) -> Doubt | None:
     """Return the reasons why a body looks wrong under the table `used` and right under the other, or None.
 
     index: (T,) numbers of the frames, at rate frames a second. Values must be as decoded: where they are not

@@ -22,6 +22,7 @@ import click
 
 from fba.cli.inputs import renamed
 from fba.errors import FormatError
+from fba.parameters import BapTable
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -162,7 +163,7 @@ def display_name(path: Path) -> str:
     return "standard output" if path == STANDARD else str(path)
 
 
-def opening_for(output: Path, animation: Animation, table: str, quant: int, *, marked: bool) -> bytes:
+def opening_for(output: Path, animation: Animation, table: BapTable, quant: int, *, marked: bool) -> bytes:
     """Return what goes before a stream that others may read while it comes; b"" for a file.
 
     Nothing in streams without a mark, and without BAPs that the table makes a difference to.

@@ -12,7 +12,6 @@ from fba.codec._encoder import (
     encode_with_statistics,
     warn_of_clamped,
 )
-from fba.codec._options import EncoderOptions
 from fba.codec._plane.pricing import NextPlane
 from fba.codec._plane.slots import weights_of_slots
 from fba.codec._script import encode_planes
@@ -26,6 +25,7 @@ from fba.codec.quantisation import coarsest_quantisers, count_rounded, exact_qua
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
 from fba.codec.stream_info import PartInfo, StreamInfo, probe_stream
 from fba.codec.verification import Verification, digest, verify_stream
+from fba.encoder_options import EncoderOptions
 
 __all__ = [
     "INTRA_BITS",

@@ -27,26 +27,26 @@ MOST_RATE = 10_000
 def read_recording(
     path: Path,
     *,
-    fps: Fraction | None = None,
+    source_rate: Fraction | None = None,
     face: str | None = None,
     aspect: float | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> TrackedFace:
     """Return what a tracker saw, from a file of points.
 
-    Any file of 68, 70, 468 or 478 points that `fba.read` reads, or an archive of NumPy (.npz) with
-    `points`, 64 of them, and perhaps `angles`, radians, `tracked` and `fps`. fps: for files that do not say
-    it. face: which, where there are several. Raises FormatError, LimitError.
+    Any file of 68, 70, 468 or 478 points that `fba.read` reads, or an archive of NumPy (.npz) with `points`,
+    64 of them, and perhaps `angles`, radians, `tracked` and `fps`. source_rate: for files that do not say it.
+    face: which, where there are several. Raises FormatError, LimitError.
     """
     if read_head(path).startswith(ZIP):
         arrays = read_arrays(path, limits, single=POINTS)
         points = arrays.get(POINTS)
         if points is not None and points.ndim == 3 and points.shape[1:] == (TRACKED, 2):
-            return _tracked(arrays, path, fps)
+            return _tracked(arrays, path, source_rate)
     reader = format_of(path)
     if reader.read_face is None:
         raise FormatError(f"is no file of tracked points, but {reader.description}", path=path)
-    given = {"fps": fps, "face": face}
+    given = {"source_rate": source_rate, "face": face}
     known = {
         name: value for name, value in given.items() if value is not None and name in reader.face_options
     }
@@ -71,9 +71,9 @@ def write_recording(face: TrackedFace, path: Path) -> None:
         np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
-def _tracked(arrays: dict[str, Float64], path: Path, fps: Fraction | None) -> TrackedFace:
+def _tracked(arrays: dict[str, Float64], path: Path, source_rate: Fraction | None) -> TrackedFace:
     count = len(arrays[POINTS])
-    rate = fps
+    rate = source_rate
     if rate is None:
         told = arrays.get(RATE, np.array(float(USUAL_RATE)))
         if told.size != 1 or not 0 < float(told.reshape(())) <= MOST_RATE:

@@ -148,9 +148,9 @@ def _read_with_rate(path: Path) -> object:
     try:
         return fba.read(path)
     except FbaError as error:
-        if not any(remedy.argument == "fps" for remedy in error.remedies):
+        if not any(remedy.argument == "source_rate" for remedy in error.remedies):
             raise
-        return fba.read(path, fps=30)
+        return fba.read(path, source_rate=30)
 
 
 def check_live(data: bytes, folder: Path) -> Outcome:

@@ -15,7 +15,6 @@ import numpy as np
 
 from fba.arrays import Bool, UInt8
 from fba.codec.settings import (
-    QUANT_MAX,
     RANGE_CODE_MAX,
     RANGE_UNIT,
     FrameRate,
@@ -24,6 +23,7 @@ from fba.codec.settings import (
     RangeLists,
     TimeCode,
 )
+from fba.encoder_options import QUANT_MAX
 from fba.errors import FbaWarning
 from fba.formats.epf._tags import BODY, FACE, PARTS, TAGS, Part
 from fba.formats.text.lines import Lines, content, decoded

@@ -62,7 +62,7 @@ def read(
     path: Path,
     *,
     rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     swap: str = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
@@ -71,30 +71,30 @@ def read(
     The options are those of `read_face`, and `fba.capture.from_blendshapes` says how it is done. Warns
     (FbaWarning) of what was repaired. Raises FormatError, LimitError, OptionError.
     """
-    motion = read_face(path, fps=fps, swap=swap, limits=limits)
+    motion = read_face(path, source_rate=source_rate, swap=swap, limits=limits)
     return to_animation(motion, rate, path, limits, warn=4)
 
 
 def read_face(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     swap: str = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> ShapeMotion:
     """Return weights, head and eyes as they are in a table.
 
-    fps: rows in a second, for a table without times. swap: whether MouthLeft and MouthRight, JawLeft and
-    JawRight change places, as Live Link Face writes them the wrong way round: "yes", "no", or "auto", which
-    looks at how they go with lop-sided smiles. `ShapeMotion.findings` say what was done. Raises FormatError,
-    LimitError, OptionError.
+    source_rate: rows in a second, for a table without times. swap: whether MouthLeft and MouthRight, JawLeft
+    and JawRight change places, as Live Link Face writes them the wrong way round: "yes", "no", or "auto",
+    which looks at how they go with lop-sided smiles. `ShapeMotion.findings` say what was done. Raises
+    FormatError, LimitError, OptionError.
     """
     table = read_table(path, limits)
     columns = _find_columns(table)
     shapes = list(columns.shapes)
     weights = table.numbers(list(columns.shapes.values()))
     check_weights(weights, shapes, path, table.lines)
-    times = _read_times(table, fps)
+    times = _read_times(table, source_rate)
     head = eyes = None
     still = []
     unit, odd = angle_unit(table.numbers(columns.head + columns.eyes))
@@ -171,7 +171,7 @@ def _find_columns(table: Table) -> _Columns:
     )
 
 
-def _read_times(table: Table, fps: Fraction | int | str | None) -> _Times:
+def _read_times(table: Table, source_rate: Fraction | int | str | None) -> _Times:
     keys = [key_of(name) for name in table.names]
 
     def column(names: tuple[str, ...]) -> int | None:
@@ -198,11 +198,11 @@ def _read_times(table: Table, fps: Fraction | int | str | None) -> _Times:
             return _Times(seconds, find_rate(seconds), None, False)
         except ModelError as error:
             raise FormatError(error.finding, path=table.path) from error
-    if fps is None:
+    if source_rate is None:
         raise FormatError(
             "has no column of times: none is called Timecode, time or timestamp", path=table.path
-        ).with_remedies(Remedy("fps", "give the rate of its rows with {}", "30"))
-    rate = Fraction(fps)
+        ).with_remedies(Remedy("source_rate", "give the rate of its rows with {}", "30"))
+    rate = Fraction(source_rate)
     rows = np.arange(len(table.rows), dtype=np.float64)
     if counted is not None:
         rows = table.numbers([counted])[:, 0]

@@ -51,7 +51,7 @@ def read(
     path: Path,
     *,
     rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
@@ -60,20 +60,22 @@ def read(
     The options are those of `read_face`, and `fba.capture.from_action_units` says how it is done. Warns
     (FbaWarning) of what is odd. Raises FormatError, LimitError.
     """
-    return to_animation(read_face(path, fps=fps, face=face, limits=limits), rate, path, limits)
+    return to_animation(
+        read_face(path, source_rate=source_rate, face=face, limits=limits), rate, path, limits
+    )
 
 
 def read_face(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> ActionUnitMotion:
     """Return action units, head and eyes as they are in a table.
 
-    fps: frames in a second, for tables without times. face: the `face_id` of the face to read, where there
-    are several. Raises FormatError, LimitError.
+    source_rate: frames in a second, for tables without times. face: the `face_id` of the face to read, where
+    there are several. Raises FormatError, LimitError.
     """
     table = read_table(path, limits)
     column = number_columns(table)
@@ -87,7 +89,7 @@ def read_face(
     if set(columns) == set(VERSION_3):
         columns = {VERSION_3[unit]: number for unit, number in columns.items()}
         findings.append("AU01_r to AU08_r are taken as OpenFace 3's: action units 1, 6, 12, 15, 17, 2, 9, 10")
-    rows = read_unit_rows(table, columns, LAYOUT, face, fps)
+    rows = read_unit_rows(table, columns, LAYOUT, face, source_rate)
     turns, odd = _turns(table, column)
     turns = None if turns is None else turns[rows.numbers]
     findings += odd

@@ -23,7 +23,7 @@ def read(
     path: Path,
     *,
     rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     markers: dict[str, str] | None = None,
     neutral: Neutral = "auto",
@@ -34,10 +34,10 @@ def read(
 ) -> Animation:
     """Return a tracked face as FAPs, at `rate` or at the rate of its own times.
 
-    fps, face: as for `read_points`; the others: as for `fba.capture.points.from_points`. Warns (FbaWarning)
-    of what is odd. Raises FormatError, LimitError.
+    source_rate, face: as for `read_points`; the others: as for `fba.capture.points.from_points`. Warns
+    (FbaWarning) of what is odd. Raises FormatError, LimitError.
     """
-    motion = read_points(path, fps=fps, face=face, limits=limits)
+    motion = read_points(path, source_rate=source_rate, face=face, limits=limits)
     return points_to_animation(
         motion, rate, path, limits, markers=markers, neutral=neutral, gaze=gaze, head_path=head_path,
         aspect=aspect,
@@ -47,18 +47,18 @@ def read(
 def read_points(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> PointMotion:
     """Return the points as they are in a file.
 
-    fps: frames in a second, for files without times. face: the name or number of the face to read, where
-    there are several. Raises FormatError, LimitError.
+    source_rate: frames in a second, for files without times. face: the name or number of the face to read,
+    where there are several. Raises FormatError, LimitError.
     """
     head = read_head(path)
     if points_arrays.sniff(head, ""):
-        return points_arrays.read_points(path, fps=fps, face=face, limits=limits)
+        return points_arrays.read_points(path, source_rate=source_rate, face=face, limits=limits)
     if points_json.sniff(head, ""):
-        return points_json.read_points(path, fps=fps, face=face, limits=limits)
-    return points_csv.read_points(path, fps=fps, face=face, limits=limits)
+        return points_json.read_points(path, source_rate=source_rate, face=face, limits=limits)
+    return points_csv.read_points(path, source_rate=source_rate, face=face, limits=limits)

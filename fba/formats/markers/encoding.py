@@ -16,7 +16,7 @@ def read_face(
     read_markers: Callable[..., MarkerMotion],
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     rate: Fraction | int | str | None = None,
     markers: Mapping[str, str] | None = None,
     neutral: str | int | tuple[float, float] = "auto",
@@ -26,10 +26,12 @@ def read_face(
 ) -> Animation:
     """Return the FAPs of a face with markers, and its head's path as BAPs; see `fba.capture.from_markers`.
 
-    fps: the rate of a file that has none. Raises FormatError for anything that is not what the reader reads,
-    or holds no face; LimitError. Warns (FbaWarning) of what was repaired.
+    source_rate: the rate of a file that has none. Raises FormatError for anything that is not what the reader
+    reads, or holds no face; LimitError. Warns (FbaWarning) of what was repaired.
     """
-    motion = read_markers(path, fps=None if fps is None else Fraction(fps), limits=limits)
+    motion = read_markers(
+        path, source_rate=None if source_rate is None else Fraction(source_rate), limits=limits
+    )
     with naming_file(path):
         return from_markers(
             motion, rate, markers=markers, neutral=neutral, gaze=gaze, head_path=head_path, limits=limits

@@ -38,11 +38,13 @@ def sniff(head: bytes, suffix: str) -> bool:
     return re.match(rb'(?:\xef\xbb\xbf)?"?Format Version"?\s*,', head, re.IGNORECASE) is not None
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
+def read_markers(
+    path: Path, *, source_rate: Fraction | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
     """Return the markers of a CSV export of Motive; those without a label only if none has one.
 
-    fps: the rate of a file that has none. Raises FormatError, LimitError; warns (FbaWarning) of markers
-    that are left out.
+    source_rate: the rate of a file that has none. Raises FormatError, LimitError; warns (FbaWarning) of
+    markers that are left out.
     """
     lines = read_lines(path, "a CSV export of Motive")
     if not sniff(lines[0].encode(), ""):
@@ -70,7 +72,7 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
     second = next((n for n, cell in enumerate(columns) if cell.lower().startswith("time (")), None)
     times = rows[:, second] if second is not None else np.full(len(rows), np.nan)
     stored: str | float = settings.get("export frame rate", "") or settings.get("capture frame rate", "")
-    rate = file_rate(stored or rate_of_times(times[np.isfinite(times)].tolist()), fps, path)
+    rate = file_rate(stored or rate_of_times(times[np.isfinite(times)].tolist()), source_rate, path)
     places = np.array([start for _, start in chosen])[:, None] + np.arange(3)
     unit = UNITS.get(settings.get("length units", "meters").lower(), "")
     return build_motion(

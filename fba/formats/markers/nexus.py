@@ -33,8 +33,10 @@ def sniff(head: bytes, suffix: str) -> bool:
     return re.search(rb"Frame[,;\t]\"?Sub Frame", head, re.IGNORECASE) is not None or len(head) >= 65536
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
-    """Return the trajectories of a CSV export of Nexus. fps: the rate of a file that has none.
+def read_markers(
+    path: Path, *, source_rate: Fraction | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
+    """Return the trajectories of a CSV export of Nexus. source_rate: the rate of a file that has none.
 
     Raises FormatError, LimitError.
     """
@@ -61,7 +63,7 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
     rows, numbers = parse_rows(lines, start + 5, delimiter, len(axes), path, limits, last=end)
     if not len(rows):
         raise FormatError("the section Trajectories holds no frames", path=path, line=start + 6)
-    rate = file_rate(lines[start + 1].strip(' \t,;"'), fps, path)
+    rate = file_rate(lines[start + 1].strip(' \t,;"'), source_rate, path)
     frames = rows[:, 0]
     if not np.isfinite(frames).all():
         raise FormatError(

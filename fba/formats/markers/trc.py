@@ -37,8 +37,10 @@ def sniff(head: bytes, suffix: str) -> bool:
     return re.match(rb"(?:\xef\xbb\xbf)?\s*PathFileType\b", head) is not None
 
 
-def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DEFAULT_LIMITS) -> MarkerMotion:
-    """Return the markers of a TRC file. fps: the rate of a file that has none.
+def read_markers(
+    path: Path, *, source_rate: Fraction | None = None, limits: Limits = DEFAULT_LIMITS
+) -> MarkerMotion:
+    """Return the markers of a TRC file. source_rate: the rate of a file that has none.
 
     Raises FormatError, LimitError; warns (FbaWarning) of a wrong number of frames.
     """
@@ -64,7 +66,7 @@ def read_markers(path: Path, *, fps: Fraction | None = None, limits: Limits = DE
     stored = header.get("datarate", "") or (
         rate_of_times(times.tolist()) if np.isfinite(times).all() else 0.0
     )
-    rate = file_rate(stored, fps, path)
+    rate = file_rate(stored, source_rate, path)
     unit = header.get("units", "").lower()
     return build_motion(
         without_subject(labels), rows[:, 2:].reshape(len(rows), -1, 3), own_times(times, rate), rate,

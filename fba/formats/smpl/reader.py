@@ -70,7 +70,7 @@ def read(
     path: Path,
     *,
     rate: Fraction | int | str | None = None,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     origin: str = "source",
     ground: str = "floor",
     plant: bool = True,
@@ -82,11 +82,11 @@ def read(
 ) -> Animation:
     """Return the motion of a body as BAPs, and of its jaw and eyes, where they move, as FAPs.
 
-    The options are those of `fba.capture.from_skeleton`; fps: of a file that has no rate. Raises FormatError,
-    LimitError; warns (FbaWarning).
+    The options are those of `fba.capture.from_skeleton`; source_rate: of a file that has no rate. Raises
+    FormatError, LimitError; warns (FbaWarning).
     """
     with naming_file(path):
-        read_in = _read(path, fps, limits)
+        read_in = _read(path, source_rate, limits)
         motion = _skeleton(read_in, path, limits)
         animation = from_skeleton(
             motion, rate, joints=joints, origin=origin, ground=ground, plant=plant, spine=spine, rest=rest,
@@ -97,14 +97,14 @@ def read(
 
 
 def read_motion(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> SkeletonMotion:
     """Return the joints as they turn in the file, y up. Raises FormatError, LimitError."""
     with naming_file(path):
-        return _skeleton(_read(path, fps, limits), path, limits)
+        return _skeleton(_read(path, source_rate, limits), path, limits)
 
 
-def _read(path: Path, fps: Fraction | int | str | None, limits: Limits) -> _Motion:
+def _read(path: Path, source_rate: Fraction | int | str | None, limits: Limits) -> _Motion:
     arrays = read_arrays(path, limits, single="poses", objects=True)
     poses, jaw, eyes = _poses(arrays, path)
     count = len(poses)
@@ -114,7 +114,7 @@ def _read(path: Path, fps: Fraction | int | str | None, limits: Limits) -> _Moti
         raise FormatError(f"trans has the shape {path_of_root.shape}, not ({count}, 3)", path=path)
     _check_sizes(path, MAX_TURN, "rad", {"poses": poses, "pose_jaw": jaw, "pose_eye": eyes})
     _check_sizes(path, MAX_COORDINATE, "m", {"trans": path_of_root})
-    rate = _rate(arrays, fps, path)
+    rate = _rate(arrays, source_rate, path)
     turns = poses.reshape(count, -1, 3)
     return _Motion(turns, path_of_root, jaw, None if eyes is None else eyes.reshape(count, 2, 3), rate)
 
@@ -130,15 +130,15 @@ def _check_sizes(path: Path, most: float, unit: str, arrays: Mapping[str, Float6
             )  # fmt: skip
 
 
-def _rate(arrays: dict[str, Any], fps: Fraction | int | str | None, path: Path) -> Fraction:
-    """Return the frame rate of a file, or `fps` if it has none."""
+def _rate(arrays: dict[str, Any], source_rate: Fraction | int | str | None, path: Path) -> Fraction:
+    """Return the frame rate of a file, or `source_rate` if it has none."""
     stored = next((arrays[name] for name in RATES if name in arrays and arrays[name].size == 1), None)
     if stored is None:
-        if fps is None:
+        if source_rate is None:
             raise FormatError("has no frame rate", path=path).with_remedies(
-                Remedy("fps", "give one with {}", "120")
+                Remedy("source_rate", "give one with {}", "120")
             )
-        return Fraction(fps)
+        return Fraction(source_rate)
     if not MIN_RATE <= (rate := float(stored.ravel()[0])) <= MAX_RATE:
         raise FormatError(f"its frame rate must be {MIN_RATE} to {MAX_RATE:g}", path=path, token=f"{rate:g}")
     return find_rate(np.array([0.0, 1.0 / rate]))

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Int64
+from fba.choices import BapTableOrAuto
 from fba.codec import Decoder, FrameBuffer, StreamInfo, marked_table
 from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaError, FbaWarning
@@ -70,7 +71,7 @@ class LiveAnimation:
         *,
         head: bytes = b"",
         name: str = "",
-        bap_steps: str = "iso",
+        bap_steps: BapTableOrAuto = "iso",
         at_end: Callable[[], None] | None = None,
     ) -> None:
         self.name = name

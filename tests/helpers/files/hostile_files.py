@@ -536,7 +536,7 @@ def read_markers(path: Path) -> object:
 
     reader = format_of(path).read_face
     assert reader is not None
-    return reader(path, fps=Fraction(50))
+    return reader(path, source_rate=Fraction(50))
 
 
 def _markers() -> dict[str, HostileFile]:
