@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import click
 
 from fba.cli.inputs import renamed
+from fba.cli.option_fields import option
 from fba.errors import FormatError
 from fba.parameters import BapTable
 
@@ -61,6 +62,16 @@ class OutputType(click.ParamType[Path]):
             self.fail(f"there is no folder {text}; make it first, or leave the slash out", param, ctx)
         # Path("./-") would be "-"
         return Path(text) if Path(text) != STANDARD else Path(os.path.abspath(text))
+
+
+def output_option(metavar: str, text: str, **settings: Any) -> Any:
+    """Return `-o`, `--output`. text: its help. settings: as for `option`."""
+    return option("-o", "--output", metavar=metavar, type=OutputType(), help=text, **settings)
+
+
+def further_output_option(metavar: str, text: str, *flags: str) -> Any:
+    """Return an option for a file that is written beside the output. text: its help."""
+    return option(*flags, metavar=metavar, type=OutputType(), help=text)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from fba.choices import Gaze, Ground, Origin, SignedUpAxis, Spine, Swap
 from fba.cli import joint_options, marker_options, options
 from fba.cli.inputs import Reading, check_capture_options
 from fba.cli.option_fields import option
-from fba.cli.outputs import OutputType
+from fba.cli.outputs import further_output_option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,10 +33,8 @@ class CaptureOptions:
     )
     origin: Origin = option(default="source", help="Motion capture: what is placed at the default position.")
     maps: joint_options.Maps = joint_options.map_option
-    map_out: Path | None = option(
-        type=OutputType(),
-        metavar="FILE.toml",
-        help="Motion capture: write the joints or markers that were found, for --map.",
+    map_out: Path | None = further_output_option(
+        "FILE.toml", "Motion capture: write the joints or markers that were found, for --map."
     )
     rest: str | int = option(
         type=joint_options.RestType(),

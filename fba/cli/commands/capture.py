@@ -20,7 +20,7 @@ from fba.cli.coding.clamped_values import clamped_lines
 from fba.cli.command import Command, examples
 from fba.cli.interruptions import raise_delayed
 from fba.cli.option_fields import option, option_like, with_options
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.outputs import STANDARD, Output, Outputs, display_name, output_option
 from fba.cli.printing import rate_text, seconds_text
 from fba.encoder_options import QUANT_MAX, EncoderOptions
 from fba.errors import FbaError
@@ -90,10 +90,7 @@ class _Request:
     """What the command line asks for."""
 
     kind: str
-    output: Path | None = option(
-        "-o", "--output", metavar="OUT.fba", type=OutputType(),
-        help="Stream to write while it comes; - for standard output.",
-    )  # fmt: skip
+    output: Path | None = output_option("OUT.fba", "Stream to write while it comes; - for standard output.")
     no_clobber: bool = options.no_clobber_option
     play: bool = option(default=False, help="Show it in a window.")
     network: _Network

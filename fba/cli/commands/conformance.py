@@ -14,7 +14,7 @@ from fba.atomic import atomic
 from fba.cli import options
 from fba.cli.command import Command, examples
 from fba.cli.option_fields import option, with_options
-from fba.cli.outputs import Output, Outputs, OutputType, display_name
+from fba.cli.outputs import Output, Outputs, display_name, further_output_option
 from fba.cli.printing import Progress
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class _Programs:
 class _Report:
     """How results are shown."""
 
-    junit: Path | None = option(type=OutputType(), metavar="FILE", help="Write JUnit XML, too.")
+    junit: Path | None = further_output_option("FILE", "Write JUnit XML, too.")
     verbose: bool = option(
         "--verbose", "-v", default=False, help="Print a line for every vector, not only for failures."
     )
@@ -108,11 +108,10 @@ def command(
     only: tuple[str, ...] = option(
         default=(), metavar="NAME", help="Only vectors or groups of this name; may be repeated."
     ),
-    archive: Path | None = option(
+    archive: Path | None = further_output_option(
+        "FILE",
+        "Write the vectors that come with fba as a zip, with all values as text, and test nothing.",
         "--zip",
-        type=OutputType(),
-        metavar="FILE",
-        help="Write the vectors that come with fba as a zip, with all values as text, and test nothing.",
     ),
     no_clobber: bool = options.no_clobber_option,
 ) -> None:

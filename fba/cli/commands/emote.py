@@ -14,10 +14,17 @@ import numpy as np
 
 from fba.cli import options
 from fba.cli.command import Command, examples, usage_errors
-from fba.cli.emotions.pictures import draw, option_errors, picture_kind
+from fba.cli.emotions.pictures import OUTPUT_TEXT, draw, option_errors, picture_kind
 from fba.cli.inputs import Reading, read_input, read_model
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.outputs import (
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    display_name,
+    find_writer,
+    output_option,
+)
 from fba.cli.printing import Progress, seconds_text
 from fba.errors import SAVE_AS_UTF8, FormatError
 
@@ -121,11 +128,7 @@ class _Asked:
 class _Target:
     """Where the performance goes."""
 
-    output: Path = option(
-        "-o", "--output", metavar="OUT", type=OutputType(), required=True,
-        help="File to write: .fba, .fap or another format of animations, .png, .jpg, .mp4, .gif. - for "
-        "standard output.",
-    )  # fmt: skip
+    output: Path = output_option("OUT", OUTPUT_TEXT, required=True)
     to: str | None = options.to_option
     no_clobber: bool = options.no_clobber_option
     model: Path | None = options.model_option(

@@ -16,7 +16,7 @@ from fba.cli.command import Command, examples
 from fba.cli.emotions import tables
 from fba.cli.inputs import Reading, read_input, read_model
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import Output, Outputs, OutputType, display_name
+from fba.cli.outputs import Output, Outputs, display_name, output_option
 from fba.cli.printing import print_json
 from fba.errors import FormatError
 
@@ -29,10 +29,7 @@ class _Target:
     """Where readings go: a table; else they are printed."""
 
     frames: bool = option(default=False, help="Print a row a frame, not only the summary and the changes.")
-    output: Path | None = option(
-        "-o", "--output", metavar="OUT.csv", type=OutputType(),
-        help="Write a row a frame as CSV. - for standard output.",
-    )  # fmt: skip
+    output: Path | None = output_option("OUT.csv", "Write a row a frame as CSV. - for standard output.")
     no_clobber: bool = options.no_clobber_option
     as_json: bool = options.json_option
 

@@ -19,7 +19,7 @@ from fba.cli.coding.coded_streams import CodedStream, encode_as_epf, encode_stre
 from fba.cli.command import Command, examples
 from fba.cli.inputs import Reading, check_clip, has_markers, has_skeleton
 from fba.cli.option_fields import group, option, option_like, with_options
-from fba.cli.outputs import Output, Outputs, OutputType, display_name, opening_for
+from fba.cli.outputs import Output, Outputs, display_name, opening_for, output_option
 from fba.cli.printing import Progress
 from fba.cli.recordings import voice
 from fba.cli.recordings.inputs import (
@@ -73,10 +73,7 @@ class _Request:
     """What the command line asks for."""
 
     inputs: tuple[Path, ...]
-    output: Path = option(
-        "-o", "--output", metavar="OUT.fba", required=True, type=OutputType(),
-        help="Stream to write; - for standard output.",
-    )  # fmt: skip
+    output: Path = output_option("OUT.fba", "Stream to write; - for standard output.", required=True)
     no_clobber: bool = options.no_clobber_option
     rate: Fraction | None = options.rate_option(
         "Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own."

@@ -13,9 +13,16 @@ from fba.choices import Sending
 from fba.cli import options
 from fba.cli.command import Command, examples
 from fba.cli.emotions import tables
-from fba.cli.emotions.pictures import PICTURES, draw, option_errors, picture_kind
+from fba.cli.emotions.pictures import OUTPUT_TEXT, PICTURES, draw, option_errors, picture_kind
 from fba.cli.option_fields import option, with_options
-from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.outputs import (
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    display_name,
+    find_writer,
+    output_option,
+)
 from fba.cli.printing import seconds_text
 
 if TYPE_CHECKING:
@@ -80,11 +87,7 @@ class _Motion:
 class _Target:
     """Where an expression goes."""
 
-    output: Path | None = option(
-        "-o", "--output", metavar="OUT", type=OutputType(),
-        help="File to write: .fba, .fap or another format of animations, .png, .jpg, .mp4, .gif. - for "
-        "standard output.",
-    )  # fmt: skip
+    output: Path | None = output_option("OUT", OUTPUT_TEXT)
     to: str | None = options.to_option
     no_clobber: bool = options.no_clobber_option
     model: Path | None = options.model_option("Pictures: the face; default: the built-in head.")

@@ -18,10 +18,10 @@ from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
     Outputs,
-    OutputType,
     display_name,
     find_writer,
     opening_for,
+    output_option,
 )
 from fba.cli.printing import print_json, seconds_text
 from fba.encoder_options import EncoderOptions
@@ -65,10 +65,9 @@ class _Walk:
 class _Target:
     """Where a walk goes."""
 
-    output: Path | None = option(
-        "-o", "--output", metavar="OUT", type=OutputType(),
-        help="File to write; its suffix says in which format. - for standard output.",
-    )  # fmt: skip
+    output: Path | None = output_option(
+        "OUT", "File to write; its suffix says in which format. - for standard output."
+    )
     to: str | None = options.to_option
     no_clobber: bool = options.no_clobber_option
     mark: bool | None = options.mark_option

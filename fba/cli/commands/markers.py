@@ -17,7 +17,14 @@ from fba.cli.inputs import Reading
 from fba.cli.joint_options import Maps, MapType
 from fba.cli.marker_options import Neutral, neutral_option
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.outputs import (
+    STANDARD,
+    Output,
+    Outputs,
+    display_name,
+    further_output_option,
+    output_option,
+)
 from fba.cli.printing import Progress
 from fba.errors import FbaWarning, ModelError, OptionError
 
@@ -86,10 +93,10 @@ class _Request:
 
     capture: Path
     head: Path | None
-    output: Path | None = option(
-        "-o", "--output", type=OutputType(), metavar="OUT.png|.jpg|.mp4|.gif|.glb|.toml",
-        help="A picture, a film, the head with its animation, or the mapping, instead of a window.",
-    )  # fmt: skip
+    output: Path | None = output_option(
+        "OUT.png|.jpg|.mp4|.gif|.glb|.toml",
+        "A picture, a film, the head with its animation, or the mapping, instead of a window.",
+    )
     maps: Maps = option(
         "--map",
         default=(),
@@ -99,10 +106,9 @@ class _Request:
         help="A saved mapping, in place of the proposed one. Or where a marker is: a feature point, "
         "Chin=2.1, or a vertex, Chin=1234; nowhere: Chin=. Repeatable.",
     )
-    map_out: Path | None = option(
-        type=OutputType(),
-        metavar="FILE.toml",
-        help="Write the mapping beside OUT; in the window, Ctrl+S does. Default there: the file of --map, "
+    map_out: Path | None = further_output_option(
+        "FILE.toml",
+        "Write the mapping beside OUT; in the window, Ctrl+S does. Default there: the file of --map, "
         "else the capture's name with .virtual.toml.",
     )
     no_clobber: bool = options.no_clobber_option

@@ -14,7 +14,14 @@ from fba.choices import Adaptation, UpAxis
 from fba.cli import options
 from fba.cli.command import Group, examples
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.outputs import (
+    STANDARD,
+    Output,
+    Outputs,
+    display_name,
+    further_output_option,
+    output_option,
+)
 from fba.cli.printing import Progress, colour_grade, print_json
 from fba.cli.subcommands import model_learn_fit
 from fba.errors import FbaWarning
@@ -27,10 +34,7 @@ if TYPE_CHECKING:
 SOURCE = options.ExistingPath()
 POINT_FILES = "FDP, CSV or JSON file"
 DEFAULT_OPTION = option(default=False, help="Use the built-in head instead of FILE.")
-OUTPUT_OPTION = option(
-    "-o", "--output", metavar="OUT.glb", required=True, type=OutputType(),
-    help="Model to write; - for standard output.",
-)  # fmt: skip
+OUTPUT_OPTION = output_option("OUT.glb", "Model to write; - for standard output.", required=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,10 +43,9 @@ class _Target:
 
     output: Path = OUTPUT_OPTION
     no_clobber: bool = options.no_clobber_option
-    sheet: Path | None = option(
-        metavar="FILE.png|.jpg",
-        type=OutputType(),
-        help="Picture that shows the face at rest and in its main motions, visemes and expressions.",
+    sheet: Path | None = further_output_option(
+        "FILE.png|.jpg",
+        "Picture that shows the face at rest and in its main motions, visemes and expressions.",
     )
 
 
@@ -252,10 +255,7 @@ def import_(
 @with_options
 def points_(
     head: Path,
-    output: Path = option(
-        "-o", "--output", metavar="POINTS.csv", required=True, type=OutputType(),
-        help="File of points to write.",
-    ),
+    output: Path = output_option("POINTS.csv", "File of points to write.", required=True),
     no_clobber: bool = options.no_clobber_option,
     mesh: _Mesh = group(
         points=options.model_option(

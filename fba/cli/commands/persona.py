@@ -15,7 +15,15 @@ from fba.cli.command import Group, examples
 from fba.cli.inputs import input_file
 from fba.cli.marker_options import aspect_option
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.outputs import (
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    display_name,
+    find_writer,
+    further_output_option,
+    output_option,
+)
 from fba.cli.printing import print_json
 from fba.limits import Limits
 
@@ -130,9 +138,7 @@ def command() -> None:
 @with_options
 def learn_command(
     actors: tuple[Path, ...],
-    output: Path = option(
-        "-o", "--output", metavar="OUT.persona", required=True, type=OutputType(), help="Persona to write."
-    ),
+    output: Path = output_option("OUT.persona", "Persona to write.", required=True),
     no_clobber: bool = options.no_clobber_option,
     name: str = option(default="", metavar="NAME", help="Name of the actor; default: that of the file."),
     warm_up: int = option(
@@ -141,8 +147,8 @@ def learn_command(
         metavar="N",
         help="Leave out the first N frames of each recording, in which the tracker looks for the face.",
     ),
-    report: Path | None = option(
-        metavar="FILE.html", type=OutputType(), help="Also write a page with masks, classes and plots."
+    report: Path | None = further_output_option(
+        "FILE.html", "Also write a page with masks, classes and plots."
     ),
     tracking: _Tracking = group(),
     as_json: bool = options.json_option,
@@ -210,9 +216,8 @@ def info_command(
 def play_command(
     file: Path,
     performer: _Performer,
-    output: Path = option(
-        "-o", "--output", metavar="OUT", required=True, type=OutputType(),
-        help="File to write; its suffix says in which format. - for standard output.",
+    output: Path = output_option(
+        "OUT", "File to write; its suffix says in which format. - for standard output.", required=True
     ),
     to: str | None = options.to_option,
     no_clobber: bool = options.no_clobber_option,

@@ -14,7 +14,14 @@ from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Command, examples
 from fba.cli.inputs import Reading, read_input
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.outputs import (
+    STANDARD,
+    Output,
+    Outputs,
+    display_name,
+    further_output_option,
+    output_option,
+)
 from fba.cli.printing import Progress
 from fba.errors import FbaError
 
@@ -27,15 +34,10 @@ if TYPE_CHECKING:
 class _Target:
     """Where the model goes, and its table by itself."""
 
-    output: Path = option(
-        "-o", "--output", metavar="OUT.glb", required=True, type=OutputType(),
-        help="The model with the table; - for standard output.",
-    )  # fmt: skip
+    output: Path = output_option("OUT.glb", "The model with the table; - for standard output.", required=True)
     no_clobber: bool = options.no_clobber_option
-    fit: Path | None = option(
-        metavar="FIT.json",
-        type=OutputType(),
-        help="Write the table by itself, too: the fields of the standard's node FIT.",
+    fit: Path | None = further_output_option(
+        "FIT.json", "Write the table by itself, too: the fields of the standard's node FIT."
     )
 
 
