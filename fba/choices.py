@@ -6,8 +6,8 @@ from typing import Literal
 
 from fba.parameters import BapTable
 
-Axes = Literal["iso", "vreng"]
-"""The senses in which BAPs turn: the standard's, or those of old files."""
+Axes = Literal["iso", "vreng", "abduct_first", "parent_twist", "fixed_axes"]
+"""About which axes, and in which sense, BAPs turn: as the standard says, as in old files, or otherwise."""
 BapTableOrAuto = Literal["auto", BapTable]
 """A table of BAP steps, or the one that the stream's mark names, else the one that its motion shows."""
 UpAxis = Literal["y", "z"]
@@ -40,3 +40,5 @@ Means = Literal["motion", "curves", "masks"]
 """How a face becomes an actor's: by maps and by how it moves, by maps alone, or by masks."""
 Adaptation = Literal["auto", "carry", "author"]
 """How the motions of FAPs are fitted to a face: the better one, carried over, or computed again."""
+SkinMethod = Literal["dual", "linear"]
+"""How skin follows joints: by dual quaternions, or by linear blending."""

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from fba.body.model import BodyModel
     from fba.body.skeleton import Skeleton
     from fba.body.solve.conventions import convention_names
-    from fba.body.solve.limits import Excess, Limit, Limits
+    from fba.body.solve.limits import Excess, JointLimit, JointLimits
     from fba.body.solve.solver import BapSolver, wrapped
 
 _MODULE_OF = {
@@ -18,8 +18,8 @@ _MODULE_OF = {
     "BodyDefinition": "fba.body._definition",
     "BodyModel": "fba.body.model",
     "Excess": "fba.body.solve.limits",
-    "Limit": "fba.body.solve.limits",
-    "Limits": "fba.body.solve.limits",
+    "JointLimit": "fba.body.solve.limits",
+    "JointLimits": "fba.body.solve.limits",
     "Skeleton": "fba.body.skeleton",
     "convention_names": "fba.body.solve.conventions",
     "wrapped": "fba.body.solve.solver",
@@ -30,8 +30,8 @@ __all__ = [
     "BodyDefinition",
     "BodyModel",
     "Excess",
-    "Limit",
-    "Limits",
+    "JointLimit",
+    "JointLimits",
     "Skeleton",
     "convention_names",
     "wrapped",

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from fba.arrays import Float64
 from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
+from fba.choices import Axes
 
 OUTLINE = (
     ("ankle", 0.011, 0.0, -0.0645), ("ankle", -0.024, 0.0, -0.030), ("ankle", 0.040, 0.0, -0.039),
@@ -59,7 +60,7 @@ class GroundedPoser:
     A body without feet, and the default skeleton itself, stay where the BAPs put them. axes: see `BapSolver`.
     """
 
-    def __init__(self, skeleton: Skeleton, axes: str = "iso") -> None:
+    def __init__(self, skeleton: Skeleton, axes: Axes = "iso") -> None:
         self._solver = BapSolver(skeleton, axes)
         feet = all(f"{side}_{joint}" in skeleton for side in "lr" for joint in ("ankle", "metatarsal"))
         default = Skeleton.default()

@@ -22,6 +22,7 @@ from fba.capture._rest_from_motion import rest_from_motion, with_rest
 from fba.capture._up_axis import UPS, find_up_axis, nearest_axis, turn_axes
 from fba.capture.bones import check_extent, find_bones, joints_remedy, refuse_swapped_sides
 from fba.capture.motion import SkeletonMotion, read_axis
+from fba.choices import SignedUpAxis
 from fba.errors import FbaWarning, ModelError, Remedy
 
 MIN_CONFIDENCE = 0.5
@@ -65,7 +66,7 @@ def prepare(
     *,
     joints: Mapping[str, str] | None = None,
     rest: str | int = "auto",
-    up: str = "auto",
+    up: SignedUpAxis = "auto",
 ) -> Preparation:
     """Return a motion made ready, see `Preparation`.
 

@@ -19,6 +19,7 @@ from fba.capture.limbs import bone_ik, hinges
 from fba.capture.limbs.foot_planting import plant_feet, turn_foot
 from fba.capture.limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion
+from fba.choices import Ground
 from fba.errors import FbaWarning, ModelError, Remedy
 from fba.parameters import baps
 
@@ -52,7 +53,7 @@ class Retargeting:
     groups: int
     with_anchors: bool
     scale: float | None
-    ground: str
+    ground: Ground
     plant: bool
 
 

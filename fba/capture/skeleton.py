@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from typing import get_args
 
 import numpy as np
 
@@ -21,12 +22,13 @@ from fba.capture import retarget
 from fba.capture.bones import LIMBS
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare
+from fba.choices import Ground, Origin, SignedUpAxis, Spine
 from fba.errors import FbaWarning, ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.tracks import BodyTrack
 
-ORIGINS = ("source", "start", "middle")
-GROUNDS = ("floor", "source", "none")
+ORIGINS: tuple[Origin, ...] = get_args(Origin)
+GROUNDS: tuple[Ground, ...] = get_args(Ground)
 SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spines.GROUPS}
 MAX_FRAMES = 500_000
 """Frames of the longest motion: more than an hour at 120 frames/s."""
@@ -48,12 +50,12 @@ def from_skeleton(
     *,
     joints: Mapping[str, str] | None = None,
     scale: float | None = None,
-    origin: str = "source",
-    ground: str = "floor",
+    origin: Origin = "source",
+    ground: Ground = "floor",
     plant: bool = True,
-    spine: str | int = "spread",
+    spine: Spine | int = "spread",
     rest: str | int = "auto",
-    up: str = "auto",
+    up: SignedUpAxis = "auto",
     solver: BapSolver | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
@@ -108,12 +110,12 @@ class _Options:
 
     joints: Mapping[str, str] | None
     scale: float | None
-    origin: str
-    ground: str
+    origin: Origin
+    ground: Ground
     plant: bool
-    spine: str | int
+    spine: Spine | int
     rest: str | int
-    up: str
+    up: SignedUpAxis
 
     def __post_init__(self) -> None:
         if self.origin not in ORIGINS:

@@ -74,7 +74,7 @@ def _remedy_text(remedy: Remedy, context: click.Context) -> str:
     name = OPTIONS.get(remedy.argument)
     if remedy.call == "fba.write" and name == "format":
         name = "to"
-    if remedy.call.endswith(".read_body") and not any(
+    if remedy.call.endswith(".import_body") and not any(
         param.name == "body" for param in context.command.params
     ):
         name = None  # the joints of a body that is shown, not of a capture

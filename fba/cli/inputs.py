@@ -296,6 +296,6 @@ def read_body(path: Path | None, joints: Mapping[str, str] | None = None) -> Bod
     """Return the body of `--body`, or None for the built-in one. joints: see `fba.capture.from_skeleton`."""
     if path is None:
         return None
-    from fba.formats.gltf.bodies import read_body as read
+    from fba.formats.gltf.bodies import import_body
 
-    return read(path, joints=joints)
+    return import_body(path, joints=joints)

@@ -8,7 +8,6 @@ from typing import Any, Literal
 
 import click
 
-from fba.choices import Axes
 from fba.cli import inputs, options
 from fba.cli.inputs import Reading
 from fba.cli.joint_options import Maps, MapType
@@ -77,7 +76,7 @@ class SceneOptions(Reading):
         help="What else is shown; repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, "
         "normals; shadows, wrinkles, eyes, teeth, hair=off; background=grey or transparent.",
     )
-    axes: Axes = option(
+    axes: Literal["iso", "vreng"] = option(
         default="iso", help="Which way BAPs turn: as the standard says, or as in some old files."
     )
 

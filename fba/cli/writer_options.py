@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from fba.choices import Axes
 from fba.cli import options
 from fba.cli.inputs import read_body, read_model
 from fba.cli.option_fields import option
@@ -35,7 +34,7 @@ class WriterOptions:
     body: Path | None = option(
         type=options.FILE, metavar="FILE.glb", help="glTF: the body; default: the built-in person."
     )
-    axes: Axes | None = option(
+    axes: Literal["iso", "vreng"] | None = option(
         help="BVH, glTF: which way BAPs turn: as the standard says (default), or as in old files."
     )
 

@@ -78,7 +78,7 @@ def labels() -> tuple[str, ...]:
     return (NEUTRAL, UNKNOWN, *FAMILIES, *loners)
 
 
-class Recogniser:
+class ExpressionRecogniser:
     """Reads expressions from frames as they come.
 
     rate: frames a second. known: bool (68,), the FAPs that the source sends; a FAP that it never sends says

@@ -5,15 +5,15 @@ surfaces(gltf) -> tuple[Surface, ...]    # the surfaces of its scene, all in the
 """
 
 from fba.gltf.reader import read_gltf
-from fba.gltf.scene import Animation, Channel, Gltf, Material, Mesh, Node, Primitive, Skin
+from fba.gltf.scene import Channel, Clip, Gltf, GltfMaterial, GltfMesh, Node, Primitive, Skin
 from fba.gltf.surfaces import Surface, surfaces
 
 __all__ = [
-    "Animation",
     "Channel",
+    "Clip",
     "Gltf",
-    "Material",
-    "Mesh",
+    "GltfMaterial",
+    "GltfMesh",
     "Node",
     "Primitive",
     "Skin",

@@ -7,8 +7,7 @@ from typing import Any, Protocol
 
 from fba.arrays import Float32
 from fba.errors import ModelError
-from fba.gltf.scene import Gltf
-from fba.gltf.scene import Material as GltfMaterial
+from fba.gltf.scene import Gltf, GltfMaterial
 from fba.gltf.values import Value
 from fba.gltf.writer import Builder
 from fba.mesh.meshes import Material, Mesh

@@ -1,33 +1,33 @@
-"""Persona: how an actor moves the face, learnt from tracked points, and played with another person's
-performance.
+"""Persona: how an actor moves the face, learnt from tracked points, and another person's performance in that
+style.
 
-persona = fba.persona.learn([actor]) # actor: a TrackedFace, from `from_point_motion` or of its own
-animation = fba.persona.play(user, persona) # FAPs, which move any face May use: points and recognition of a
-Persona, formats, and the modules of `fba` itself.
+::
+
+    persona = fba.persona.learn([actor])  # actor: a TrackedFace, from `from_point_motion` or `read_recording`
+    animation = fba.persona.animate_as(user, persona)  # FAPs, which move any face
+
+May use: points and recognition of a Persona, formats, and the modules of `fba` itself.
 """
 
 from fba.persona.learning import learn
 from fba.persona.live import LivePersona
-from fba.persona.performance import Performance, perform, play
+from fba.persona.performance import Performance, animate_as, transfer
 from fba.persona.persona import PartStyle, Persona
 from fba.persona.points import TrackedFace, from_point_motion
-from fba.persona.recognition import Recogniser
+from fba.persona.recognition import ClassRecogniser
 from fba.persona.recordings import read_recording, write_recording
-from fba.persona.storage import load_persona, save_persona
 
 __all__ = [
+    "ClassRecogniser",
     "LivePersona",
     "PartStyle",
     "Performance",
     "Persona",
-    "Recogniser",
     "TrackedFace",
+    "animate_as",
     "from_point_motion",
     "learn",
-    "load_persona",
-    "perform",
-    "play",
     "read_recording",
-    "save_persona",
+    "transfer",
     "write_recording",
 ]

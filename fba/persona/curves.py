@@ -14,7 +14,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.persona.points.layout import PARTS
-from fba.persona.recognition import Labels, Recogniser
+from fba.persona.recognition import ClassRecogniser, Labels
 
 FEWEST = 4
 """Frames of a class that tell how a face shows it."""
@@ -64,7 +64,7 @@ def _measure(moved: Float64) -> Float64:
 
 
 @lru_cache(maxsize=4)
-def general_curves(recogniser: Recogniser) -> dict[str, Curves]:
+def general_curves(recogniser: ClassRecogniser) -> dict[str, Curves]:
     """Return how faces move in general, part by part: from the examples of a recogniser."""
     result = {}
     for part in PARTS:

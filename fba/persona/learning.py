@@ -16,7 +16,7 @@ from fba.persona.persona import SHARE_OF_WIDTH, PartStyle, Persona, part_width
 from fba.persona.points import TrackedFace
 from fba.persona.points.distances import mask_distance
 from fba.persona.points.layout import PARTS, part_points, part_vertices
-from fba.persona.recognition import Labels, Recogniser
+from fba.persona.recognition import ClassRecogniser, Labels
 from fba.persona.recognition.faps import face_scale, measure_fapu
 
 REST = 1.5
@@ -31,7 +31,7 @@ def learn(
     *,
     neutral: Sequence[Neutral] | None = None,
     warm_up: int = 0,
-    recogniser: Recogniser | None = None,
+    recogniser: ClassRecogniser | None = None,
 ) -> Persona:
     """Return the Persona of an actor, from one or several recordings.
 
@@ -46,7 +46,7 @@ def learn(
     rests = [None] * len(faces) if neutral is None else list(neutral)
     if len(rests) != len(faces):
         raise OptionError(f"{len(faces)} recordings have {len(rests)} neutral faces")
-    known = Recogniser.default() if recogniser is None else recogniser
+    known = ClassRecogniser.default() if recogniser is None else recogniser
     seen = [observe(face, known, rest, warm_up=warm_up) for face, rest in zip(faces, rests, strict=True)]
     still = np.asarray(np.mean([one.neutral for one in seen], axis=0))
     moved = np.concatenate([one.mask_motion(known) for one in seen])
@@ -83,7 +83,7 @@ def _learn_part(
     source: Intp,
     frame: Intp,
     still: Float64,
-    known: Recogniser,
+    known: ClassRecogniser,
 ) -> PartStyle:
     """Return what the actor does with a part. moved: (S, 86, 3), of all frames that are used."""
     component = known.components[part]

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64
+from fba.choices import Means
 from fba.errors import ModelError
 from fba.parameters import FAP_COUNT
 from fba.persona._restyle import Follower, keep_shut
@@ -14,7 +15,7 @@ from fba.persona.performance import DEFAULT_MEANS, HEAD, MAPPED, choose_masks, u
 from fba.persona.persona import Persona
 from fba.persona.points.layout import PARTS, TRACKED, VERTICES, flat_mask, part_vertices
 from fba.persona.points.registration import MISFIT, MOST_TURNED, register_points
-from fba.persona.recognition import Recogniser, decide
+from fba.persona.recognition import ClassRecogniser, decide
 from fba.persona.recognition.displacements import displacements
 from fba.persona.recognition.faps import face_scale, mask_faps, measure_fapu
 from fba.persona.rest import NEUTRAL_FRAMES
@@ -35,13 +36,13 @@ class LivePersona:
         self,
         persona: Persona,
         *,
-        means: str = DEFAULT_MEANS,
+        means: Means = DEFAULT_MEANS,
         user: Persona | None = None,
         rate: float = 30.0,
-        recogniser: Recogniser | None = None,
+        recogniser: ClassRecogniser | None = None,
     ) -> None:
         self._persona, self._means = persona, usable_means(persona, means)
-        self._known = Recogniser.default() if recogniser is None else recogniser
+        self._known = ClassRecogniser.default() if recogniser is None else recogniser
         self._maps = user_maps(persona, self._known, user) if self._means in MAPPED else {}
         self._followers: dict[str, Follower] = {}
         if self._means == "motion":

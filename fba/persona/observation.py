@@ -11,7 +11,7 @@ from fba.arrays import Bool, Float64, Intp
 from fba.errors import FbaWarning, ModelError, OptionError, Remedy
 from fba.persona.points import Registered, TrackedFace, register
 from fba.persona.points.layout import PARTS, flat_mask
-from fba.persona.recognition import Labels, Recogniser, decide
+from fba.persona.recognition import ClassRecogniser, Labels, decide
 from fba.persona.recognition.displacements import displacements
 from fba.persona.rest import FEWEST, eye_opening, find_rest
 
@@ -37,7 +37,7 @@ class Observation:
     labels: dict[str, Labels]
     registered: Registered
 
-    def mask_motion(self, recogniser: Recogniser) -> Float64:
+    def mask_motion(self, recogniser: ClassRecogniser) -> Float64:
         """Return how far the vertices of the face's own mask have moved: float64 (S, 86, 3), millimetres.
 
         Depth, which no picture shows, is that of the nearest example of the mouth's class.
@@ -48,7 +48,7 @@ class Observation:
 
 
 def observe(
-    face: TrackedFace, recogniser: Recogniser, neutral: Neutral = None, *, warm_up: int = 0
+    face: TrackedFace, recogniser: ClassRecogniser, neutral: Neutral = None, *, warm_up: int = 0
 ) -> Observation:
     """Return what is seen of a face.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Intp
+from fba.choices import Means
 from fba.errors import FbaWarning, OptionError, did_you_mean
 from fba.parameters import FAP_COUNT
 from fba.persona._restyle import keep_shut, restyle
@@ -20,7 +21,7 @@ from fba.persona.persona import MEANS, PartStyle, Persona
 from fba.persona.points import TrackedFace
 from fba.persona.points.distances import mask_distance
 from fba.persona.points.layout import PARTS, part_points, part_vertices, standard_mask
-from fba.persona.recognition import Labels, Recogniser
+from fba.persona.recognition import ClassRecogniser, Labels
 from fba.persona.recognition.faps import face_scale, mask_faps, measure_fapu, told_numbers
 from fba.tracks import FaceTrack
 
@@ -31,7 +32,7 @@ EASE = 2
 each other."""
 BLOCK = 256
 """Frames whose distances from masks are computed at once."""
-DEFAULT_MEANS = "motion"
+DEFAULT_MEANS: Means = "motion"
 MAPPED = ("motion", "curves")
 """Means that need no masks: every frame is a key."""
 
@@ -66,14 +67,14 @@ class Performance:
         return result
 
 
-def perform(
+def transfer(
     face: TrackedFace,
     persona: Persona,
     *,
-    means: str = DEFAULT_MEANS,
+    means: Means = DEFAULT_MEANS,
     neutral: Neutral = None,
     user: Persona | None = None,
-    recogniser: Recogniser | None = None,
+    recogniser: ClassRecogniser | None = None,
 ) -> Performance:
     """Return a user's performance in an actor's way.
 
@@ -84,7 +85,7 @@ def perform(
     then take the place of "motion".
     """
     means = usable_means(persona, means)
-    known = Recogniser.default() if recogniser is None else recogniser
+    known = ClassRecogniser.default() if recogniser is None else recogniser
     seen = observe(face, known, neutral)
     own, here = seen.mask_motion(known), measure_fapu(seen.neutral)
     acted = np.zeros_like(own)
@@ -118,7 +119,7 @@ def perform(
     return Performance(seen.rows, own, acted, labels, used, chosen, keys)
 
 
-def usable_means(persona: Persona, means: str) -> str:
+def usable_means(persona: Persona, means: Means) -> Means:
     """Return the means that a Persona has what it takes for, and warn where they are others than asked for.
 
     Raises OptionError for means that do not exist.
@@ -137,7 +138,9 @@ def usable_means(persona: Persona, means: str) -> str:
     return "curves"
 
 
-def user_maps(persona: Persona, recogniser: Recogniser, user: Persona | None = None) -> dict[str, CurveMap]:
+def user_maps(
+    persona: Persona, recogniser: ClassRecogniser, user: Persona | None = None
+) -> dict[str, CurveMap]:
     """Return what makes the actor's displacements of each part of a user's.
 
     user: the user's own Persona; None for somebody who moves as people do in general.
@@ -223,33 +226,33 @@ def bridge(style: PartStyle, chosen: Intp, keys: Bool, frames: Intp) -> Float64:
     return np.asarray((values[place] * (1 - share) + values[after] * share).reshape(len(chosen), *width))
 
 
-def play(
+def animate_as(
     face: TrackedFace,
     persona: Persona | None,
     *,
-    means: str = DEFAULT_MEANS,
+    means: Means = DEFAULT_MEANS,
     neutral: Neutral = None,
     user: Persona | None = None,
     head: bool = True,
-    recogniser: Recogniser | None = None,
+    recogniser: ClassRecogniser | None = None,
 ) -> Animation:
     """Return a user's performance in an actor's way, as FAPs that move any face.
 
     persona: None for the user's own way. head: whether the user's head turns, too. Other options and errors
-    as for `perform`. Frames in which the user is not seen are interpolated; before and after, the face
+    as for `transfer`. Frames in which the user is not seen are interpolated; before and after, the face
     keeps still.
     """
-    known = Recogniser.default() if recogniser is None else recogniser
+    known = ClassRecogniser.default() if recogniser is None else recogniser
     if persona is None:
         seen = observe(face, known, neutral)
         rows, values = seen.rows, own_faps(seen, known)
     else:
-        performance = perform(face, persona, means=means, neutral=neutral, user=user, recogniser=known)
+        performance = transfer(face, persona, means=means, neutral=neutral, user=user, recogniser=known)
         rows, values = performance.rows, mask_faps(performance.acted, persona.fapu, known.jaw)
     return make_animation(face, rows, values, head=head, name=face.name)
 
 
-def own_faps(seen: Observation, recogniser: Recogniser) -> Float64:
+def own_faps(seen: Observation, recogniser: ClassRecogniser) -> Float64:
     """Return the FAPs (S, 68) of a face that nobody's way is given to."""
     return mask_faps(seen.mask_motion(recogniser), measure_fapu(seen.neutral), recogniser.jaw)
 

@@ -5,17 +5,25 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, get_args
 
 import numpy as np
 
-from fba.arrays import Float64, Intp
+from fba.arrays import Array, Float64, Intp
+from fba.atomic import atomic
+from fba.choices import Means
+from fba.errors import FormatError, ModelError
 from fba.face import Fapu
-from fba.persona.curves import Curves
+from fba.limits import DEFAULT_LIMITS, Limits
+from fba.persona.curves import RANKS, Curves
 from fba.persona.motion import Motion
-from fba.persona.points.layout import flat_mask, part_vertices
+from fba.persona.points.layout import PARTS, TRACKED, flat_mask, part_vertices
+from fba.persona.recognition import ClassRecogniser
+from fba.persona.recognition.archive import Fields, pack_archive, read_archive
 from fba.persona.recognition.faps import measure_fapu
+from fba.source import Path
 
-MEANS = ("motion", "curves", "masks")
+MEANS: tuple[Means, ...] = get_args(Means)
 """How a user's face becomes the actor's, part by part: by smooth maps that bring together how both show each
 class and by the statistics of the actor's motion, by the maps alone, by the nearest mask of the user's
 class."""
@@ -26,6 +34,16 @@ WIDTHS = {
     "right_brow": (21, 17),
 }  # fmt: skip
 """Points between which that width is measured: corners of the mouth, and of the eye."""
+KIND, VERSION, OLDEST = "persona", 2, 1
+"""Version 1 has no statistics of motion."""
+MOTION = ("seconds", "spread", "speed")
+COUNTS = ("frames", "kept", "turned", "untracked")
+LARGEST = 500.0
+"""Millimetres: vertices of faces move less."""
+MOST_FRAMES = 1 << 40
+MOST_SECONDS = 1e9
+MOST_LOG = 10.0
+"""Natural logarithm: deviations in millimetres, and speeds for them per second, are within e^10 of 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +100,56 @@ class Persona:
     turned: int
     untracked: int
 
+    @staticmethod
+    def load(
+        path: Path, recogniser: ClassRecogniser | None = None, *, limits: Limits = DEFAULT_LIMITS
+    ) -> Persona:
+        """Return a Persona from a file. recogniser: what is used with it; None for the default.
+
+        A file of version 1 gives one without statistics of motion. Raises FormatError for damage, or a
+        Persona that was learnt with other classes; UnsupportedError for another version; LimitError.
+        """
+        known = ClassRecogniser.default() if recogniser is None else recogniser
+        header, arrays = read_archive(path, KIND, VERSION, limits, oldest=OLDEST)
+        fields = Fields(path, header, arrays)
+        moves = header["version"] > OLDEST
+        parts = {part: _read_part(fields, path, part, known, moves=moves) for part in PARTS}
+        counts = [fields.number(name) for name in COUNTS]
+        if any(count < 0 or count > MOST_FRAMES or count != int(count) for count in counts):
+            raise FormatError(f"{', '.join(COUNTS)} must be whole numbers, not {counts}", path=path)
+        neutral = fields.array("neutral", TRACKED, 2)
+        persona = Persona(fields.text("name"), neutral, parts, *map(int, counts))
+        try:
+            persona.fapu  # noqa: B018 - raises ModelError for an impossible neutral face
+        except ModelError as error:
+            raise FormatError(error.finding, path=path) from error
+        return persona
+
+    def save(self, path: Path, recogniser: ClassRecogniser | None = None) -> None:
+        """Write the Persona, atomically: a `.persona` file, described in docs/persona.md.
+
+        recogniser: what it was learnt with; None for the default. A Persona that has no statistics of motion
+        is written as version 1, in which they are not.
+        """
+        known = ClassRecogniser.default() if recogniser is None else recogniser
+        header: dict[str, Any] = {"name": self.name, **{name: getattr(self, name) for name in COUNTS}}
+        arrays: dict[str, Array] = {"neutral": self.neutral.astype(np.float32)}
+        for part, style in self.parts.items():
+            header[f"{part}.labels"] = list(style.labels)
+            header[f"{part}.classes"] = list(known.components[part].classes)
+            arrays |= {
+                f"{part}.moved": style.moved.astype(np.float32),
+                f"{part}.source": style.source.astype(np.int32),
+                f"{part}.frame": style.frame.astype(np.int32),
+                f"{part}.curves": style.curves.moved.astype(np.float32),
+                f"{part}.known": style.curves.known.astype(np.uint8),
+            }
+            if self.motions is not None:
+                motion = self.motions[part]
+                arrays |= {f"{part}.{name}": getattr(motion, name).astype(np.float32) for name in MOTION}
+        with atomic(path) as file:
+            file.write(pack_archive(KIND, VERSION if self.motions else OLDEST, header, arrays))
+
     @cached_property
     def fapu(self) -> Fapu:
         """The actor's FAPU, millimetres on the standard mask."""
@@ -126,3 +194,38 @@ def part_width(points: Float64, part: str) -> float:
     """Return the width of the mouth, or of the eye of a part, in neutral points (64, 2)."""
     one, other = WIDTHS[part]
     return float(np.linalg.norm(points[one - 1] - points[other - 1]))
+
+
+def _read_part(fields: Fields, path: Path, part: str, known: ClassRecogniser, *, moves: bool) -> PartStyle:
+    """Return the style of a part. moves: whether there are statistics of motion. Raises FormatError."""
+    classes = known.components[part].classes
+    if fields.texts(f"{part}.classes") != classes:
+        raise FormatError(
+            f"{part}: it was learnt with other classes than are recognised here; learn it again", path=path
+        )
+    labels = fields.texts(f"{part}.labels")
+    odd = [label for label in labels if not set(label.split("/")) <= set(classes)]
+    if odd:
+        raise FormatError(f"{part}: there is no class {odd[0]!r}"[:200], path=path)
+    vertices = len(part_vertices(part))
+    moved = fields.array(f"{part}.moved", len(labels), vertices, 3)
+    curves = fields.array(f"{part}.curves", len(classes), len(RANKS), 2 * vertices)
+    if max(float(np.abs(array).max(initial=0.0)) for array in (moved, curves)) > LARGEST:
+        raise FormatError(f"{part}: vertices move by more than {LARGEST:g} mm", path=path)
+    source, frame = (
+        fields.indices(f"{part}.{name}", MOST_FRAMES, len(labels)) for name in ("source", "frame")
+    )
+    shown = fields.array(f"{part}.known", len(classes)) > 0
+    motion = _read_motion(fields, path, part, len(classes) + 1, 2 * vertices) if moves else None
+    return PartStyle(labels, moved, source, frame, Curves(curves, shown), motion)
+
+
+def _read_motion(fields: Fields, path: Path, part: str, rows: int, width: int) -> Motion:
+    """Return how a part moves. Raises FormatError."""
+    seconds = fields.array(f"{part}.seconds", rows)
+    spread, speed = fields.array(f"{part}.spread", rows, width), fields.array(f"{part}.speed", rows)
+    if seconds.min() < 0 or seconds.max() > MOST_SECONDS:
+        raise FormatError(f"{part}: seconds must be from 0 to {MOST_SECONDS:g}", path=path)
+    if max(np.abs(spread).max(), np.abs(speed).max()) > MOST_LOG:
+        raise FormatError(f"{part}: spread and speed must be from -{MOST_LOG:g} to {MOST_LOG:g}", path=path)
+    return Motion(seconds, spread, speed)

@@ -59,7 +59,7 @@ def read_recording(
         return from_point_motion(motion, aspect=aspect)
 
 
-def write_recording(face: TrackedFace, path: Path) -> None:
+def write_recording(path: Path, face: TrackedFace) -> None:
     """Write 64 points as an archive of NumPy, atomically. Frames are taken to be evenly spaced."""
     arrays: dict[str, Array] = {
         POINTS: face.points.astype(np.float32),

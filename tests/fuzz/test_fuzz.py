@@ -144,7 +144,7 @@ READING = {
         "fba.formats.face_tables.points_csv", "fba.formats.face_tables.points_json",
     ),
     "smpl": ("fba.formats.smpl.reader", "fba.formats.numpy_archives"),
-    "persona": ("fba.persona.storage", "fba.persona.recognition.archive"),
+    "persona": ("fba.persona.persona", "fba.persona.recognition.archive"),
     "live": (
         "fba.live.protocols.livelink", "fba.live.protocols.ifacialmocap", "fba.live.protocols.vtube",
         "fba.live.protocols.vmc", "fba.live.protocols._osc",

@@ -38,7 +38,7 @@ from fba.mesh.obj import read_obj
 from fba.mesh.ply import read_ply
 from fba.mesh.vrml import read_vrml
 from fba.mesh.wfm import read_wfm
-from fba.persona.storage import load_persona
+from fba.persona import Persona
 from tools.fuzz._outcome import ContractError, Outcome
 from tools.fuzz._small_head import small_head_obj, small_head_points, small_head_vrml
 
@@ -116,7 +116,7 @@ def check_smpl(data: bytes, folder: Path) -> Outcome:
 
 def check_persona(data: bytes, folder: Path) -> Outcome:
     """Load a Persona."""
-    return _check_file(_with_checksums(data), folder / "input.persona", load_persona)
+    return _check_file(_with_checksums(data), folder / "input.persona", Persona.load)
 
 
 _MEMBER, _DIRECTORY = b"PK\3\4", b"PK\1\2"

@@ -185,11 +185,11 @@ def _make_blend(asked: _Asked) -> Blend:
 
 
 def _perform(blend: Blend, motion: _Motion, send: Sending) -> Animation:
-    from fba.emotion import perform
+    from fba.emotion import animate
 
     seconds = DEFAULT_SECONDS if motion.seconds is None else motion.seconds
     ease = min(DEFAULT_EASE, seconds / 2) if motion.ease is None else motion.ease
-    return perform(blend, seconds=seconds, ease=ease, rate=motion.rate or DEFAULT_RATE, send=send)
+    return animate(blend, seconds=seconds, ease=ease, rate=motion.rate or DEFAULT_RATE, send=send)
 
 
 def _count_bits(blend: Blend, motion: _Motion) -> dict[str, int | None]:

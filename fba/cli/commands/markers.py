@@ -196,10 +196,10 @@ def _write_moved(
     outputs: Outputs,
 ) -> None:
     """Write the head that markers move: its animation as glTF, a picture or a film."""
-    from fba.capture.virtual_markers import perform
+    from fba.capture.virtual_markers import move_head
 
     with Progress("preparing", None):
-        performance = perform(motion, head, mapping, request.neutral)  # says what is wrong or odd
+        performance = move_head(motion, head, mapping, request.neutral)  # says what is wrong or odd
     if output.suffix.lower() == ".glb":
         from fba.formats.gltf.moved_head import write_moved_head
 

@@ -357,14 +357,14 @@ def fit(
 
 def _read_points(path: Path, model: FaceModel) -> Float64:
     """Return feature points of a file; for an Xface file without its mesh, those that its distances imply."""
-    from fba.face.importers.points.fdp import load_fdp
+    from fba.face.importers.points.fdp import read_fdp
     from fba.face.importers.points.points_file import read_points
     from fba.face.importers.points.xface import xface_points
     from fba.mesh.text_files import find_beside
 
     if path.suffix.lower() in (".json", ".csv"):
         return read_points(path).points
-    fdp = load_fdp(path)
+    fdp = read_fdp(path)
     if fdp.format != "xface":
         return fdp.points
     meshes = sorted({mesh.rpartition("_")[0] for mesh, _ in fdp.vertices.values()})

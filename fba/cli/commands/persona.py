@@ -103,11 +103,11 @@ class _Performer:
 
     def play(self, file: Path, tracking: _Tracking) -> tuple[Persona | None, Animation]:
         """Return the actor's Persona, if any, and a user's recording played by it."""
-        from fba.persona.performance import play
+        from fba.persona.performance import animate_as
 
         persona = None if self.persona_file is None else _load(self.persona_file, tracking.limit)
         user = None if self.user_file is None else _load(self.user_file, tracking.limit)
-        return persona, play(
+        return persona, animate_as(
             tracking.read(file),
             persona,
             means=self.means,
@@ -165,13 +165,12 @@ def learn_command(
         written.append(Output("--report", report, text=True))
     outputs = Outputs(written, actors, no_clobber=no_clobber)
     from fba.persona.learning import learn
-    from fba.persona.storage import save_persona
 
     neutral = tracking.neutral
     faces = [tracking.read(path) for path in actors]
     persona = learn(faces, name or actors[0].stem, neutral=[neutral] * len(faces), warm_up=warm_up)
     with outputs.file(output) as file:
-        save_persona(persona, file)
+        persona.save(file)
     if report is not None:
         from fba.persona.report import make_report
 
@@ -245,10 +244,10 @@ def play_command(
 
 
 def _load(path: Path, limits: Limits) -> Persona:
-    from fba.persona.storage import load_persona
+    from fba.persona import Persona
 
     with input_file(path) as file:
-        return load_persona(file, limits=limits)
+        return Persona.load(file, limits=limits)
 
 
 def _describe(persona: Persona) -> dict[str, Any]:
@@ -272,9 +271,9 @@ def _describe(persona: Persona) -> dict[str, Any]:
 
 
 def _missing(persona: Persona) -> dict[str, list[str]]:
-    from fba.persona.recognition import Recogniser
+    from fba.persona.recognition import ClassRecogniser
 
-    known = Recogniser.default().components
+    known = ClassRecogniser.default().components
     return persona.missing({part: component.classes for part, component in known.items()})
 
 

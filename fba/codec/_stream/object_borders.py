@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from fba.codec._plane import syntax
 from fba.codec._stream.mark import SEQUENCE, USER_DATA, Mark, read_mark
@@ -50,8 +50,8 @@ class ObjectBorders:
 
     def begin_object(self, byte: int) -> None:
         """Begin another object, at this byte of the stream."""
-        marked: Iterator[BapTable] = (mark.table for mark in self._marks if mark.begin <= byte < mark.end)
-        self.table = self._bap_steps or self._before or next(marked, _DEFAULT_TABLE)
+        marked = next((mark.table for mark in self._marks if mark.begin <= byte < mark.end), None)
+        self.table = self._bap_steps or self._before or marked or _DEFAULT_TABLE
         self.count += 1
         self.has_body = False
         self.end_code = None

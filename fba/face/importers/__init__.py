@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from fba.choices import UpAxis
 from fba.errors import ModelError, OptionError
 from fba.face.importers._sniffing import KINDS, sniff
 from fba.face.model import FaceModel
@@ -20,7 +21,7 @@ def import_model(
     kind: str | None = None,
     points: object = None,
     unit: float | None = None,
-    up: str = "y",
+    up: UpAxis = "y",
     kinds: Mapping[str, str] | None = None,
     name: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
@@ -56,7 +57,7 @@ def _import(
     *,
     points: object,
     unit: float | None,
-    up: str,
+    up: UpAxis,
     kinds: Mapping[str, str] | None,
     name: str | None,
     limits: Limits,

@@ -20,6 +20,7 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.skeleton import MAX_FRAMES, check_memory
+from fba.choices import Ground, Origin, SignedUpAxis, Spine
 from fba.errors import FbaWarning, FormatError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
@@ -73,13 +74,13 @@ def read(
     *,
     rate: Fraction | int | str | None = None,
     scale: float | None = None,
-    origin: str = "source",
-    ground: str = "floor",
+    origin: Origin = "source",
+    ground: Ground = "floor",
     plant: bool = True,
-    spine: str | int = "spread",
+    spine: Spine | int = "spread",
     joints: Mapping[str, str] | None = None,
     rest: str | int = "auto",
-    up: str = "auto",
+    up: SignedUpAxis = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the motion of a BVH file as BAPs; see `fba.capture.from_skeleton` for the options.

@@ -11,6 +11,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture.points import PointMotion, from_points
+from fba.choices import Gaze
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.limits import Limits
 from fba.source import Path, naming_file
@@ -78,7 +79,7 @@ def points_to_animation(
     *,
     markers: Mapping[str, str] | None,
     neutral: Neutral,
-    gaze: str,
+    gaze: Gaze,
     head_path: bool,
     aspect: float | None,
 ) -> Animation:

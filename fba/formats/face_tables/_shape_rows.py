@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from typing import get_args
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.capture.blendshapes import ShapeMotion, from_blendshapes
 from fba.capture.sampling import find_gaps
+from fba.choices import Swap
 from fba.errors import FbaWarning, OptionError
 from fba.face.shape_names import arkit_names
 from fba.formats.face_tables._tables import named
@@ -21,7 +23,7 @@ from fba.source import Path, naming_file
 
 __all__ = ["check_weights", "find_lacks", "find_swap", "shape_of", "to_animation"]
 
-SWAPS = ("auto", "yes", "no")
+SWAPS: tuple[Swap, ...] = get_args(Swap)
 SWAPPED = (("mouthLeft", "mouthRight"), ("jawLeft", "jawRight"))
 """Labels that Live Link Face's tables have the wrong way round."""
 TELLING = 0.3
@@ -67,7 +69,7 @@ def find_lacks(names: Sequence[str], weights: Float64, times: Float64, rate: Fra
     return findings
 
 
-def find_swap(motion: ShapeMotion, swap: str, *, expected: bool) -> ShapeMotion:
+def find_swap(motion: ShapeMotion, swap: Swap, *, expected: bool) -> ShapeMotion:
     """Return a capture with the labels of `SWAPPED` the right way round; its findings say what was done.
 
     swap: "yes", "no", or "auto": they are changed where mouths go to the side on which nobody smiles. Where

@@ -20,6 +20,7 @@ from fba.arrays import Float64
 from fba.capture.blendshapes import ShapeMotion
 from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_rate
+from fba.choices import Swap
 from fba.errors import FormatError, ModelError, Remedy
 from fba.face.shape_names import arkit_names
 from fba.formats.face_tables._faces import angle_unit
@@ -63,7 +64,7 @@ def read(
     *,
     rate: Fraction | int | str | None = None,
     source_rate: Fraction | int | str | None = None,
-    swap: str = "auto",
+    swap: Swap = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return a captured face as FAPs, at `rate` or at the rate of the table's own times.
@@ -79,7 +80,7 @@ def read_face(
     path: Path,
     *,
     source_rate: Fraction | int | str | None = None,
-    swap: str = "auto",
+    swap: Swap = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> ShapeMotion:
     """Return weights, head and eyes as they are in a table.

@@ -18,6 +18,7 @@ from fba.animation import Animation
 from fba.arrays import Float64, Int64, to_float64
 from fba.capture.blendshapes import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
+from fba.choices import Swap
 from fba.errors import FormatError, Remedy, UnsupportedError
 from fba.formats.face_tables._shape_rows import check_weights, find_lacks, find_swap, to_animation
 from fba.formats.face_tables._tables import named
@@ -56,7 +57,7 @@ def read(
     path: Path,
     *,
     rate: Fraction | int | str | None = None,
-    swap: str = "auto",
+    swap: Swap = "auto",
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
@@ -69,7 +70,7 @@ def read(
 
 
 def read_face(
-    path: Path, *, swap: str = "auto", face: str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, swap: Swap = "auto", face: str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> ShapeMotion:
     """Return weights, head and eyes as they were sent.
 

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 from fba.animation import Animation
 from fba.capture.points import PointMotion
+from fba.choices import Gaze
 from fba.formats.face_tables import points_arrays, points_csv, points_json
 from fba.formats.face_tables._points import Neutral, points_to_animation
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -27,7 +28,7 @@ def read(
     face: str | None = None,
     markers: dict[str, str] | None = None,
     neutral: Neutral = "auto",
-    gaze: str = "none",
+    gaze: Gaze = "none",
     head_path: bool = True,
     aspect: float | None = None,
     limits: Limits = DEFAULT_LIMITS,

@@ -21,8 +21,7 @@ from fba.face.resolve import resolve
 from fba.formats.gltf._fap_joints import FapJoint
 from fba.formats.gltf._morph_targets import Targets
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
-from fba.gltf import Animation as Clip
-from fba.gltf import Gltf
+from fba.gltf import Clip, Gltf
 from fba.gltf.values import Value
 from fba.gltf.writer import Builder
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP

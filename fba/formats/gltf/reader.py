@@ -20,14 +20,14 @@ from fba.body.skeleton import Skeleton
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.bones import find_bones
 from fba.capture.skeleton import MAX_FRAMES, check_memory
+from fba.choices import Ground, Origin, SignedUpAxis, Spine
 from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, key_times
 from fba.formats.gltf._skeletons import find_joints
 from fba.formats.gltf.clips import choose_clip
 from fba.formats.gltf.face_motion import find_face_clip, nodes_of_faces, read_face_motion
-from fba.gltf import Animation as Clip
-from fba.gltf import Gltf, read_gltf
+from fba.gltf import Clip, Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 
@@ -59,14 +59,14 @@ def read(
     *,
     rate: Fraction | int | str | None = None,
     scale: float | None = None,
-    origin: str = "source",
-    ground: str = "floor",
+    origin: Origin = "source",
+    ground: Ground = "floor",
     plant: bool = True,
-    spine: str | int = "spread",
+    spine: Spine | int = "spread",
     joints: Mapping[str, str] | None = None,
     clip: str | int | None = None,
     rest: str | int = "auto",
-    up: str = "auto",
+    up: SignedUpAxis = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Read the animation of a glTF skeleton as BAPs, and that of its face as FAPs, see `read_face_motion`.

@@ -8,6 +8,7 @@ from fractions import Fraction
 from fba.animation import Animation
 from fba.capture.markers.faces import from_markers
 from fba.capture.markers.motion import MarkerMotion
+from fba.choices import Gaze
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 
@@ -20,7 +21,7 @@ def read_face(
     rate: Fraction | int | str | None = None,
     markers: Mapping[str, str] | None = None,
     neutral: str | int | tuple[float, float] = "auto",
-    gaze: str = "none",
+    gaze: Gaze = "none",
     head_path: bool = True,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:

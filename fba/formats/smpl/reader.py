@@ -26,6 +26,7 @@ from fba.capture.blendshapes.combination import JAW_OPEN
 from fba.capture.blendshapes.conversion import convert_rows
 from fba.capture.sampling import find_rate, interpolate
 from fba.capture.skeleton import check_memory
+from fba.choices import Ground, Origin, SignedUpAxis, Spine
 from fba.errors import FormatError, Remedy
 from fba.formats.numpy_archives import ZIP, read_arrays
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -71,13 +72,13 @@ def read(
     *,
     rate: Fraction | int | str | None = None,
     source_rate: Fraction | int | str | None = None,
-    origin: str = "source",
-    ground: str = "floor",
+    origin: Origin = "source",
+    ground: Ground = "floor",
     plant: bool = True,
-    spine: str | int = "spread",
+    spine: Spine | int = "spread",
     joints: Mapping[str, str] | None = None,
     rest: str | int = "auto",
-    up: str = "auto",
+    up: SignedUpAxis = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the motion of a body as BAPs, and of its jaw and eyes, where they move, as FAPs.

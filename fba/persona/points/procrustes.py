@@ -9,7 +9,7 @@ from fba.arrays import Float64
 from fba.errors import ModelError
 
 
-def fit_similarity(points: Float64, targets: Float64, *, mirror: bool = True) -> geometry.FittedSimilarity:
+def fit_face_points(points: Float64, targets: Float64, *, mirror: bool = True) -> geometry.FittedSimilarity:
     """Return the similarity that brings points (..., N, Q) closest to targets (..., N, P), P >= Q.
 
     mirror: whether the rotation may be a reflection. Raises ModelError where all points coincide.

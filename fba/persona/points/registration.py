@@ -8,7 +8,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.persona.points.layout import REGISTERED, TRACKED, standard_points
-from fba.persona.points.procrustes import fit_similarity
+from fba.persona.points.procrustes import fit_face_points
 from fba.persona.points.tracked import TrackedFace
 from fba.rotations import axis_matrices
 
@@ -63,7 +63,7 @@ def register_points(points: Float64, yaw: Float64) -> tuple[Float64, Float64]:
     standard = standard_points()[:TRACKED] @ np.swapaxes(turn, 1, 2)  # (T, 64, 3)
     rows = [number - 1 for number in REGISTERED]
     upright = points * TO_UP
-    similarity = fit_similarity(upright[:, rows], standard[:, rows, :2], mirror=False)
+    similarity = fit_face_points(upright[:, rows], standard[:, rows, :2], mirror=False)
     laid = similarity.apply(upright)
     deep = standard[:, :, 2]
     # the first row of the inverse turn: x of the face ahead, from x and z of the turned one

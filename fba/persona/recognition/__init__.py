@@ -5,6 +5,6 @@ May use: the points of a Persona, and what reads arrays of numbers.
 
 from fba.persona.recognition.component import Component
 from fba.persona.recognition.network import Network, train
-from fba.persona.recognition.recogniser import Labels, Recogniser, decide
+from fba.persona.recognition.recogniser import ClassRecogniser, Labels, decide
 
-__all__ = ["Component", "Labels", "Network", "Recogniser", "decide", "train"]
+__all__ = ["ClassRecogniser", "Component", "Labels", "Network", "decide", "train"]

@@ -1,4 +1,4 @@
-"""`Recogniser`: what was learnt of faces in general: five components, examples with their depth, the jaw."""
+"""`ClassRecogniser`: what was learnt of faces in general: five components, examples with depth, the jaw."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ NONE = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Recogniser:
+class ClassRecogniser:
     """What recognises expressions, and knows what a picture does not show.
 
     components: by part. classes: names of what the examples are. example_classes: int (N,). example_labels:
@@ -55,12 +55,12 @@ class Recogniser:
     about: str
 
     @staticmethod
-    def default() -> Recogniser:
+    def default() -> ClassRecogniser:
         """Return the one that comes with fba, trained with faces that are made up (docs/persona.md)."""
         return _default()
 
     @staticmethod
-    def load(path: Path, limits: Limits = DEFAULT_LIMITS) -> Recogniser:
+    def load(path: Path, limits: Limits = DEFAULT_LIMITS) -> ClassRecogniser:
         """Return one from a file. Raises FormatError, UnsupportedError for another version, LimitError."""
         header, arrays = read_archive(path, KIND, VERSION, limits)
         return _unpack(Fields(path, header, arrays), path)
@@ -102,12 +102,12 @@ class Recogniser:
 
 
 @cache
-def _default() -> Recogniser:
+def _default() -> ClassRecogniser:
     with as_file(files(__package__) / "default.recogniser") as path:
-        return Recogniser.load(path)
+        return ClassRecogniser.load(path)
 
 
-def _pack(one: Recogniser) -> bytes:
+def _pack(one: ClassRecogniser) -> bytes:
     arrays: dict[str, Array] = {
         "depth": one.depth.astype(np.float16), "jaw": one.jaw.astype(np.float32),
         "example_classes": one.example_classes.astype(np.uint8),
@@ -129,7 +129,7 @@ def _pack(one: Recogniser) -> bytes:
     return pack_archive(KIND, VERSION, header, arrays)
 
 
-def _unpack(fields: Fields, path: Path) -> Recogniser:
+def _unpack(fields: Fields, path: Path) -> ClassRecogniser:
     classes = fields.texts("classes")
     example_classes = fields.indices("example_classes", len(classes))
     count = len(example_classes)
@@ -158,7 +158,7 @@ def _unpack(fields: Fields, path: Path) -> Recogniser:
         labels[part] = fields.array(f"{part}.labels", count, len(names)) > 0
     depth = fields.array("depth", count, VERTICES)
     jaw = fields.array("jaw", len(JAW_FAPS))
-    return Recogniser(
+    return ClassRecogniser(
         components, classes, example_classes, labels, scores, depth, jaw, vertices, fields.text("about")
     )
 

@@ -9,7 +9,7 @@ from fba.persona.points.layout import PARTS, VERTICES, flat_mask, part_vertices
 from fba.persona.recognition.component import Component, train_component
 from fba.persona.recognition.displacements import displacements
 from fba.persona.recognition.faps import face_scale, mask_faps, measure_fapu
-from fba.persona.recognition.recogniser import JAW_FAPS, Recogniser
+from fba.persona.recognition.recogniser import JAW_FAPS, ClassRecogniser
 from tools.persona.training.classes import class_labels, face_classes, part_classes
 from tools.persona.training.examples import Examples
 
@@ -23,7 +23,9 @@ NEUTRALS = 3
 """Neutral examples of a part are at most this many times those of its largest class."""
 
 
-def train_recogniser(examples: Examples, *, tries: int = 3, seed: int = 1, about: str = "") -> Recogniser:
+def train_recogniser(
+    examples: Examples, *, tries: int = 3, seed: int = 1, about: str = ""
+) -> ClassRecogniser:
     """Return what examples teach; every fifth person is held back for validation."""
     check = examples.person % HELD == HELD - 1
     random = np.random.default_rng(seed)
@@ -36,7 +38,7 @@ def train_recogniser(examples: Examples, *, tries: int = 3, seed: int = 1, about
             part, part_classes(part), moved[part][used], targets[used], check[used], tries=tries, seed=seed
         )
     kept = _stored(examples)
-    return Recogniser(
+    return ClassRecogniser(
         components,
         tuple(one.name for one in face_classes()),
         examples.classes[kept],
@@ -90,5 +92,5 @@ def _fit_jaw(examples: Examples) -> Float64:
         fapu = measure_fapu(examples.neutral[rows[0]])
         values[rows] = mask_faps(moved[rows], fapu, np.zeros(len(JAW_FAPS)))[:, [fap - 1 for fap in JAW_FAPS]]
     if not examples.jaw.any():  # scans do not tell it: as of faces that are made up
-        return Recogniser.default().jaw
+        return ClassRecogniser.default().jaw
     return np.asarray(np.linalg.lstsq(values, examples.jaw, rcond=None)[0])
