@@ -89,8 +89,9 @@ def prepare(
         ).with_remedies(Remedy("rest", "choose one of these with {}", "0"))
     matching.check_root(skeleton)
     check_extent(motion)
-    family, mapped, sure, how = find_bones(motion, joints, skeleton)
-    confidence, reasons = {"bones": sure}, {"bones": how}
+    bones = find_bones(motion, joints, skeleton)
+    mapped = bones.joints
+    confidence, reasons = {"bones": bones.confidence}, {"bones": bones.reason}
     few = _few(motion)
     quaternions, positions = few.world()
     at_rest = standing.measure(motion.rest()[None], mapped)
@@ -119,7 +120,7 @@ def prepare(
             chosen = f"frame {frame}"
     if chosen != "motion":
         level = correct_rest(level, mapped)
-    result = Preparation(level, mapped, family, chosen, axis, confidence, reasons)
+    result = Preparation(level, mapped, bones.family, chosen, axis, confidence, reasons)
     _refuse_doubt(result, joints is not None, rest != "auto", up != "auto")
     if found_up.doubt:
         warning = FbaWarning(f"up is taken to be {axis}: {found_up.doubt}")

@@ -52,7 +52,7 @@ WEIGHT = 0.5
 """Of classes against all frames, where they were seen long enough."""
 ENOUGH = 1.0
 """Seconds of a class that count by half."""
-MEANS = ("masks", "curves", "motion")
+MEANS: tuple[Means, ...] = ("masks", "curves", "motion")
 EVERY = 4
 """Frames from one that masks are compared with to the next."""
 

@@ -180,11 +180,12 @@ def _read_times(table: Table, source_rate: Fraction | int | str | None) -> _Time
 
     coded, timed, counted = column(TIME_CODE), column(SECONDS), column(FRAMES)
     if coded is not None:
-        seconds, rate, start = read_time_codes(table.column(coded), table.lines, table.path)
+        codes = read_time_codes(table.column(coded), table.lines, table.path)
+        seconds, rate = codes.seconds, codes.rate
         check_order(seconds, table.lines, table.path)
         if len(seconds) > 1 and float(np.median(np.diff(seconds))) * rate > SPARSE:
             rate = find_rate(seconds)  # fewer frames than the time codes count
-        return _Times(seconds, rate, start, True)
+        return _Times(seconds, rate, codes.start, True)
     if timed is not None:
         read = table.numbers([timed])[:, 0]
         if np.isnan(read).any():

@@ -102,7 +102,7 @@ def _find_start(
         if codes[0]:
             filled = [code or codes[0] for code in codes]
             with suppress(FormatError):  # codes of another kind
-                return read_time_codes(filled, numbers, path)[2]
+                return read_time_codes(filled, numbers, path).start
     begun = parse_time_of_day(settings.get("capture start time", ""))
     return None if begun is None else begun + float(np.nan_to_num(times[0]))
 
