@@ -6,15 +6,15 @@ import numpy as np
 
 from fba.gltf._accessors import Accessors
 from fba.gltf._document import MAX_ITEMS, Document
-from fba.gltf._scene import Animation, Channel, Mesh, Node
+from fba.gltf._scene import Channel, Clip, GltfMesh, Node
 from fba.gltf._values import Value
 
 TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 
 
 def read_animations(
-    document: Document, accessors: Accessors, nodes: tuple[Node, ...], meshes: tuple[Mesh, ...]
-) -> tuple[Animation, ...]:
+    document: Document, accessors: Accessors, nodes: tuple[Node, ...], meshes: tuple[GltfMesh, ...]
+) -> tuple[Clip, ...]:
     """Return all animations, in order, without channels that have no node or belong to extensions."""
     animations = []
     for number, entry in enumerate(document.entries("animations")):
@@ -35,11 +35,11 @@ def read_animations(
                 # charged for every channel that shares the keys, so that millions of channels are refused
                 document.budget.charge(channel.times.nbytes + channel.values.nbytes, each)
                 channels.append(channel)
-        animations.append(Animation(f"animation {number}" if name is None else name.text(), tuple(channels)))
+        animations.append(Clip(f"animation {number}" if name is None else name.text(), tuple(channels)))
     return tuple(animations)
 
 
-def _width(target: Value, path: str, node: Node, meshes: tuple[Mesh, ...]) -> int:
+def _width(target: Value, path: str, node: Node, meshes: tuple[GltfMesh, ...]) -> int:
     """Return how many numbers a key has; for weights, one for each morph target of the node's mesh."""
     if path != "weights":
         return 4 if path == "rotation" else 3

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fba import text_files
 from fba.errors import FbaWarning, ModelError
 from fba.face.importers.assembly._polygon_parts import make_piece
 from fba.mesh import _obj as obj
-from fba.mesh import text_files
 from fba.mesh._mtl import read_mtl
 from fba.mesh._obj import read_obj
 from fba.mesh._polygons import triangulate

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 from fba.errors import FbaError, FbaWarning
+from fba.parameters import BapTable
 from fba_conformance import trace
 from fba_conformance._values import Listing, PlaneValues, trace_values
 from fba_conformance.suite._judgement import find_fault
@@ -31,7 +32,7 @@ _MODULES = ("_textbook", "_reader", "_part", "listing", "trace")
 """Those of the independent decoder, each behind those that it imports."""
 _KEPT = "_KEPT"
 """A dictionary that a mistake may use, empty at the beginning of a stream."""
-Decoder = Callable[[bytes, str], Listing]
+Decoder = Callable[[bytes, BapTable], Listing]
 
 
 @contextmanager
@@ -57,7 +58,7 @@ def broken_decoder(mistake: Mistake) -> Iterator[Decoder]:
         walker = sys.modules[names[-1]].__dict__["Walker"]
         kept = [sys.modules[name].__dict__.get(_KEPT, {}) for name in names]
 
-        def decode(data: bytes, bap_steps: str) -> Listing:
+        def decode(data: bytes, bap_steps: BapTable) -> Listing:
             for one in kept:
                 one.clear()
             return _decode(walker, data, bap_steps)
@@ -74,7 +75,7 @@ def _compiled(source: str, name: str) -> CodeType:
     return compile(source, f"<{name} with a mistake>", "exec")
 
 
-def _decode(walker: Callable[..., trace.Walker], data: bytes, bap_steps: str) -> Listing:
+def _decode(walker: Callable[..., trace.Walker], data: bytes, bap_steps: BapTable) -> Listing:
     """Return what a decoder finds; any exception is an error that it reports."""
     found: list[PlaneValues] = []
     try:

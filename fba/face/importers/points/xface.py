@@ -20,7 +20,7 @@ NEUTRAL = "Rest"
 """Alias of the mesh file that shows the neutral face."""
 
 
-def load_xface(path: str) -> Fdp:
+def read_xface(path: str) -> Fdp:
     """An Xface file; positions are NaN until `xface_points` looks them up. ModelError where damaged."""
     data = read_bytes(path)
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
