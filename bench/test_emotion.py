@@ -17,7 +17,7 @@ def test_an_expression_over_time(benchmark: Any, report: Callable[[str], None]) 
     blend = emotion.combine({"fear": 60, "terror": 40})
     seconds = FRAMES / 100
     made = benchmark.pedantic(
-        emotion.perform, (blend,), {"seconds": seconds, "ease": 1.0, "rate": 100}, rounds=3, warmup_rounds=1
+        emotion.animate, (blend,), {"seconds": seconds, "ease": 1.0, "rate": 100}, rounds=3, warmup_rounds=1
     )
     rate = FRAMES / benchmark.stats.stats.median
     benchmark.extra_info.update(frames_per_second=rate)
@@ -56,7 +56,7 @@ def test_reading_live(benchmark: Any, report: Callable[[str], None]) -> None:
     rng = np.random.default_rng(0)
     frames = 0.5 * emotion.expression("joy").faps + rng.normal(0, 20, (LIVE, 68))
     frames[100:110, 18:20] = 900  # a blink
-    recogniser = emotion.Recogniser(60)
+    recogniser = emotion.ExpressionRecogniser(60)
     recogniser.prepare()
 
     def push() -> None:
@@ -71,7 +71,7 @@ def test_reading_live(benchmark: Any, report: Callable[[str], None]) -> None:
 
 def test_reading_a_file(benchmark: Any, report: Callable[[str], None]) -> None:
     blend = emotion.combine({"anger": 80})
-    animation = emotion.perform(blend, seconds=40, ease=5, rate=50, send="faps")
+    animation = emotion.animate(blend, seconds=40, ease=5, rate=50, send="faps")
     benchmark.pedantic(emotion.read_expressions, (animation,), rounds=3, warmup_rounds=1)
     rate = len(animation) / benchmark.stats.stats.median
     benchmark.extra_info.update(frames_per_second=rate)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fba.persona import LivePersona, Persona, TrackedFace, learn, play
+from fba.persona import LivePersona, Persona, TrackedFace, animate_as, learn
 from fba.persona._persona import MEANS
 from tools.persona.actors import act, all_contents, named_styles
 
@@ -64,7 +64,7 @@ def test_a_frame_in_an_actors_way(
 def test_two_minutes_in_an_actors_way(
     benchmark: Any, actor: TrackedFace, persona: Persona, report: Callable[[str], None]
 ) -> None:
-    benchmark.pedantic(play, (actor, persona), rounds=3, warmup_rounds=1)
+    benchmark.pedantic(animate_as, (actor, persona), rounds=3, warmup_rounds=1)
     rate = len(actor) / benchmark.stats.stats.median
     benchmark.extra_info.update(frames_per_second=rate)
     report(f"{len(actor)} frames in an actor's way at once: {rate:.0f} frames/s")

@@ -6,7 +6,7 @@ import inspect
 import re
 from importlib import import_module
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 PAGE = Path(__file__).parent / "api.md"
 ROOMS = (
@@ -47,8 +47,9 @@ def _row(module: Any, name: str) -> str:
     if inspect.ismodule(value):
         return ""
     if get_origin(value) is not None:
-        choices = [repr(text) for one in get_args(value) for text in get_args(one)]
-        choices += [one.__name__ for one in get_args(value) if not get_args(one)]
+        parts = (value,) if get_origin(value) is Literal else get_args(value)
+        choices = [repr(text) for one in parts for text in get_args(one)]
+        choices += [one.__name__ for one in parts if not get_args(one)]
         return f"| `{name}` | type: {', '.join(f'`{choice}`' for choice in choices)} |\n"
     if inspect.isclass(value):
         kind = "exception" if issubclass(value, BaseException) else "class"

@@ -47,7 +47,7 @@ def main() -> None:
         warnings.simplefilter("ignore", FbaWarning)
         motion = read_motion(SOURCE)
     result = spoil(from_skeleton(motion))
-    mapped = find_bones(motion, None, Skeleton.default())[1]
+    mapped = find_bones(motion, None, Skeleton.default()).joints
     report = CaptureReport(SOURCE, motion, mapped, result, compare(motion, result, mapped))
     picture = Image.fromarray(draw_sights(report, 2))
     size = (WIDTH, round(picture.height * WIDTH / picture.width))

@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 from fba import player
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.persona import Recogniser, learn, play
+from fba.persona import ClassRecogniser, animate_as, learn
 from fba.persona._observation import observe
 from fba.persona.points.layout import TRACKED, flat_mask, standard_mask, triangles
 from tools.persona.actors import Act, act, all_contents, named_styles
@@ -27,11 +27,11 @@ ACTORS = ("asymmetry", "tragedian")
 def main() -> None:
     """Draw a user's points and mask, the user's own way, and the ways of two actors."""
     user = act(SCRIPT, seed=99)
-    shown = [play(user.face, None, head=False)]
+    shown = [animate_as(user.face, None, head=False)]
     for number, name in enumerate(ACTORS):
         script = all_contents(2, np.random.default_rng(number))
         actor = learn([act(script, named_styles()[name], seed=20 + number).face], name)
-        shown.append(play(user.face, actor, head=False))
+        shown.append(animate_as(user.face, actor, head=False))
     sheet = Image.new("RGB", (len(SCRIPT) * SIZE[0], (1 + len(shown)) * SIZE[1]), "white")
     for column, picture in enumerate(draw_masks(user)):
         sheet.paste(picture, (column * SIZE[0], 0))
@@ -50,7 +50,7 @@ def render(animation: Animation, user: Act) -> list[Image.Image]:
 
 def draw_masks(user: Act) -> list[Image.Image]:
     """Return the user's mask over the tracked points at the strongest moment of each expression."""
-    seen = observe(user.face, Recogniser.default())
+    seen = observe(user.face, ClassRecogniser.default())
     pictures = []
     for _, frame in user.apex:
         points = seen.points[np.searchsorted(seen.rows, frame)]

@@ -7,7 +7,7 @@ from pathlib import Path
 from PIL import Image, ImageDraw
 
 from fba.animation import Animation
-from fba.persona import learn, play
+from fba.persona import animate_as, learn
 from tools.persona import blind_test as blind
 from tools.persona.actors import act
 
@@ -21,13 +21,13 @@ SIZE, MARGIN = (210, 240), 64
 def main() -> None:
     """Draw a user's own way and three moods at the strongest moment of each expression."""
     user = act(SCRIPT * LONGER, seed=99)
-    shown = {"the user": play(user.face, None, head=False)}
+    shown = {"the user": animate_as(user.face, None, head=False)}
     for number, (mood, style) in enumerate(blind.MOODS.items()):
         takes = [
             act(blind.script([number, take]), style, seed=blind.ACTOR, take=100 * number + take).face
             for take in range(blind.LEARNT)
         ]
-        shown[mood] = play(user.face, learn(takes, mood), head=False)
+        shown[mood] = animate_as(user.face, learn(takes, mood), head=False)
     peaks = [frame for _, frame in user.apex[-len(SCRIPT) :]]
     sheet = Image.new("RGB", (MARGIN + len(peaks) * SIZE[0], len(shown) * SIZE[1]), "white")
     draw = ImageDraw.Draw(sheet)

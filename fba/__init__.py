@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from fba import planning as planning
     from fba import player as player
     from fba.animation import Animation, BodyTrack, FaceTrack, Frame
-    from fba.codec import Decoder, Encoder, EncoderOptions, StreamInfo, decode
+    from fba.codec import Decoder, Encoder, StreamInfo, decode
+    from fba.encoder_options import EncoderOptions
     from fba.errors import (
         BitstreamError,
         DisplayError,
@@ -60,7 +61,7 @@ _MODULE_OF = {
     "UnsupportedError": "fba.errors",
     "Decoder": "fba.codec",
     "Encoder": "fba.codec",
-    "EncoderOptions": "fba.codec",
+    "EncoderOptions": "fba.encoder_options",
     "StreamInfo": "fba.codec",
     "decode": "fba.codec",
     "encode": "fba.planning",

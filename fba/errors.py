@@ -40,7 +40,7 @@ class Remedy:
     call: str = ""
 
     def __str__(self) -> str:
-        """Return the text for Python: "give one with fps=25"."""
+        """Return the text for Python: "give one with source_rate=25"."""
         given = f"{self.argument}={self.value}"
         return self.fill_in(f"{self.call}({given})" if self.call else given)
 

@@ -26,7 +26,7 @@ from fba.cache import load_or_make  # noqa: E402
 from fba.capture import MarkerMotion  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.live import KINDS  # noqa: E402
-from fba.persona import learn, save_persona  # noqa: E402
+from fba.persona import learn  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
 from mesh_files import ply  # noqa: E402
@@ -311,7 +311,7 @@ def persona(folder: Path) -> bytes:
                       curves=replace(part.curves, moved=_rounded(part.curves.moved)))
         for name, part in learnt.parts.items()
     }  # fmt: skip
-    save_persona(replace(learnt, neutral=_rounded(learnt.neutral), parts=parts), path)
+    replace(learnt, neutral=_rounded(learnt.neutral), parts=parts).save(path)
     data = io.BytesIO()
     with zipfile.ZipFile(path) as packed, zipfile.ZipFile(data, "w", zipfile.ZIP_STORED) as archive:
         for member in packed.infolist():

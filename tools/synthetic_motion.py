@@ -11,7 +11,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, FAP_COUNT, bap_steps, baps, faps
+from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, FAP_COUNT, BapTable, bap_steps, baps, faps
 
 _MULTIPLIER, _INCREMENT, _MODULUS = 1664525, 1013904223, 1 << 32
 
@@ -63,7 +63,7 @@ def face(
 
 
 def body(
-    frames: int, *, baps_sent: tuple[int, ...] | None = None, table: str = "iso", seed: int = 2
+    frames: int, *, baps_sent: tuple[int, ...] | None = None, table: BapTable = "iso", seed: int = 2
 ) -> BodyTrack:
     """Return a body whose BAPs walk within the standard's ranges; extension BAPs within -1860..1860 steps."""
     source = noise(seed)

@@ -150,7 +150,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--fps")
     given = parser.parse_args(arguments)
     wide, high = (int(part) for part in given.size.split("x"))
-    animation = fba.read(given.file, **({"fps": given.fps} if given.fps else {}))
+    animation = fba.read(given.file, **({"source_rate": given.fps} if given.fps else {}))
     scene = Scene(animation)
     session = Session(scene, source=Source(scene, given.file), size=(wide, high), scale=given.scale)
     session.transport.seek(given.time)

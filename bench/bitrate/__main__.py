@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib.resources import files as package_files
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -24,16 +25,16 @@ from bench.bitrate.packages import EXTRA
 from bench.bitrate.page import picture_names
 from bench.bitrate.rivals import missing_packages
 from fba.cli import options
-from fba.cli.clamped_values import bring_near
-from fba.cli.inputs import EXISTING, Reading, read_file
+from fba.cli.coding.clamped_values import bring_near
+from fba.cli.inputs import Reading, read_file
+from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import Output, Outputs
 from fba.errors import FbaError
-from fba.limits import Limits
-from fba.parameters import BAP_STEPS_AUTO
+from fba.parameters import BAP_STEPS_AUTO, BapTable
 
 SAMPLES = ("hello.fap", "talk.c3d", "hello.bvh")
 """What is measured where no file is given: it comes with fba."""
-FINE = "visage"
+FINE: BapTable = "visage"
 """The table of BAP steps for files that are not streams."""
 TABLE = "results.csv"
 PAGE = "bitrate.md"
@@ -44,40 +45,30 @@ PAGE = "bitrate.md"
     epilog="Examples: ./dev bitrate --summary; ./dev bitrate talk.fba walk.bvh -o study; "
     "./dev bitrate --results study/results.csv --summary",
 )
-@click.argument("files", metavar="[FILE...]", nargs=-1, type=EXISTING)
-@click.option(
-    "-o",
-    "folder",
-    metavar="FOLDER",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the page bitrate.md, its pictures, and results.csv.",
-)
-@click.option("--summary", is_flag=True, help="Print the main results as a Markdown table.")
-@click.option(
-    "--results",
-    "tables",
-    metavar="FILE.csv",
-    multiple=True,
-    type=EXISTING,
-    help="Results measured before, instead of measuring; repeatable.",
-)
-@click.option(
-    "--only", type=click.Choice(("face", "body")), help="Measure only the faces, or only the bodies."
-)
-@click.option("--title", metavar="TEXT", help="What the files are, for the tables; default: their number.")
-@options.bap_steps_option
-@options.no_clobber_option
-@options.limit_option
+@click.argument("files", metavar="[FILE...]", nargs=-1, type=options.EXISTING)
+@with_options
 def command(
     files: tuple[Path, ...],
-    folder: Path | None,
-    summary: bool,
-    tables: tuple[Path, ...],
-    only: str | None,
-    title: str | None,
-    bap_steps: str,
-    no_clobber: bool,
-    limit: Limits,
+    folder: Path | None = option(
+        "-o",
+        metavar="FOLDER",
+        type=click.Path(file_okay=False, path_type=Path),
+        help="Folder for the page bitrate.md, its pictures, and results.csv.",
+    ),
+    summary: bool = option(default=False, help="Print the main results as a Markdown table."),
+    tables: tuple[Path, ...] = option(
+        "--results",
+        default=(),
+        metavar="FILE.csv",
+        type=options.EXISTING,
+        help="Results measured before, instead of measuring; repeatable.",
+    ),
+    only: Literal["face", "body"] | None = option(help="Measure only the faces, or only the bodies."),
+    title: str | None = option(
+        metavar="TEXT", help="What the files are, for the tables; default: their number."
+    ),
+    no_clobber: bool = options.no_clobber_option,
+    reading: Reading = group("bap_steps", "limit"),
 ) -> None:
     """Measure bit rates and errors of faces and bodies, beside other ways to send the same.
 
@@ -98,7 +89,7 @@ def command(
         outputs = Outputs(
             [Output("-o", folder / name) for name in names], [*files, *tables], no_clobber=no_clobber
         )
-    results = measured or _measure(title, files, only, bap_steps, limit)
+    results = measured or _measure(title, files, only, reading)
     if folder is not None and outputs is not None:
         outputs.write(folder / TABLE, results_csv(results).encode())
         for name, data in make_pictures(results).items():
@@ -113,24 +104,22 @@ def _read_results(tables: Sequence[Path]) -> list[Result]:
     return [result for table in tables for result in read_results(table)]
 
 
-def _measure(
-    title: str, files: Sequence[Path], only: str | None, bap_steps: str, limits: Limits
-) -> list[Result]:
+def _measure(title: str, files: Sequence[Path], only: str | None, reading: Reading) -> list[Result]:
     """Return the results of files, or of the samples. title: what they are."""
     for package in missing_packages():
         click.echo(f"fba: {package} is not installed, so its rows are left out: {EXTRA}", err=True)
     subjects: list[Subject] = []
     paths = list(files) or [Path(str(package_files("fba") / "samples" / name)) for name in SAMPLES]
     for path in paths:
-        subjects += _subjects_of(path, only, bap_steps, limits)
+        subjects += _subjects_of(path, only, reading)
     return measure(title, subjects, lambda line: click.echo(f"fba: {line}", err=True))
 
 
-def _subjects_of(path: Path, only: str | None, bap_steps: str, limits: Limits) -> list[Subject]:
+def _subjects_of(path: Path, only: str | None, reading: Reading) -> list[Subject]:
     """Return the face and the body of a file, if they move and are asked for."""
-    read = read_file(path, Reading(bap_steps=bap_steps, limit=limits))
+    read = read_file(path, reading)
     animation = read.animation
-    steps = read.table or (FINE if bap_steps == BAP_STEPS_AUTO else bap_steps)
+    steps = read.table or (FINE if reading.bap_steps == BAP_STEPS_AUTO else reading.bap_steps)
     if read.table is None:
         animation = bring_near(animation, steps, 1)
     found = split_subjects(path.name, animation, steps)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from fba.animation import Animation
 from fba.errors import OptionError
-from fba.parameters import BAP_STEPS_DEFAULT
+from fba.parameters import BAP_STEPS_DEFAULT, BapTable
 
 FACE, BODY = "face", "body"
 
@@ -21,7 +21,7 @@ class Subject:
     name: str
     kind: str
     animation: Animation
-    bap_steps: str = BAP_STEPS_DEFAULT
+    bap_steps: BapTable = BAP_STEPS_DEFAULT
 
     @property
     def seconds(self) -> float:
@@ -29,7 +29,7 @@ class Subject:
         return float(self.animation.duration)
 
 
-def split_subjects(name: str, animation: Animation, bap_steps: str) -> list[Subject]:
+def split_subjects(name: str, animation: Animation, bap_steps: BapTable) -> list[Subject]:
     """Return the face and the body of an animation, as far as they move; an empty list where neither does.
 
     Visemes and expressions alone do not count: they take a few bits a second in any form.

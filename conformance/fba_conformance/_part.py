@@ -13,6 +13,7 @@ from fba.parameters import (
     EXPRESSION_SELECT_MAX,
     VISEME_FIELDS,
     VISEME_SELECT_MAX,
+    BapTable,
     bap_groups,
     baps,
     fap_groups,
@@ -51,7 +52,7 @@ class Part:
     """State of one half. `kind` is "fap" or "bap"; `quant` is None before its first I plane."""
 
     kind: str
-    bap_steps: str = "iso"
+    bap_steps: BapTable = "iso"
     quant: int | None = None
     mask_types: list[int] = field(default_factory=list)
     mask: frozenset[int] = frozenset()

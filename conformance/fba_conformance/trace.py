@@ -10,10 +10,10 @@ import re
 import warnings
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import Any
+from typing import Any, cast
 
 from fba.errors import FbaError, FbaWarning
-from fba.parameters import BAP_STEP_TABLES
+from fba.parameters import BAP_STEP_TABLES, BapTable
 from fba.recognition import HEAD_BYTES, recognition_hint
 from fba_conformance._part import HighLevel, Part
 from fba_conformance._reader import (
@@ -40,7 +40,7 @@ SKIP_MORE = 15
 """Value of a word of number_of_frames_to_skip after which another word follows."""
 
 
-def trace(data: bytes, *, bap_steps: str | None = None) -> Iterator[Element]:
+def trace(data: bytes, *, bap_steps: BapTable | None = None) -> Iterator[Element]:
     """Yield every syntax element of a stream, in order.
 
     bap_steps: "iso" or "visage", the table of BAP steps that the writer used; it only changes values. None:
@@ -60,7 +60,7 @@ def trace(data: bytes, *, bap_steps: str | None = None) -> Iterator[Element]:
         yield from walker.reader.drain()
 
 
-def planes(data: bytes, *, bap_steps: str | None = None) -> Iterator[dict[str, Any]]:
+def planes(data: bytes, *, bap_steps: BapTable | None = None) -> Iterator[dict[str, Any]]:
     """Yield the content of each plane, in order; raises like `trace`, after the last undamaged plane.
 
     Keys: number; bit and bits (where it starts and its length, start code and stuffing before it
@@ -81,7 +81,7 @@ def planes(data: bytes, *, bap_steps: str | None = None) -> Iterator[dict[str, A
             yield walker.record
 
 
-def decode_values(data: bytes, *, bap_steps: str | None = None) -> list[dict[str, Any]]:
+def decode_values(data: bytes, *, bap_steps: BapTable | None = None) -> list[dict[str, Any]]:
     """Return `planes` as a list. For untrusted streams use `planes`: a plane may have only six bits."""
     return list(planes(data, bap_steps=bap_steps))
 
@@ -92,11 +92,11 @@ def _find_code(data: bytes, code: int, start: int) -> int:
     return position if position >= 0 else len(data)
 
 
-def named_steps(data: bytes) -> str:
+def named_steps(data: bytes) -> BapTable:
     """Return the table of BAP steps that a mark before the object names, else "iso"."""
     before = data[: min(_find_code(data, code, 0) for code in OBJECT_START_CODES)]
     named = _NAMED_STEPS.search(before)
-    return named[1].decode() if named is not None else BAP_STEP_TABLES[0]
+    return cast("BapTable", named[1].decode()) if named is not None else BAP_STEP_TABLES[0]
 
 
 class Walker:
@@ -107,7 +107,7 @@ class Walker:
     """
 
     def __init__(
-        self, data: bytes, *, bap_steps: str = BAP_STEP_TABLES[0], byte_aligned: bool = False
+        self, data: bytes, *, bap_steps: BapTable = BAP_STEP_TABLES[0], byte_aligned: bool = False
     ) -> None:
         if bap_steps not in BAP_STEP_TABLES:
             raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {bap_steps!r}")

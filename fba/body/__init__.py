@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from fba.body.model import BodyModel
     from fba.body.skeleton import SIDES, Skeleton
     from fba.body.solve.conventions import convention_names
-    from fba.body.solve.limits import Excess, Limit, Limits
+    from fba.body.solve.limits import Excess, JointLimit, JointLimits
     from fba.body.solve.solver import BapSolver, wrapped
 
 _MODULE_OF = {
@@ -20,8 +20,8 @@ _MODULE_OF = {
     "BodyDefinition": "fba.body._definition",
     "BodyModel": "fba.body.model",
     "Excess": "fba.body.solve.limits",
-    "Limit": "fba.body.solve.limits",
-    "Limits": "fba.body.solve.limits",
+    "JointLimit": "fba.body.solve.limits",
+    "JointLimits": "fba.body.solve.limits",
     "Skeleton": "fba.body.skeleton",
     "attach_head": "fba.body.head_attachment",
     "convention_names": "fba.body.solve.conventions",
@@ -34,8 +34,8 @@ __all__ = [
     "BodyDefinition",
     "BodyModel",
     "Excess",
-    "Limit",
-    "Limits",
+    "JointLimit",
+    "JointLimits",
     "Skeleton",
     "attach_head",
     "convention_names",

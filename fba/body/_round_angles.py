@@ -9,7 +9,7 @@ import numpy as np
 from fba.arrays import Bool, Int64
 from fba.body.solve._pose_loops import UNIT
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
-from fba.parameters import BAP_STEP_TABLES, bap_steps
+from fba.parameters import BAP_STEP_TABLES, BapTable, bap_steps
 
 ROUND_DEGREES = 5.0
 """Unit of angles that were set by hand in degrees."""
@@ -41,7 +41,7 @@ class Roundness:
     unit: str
 
 
-def find_rounder_table(levels: Int64, used: str) -> tuple[str, str] | None:
+def find_rounder_table(levels: Int64, used: BapTable) -> tuple[BapTable, str] | None:
     """Return the table in which angles are round far more often than in `used`, and the unit; or None.
 
     levels: (T, 296), in steps.

@@ -42,7 +42,7 @@ BIND_TOLERANCE = 1e-3
 """Metres and sines by which a file's inverse bind matrices may contradict its nodes."""
 
 
-def save(model: BodyModel, path: Path) -> None:
+def save(path: Path, model: BodyModel) -> None:
     """Write a body as .glb, atomically; loading it gives an equal model."""
     if os.fspath(path).lower().endswith(".gltf"):
         raise ModelError(f"{os.fspath(path)}: body models are written in one file; name it .glb")

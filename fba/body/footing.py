@@ -14,6 +14,7 @@ import numpy.typing as npt
 from fba.arrays import Float64
 from fba.body.skeleton import SIDES, Skeleton
 from fba.body.solve.solver import BapSolver
+from fba.choices import Axes
 
 OUTLINE = (
     ("ankle", 0.011, 0.0, -0.0645), ("ankle", -0.024, 0.0, -0.030), ("ankle", 0.040, 0.0, -0.039),
@@ -100,7 +101,7 @@ class GroundedPoser:
     A body without feet, and the default skeleton, are posed as the BAPs say. axes: see `BapSolver`.
     """
 
-    def __init__(self, skeleton: Skeleton, axes: str = "iso") -> None:
+    def __init__(self, skeleton: Skeleton, axes: Axes = "iso") -> None:
         self._solver = BapSolver(skeleton, axes)
         default = Skeleton.default()
         self._default = BapSolver(default, axes) if has_feet(skeleton) and skeleton is not default else None

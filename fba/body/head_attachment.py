@@ -12,6 +12,7 @@ from fba.body._neck_blending import blend_with_neck
 from fba.body.model import BodyModel
 from fba.body.skin._skinning import Skinner, build_skinner
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights
+from fba.choices import SkinMethod
 from fba.errors import ModelError
 from fba.mesh import checked_rows
 
@@ -74,7 +75,7 @@ class AttachedHead:
         *,
         local_normals: Float32 | None = None,
         normals: Float32 | None = None,
-        method: str = "dual",
+        method: SkinMethod = "dual",
     ) -> Float32:
         """Return the face on the body: float32 (V, 3), metres.
 

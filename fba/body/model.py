@@ -14,6 +14,7 @@ import numpy.typing as npt
 from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import checked_weights
+from fba.choices import SkinMethod
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh import Material, Meshes, join_rows, mesh_arrays
@@ -153,14 +154,14 @@ class BodyModel(Meshes[BodyPart]):
         """
         from fba.body._storage import save
 
-        save(self, path)
+        save(path, self)
 
     def skin(
         self,
         matrices: npt.ArrayLike,
         out: Float32 | None = None,
         normals: Float32 | None = None,
-        method: str = "dual",
+        method: SkinMethod = "dual",
     ) -> Float32:
         """Return the body in a pose: float32 (V, 3) for joint matrices (J, 4, 4), (T, V, 3) for (T, J, 4, 4).
 

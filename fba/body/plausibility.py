@@ -30,7 +30,7 @@ from fba.body.skeleton import Skeleton
 from fba.body.solve._pose_loops import MILLIMETRE, UNIT
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
-from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps, baps
+from fba.parameters import BAP_STEP_TABLES, BapTable, bap_numbers, bap_steps, baps
 from fba.tracks import BodyTrack, batches
 
 RUNS = 32
@@ -116,8 +116,8 @@ class Doubt:
     used, likely: names of the tables. findings: faults, in words.
     """
 
-    used: str
-    likely: str
+    used: BapTable
+    likely: BapTable
     findings: tuple[str, ...]
 
     def __str__(self) -> str:
@@ -127,7 +127,7 @@ class Doubt:
         )
 
 
-def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str) -> Doubt | None:
+def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: BapTable) -> Doubt | None:
     """Return the doubt about a body that looks wrong with the table `used` and right with the other, or None.
 
     index: (T,) numbers of the frames, at rate frames a second. Values must be as decoded; if they are not

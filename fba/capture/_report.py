@@ -15,6 +15,7 @@ from fba.capture import _rest_alignment as rest_alignment
 from fba.capture._limbs import soles
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import Preparation, prepare
+from fba.choices import SignedUpAxis
 from fba.errors import ModelError
 
 POSED_FRAMES = 2048
@@ -91,7 +92,7 @@ def retarget_report(
     joints: Mapping[str, str] | None = None,
     scale: float | None = None,
     rest: str | int = "auto",
-    up: str = "auto",
+    up: SignedUpAxis = "auto",
     solver: BapSolver | None = None,
 ) -> RetargetReport:
     """Compare an animation, such as a decoded one, with the motion it was made from.

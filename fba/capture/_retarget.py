@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import get_args
 
 import numpy as np
 
@@ -20,11 +21,12 @@ from fba.capture._limbs.foot_planting import plant_feet, turn_foot
 from fba.capture._limbs.targets import Targets
 from fba.capture._named_bones import FINGERS
 from fba.capture.motion import SkeletonMotion
+from fba.choices import Ground, Origin, SignedUpAxis, Spine
 from fba.errors import FbaWarning, ModelError, Remedy
 from fba.parameters import baps
 
-ORIGINS = ("source", "start", "middle")
-GROUNDS = ("floor", "source", "none")
+ORIGINS: tuple[Origin, ...] = get_args(Origin)
+GROUNDS: tuple[Ground, ...] = get_args(Ground)
 SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spine.GROUPS}
 HINGES = (("shoulder", "elbow"), ("hip", "knee"))
 LOOSE = 1e-3
@@ -72,13 +74,13 @@ class SkeletonOptions:
     """
 
     scale: float | None = None
-    origin: str = "source"
-    ground: str = "floor"
+    origin: Origin = "source"
+    ground: Ground = "floor"
     plant: bool = True
-    spine: str | int = "spread"
+    spine: Spine | int = "spread"
     joints: Mapping[str, str] | None = None
     rest: str | int = "auto"
-    up: str = "auto"
+    up: SignedUpAxis = "auto"
 
     def __post_init__(self) -> None:
         if self.origin not in ORIGINS:

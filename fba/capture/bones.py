@@ -8,6 +8,7 @@ names are swapped, they point backwards.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,10 +41,22 @@ MIN_BENT_FRAMES = 5
 """Smallest number of frames with a bent knee that show where knees point."""
 
 
-def find_bones(
-    motion: SkeletonMotion, joints: Mapping[str, str] | None, skeleton: Skeleton
-) -> tuple[str, dict[str, int], float, str]:
-    """Return the family of names, body joint -> source's joint, the confidence, and a reason.
+@dataclass(frozen=True)
+class Bones:
+    """Which joints of a source are joints of the body.
+
+    family: of the names. joints: joint of the body -> number of the source's. confidence: 0 to 1. reason: for
+    people.
+    """
+
+    family: str
+    joints: dict[str, int]
+    confidence: float
+    reason: str
+
+
+def find_bones(motion: SkeletonMotion, joints: Mapping[str, str] | None, skeleton: Skeleton) -> Bones:
+    """Return the bones of a motion. joints: as for `from_skeleton`.
 
     A family that names all limbs is taken as it is. Otherwise names are read word by word; where that finds
     more limbs, its joints are added to a family that names at least as many joints, and else replace it.
@@ -51,10 +64,10 @@ def find_bones(
     """
     if joints is None and motion.declared:
         family, mapped = matching.map_joints(motion.names, motion.declared, skeleton)
-        return family, mapped, 1.0, f"{len(mapped)} joints as the file says"
+        return Bones(family, mapped, 1.0, f"{len(mapped)} joints as the file says")
     if joints is not None:
         family, mapped = matching.map_joints(motion.names, joints, skeleton)
-        return family, mapped, 1.0, f"{len(mapped)} joints as given"
+        return Bones(family, mapped, 1.0, f"{len(mapped)} joints as given")
     try:
         family, by_family = matching.map_joints(motion.names, None, skeleton)
         failure = None
@@ -81,7 +94,7 @@ def find_bones(
     how = f"{len(by_family)} of {len(motion.names)} joints by " + (
         "the words in their names" if family == "words" else f"names as of {family!r}"
     )
-    return family, by_family, sure, how
+    return Bones(family, by_family, sure, how)
 
 
 def _fill_limbs(mapped: Mapping[str, int], others: Mapping[str, int]) -> dict[str, int]:

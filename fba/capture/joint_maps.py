@@ -21,8 +21,8 @@ def find_map(motion: SkeletonMotion, joints: Mapping[str, str] | None = None) ->
 
     joints: as for `from_skeleton`; None to find them. ModelError where none are found.
     """
-    _, mapped, *_ = find_bones(motion, joints, Skeleton.default())
-    by_number = sorted((number, joint) for joint, number in mapped.items())
+    found = find_bones(motion, joints, Skeleton.default()).joints
+    by_number = sorted((number, joint) for joint, number in found.items())
     return {motion.names[number]: joint for number, joint in by_number}
 
 

@@ -23,6 +23,7 @@ from fba.capture._rest_from_motion import rest_from_motion, with_rest
 from fba.capture._up_axis import UPS, find_up_axis, nearest_axis, turn_axes
 from fba.capture.bones import check_extent, find_bones, joints_remedy, refuse_swapped_sides
 from fba.capture.motion import SkeletonMotion, read_axis
+from fba.choices import SignedUpAxis
 from fba.errors import FbaWarning, ModelError, Remedy
 
 MIN_CONFIDENCE = 0.5
@@ -66,7 +67,7 @@ def prepare(
     *,
     joints: Mapping[str, str] | None = None,
     rest: str | int = "auto",
-    up: str = "auto",
+    up: SignedUpAxis = "auto",
 ) -> Preparation:
     """Return a motion made ready, see `Preparation`.
 
@@ -89,8 +90,9 @@ def prepare(
         ).with_remedies(Remedy("rest", "choose one of these with {}", "0"))
     matching.check_root(skeleton)
     check_extent(motion)
-    family, mapped, sure, how = find_bones(motion, joints, skeleton)
-    confidence, reasons = {"bones": sure}, {"bones": how}
+    bones = find_bones(motion, joints, skeleton)
+    mapped = bones.joints
+    confidence, reasons = {"bones": bones.confidence}, {"bones": bones.reason}
     few = motion.select(motion.spread(SAMPLE_FRAMES))
     quaternions, positions = few.world()
     at_rest = standing.measure(motion.rest()[None], mapped)
@@ -119,7 +121,7 @@ def prepare(
             chosen = f"frame {frame}"
     if chosen != "motion":
         level = correct_rest(level, mapped)
-    result = Preparation(level, mapped, family, chosen, axis, confidence, reasons)
+    result = Preparation(level, mapped, bones.family, chosen, axis, confidence, reasons)
     _refuse_doubt(result, joints is not None, rest != "auto", up != "auto")
     if found_up.doubt:
         warning = FbaWarning(f"up is taken to be {axis}: {found_up.doubt}")

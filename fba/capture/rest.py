@@ -30,7 +30,7 @@ class Rest:
 
 def find_rest(motion: SkeletonMotion, skeleton: Skeleton, joints: Mapping[str, str] | None = None) -> Rest:
     """Return how a skeleton rests. joints: as for `from_skeleton`. ModelError as `from_skeleton`."""
-    _, mapped, *_ = find_bones(motion, joints, skeleton)
+    mapped = find_bones(motion, joints, skeleton).joints
     upright = find_upright(motion, mapped)
     alignment = rest_alignment.align(turn_axes(motion, upright), mapped, skeleton)
     ahead = alignment.corrections["sacroiliac"].T

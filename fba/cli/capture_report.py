@@ -59,9 +59,9 @@ def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str
     """Return the animation, clamped to the limits of human motion if limits is "clamp"; and a report."""
     if limits == "off" or animation.body is None:
         return animation, {}
-    from fba.body import Limits
+    from fba.body import JointLimits
 
-    human = Limits.human()
+    human = JointLimits.human()
     excesses = human.check(animation.body.values)
     rows = [
         {

@@ -15,30 +15,10 @@ from fba.errors import FbaError, FbaWarning, Remedy
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
-OPTIONS = {
-    "fps": "fps",
-    "rate": "fps",
-    "bit_rate": "bitrate",
-    "buffer": "buffer",
-    "format": "format",
-    "salvage": "salvage",
-    "clamp": "clamp",
-    "points": "points",
-    "kind": "kind",
-    "replace": "replace",
-    "limits": "limit",
-    "clip": "clip",
-    "face": "face",
-    "aspect": "aspect",
-    "neutral": "neutral",
-    "sync": "sync",
-    "offset": "offset",
-    "joints": "maps",
-    "markers": "maps",
-    "rest": "rest",
-    "up": "up",
-    "scale": "scale",
-}
+OPTIONS = {name: name for name in (
+    "source_rate", "rate", "bit_rate", "buffer", "format", "salvage", "clamp", "points", "kind", "replace",
+    "clip", "face", "aspect", "neutral", "sync", "offset", "rest", "up", "scale",
+)} | {"limits": "limit", "joints": "maps", "markers": "maps"}  # fmt: skip
 """Arguments of the library, and the parameters of commands that do the same."""
 OTHER_COMMANDS = (("encode",), ("convert",), ("model", "import"))
 """Commands that may have an option which the current one lacks."""
@@ -94,7 +74,7 @@ def _remedy_text(remedy: Remedy, context: click.Context) -> str:
     name = OPTIONS.get(remedy.argument)
     if remedy.call == "fba.write" and name == "format":
         name = "to"
-    if remedy.call.endswith(".read_body") and not any(
+    if remedy.call.endswith(".import_body") and not any(
         param.name == "body" for param in context.command.params
     ):
         name = None  # the joints of a body that is shown, not of a capture

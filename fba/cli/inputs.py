@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 import warnings
@@ -16,11 +15,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import click
 
 from fba.animation import Animation
-from fba.cli import step_tables
+from fba.choices import BapTableOrAuto
+from fba.cli import options, step_tables
 from fba.cli.command import STANDARD_INPUT
-from fba.errors import FbaError, FbaWarning, FormatError, OptionError, did_you_mean
-from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import BAP_STEPS_AUTO
+from fba.cli.option_fields import option
+from fba.errors import FbaError, FbaWarning, FormatError, OptionError
+from fba.limits import Limits
+from fba.parameters import BAP_STEPS_AUTO, BapTable
 from fba.source import read_whole
 
 if TYPE_CHECKING:
@@ -31,47 +32,6 @@ if TYPE_CHECKING:
     from fba.formats import Format
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
-
-NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
-
-
-class ExistingPath(click.Path):
-    """A file or folder that exists; the error for one that does not names the nearest that does."""
-
-    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True, allow_dash: bool = False) -> None:
-        super().__init__(
-            exists=True, file_okay=file_okay, dir_okay=dir_okay, allow_dash=allow_dash, path_type=Path
-        )
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        path = Path(os.fsdecode(value))
-        if not os.path.lexists(path) and not (self.allow_dash and str(path) == "-"):
-            self.fail(f"{str(path)!r} does not exist{did_you_mean(path.name, _neighbours(path))}", param, ctx)
-        return Path(os.fsdecode(super().convert(value, param, ctx)))
-
-
-def _neighbours(path: Path) -> list[str]:
-    """Return the names in the folder of a path, none if it cannot be listed."""
-    try:
-        return os.listdir(path.parent)
-    except OSError:
-        return []
-
-
-class InputType(ExistingPath):
-    """An existing file, "-" for standard input."""
-
-    def __init__(self) -> None:
-        super().__init__(dir_okay=False, allow_dash=True)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        if str(value) in NAMES_OF_STANDARD_INPUT:
-            return Path("-")
-        path = super().convert(value, param, ctx)
-        return path if str(path) != "-" else path.absolute()  # it was "./-", a file of that name
-
-
-EXISTING = InputType()
 
 
 @contextmanager
@@ -124,17 +84,23 @@ def renamed(path: Path, name: str) -> Iterator[None]:
 class Reading:
     """How files are read: options that most commands share.
 
-    format: name of the format; None where content and suffix show it. clip: of several animations in a file,
-    the one to read, by name or number; without effect where the format holds one. bap_steps: "auto" prints
-    which table a stream is decoded with, and why; a table warns if the stream names another one or, where it
-    names none, if its BAPs look wrong with these steps. salvage: read what is undamaged.
+    bap_steps: "auto" prints which table a stream is decoded with, and why; a table warns if the stream names
+    another one or, where it names none, if its BAPs look wrong with these steps.
     """
 
-    format: str | None = None
-    clip: str | None = None
-    bap_steps: str = BAP_STEPS_AUTO
-    salvage: bool = False
-    limit: Limits = DEFAULT_LIMITS
+    format: str | None = options.format_option
+    source_rate: Fraction | None = option(
+        "--source-fps", type=options.RateType(), metavar="RATE", help="Frame rate of a file that has none."
+    )
+    clip: str | None = option(
+        metavar="NAME",
+        help="Which animation of a glTF file with several, by name or number; `fba info` lists them.",
+    )
+    bap_steps: BapTableOrAuto = options.read_steps_option
+    salvage: bool = option(
+        default=False, help="Read the undamaged parts of damaged input, and list what was lost."
+    )
+    limit: Limits = options.limit_option
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +117,7 @@ class ReadFile:
     format: Format
     rate: Fraction
     captured: Captured | None = None
-    table: str | None = None
+    table: BapTable | None = None
     doubt: str | None = None
 
 
@@ -159,32 +125,31 @@ def read_input(
     path: Path,
     reading: Reading,
     *,
-    fps: Fraction | None = None,
-    header_fps: Fraction | None = None,
+    rate: Fraction | None = None,
     name: str | None = None,
 ) -> Animation:
     """Return the animation of a file; see `read_file`."""
-    return read_file(path, reading, fps=fps, header_fps=header_fps, name=name).animation
+    return read_file(path, reading, rate=rate, name=name).animation
 
 
 def read_file(
     path: Path,
     reading: Reading,
     *,
-    fps: Fraction | None = None,
-    header_fps: Fraction | None = None,
+    rate: Fraction | None = None,
     name: str | None = None,
     capture: Mapping[str, object] | None = None,
 ) -> ReadFile:
     """Return the animation of a file of any format, or of the one that `reading` names.
 
-    fps resamples the animation, and motion capture before it is retargeted. It, or header_fps, and name
-    replace a header that a file lacks. capture: options for the readers of motion capture.
+    rate: to resample the animation to, and motion capture before it is retargeted. name: of a file that has
+    none. capture: options for the readers of motion capture.
     """
     from fba.codec import marked_table
 
-    limits, table = reading.limit, reading.bap_steps
-    marked: str | None = None
+    limits = reading.limit
+    table: BapTable | None = None
+    marked: BapTable | None = None
     doubt: str | None = None
     with input_file(path) as file:
         reader = _find_format(file, reading.format)
@@ -192,40 +157,43 @@ def read_file(
         if is_stream:
             data = read_whole(file)
             marked = marked_table(data)
-            table = step_tables.table_to_read(path, data, table, limits)
-        options: dict[str, object] = {
+            table = step_tables.table_to_read(path, data, reading.bap_steps, limits)
+        given: dict[str, object] = {
             "bap_steps": table,
-            "fps": fps or header_fps,
+            "source_rate": reading.source_rate,
             "name": name,
             "salvage": reading.salvage or None,
-            "rate": fps,
+            "rate": rate,
             "limits": limits,
             "clip": reading.clip,
             **(capture or {}),
         }
-        taken = _taken(reader, options)
+        taken = _taken(reader, given)
         captured = reader.read_captured(file, **taken) if reader.is_capture else None
         animation = reader.read(file, **taken) if captured is None else captured.animation
-    has_table = is_stream and animation.body is not None
-    if has_table and reading.bap_steps != BAP_STEPS_AUTO:
+    if animation.body is None:
+        table = None
+    if table is not None and reading.bap_steps != BAP_STEPS_AUTO:
         doubt = step_tables.warn_of_doubt(path, animation, table, marked)
-    rate = animation.rate
-    if fps is not None and rate != fps:
-        animation = animation.resample(fps, limits=limits)
-    return ReadFile(path, animation, reader, rate, captured, table if has_table else None, doubt)
+    read_rate = animation.rate
+    if rate is not None and read_rate != rate:
+        animation = animation.resample(rate, limits=limits)
+    return ReadFile(path, animation, reader, read_rate, captured, table, doubt)
 
 
-def probe_input(path: Path, reading: Reading, *, fps: Fraction | None, face: str | None = None) -> StreamInfo:
-    """Return what a file of any format holds.
-
-    fps: the rate of a file that has none. face: the one to read of several.
-    """
+def probe_input(path: Path, reading: Reading, *, face: str | None = None) -> StreamInfo:
+    """Return what a file of any format holds. face: the one to read of several."""
     from fba.formats import probe
 
     reader = _find_format(path, reading.format)
-    given = {"fps": fps, "salvage": reading.salvage or None, "clip": reading.clip, "face": face}
-    options = {} if reader.name == "fba" else _taken(reader, given)
-    return probe(path, format=reader.name, limits=reading.limit, **options)
+    given = {
+        "source_rate": reading.source_rate,
+        "salvage": reading.salvage or None,
+        "clip": reading.clip,
+        "face": face,
+    }
+    taken = {} if reader.name == "fba" else _taken(reader, given)
+    return probe(path, format=reader.name, limits=reading.limit, **taken)
 
 
 def list_clips(path: Path, format: str | None, limits: Limits) -> tuple[ClipInfo, ...]:
@@ -275,18 +243,18 @@ def has_markers(path: Path, format: str | None) -> bool:
 
 
 def read_face(
-    path: Path, fps: Fraction | None, reading: Reading, capture: Mapping[str, object] | None = None
+    path: Path, reading: Reading, capture: Mapping[str, object] | None = None
 ) -> tuple[str, FaceCapture] | None:
     """Return the name of the format and the captured face as it is in a file; None for other files.
 
-    fps: of a file without times. capture: further options of the readers of captures.
+    capture: further options of the readers of captures.
     """
     reader = _find_format(path, reading.format)
     if reader.read_face is None:
         return None
-    given: dict[str, Any] = {"fps": fps, **(capture or {})}
-    options = {name: given[name] for name in given if name in reader.face_options and given[name] is not None}
-    return reader.name, reader.read_face(path, limits=reading.limit, **options)
+    given: dict[str, Any] = {"source_rate": reading.source_rate, **(capture or {})}
+    taken = {name: given[name] for name in given if name in reader.face_options and given[name] is not None}
+    return reader.name, reader.read_face(path, limits=reading.limit, **taken)
 
 
 def check_capture_options(given: Mapping[str, str], files: Iterable[Path], reading: Reading) -> None:
@@ -297,9 +265,9 @@ def check_capture_options(given: Mapping[str, str], files: Iterable[Path], readi
     from fba.formats import formats
 
     readers = {_find_format(file, reading.format) for file in files if str(file) != "-"}
-    for option, flag in given.items():
-        if readers and not any(option in reader.read_options for reader in readers):
-            able = [one.name.upper() for one in formats() if one.is_capture and option in one.read_options]
+    for name, flag in given.items():
+        if readers and not any(name in reader.read_options for reader in readers):
+            able = [one.name.upper() for one in formats() if one.is_capture and name in one.read_options]
             takers = " and ".join([*([", ".join(able[:-1])] if able[:-1] else []), *able[-1:]])
             names = " and ".join(sorted(one.name.upper() for one in readers))
             raise click.UsageError(f"{flag} is for {takers}, not for {names}")
@@ -318,6 +286,6 @@ def read_body(path: Path | None, joints: Mapping[str, str] | None = None) -> Bod
     """Return the body of `--body`, or None for the built-in one. joints: see `fba.capture.from_skeleton`."""
     if path is None:
         return None
-    from fba.formats.gltf.bodies import read_body as read
+    from fba.formats.gltf.bodies import import_body
 
-    return read(path, joints=joints)
+    return import_body(path, joints=joints)

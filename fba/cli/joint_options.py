@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.cli.command import Decorated
 from fba.cli.inputs import Reading, input_file
-from fba.cli.outputs import OutputType
+from fba.cli.option_fields import option
 from fba.cli.program import as_typed
 from fba.errors import OptionError
 from fba.limits import Limits
@@ -58,41 +57,18 @@ class RestType(click.ParamType["str | int"]):
         return int(text)
 
 
-body_map_option = click.option(
+Maps = tuple[Path | Pair, ...]
+"""What `--map` names: files, and pairs of names."""
+map_option = option(
     "--map",
-    "maps",
+    default=(),
     type=MapType(),
     multiple=True,
-    metavar="JOINT=JOINT|FILE",
-    help="With --body: which joint of the standard a joint of its skeleton is, Pelvis=HumanoidRoot; none: "
-    "Hat=. Repeatable. Or a TOML file of such pairs.",
+    metavar="NAME=PLACE|FILE",
+    help="Motion capture: which joint of the standard a joint of the file is, Pelvis=HumanoidRoot; none: "
+    "Hat=. Or where on the face a marker is, Chin=2.1. Repeatable. Or a TOML file of such pairs, in place "
+    "of what is found.",
 )
-
-
-def map_options(*, out: bool) -> Callable[[Decorated], Decorated]:
-    """Return a decorator that adds `--map`, and `--map-out` if `out`."""
-    given = click.option(
-        "--map",
-        "maps",
-        type=MapType(),
-        multiple=True,
-        metavar="NAME=PLACE|FILE",
-        help="Motion capture: which joint of the standard a joint of the file is, Pelvis=HumanoidRoot; none: "
-        "Hat=. Or where on the face a marker is, Chin=2.1. Repeatable. Or a TOML file of such pairs, in "
-        "place of what is found.",
-    )
-    saved = click.option(
-        "--map-out",
-        type=OutputType(),
-        metavar="FILE.toml",
-        help="Motion capture: write the joints or markers that were found, for --map.",
-    )
-
-    def decorate(command: Decorated) -> Decorated:
-        decorated: Any = saved(command) if out else command
-        return given(decorated)  # type: ignore[no-any-return]
-
-    return decorate
 
 
 def read_joints(

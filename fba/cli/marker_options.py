@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.cli import options
-from fba.cli.command import Decorated
 from fba.cli.inputs import Reading, input_file
 from fba.cli.joint_options import Pair
+from fba.cli.option_fields import option
 from fba.errors import FbaWarning, OptionError
 
 if TYPE_CHECKING:
@@ -63,36 +62,19 @@ class NeutralType(click.ParamType["Neutral"]):
         return float(times[1]), float(times[2])
 
 
-def marker_options(command: Decorated) -> Decorated:
-    """Add the options that say how markers become FAPs."""
-    neutral = click.option(
-        "--neutral",
+def neutral_option(subject: str) -> Any:
+    """Return `--neutral`. subject: the first words of its help."""
+    return option(
         type=NeutralType(),
         default="auto",
-        show_default=True,
         metavar="auto|first|N|FROM-TO",
-        help="Markers, points: the neutral face is found, the first moment, frame N, or between two times.",
+        help=f"{subject} neutral face is found, the first moment, frame N, or between two times.",
     )
-    gaze = options.choice_option(
-        "--gaze",
-        "Markers, points: eyes turn as their pupils say, if these are there, or keep looking at the camera.",
-        "none",
-        "camera",
-    )
-    aspect = click.option(
-        "--aspect",
-        type=AspectType(),
-        metavar="W:H",
-        help="Points: width and height of the picture, 16:9 or 1920x1080; default: what makes them a face.",
-    )
-    path = click.option(
-        "--head-path/--no-head-path",
-        default=None,
-        help="Markers: where the head goes moves the body; default: unless another file has a body.",
-    )
-    decorated: Any = aspect(path(command))
-    decorated = gaze(decorated)
-    return neutral(decorated)  # type: ignore[no-any-return]
+
+
+def aspect_option(text: str) -> Any:
+    """Return `--aspect`. text: its help."""
+    return option(type=AspectType(), metavar="W:H", help=text)
 
 
 def read_places(

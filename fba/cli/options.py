@@ -2,43 +2,65 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable
+import os
 from dataclasses import fields
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import click
 
-from fba.cli.command import Decorated
+from fba.cli.option_fields import option, option_like
+from fba.encoder_options import EncoderOptions
 from fba.errors import did_you_mean
-from fba.limits import Limits
-from fba.parameters import BAP_STEP_TABLES, BAP_STEPS_AUTO
+from fba.limits import DEFAULT_LIMITS, Limits
 
 RATES = (Fraction(1, 3600), Fraction(10_000))
 """Smallest and largest frame rate that can be asked for, as in BVH files."""
 LARGEST_LIMIT = 10**18
+NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
 
 
-def gather(**groups: type) -> Callable[[Decorated], Decorated]:
-    """Return a decorator that hands a command its options as dataclasses, by the names of their fields.
+class ExistingPath(click.Path):
+    """A file or folder that exists; the error for one that does not names the nearest that does."""
 
-    groups: name of the command's argument -> the dataclass; a field with a default may have no option.
-    """
+    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True, allow_dash: bool = False) -> None:
+        super().__init__(
+            exists=True, file_okay=file_okay, dir_okay=dir_okay, allow_dash=allow_dash, path_type=Path
+        )
 
-    def decorate(command: Decorated) -> Decorated:
-        @functools.wraps(command)
-        def gathering(**values: Any) -> Any:
-            made = {
-                name: kind(**{one.name: values.pop(one.name) for one in fields(kind) if one.name in values})
-                for name, kind in groups.items()
-            }
-            return command(**made, **values)
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        path = Path(os.fsdecode(value))
+        if not os.path.lexists(path) and not (self.allow_dash and str(path) == "-"):
+            self.fail(f"{str(path)!r} does not exist{did_you_mean(path.name, _neighbours(path))}", param, ctx)
+        return Path(os.fsdecode(super().convert(value, param, ctx)))
 
-        return gathering  # type: ignore[return-value]
 
-    return decorate
+def _neighbours(path: Path) -> list[str]:
+    """Return the names in the folder of a path, none if it cannot be listed."""
+    try:
+        return os.listdir(path.parent)
+    except OSError:
+        return []
+
+
+class InputType(ExistingPath):
+    """An existing file, "-" for standard input."""
+
+    def __init__(self) -> None:
+        super().__init__(dir_okay=False, allow_dash=True)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        if str(value) in NAMES_OF_STANDARD_INPUT:
+            return Path("-")
+        path = super().convert(value, param, ctx)
+        return path if str(path) != "-" else path.absolute()  # it was "./-", a file of that name
+
+
+EXISTING = InputType()
+"""The type of a file to read, or of standard input."""
+FILE = ExistingPath(dir_okay=False)
 
 
 class RateType(click.ParamType[Fraction]):
@@ -128,34 +150,42 @@ class SizeType(click.ParamType[tuple[int, int]]):
         return int(width), int(height)
 
 
-from_option = click.option(
+def is_given(name: str) -> bool:
+    """Whether an option of the running command, by the name of its field, was given and is no default."""
+    source = click.get_current_context().get_parameter_source(name)
+    return source is not None and source is not click.core.ParameterSource.DEFAULT
+
+
+def rate_option(text: str) -> Any:
+    """Return `--fps`, the frame rate of the result. text: its help."""
+    return option("--fps", type=RateType(), metavar="RATE", help=text)
+
+
+def size_option(**settings: Any) -> Any:
+    """Return `--size` of pictures and films. settings: as for `option`."""
+    default = {"help": "Default: 1280x720; of a GIF, 480x270."}
+    return option(type=SizeType(), metavar="WxH", **(settings or default))
+
+
+def model_option(text: str, *flags: str) -> Any:
+    """Return an option for a face model, by default `--model`. text: its help."""
+    return option(*flags, type=ExistingPath(), metavar="FILE", help=text)
+
+
+format_option = option(
     "--from",
-    "format",
     metavar="FORMAT",
     help="Input format, if neither content nor suffix shows it: fap, bap, fba, bvh, gltf.",
 )
-to_option = click.option(
+to_option = option(
     "--to", metavar="FORMAT", help="Output format, if OUT is - or its suffix does not show it."
 )
-no_clobber_option = click.option("--no-clobber", is_flag=True, help="Fail if an output file already exists.")
-salvage_option = click.option(
-    "--salvage", is_flag=True, help="Read the undamaged parts of damaged input, and list what was lost."
-)
-json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
-
-clip_option = click.option(
-    "--clip",
-    metavar="NAME",
-    help="Which animation of a glTF file with several, by name or number; `fba info` lists them.",
-)
-
-face_option = click.option(
-    "--face", metavar="NAME", help="Captures of several faces: the one to read, by its name."
-)
-
-limit_option = click.option(
+no_clobber_option = option(default=False, help="Fail if an output file already exists.")
+json_option = option("--json", default=False, help="Print JSON, for programs.")
+face_option = option(metavar="NAME", help="Captures of several faces: the one to read, by its name.")
+limit_option = option(
     "--limit",
-    "limit",
+    default=DEFAULT_LIMITS,
     type=LimitType(),
     metavar="NAME=VALUE",
     multiple=True,
@@ -164,49 +194,14 @@ limit_option = click.option(
     f"names: {', '.join(limit.name for limit in fields(Limits))}.",
 )
 """`--limit`, several times if need be; its value is `Limits`."""
-
-
-def is_given(option: str) -> bool:
-    """Whether an option of the running command, by the name of its parameter, was given and is no default."""
-    source = click.get_current_context().get_parameter_source(option)
-    return source is not None and source is not click.core.ParameterSource.DEFAULT
-
-
-def choice_option(flag: str, text: str, *choices: str) -> Callable[[Decorated], Decorated]:
-    """Return an option with choices, of which the first is the default. text: its help."""
-    return click.option(flag, type=click.Choice(choices), default=choices[0], show_default=True, help=text)
-
-
-fap_quant_option = click.option(
-    "--quant",
-    "fap_quant",
-    type=click.IntRange(0, 31),
-    default=1,
-    show_default=True,
-    help="Quantiser of FAPs (fap_quant); 0: unquantised.",
-)
-bap_steps_option = choice_option(
-    "--bap-steps",
-    "Table of BAP steps of a stream, the standard's or one vendor's; auto: the one that it names, else "
+read_steps_option = option(
+    default="auto",
+    help="Table of BAP steps of a stream, the standard's or one vendor's; auto: the one that it names, else "
     "the one that looks right.",
-    BAP_STEPS_AUTO,
-    *BAP_STEP_TABLES,
 )
-written_bap_steps_option = choice_option(
-    "--bap-steps",
-    "Table of BAP steps of a stream, the standard's or one vendor's, which is finer; auto: the finer one for "
-    "motion capture and walks, that of a stream for what comes from one, else the standard's.",
-    BAP_STEPS_AUTO,
-    *BAP_STEP_TABLES,
+written_steps_option = option(
+    default="auto",
+    help="Table of BAP steps of a stream, the standard's or one vendor's, which is finer; auto: the finer "
+    "one for motion capture and walks, that of a stream for what comes from one, else the standard's.",
 )
-mark_option = click.option(
-    "--mark/--no-mark",
-    default=None,
-    help="Name the table of BAP steps behind the end of the stream, where other decoders do not read; "
-    "default: yes, if it has a body.",
-)
-
-
-def fps_option(text: str) -> Callable[[Decorated], Decorated]:
-    """Return `--fps`. text: its help."""
-    return click.option("--fps", type=RateType(), metavar="RATE", help=text)
+mark_option = option_like(EncoderOptions, "mark", default=None, by_default="yes, if it has a body")

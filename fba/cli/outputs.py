@@ -21,7 +21,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import click
 
 from fba.cli.inputs import renamed
+from fba.cli.option_fields import option
 from fba.errors import FormatError
+from fba.parameters import BapTable
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -60,6 +62,16 @@ class OutputType(click.ParamType[Path]):
             self.fail(f"there is no folder {text}; make it first, or leave the slash out", param, ctx)
         # Path("./-") would be "-"
         return Path(text) if Path(text) != STANDARD else Path(os.path.abspath(text))
+
+
+def output_option(metavar: str, text: str, **settings: Any) -> Any:
+    """Return `-o`, `--output`. text: its help. settings: as for `option`."""
+    return option("-o", "--output", metavar=metavar, type=OutputType(), help=text, **settings)
+
+
+def further_output_option(metavar: str, text: str, *flags: str) -> Any:
+    """Return an option for a file that is written beside the output. text: its help."""
+    return option(*flags, metavar=metavar, type=OutputType(), help=text)
 
 
 @dataclass(frozen=True)
@@ -162,7 +174,7 @@ def display_name(path: Path) -> str:
     return "standard output" if path == STANDARD else str(path)
 
 
-def opening_for(output: Path, animation: Animation, table: str, quant: int, *, marked: bool) -> bytes:
+def opening_for(output: Path, animation: Animation, table: BapTable, quant: int, *, marked: bool) -> bytes:
     """Return what goes before a stream that others may read while it comes; b"" for a file.
 
     Nothing in streams without a mark, and without BAPs that the table makes a difference to.

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fba.cli.option_fields import option
+
 if TYPE_CHECKING:
     from fba.animation import Animation
 
@@ -19,14 +21,27 @@ LARGEST = 2**31 - 1
 
 @dataclass(frozen=True)
 class Pose:
-    """A face as it is typed; a name may be a number.
+    """A face as it is typed; a name may be a number."""
 
-    faps: NAME=VALUE. visemes: NAME or NAME=BLEND. expressions: NAME or NAME=INTENSITY.
-    """
-
-    faps: tuple[str, ...] = ()
-    visemes: tuple[str, ...] = ()
-    expressions: tuple[str, ...] = ()
+    faps: tuple[str, ...] = option(
+        "--fap",
+        default=(),
+        metavar="NAME=VALUE",
+        help="Without a file: a FAP of the face, by name or number; repeatable. A left or right FAP alone "
+        "moves both sides, as in a stream; give its counterpart as well to move them apart.",
+    )
+    visemes: tuple[str, ...] = option(
+        "--viseme",
+        default=(),
+        metavar="NAME[=BLEND]",
+        help="Without a file: a viseme by number, name or sound; of two, BLEND (0..63) is the share of one.",
+    )
+    expressions: tuple[str, ...] = option(
+        "--expression",
+        default=(),
+        metavar="NAME[=INTENSITY]",
+        help="Without a file: an expression, 0..63; up to two.",
+    )
 
     @property
     def given(self) -> list[str]:

@@ -41,7 +41,7 @@ def open_file(file: Path, how: SceneOptions) -> inputs.ReadFile | LiveAnimation:
     if str(file) == "-" and sys.stdin.isatty():
         raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):
-        return inputs.read_file(file, how, header_fps=how.fps)
+        return inputs.read_file(file, how)
     with contextlib.ExitStack() as stack:
         source: BinaryIO = sys.stdin.buffer if str(file) == "-" else stack.enter_context(_fifo(file))
         head = b""
@@ -160,7 +160,7 @@ def _fifo(file: Path) -> BinaryIO:
 def _read_other(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> inputs.ReadFile:
     """Return what a pipe holds that carries no FBA stream. head: what was read from it before."""
     with inputs.spooled(source, name, head) as path:
-        found = inputs.read_file(path, how, header_fps=how.fps, name=name)
+        found = inputs.read_file(path, how, name=name)
     if found.animation.name != path.name:
         return found
     return replace(found, animation=replace(found.animation, name=name))

@@ -2,45 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
 from fba.cli import inputs, options
-from fba.cli.command import Decorated
-from fba.cli.inputs import EXISTING, ExistingPath, Reading
-from fba.cli.joint_options import Pair, body_map_option
+from fba.cli.inputs import Reading
+from fba.cli.joint_options import Maps, MapType
+from fba.cli.option_fields import option
 
 MOST = 8
 """Files shown at once."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SceneOptions(Reading):
-    """How files are read and shown: the options' values."""
-
-    model: Path | None
-    body: Path | None
-    maps: tuple[Path | Pair, ...]
-    arrange: str | None
-    fps: Fraction | None
-    camera: str | None
-    view: str
-    shows: tuple[tuple[str, object], ...]
-    axes: str
-
-
-@dataclass(frozen=True)
-class SoundOptions:
-    """Which sound is played, and when."""
-
-    audio: Path | None
-    no_audio: bool
-    audio_offset: float
 
 
 class ShowType(click.ParamType[tuple[str, Any]]):
@@ -59,81 +33,69 @@ class ShowType(click.ParamType[tuple[str, Any]]):
             self.fail(str(error), param, ctx)
 
 
-files_argument = click.argument("files", type=EXISTING, nargs=-1, metavar="[FILE...]")
+files_argument = click.argument("files", type=options.EXISTING, nargs=-1, metavar="[FILE...]")
 
 
-def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]:
-    """Return a decorator that gives a command `how`, a `SceneOptions`. fps, arrange: the help of these."""
-    return _gathered(
-        "how",
-        SceneOptions,
-        click.option(
-            "--model",
-            type=ExistingPath(),
-            metavar="FILE",
-            help="The face: a .glb of this project, or another that can be imported. "
-            "Default: the built-in head.",
-        ),
-        click.option(
-            "--body",
-            type=ExistingPath(dir_okay=False),
-            metavar="FILE",
-            help="The body: one of this project, or any skinned person (.glb, .vrm) with its own head. "
-            "Default: the built-in person.",
-        ),
-        body_map_option,
-        click.option("--arrange", type=click.Choice(["side", "over"]), help=arrange),
-        options.fps_option(fps),
-        options.from_option,
-        options.clip_option,
-        click.option(
-            "--camera",
-            type=click.Choice(["front", "three-quarter", "profile", "body"]),
-            help="Default: one that suits the content.",
-        ),
-        options.choice_option(
-            "--view",
-            "A person, or the face as its feature points and the body as its bones.",
-            "figure",
-            "points",
-        ),
-        click.option(
-            "--show",
-            "shows",
-            type=ShowType(),
-            multiple=True,
-            metavar="SWITCH[=VALUE]",
-            help="What else is shown; repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, "
-            "normals; shadows, wrinkles, eyes, teeth, hair=off; background=grey or transparent.",
-        ),
-        options.choice_option(
-            "--axes", "Which way BAPs turn: as the standard says, or as in some old files.", "iso", "vreng"
-        ),
-        options.bap_steps_option,
-        options.salvage_option,
-        options.limit_option,
+@dataclass(frozen=True, kw_only=True)
+class SceneOptions(Reading):
+    """How files are read and shown."""
+
+    model: Path | None = options.model_option(
+        "The face: a .glb of this project, or another that can be imported. Default: the built-in head."
+    )
+    body: Path | None = option(
+        type=options.FILE,
+        metavar="FILE",
+        help="The body: one of this project, or any skinned person (.glb, .vrm) with its own head. Default: "
+        "the built-in person.",
+    )
+    maps: Maps = option(
+        "--map",
+        default=(),
+        type=MapType(),
+        multiple=True,
+        metavar="JOINT=JOINT|FILE",
+        help="With --body: which joint of the standard a joint of its skeleton is, Pelvis=HumanoidRoot; "
+        "none: Hat=. Repeatable. Or a TOML file of such pairs.",
+    )
+    arrange: Literal["side", "over"] | None = option(
+        help="Several files: side by side (default), or the others as drawings over the first."
+    )
+    camera: Literal["front", "three-quarter", "profile", "body"] | None = option(
+        help="Default: one that suits the content."
+    )
+    view: Literal["figure", "points"] = option(
+        default="figure", help="A person, or the face as its feature points and the body as its bones."
+    )
+    shows: tuple[tuple[str, object], ...] = option(
+        "--show",
+        default=(),
+        type=ShowType(),
+        multiple=True,
+        metavar="SWITCH[=VALUE]",
+        help="What else is shown; repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, "
+        "normals; shadows, wrinkles, eyes, teeth, hair=off; background=grey or transparent.",
+    )
+    axes: Literal["iso", "vreng"] = option(
+        default="iso", help="Which way BAPs turn: as the standard says, or as in some old files."
     )
 
 
-def sound_options(kind: str = "Sound") -> Callable[[Decorated], Decorated]:
-    """Return a decorator that gives a command `sound`, a `SoundOptions`. kind: what the help calls it."""
-    return _gathered(
-        "sound",
-        SoundOptions,
-        click.option(
-            "--audio",
-            type=ExistingPath(dir_okay=False),
-            metavar="FILE",
-            help=f"{kind}, from the first frame. Default: the WAV file of the same name beside the input.",
-        ),
-        click.option("--no-audio", is_flag=True, help="No sound."),
-        click.option(
-            "--audio-offset",
-            type=options.MomentType(),
-            default=0.0,
-            metavar="SECONDS",
-            help="Delay of the sound; negative: it begins earlier.",
-        ),
+@dataclass(frozen=True, kw_only=True)
+class SoundOptions:
+    """Which sound is played, and when."""
+
+    audio: Path | None = option(
+        type=options.FILE,
+        metavar="FILE",
+        help="Sound, from the first frame. Default: the WAV file of the same name beside the input.",
+    )
+    no_audio: bool = option(default=False, help="No sound.")
+    audio_offset: float = option(
+        default=0.0,
+        type=options.MomentType(),
+        metavar="SECONDS",
+        help="Delay of the sound; negative: it begins earlier.",
     )
 
 
@@ -152,16 +114,3 @@ def check_files(files: tuple[Path, ...], how: SceneOptions, sound: SoundOptions,
     if len(files) < 2 and how.arrange is not None:
         one = f"; {files[0]} is one" if files else ""
         raise click.UsageError(f"--arrange needs two files or more{one}")
-
-
-def _gathered(
-    name: str, kind: type, *given: Callable[[Decorated], Decorated]
-) -> Callable[[Decorated], Decorated]:
-    """Return a decorator that adds options whose values reach the command as one object of a kind."""
-
-    def decorate(command: Decorated) -> Decorated:
-        for option in (options.gather(**{name: kind}), *reversed(given)):
-            command = option(command)
-        return command
-
-    return decorate

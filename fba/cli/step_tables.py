@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fba.choices import BapTableOrAuto
 from fba.cli.program import as_typed
 from fba.errors import FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT, bap_numbers, bap_steps
+from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT, BapTable, bap_numbers, bap_steps
 from fba.tracks import batches
 
 if TYPE_CHECKING:
     from fba.animation import Animation
 
-FINE = "visage"
+FINE: BapTable = "visage"
 
 
-def explain_choice(data: bytes, asked: str, limits: Limits = DEFAULT_LIMITS) -> str:
+def explain_choice(data: bytes, asked: BapTableOrAuto, limits: Limits = DEFAULT_LIMITS) -> str:
     """Return a stream's table, and why: "visage: the stream says so"; "" if it makes no difference."""
     from fba.formats.step_choice import choose_steps
 
@@ -31,8 +32,13 @@ def explain_choice(data: bytes, asked: str, limits: Limits = DEFAULT_LIMITS) -> 
 
 
 def table_to_read(
-    name: str | Path, data: bytes, asked: str, limits: Limits = DEFAULT_LIMITS, *, shown: bool = True
-) -> str:
+    name: str | Path,
+    data: bytes,
+    asked: BapTableOrAuto,
+    limits: Limits = DEFAULT_LIMITS,
+    *,
+    shown: bool = True,
+) -> BapTable:
     """Return the table with which a stream is to be decoded; print in one line which it is, and why.
 
     asked: the value of --bap-steps. shown: whether its BAPs are shown or written at all. Nothing is printed
@@ -48,7 +54,9 @@ def table_to_read(
     return choice.table
 
 
-def table_to_write(asked: str, *, made: bool, marked: bool, read: str | None = None) -> str:
+def table_to_write(
+    asked: BapTableOrAuto, *, made: bool, marked: bool, read: BapTable | None = None
+) -> BapTable:
     """Return the table with which a body is to be encoded.
 
     asked: the value of --bap-steps. made: whether the body is motion capture, or was generated. marked:
@@ -61,7 +69,9 @@ def table_to_write(asked: str, *, made: bool, marked: bool, read: str | None = N
     return FINE if made and marked else BAP_STEPS_DEFAULT
 
 
-def remind(output: Path, animation: Animation, table: str, quant: int = 1, *, marked: bool = True) -> None:
+def remind(
+    output: Path, animation: Animation, table: BapTable, quant: int = 1, *, marked: bool = True
+) -> None:
     """Print the option that later commands need to read a stream that was just written, if any.
 
     Unquantised BAPs (quant 0) are the same under every table.
@@ -71,7 +81,9 @@ def remind(output: Path, animation: Animation, table: str, quant: int = 1, *, ma
         click.echo(f"Play it with: {again}", err=True)
 
 
-def warn_of_coarse_steps(animation: Animation, table: str, quant: int = 1, *, captured: bool = False) -> None:
+def warn_of_coarse_steps(
+    animation: Animation, table: BapTable, quant: int = 1, *, captured: bool = False
+) -> None:
     """Warn if a body is about to be coded with the standard's steps and its root moves by less than them.
 
     captured: the body is motion capture, whose angles these steps may cut as well.
@@ -91,7 +103,7 @@ def warn_of_coarse_steps(animation: Animation, table: str, quant: int = 1, *, ca
 
 
 def warn_of_doubt(
-    name: str | Path, animation: Animation, table: str, marked: str | None = None
+    name: str | Path, animation: Animation, table: BapTable, marked: str | None = None
 ) -> str | None:
     """Warn if a decoded body was read with the wrong table; return the warning.
 
@@ -119,7 +131,7 @@ def warn_of_doubt(
     return text
 
 
-def warn_of_doubtful_stream(name: str | Path, data: bytes, table: str) -> None:
+def warn_of_doubtful_stream(name: str | Path, data: bytes, table: BapTable) -> None:
     """Do the same for a stream, of which the first frames with a body are decoded."""
     from fba.codec import marked_table
     from fba.formats.step_choice import first_frames

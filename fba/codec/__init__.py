@@ -15,7 +15,6 @@ from fba.codec._encoder import (
     warn_of_clamped,
 )
 from fba.codec._frame_buffer import DecodedFrames, FrameBuffer
-from fba.codec._options import EncoderOptions
 from fba.codec._plane.pricing import NextPlane
 from fba.codec._plane.slots import weights_of_slots
 from fba.codec._quantisation import coarsest_quantisers, count_rounded, exact_quantisers, levels, quantise
@@ -26,6 +25,7 @@ from fba.codec._stream_info import PartInfo, StreamInfo, probe_stream
 from fba.codec._verification import Verification, digest, verify_stream
 from fba.codec._whole_stream import decode
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
+from fba.encoder_options import EncoderOptions
 
 __all__ = [
     "INTRA_BITS",

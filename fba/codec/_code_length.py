@@ -7,11 +7,11 @@ from functools import lru_cache
 import numpy as np
 
 from fba.arrays import Float64, Int64
-from fba.codec._options import EncoderOptions
 from fba.codec._plane import quantiser, slots
 from fba.codec._quantisation import levels
 from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
 from fba.compiled import compiled
+from fba.encoder_options import EncoderOptions
 from fba.tracks import BodyTrack, FaceTrack
 
 RANGE_BITS = 4 * 5
@@ -37,7 +37,7 @@ def code_lengths(track: FaceTrack | BodyTrack, cuts: Int64, options: EncoderOpti
     if len(cuts) and not (cuts[0] >= 0 and cuts[-1] <= len(track) and (np.diff(cuts) > 0).all()):
         raise ValueError(f"cuts must increase from 0 to {len(track)} frames, not {cuts.tolist()}")
     part = slots.BODY_BIT if isinstance(track, BodyTrack) else slots.FACE_BIT
-    scale = quantiser.scale(part, options.quant(part))
+    scale = quantiser.scale(part, slots.quantiser_of(options, part))
     values = levels(track, options)
     result = np.zeros((values.shape[1], len(cuts), len(cuts)))
     logarithms, factorials = _logarithms(len(values))
@@ -64,7 +64,7 @@ def level_bits(values: Int64, scale: int) -> float:
 def step_scale(options: EncoderOptions, *, body: bool) -> int:
     """Return how many table steps the quantiser of BAPs, or of FAPs, takes: the divisor of range limits."""
     part = slots.BODY_BIT if body else slots.FACE_BIT
-    return quantiser.scale(part, options.quant(part))
+    return quantiser.scale(part, slots.quantiser_of(options, part))
 
 
 def range_limit(level: int, scale: int) -> int:

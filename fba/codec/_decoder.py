@@ -9,6 +9,7 @@ from fba.codec._block import Block
 from fba.codec._stream.damage import Damage
 from fba.codec._stream_reader import StreamReader
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import BapTable
 
 
 class Decoder:
@@ -34,7 +35,7 @@ class Decoder:
     def __init__(
         self,
         *,
-        bap_steps: str | None = None,
+        bap_steps: BapTable | None = None,
         on_error: Literal["raise", "salvage"] = "raise",
         limits: Limits = DEFAULT_LIMITS,
     ) -> None:

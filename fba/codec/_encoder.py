@@ -11,7 +11,6 @@ import numpy as np
 from fba.animation import Animation, Frame
 from fba.arrays import Int32, Int64
 from fba.codec import _headers as headers
-from fba.codec._options import EncoderOptions
 from fba.codec._plane import full_turns, quantiser, slots
 from fba.codec._plane.loops import SKIP_MAX
 from fba.codec._plane.pricing import NextPlane
@@ -21,6 +20,7 @@ from fba.codec._runs import Run, find_runs
 from fba.codec._stream.checksums import PeriodChecks
 from fba.codec._stream.mark import write_mark
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
+from fba.encoder_options import EncoderOptions
 from fba.errors import FbaWarning, OptionError, RangeError
 from fba.parameters import INTENSITY_MAX
 from fba.presets import REFERENCE
@@ -438,7 +438,7 @@ class Encoder:
         return PartSettings(
             run.mask_types[part],
             mask,
-            options.quant(part),
+            slots.quantiser_of(options, part),
             options.gender,
             ranges=ranges.lists() if send else RangeLists(),
         )

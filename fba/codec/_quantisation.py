@@ -9,9 +9,9 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Int32, Int64
-from fba.codec._options import EncoderOptions
 from fba.codec._plane import quantiser, slots
-from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT
+from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
+from fba.encoder_options import QUANT_MAX, EncoderOptions
 from fba.parameters import INTENSITY_MAX
 from fba.tracks import BodyTrack, FaceTrack
 
@@ -49,7 +49,7 @@ def coarsest_quantisers(animation: Animation, options: EncoderOptions) -> Encode
         (slots.FACE_BIT, "fap_quant", animation.face),
         (slots.BODY_BIT, "bap_quant", animation.body),
     ):
-        own = options.quant(part)
+        own = slots.quantiser_of(options, part)
         if track is None or not own:
             continue
         scale, coded = quantiser.scale(part, own), levels(track, options)

@@ -6,11 +6,11 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Int32, Int64, UInt8
-from fba.codec._options import EncoderOptions
 from fba.codec._plane import full_turns, quantiser, slots
 from fba.codec._plane.loops import quantise, quantise_change
-from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT, RangeLists
+from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT, RangeLists
 from fba.compiled import compiled
+from fba.encoder_options import QUANT_MAX, EncoderOptions
 from fba.errors import RangeError, Remedy
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, Bap, Fap, baps, faps
 from fba.tracks import batches
@@ -25,8 +25,8 @@ class Ranges:
     def __init__(self, part: int, options: EncoderOptions) -> None:
         self._part = part
         self._options = options
-        self._scale = quantiser.scale(part, options.quant(part))
-        self._step = quantiser.steps(part, options.quant(part), options.bap_steps)
+        self._scale = quantiser.scale(part, slots.quantiser_of(options, part))
+        self._step = quantiser.steps(part, slots.quantiser_of(options, part), options.bap_steps)
         self._first = slots.FAPS.start - 2 if part == slots.FACE_BIT else slots.BAPS.start
         self.codes = np.zeros((4, FAP_COUNT if part == slots.FACE_BIT else BAP_COUNT), dtype=np.uint8)
         self.changed = True
@@ -112,7 +112,7 @@ def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, R
     for part, track in ((slots.FACE_BIT, animation.face), (slots.BODY_BIT, animation.body)):
         if track is None:
             continue
-        step = quantiser.steps(part, options.quant(part), options.bap_steps)
+        step = quantiser.steps(part, slots.quantiser_of(options, part), options.bap_steps)
         turn = np.where(full_turns.angle_slots() & options.clamp, full_turns.FULL_TURN, 0)
         # The viseme and expression, the first two columns of a face, have fixed ranges.
         skipped, first = 2 * (part == slots.FACE_BIT), slots.BAPS.start
@@ -181,7 +181,7 @@ def does_not_fit(slot: int, value: int, position: int, options: EncoderOptions) 
         )
         for table in tables
     }
-    largest = quantiser.largest(part, slot, options.quant(part), options.bap_steps)
+    largest = quantiser.largest(part, slot, slots.quantiser_of(options, part), options.bap_steps)
     here = fitting[options.bap_steps]
     others = [
         f"bap_steps {table} with {name} {q}"
@@ -195,8 +195,8 @@ def does_not_fit(slot: int, value: int, position: int, options: EncoderOptions) 
     else:
         remedy = f"no {name} would do"
     return RangeError(
-        f"the value {value} cannot be carried: with {name} {options.quant(part)} the largest is {largest}; "
-        f"{remedy}",
+        f"the value {value} cannot be carried: with {name} {slots.quantiser_of(options, part)} the largest "
+        f"is {largest}; {remedy}",
         parameter=slots.label(slot),
         value=value,
         limits=(-largest, largest),

@@ -12,9 +12,12 @@ from fba.codec._plane import slots
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec.settings import PlaneSettings
 from fba.errors import RangeError
+from fba.parameters import BapTable
 
 
-def encode_planes(animation: Animation, planes: Sequence[PlaneSettings], *, bap_steps: str = "iso") -> bytes:
+def encode_planes(
+    animation: Animation, planes: Sequence[PlaneSettings], *, bap_steps: BapTable = "iso"
+) -> bytes:
     """Return the stream of an animation, encoded plane by plane as `planes` say.
 
     `face_frame` and `body_frame` of a plane are the frame numbers that it codes, as in `animation.index`. Its

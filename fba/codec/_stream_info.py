@@ -17,6 +17,7 @@ from fba.codec._whole_stream import read_blocks, reader_for
 from fba.codec.settings import PartSettings
 from fba.errors import BitstreamError
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import BapTable
 
 _MASK_NAMES = {
     header_loops.MASK_NONE: "none",
@@ -70,7 +71,7 @@ class StreamInfo:
     plane_intra: Bool | None = field(default=None, repr=False)
     frame_index: Int64 | None = field(default=None, repr=False)
     damage: tuple[Damage, ...] = ()
-    bap_steps: str | None = None
+    bap_steps: BapTable | None = None
 
     @property
     def bits_per_second(self) -> float:
@@ -158,7 +159,10 @@ class _PartCount:
 
 
 def probe_stream(
-    data: bytes | bytearray | memoryview, *, bap_steps: str | None = None, limits: Limits = DEFAULT_LIMITS
+    data: bytes | bytearray | memoryview,
+    *,
+    bap_steps: BapTable | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> StreamInfo:
     """Return the description of an FBA stream: planes, rates, parameters, bits.
 

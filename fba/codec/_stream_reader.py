@@ -18,7 +18,7 @@ from fba.codec._stream.object_borders import ObjectBorders
 from fba.codec._stream.plane_times import PlaneTimes
 from fba.errors import BitstreamError, FbaWarning, LimitError, UnsupportedError
 from fba.limits import Limits
-from fba.parameters import BAP_STEP_TABLES
+from fba.parameters import BAP_STEP_TABLES, BapTable
 from fba.recognition import HEAD_BYTES, recognition_hint
 
 NO_END = "the stream ends without the end code 00 00 01 b1: it may have been cut off behind this plane"
@@ -44,7 +44,7 @@ class StreamReader:
     def __init__(
         self,
         *,
-        bap_steps: str | None,
+        bap_steps: BapTable | None,
         on_error: Literal["raise", "salvage"],
         limits: Limits,
         marks: Sequence[Mark] = (),

@@ -16,7 +16,7 @@ from fba.codec._stream.damage import Damage
 from fba.codec._whole_stream import read_blocks, reader_for
 from fba.errors import BitstreamError, FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
+from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, BapTable
 
 _FRAMES = 4096
 """Frames of which the digest is computed at once."""
@@ -70,7 +70,10 @@ class Verification:
 
 
 def verify_stream(
-    data: bytes | bytearray | memoryview, *, bap_steps: str | None = None, limits: Limits = DEFAULT_LIMITS
+    data: bytes | bytearray | memoryview,
+    *,
+    bap_steps: BapTable | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Verification:
     """Check an FBA stream: decode all that can be decoded, and return the findings.
 

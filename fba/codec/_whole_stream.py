@@ -13,6 +13,7 @@ from fba.codec._stream.mark import find_marks
 from fba.codec._stream_reader import NO_END, StreamReader
 from fba.errors import BitstreamError, FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import BapTable
 
 _CHUNK = 1 << 16
 """Bytes that are read at once, so that few blocks are in memory."""
@@ -21,7 +22,7 @@ _CHUNK = 1 << 16
 def decode(
     data: bytes | bytearray | memoryview,
     *,
-    bap_steps: str | None = None,
+    bap_steps: BapTable | None = None,
     on_error: Literal["raise", "salvage"] = "raise",
     limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
@@ -52,7 +53,7 @@ def decode(
 def reader_for(
     data: memoryview,
     *,
-    bap_steps: str | None,
+    bap_steps: BapTable | None,
     on_error: Literal["raise", "salvage"] = "raise",
     limits: Limits = DEFAULT_LIMITS,
 ) -> StreamReader:

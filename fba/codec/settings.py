@@ -15,7 +15,6 @@ RANGE_UNIT = 60
 """Range limits are multiples of this."""
 RANGE_CODE_MAX = 31
 """Largest 5-bit range code: a limit of 31 x 60 = 1860."""
-QUANT_MAX = 31
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,13 @@
 """Emotions as FAPs: named expressions, measured profiles, mixtures by rules, the plane of emotions.
 
 After chapter 8 of the thesis in docs/emotion.md. `expression` returns an expression by name, `combine` mixes
-several, `expression_at` returns the expression at an activation and evaluation, and `perform` makes an
+several, `expression_at` returns the expression at an activation and evaluation, and `animate` makes an
 `Animation`.
 """
 
 from fba.emotion._modification import Damping, emote, modify
 from fba.emotion._moods import Mood, MoodCurve
-from fba.emotion._performance import perform
+from fba.emotion._performance import animate
 from fba.emotion._profiles import Measurement, Movement, measured_faps, measurements, vocabulary
 from fba.emotion._reading import Readings, read_expressions
 from fba.emotion._rules import Rules
@@ -15,7 +15,7 @@ from fba.emotion.blending import Blend, combine, parse_weights
 from fba.emotion.expression import FAMILIES, NEUTRAL_POINT, Expression
 from fba.emotion.expressions import expression, expressions
 from fba.emotion.plane import expression_at, known_points
-from fba.emotion.recogniser import Nearest, Reading, Recogniser
+from fba.emotion.recogniser import ExpressionRecogniser, Nearest, Reading
 
 __all__ = [
     "FAMILIES",
@@ -23,6 +23,7 @@ __all__ = [
     "Blend",
     "Damping",
     "Expression",
+    "ExpressionRecogniser",
     "Measurement",
     "Mood",
     "MoodCurve",
@@ -30,8 +31,8 @@ __all__ = [
     "Nearest",
     "Reading",
     "Readings",
-    "Recogniser",
     "Rules",
+    "animate",
     "combine",
     "emote",
     "expression",
@@ -42,7 +43,6 @@ __all__ = [
     "measurements",
     "modify",
     "parse_weights",
-    "perform",
     "read_expressions",
     "vocabulary",
 ]

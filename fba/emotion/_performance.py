@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from typing import get_args
 
 import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float64, Int16
+from fba.choices import Sending
 from fba.easing import smoothstep
 from fba.emotion.blending import Blend
 from fba.errors import OptionError
@@ -16,13 +18,18 @@ from fba.face.mates import fill
 from fba.parameters import FIRST_LOW_LEVEL_FAP
 from fba.tracks import FaceTrack
 
-SENDING = ("auto", "expression", "faps")
+SENDING: tuple[Sending, ...] = get_args(Sending)
 """How an expression is sent: by FAP 2 where possible, by FAP 2, by low-level FAPs."""
 MAX_FRAMES = 10_000_000
 
 
-def perform(
-    blend: Blend, *, seconds: float = 0.0, ease: float = 0.0, rate: Fraction | int = 25, send: str = "auto"
+def animate(
+    blend: Blend,
+    *,
+    seconds: float = 0.0,
+    ease: float = 0.0,
+    rate: Fraction | int = 25,
+    send: Sending = "auto",
 ) -> Animation:
     """Return an animation that shows an expression: eased in, held, eased out.
 

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.emotion.recogniser import NEUTRAL, UNKNOWN, Reading, Recogniser
+from fba.choices import Baseline
+from fba.emotion.recogniser import NEUTRAL, UNKNOWN, ExpressionRecogniser, Reading
 from fba.errors import OptionError
 from fba.face import resolve
 from fba.face.resolve import FaceSettings, known_faps
 from fba.parameters import faps
 from fba.tracks import FaceTrack
 
-BASELINES = ("none", "start", "median")
+BASELINES: tuple[Baseline, ...] = get_args(Baseline)
 """The face at rest: that of the standard, the mean of the start, the median of each FAP."""
 START_SECONDS = 0.5
 """Longest duration of the start of a recording, seconds."""
@@ -40,7 +41,7 @@ class Readings:
 
     times: Float64
     readings: tuple[Reading, ...]
-    baseline: str
+    baseline: Baseline
     unsent: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -70,7 +71,7 @@ class Readings:
 
 
 def read_expressions(
-    animation: Animation, model: FaceSettings | None = None, *, baseline: str = "none"
+    animation: Animation, model: FaceSettings | None = None, *, baseline: Baseline = "none"
 ) -> Readings:
     """Return the expressions in each frame of an animation.
 
@@ -91,7 +92,7 @@ def read_expressions(
     if len(shown) >= SILENT_SECONDS * animation.rate:
         known &= shown.any(axis=0)
     at_rest = _find_rest(shown, times, baseline)
-    recogniser = Recogniser(animation.rate, known=known, baseline=at_rest)
+    recogniser = ExpressionRecogniser(animation.rate, known=known, baseline=at_rest)
     readings: list[Reading] = []
     for start in range(0, len(shown), CHUNK):
         readings += recogniser.push_frames(shown[start : start + CHUNK])
@@ -110,7 +111,7 @@ def find_known_faps(track: FaceTrack) -> Bool:
     return known
 
 
-def _find_rest(shown: Any, times: Float64, baseline: str) -> Float64 | None:
+def _find_rest(shown: Any, times: Float64, baseline: Baseline) -> Float64 | None:
     if baseline == "none":
         return None
     first = times <= min(START_SECONDS, START_SHARE * float(times[-1]))

@@ -79,7 +79,7 @@ def labels() -> tuple[str, ...]:
     return (NEUTRAL, UNKNOWN, *FAMILIES, *loners)
 
 
-class Recogniser:
+class ExpressionRecogniser:
     """Recognises expressions in frames as they come.
 
     rate: frames a second. known: bool (68,), the FAPs that the source sends, all by default; others are

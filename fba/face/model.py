@@ -136,7 +136,7 @@ class FaceModel(Meshes[Part]):
         """Write the face as glTF 2.0 (.glb), atomically."""
         from fba.face.gltf._storage import save
 
-        save(self, path)
+        save(path, self)
 
     @property
     def feature_points(self) -> Float64:

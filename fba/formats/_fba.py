@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.atomic import atomic
+from fba.choices import BapTableOrAuto
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEPS_AUTO
 from fba.source import Path, naming_file, read_whole
@@ -36,7 +37,11 @@ def sniff_fba(head: bytes, suffix: str) -> bool:
 
 
 def read_fba(
-    path: Path, *, bap_steps: str | None = None, salvage: bool = False, limits: Limits = DEFAULT_LIMITS
+    path: Path,
+    *,
+    bap_steps: BapTableOrAuto | None = None,
+    salvage: bool = False,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Decode an FBA file.
 

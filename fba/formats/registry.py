@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError, OptionError, Remedy, UnsupportedError, did_you_mean
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import BapTable
 from fba.recognition import recognition_hint
 from fba.source import Path, read_head
 
@@ -367,7 +368,7 @@ def writer_for(path: Path, format: str | None = None) -> Format:
 def probe(
     data_or_path: bytes | bytearray | memoryview | Path,
     *,
-    bap_steps: str | None = None,
+    bap_steps: BapTable | None = None,
     format: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
     **options: Any,

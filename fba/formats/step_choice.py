@@ -11,7 +11,7 @@ import numpy as np
 from fba.animation import Animation, BodyTrack
 from fba.codec import Decoder, marked_table
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import BAP_STEPS_DEFAULT
+from fba.parameters import BAP_STEPS_DEFAULT, BapTable
 
 if TYPE_CHECKING:
     from fba.codec import Block
@@ -34,7 +34,7 @@ class StepChoice:
     nothing tells.
     """
 
-    table: str
+    table: BapTable
     reason: str
     confidence: str = CERTAIN
 
@@ -74,7 +74,7 @@ def choose_steps(data: bytes | bytearray | memoryview, *, limits: Limits = DEFAU
 
 
 def first_frames(
-    data: bytes | bytearray | memoryview, table: str, limits: Limits = DEFAULT_LIMITS
+    data: bytes | bytearray | memoryview, table: BapTable, limits: Limits = DEFAULT_LIMITS
 ) -> Animation | None:
     """Return the body in the first frames that have one; None if the table makes no difference to them.
 
@@ -103,7 +103,7 @@ def first_frames(
     return Animation(blocks[0].rate, index, None, body)
 
 
-def _blocks(data: memoryview, table: str, limits: Limits) -> Iterator[Block]:
+def _blocks(data: memoryview, table: BapTable, limits: Limits) -> Iterator[Block]:
     """Yield what can be decoded of a stream, up to an error that stops the decoder."""
     import warnings
 

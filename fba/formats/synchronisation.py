@@ -6,16 +6,18 @@ import warnings
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
+from typing import get_args
 
 import numpy as np
 
 from fba.animation import Animation
+from fba.choices import Sync
 from fba.errors import FbaWarning, FormatError, OptionError, Remedy
 from fba.formats.merge import merge
 from fba.formats.time_codes import DAY, seconds_between
 from fba.limits import DEFAULT_LIMITS, Limits
 
-SYNCS = ("timecode", "offset")
+SYNCS: tuple[Sync, ...] = get_args(Sync)
 STRAIGHT = 0.02
 """Share of a frame by which two clocks may differ and still share their frames."""
 FINEST = 1000
@@ -70,7 +72,7 @@ def join(
     first: Recording,
     second: Recording,
     *,
-    sync: str | None = None,
+    sync: Sync | None = None,
     offset: float = 0.0,
     begins: float | None = None,
     trim: bool = False,
@@ -121,7 +123,7 @@ def join(
 
 
 def _choose_clock(
-    recordings: tuple[Recording, Recording], starts: tuple[float | None, float | None], sync: str | None
+    recordings: tuple[Recording, Recording], starts: tuple[float | None, float | None], sync: Sync | None
 ) -> str:
     """Return "timecode" or "offset". Warns of recordings without the time code that is asked for."""
     if sync is not None and sync not in SYNCS:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -33,10 +34,17 @@ DROPPED = {30: 2, 60: 4, 120: 8}
 """Numbers that drop-frame codes leave out in a minute, by frames in a second."""
 
 
-def read_time_codes(
-    cells: Sequence[str], lines: Sequence[int], path: Path
-) -> tuple[Float64, Fraction, float]:
-    """Return times (T,) of time codes, seconds from the first; frames a second; the first's time of day.
+@dataclass(frozen=True, eq=False)
+class TimeCodes:
+    """Times of frames. seconds: (T,), from the first. rate: frames a second. start: time of day of that."""
+
+    seconds: Float64
+    rate: Fraction
+    start: float
+
+
+def read_time_codes(cells: Sequence[str], lines: Sequence[int], path: Path) -> TimeCodes:
+    """Return the times that time codes say.
 
     "18:48:59:39.473" is 39.473 frames after 18:48:59. Codes may pass midnight. lines: of each in the file.
     Raises FormatError for text that is no time code, or a code that no clock shows.
@@ -55,7 +63,7 @@ def read_time_codes(
     seconds = _drop_frame_seconds(parts, counted) if drop else _seconds(parts, counted)
     midnights = np.cumsum(np.diff(seconds, prepend=seconds[0]) < -NOON) * DAY
     rate = Fraction(counted * 1000, 1001) if drop else Fraction(counted)
-    return seconds + midnights - seconds[0], rate, float(seconds[0])
+    return TimeCodes(seconds + midnights - seconds[0], rate, float(seconds[0]))
 
 
 def parse_time_code(text: str, rate: Fraction | None = None) -> float | None:

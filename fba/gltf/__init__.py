@@ -8,7 +8,7 @@ from fba.gltf._document import MAX_ITEMS, Document, open_document, parse_json
 from fba.gltf._packed import unpack
 from fba.gltf._part_materials import PartWriter, convert_material, read_material
 from fba.gltf._reader import read_document, read_gltf
-from fba.gltf._scene import Animation, Channel, Gltf, Material, Mesh, Node, Primitive, Skin
+from fba.gltf._scene import Channel, Clip, Gltf, GltfMaterial, GltfMesh, Node, Primitive, Skin
 from fba.gltf._values import MAX_TEXT, Budget, Value, locating_errors, optional_member
 from fba.gltf._writer import Builder
 from fba.gltf.surfaces import Surface, surfaces
@@ -16,14 +16,14 @@ from fba.gltf.surfaces import Surface, surfaces
 __all__ = [
     "MAX_ITEMS",
     "MAX_TEXT",
-    "Animation",
     "Budget",
     "Builder",
     "Channel",
+    "Clip",
     "Document",
     "Gltf",
-    "Material",
-    "Mesh",
+    "GltfMaterial",
+    "GltfMesh",
     "Node",
     "PartWriter",
     "Primitive",

@@ -7,7 +7,7 @@ from typing import Literal
 
 from fba.errors import FbaWarning
 from fba.gltf._document import Document
-from fba.gltf._scene import Material
+from fba.gltf._scene import GltfMaterial
 from fba.gltf._values import Value, optional_member
 
 WEBP = "EXT_texture_webp"
@@ -23,7 +23,7 @@ def media_type(data: bytes) -> str | None:
     return None if kind == "image/webp" and data[8:12] != b"WEBP" else kind
 
 
-def read_materials(document: Document) -> tuple[Material, ...]:
+def read_materials(document: Document) -> tuple[GltfMaterial, ...]:
     """Return all materials, in order."""
     pictures = _Pictures(document)
     materials = tuple(_material(entry, n, pictures) for n, entry in enumerate(document.entries("materials")))
@@ -31,7 +31,7 @@ def read_materials(document: Document) -> tuple[Material, ...]:
     return materials
 
 
-def _material(entry: Value, number: int, pictures: _Pictures) -> Material:
+def _material(entry: Value, number: int, pictures: _Pictures) -> GltfMaterial:
     pictures.document.budget.charge(1024, entry)
     name = entry.get("name")
     surface = entry.get("pbrMetallicRoughness")
@@ -43,7 +43,7 @@ def _material(entry: Value, number: int, pictures: _Pictures) -> Material:
     coordinates = optional_member(texture, "texCoord")
     given, cutoff, two_sided = (entry.get(key) for key in ("alphaMode", "alphaCutoff", "doubleSided"))
     mode = None if given is None else given.choice(*ALPHA)
-    return Material(
+    return GltfMaterial(
         name=f"material {number}" if name is None else name.text(),
         colour=(red, green, blue, alpha),
         metallic=1.0 if metallic is None else metallic.number(0.0, 1.0),

@@ -12,7 +12,7 @@ from fba.errors import FbaWarning
 from fba.gltf._accessors import Accessors
 from fba.gltf._document import MAX_ITEMS, Document
 from fba.gltf._draco import unpack_primitive
-from fba.gltf._scene import Mesh, Primitive
+from fba.gltf._scene import GltfMesh, Primitive
 from fba.gltf._values import Value
 
 TRIANGLES = 4
@@ -27,14 +27,14 @@ MAX_SETS = 8
 """Most sets of texture coordinates, or of joints, that are read."""
 
 
-def read_meshes(document: Document, accessors: Accessors, materials: int) -> tuple[Mesh, ...]:
+def read_meshes(document: Document, accessors: Accessors, materials: int) -> tuple[GltfMesh, ...]:
     """Return all meshes, in order; materials: how many there are."""
     return tuple(
         _mesh(document, accessors, entry, n, materials) for n, entry in enumerate(document.entries("meshes"))
     )
 
 
-def _mesh(document: Document, accessors: Accessors, entry: Value, number: int, materials: int) -> Mesh:
+def _mesh(document: Document, accessors: Accessors, entry: Value, number: int, materials: int) -> GltfMesh:
     name = entry.get("name")
     entries = entry.member("primitives").elements(MAX_ITEMS)
     primitives = []
@@ -58,7 +58,7 @@ def _mesh(document: Document, accessors: Accessors, entry: Value, number: int, m
     weights = entry.get("weights")
     if weights is not None and primitives and len(weights.elements(MAX_TARGETS)) != count:
         raise weights.error(f"{len(weights.data)} weights for {count} morph targets")
-    return Mesh(
+    return GltfMesh(
         name=f"mesh {number}" if name is None else name.text(),
         primitives=tuple(primitives),
         morph_names=_names(entry, entries, count),

@@ -9,7 +9,7 @@ from fba import rotations
 from fba.arrays import Float64
 from fba.gltf._accessors import Accessors
 from fba.gltf._document import MAX_ITEMS, Document
-from fba.gltf._scene import Mesh, Node, Skin
+from fba.gltf._scene import GltfMesh, Node, Skin
 from fba.gltf._values import Value
 
 MAX_NUMBER = 1e100
@@ -20,7 +20,7 @@ MAX_ROUNDING = 1e-6
 
 
 def read_nodes(
-    document: Document, meshes: tuple[Mesh, ...], skins: tuple[Skin, ...]
+    document: Document, meshes: tuple[GltfMesh, ...], skins: tuple[Skin, ...]
 ) -> tuple[tuple[Node, ...], tuple[int, ...]]:
     """Return all nodes, and their indices with parents before children.
 
@@ -144,7 +144,7 @@ def _transform(entry: Value) -> tuple[Float64 | None, Float64 | None, Float64 | 
     return translation, rotation, scale, matrix_out
 
 
-def _highest_joint(mesh: Mesh) -> int:
+def _highest_joint(mesh: GltfMesh) -> int:
     """Return the highest number of a joint that a mesh names, -1 where it names none."""
     return max((int(p.joints.max()) for p in mesh.primitives if p.joints is not None), default=-1)
 

@@ -7,8 +7,7 @@ from typing import Any, Protocol
 
 from fba.arrays import Float32
 from fba.errors import ModelError
-from fba.gltf._scene import Gltf
-from fba.gltf._scene import Material as GltfMaterial
+from fba.gltf._scene import Gltf, GltfMaterial
 from fba.gltf._values import Value
 from fba.gltf._writer import Builder
 from fba.mesh import Material, Mesh

@@ -16,7 +16,7 @@ from fba.gltf._document import MAX_ITEMS, Document, open_document
 from fba.gltf._materials import read_materials
 from fba.gltf._meshes import read_meshes
 from fba.gltf._nodes import read_nodes, read_roots, read_skins
-from fba.gltf._scene import Animation, Channel, Gltf, Mesh, Node
+from fba.gltf._scene import Channel, Clip, Gltf, GltfMesh, Node
 from fba.gltf._values import Value
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
@@ -89,8 +89,8 @@ def _check_extensions(document: Document) -> None:
 
 
 def _read_animations(
-    document: Document, accessors: Accessors, nodes: tuple[Node, ...], meshes: tuple[Mesh, ...]
-) -> tuple[Animation, ...]:
+    document: Document, accessors: Accessors, nodes: tuple[Node, ...], meshes: tuple[GltfMesh, ...]
+) -> tuple[Clip, ...]:
     """Return all animations, in order, without channels that have no node or belong to extensions."""
     animations = []
     for number, entry in enumerate(document.entries("animations")):
@@ -111,11 +111,11 @@ def _read_animations(
                 # charged for every channel that shares the keys, so that millions of channels are refused
                 document.budget.charge(channel.times.nbytes + channel.values.nbytes, each)
                 channels.append(channel)
-        animations.append(Animation(f"animation {number}" if name is None else name.text(), tuple(channels)))
+        animations.append(Clip(f"animation {number}" if name is None else name.text(), tuple(channels)))
     return tuple(animations)
 
 
-def _width(target: Value, path: str, node: Node, meshes: tuple[Mesh, ...]) -> int:
+def _width(target: Value, path: str, node: Node, meshes: tuple[GltfMesh, ...]) -> int:
     """Return how many numbers a key has; for weights, one for each morph target of the node's mesh."""
     if path != "weights":
         return 4 if path == "rotation" else 3

@@ -11,7 +11,7 @@ from fba.gltf._values import Budget, Value
 
 
 @dataclass(frozen=True, eq=False)
-class Material:
+class GltfMaterial:
     """The look of a surface.
 
     colour: red, green, blue in linear light, and opacity, 0..1; it multiplies the texture. texture: PNG,
@@ -54,7 +54,7 @@ class Primitive:
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class GltfMesh:
     """Primitives with the same morph targets. morph_names, weights: the targets' names and defaults."""
 
     name: str
@@ -113,7 +113,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Animation:
+class Clip:
     """Channels that play together."""
 
     name: str
@@ -130,11 +130,11 @@ class Gltf:
     """
 
     file: str
-    meshes: tuple[Mesh, ...]
+    meshes: tuple[GltfMesh, ...]
     nodes: tuple[Node, ...]
     skins: tuple[Skin, ...]
-    materials: tuple[Material, ...]
-    animations: tuple[Animation, ...]
+    materials: tuple[GltfMaterial, ...]
+    animations: tuple[Clip, ...]
     roots: tuple[int, ...]
     order: tuple[int, ...]
     document: Value

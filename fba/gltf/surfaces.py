@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import FbaWarning
-from fba.gltf._scene import Gltf, Material, Node, Primitive
+from fba.gltf._scene import Gltf, GltfMaterial, Node, Primitive
 from fba.mesh import UniqueNames
 
 SURFACE_BYTES = 2500
@@ -43,7 +43,7 @@ class Surface:
     texcoords: Float32 | None
     colours: Float32 | None
     morphs: Mapping[str, Float32]
-    material: Material | None
+    material: GltfMaterial | None
     node: int
     primitive: Primitive
 

@@ -11,6 +11,7 @@ import io
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from typing import Final, Literal
 
 import numpy as np
 
@@ -24,10 +25,12 @@ FIRST_LOW_LEVEL_FAP = 3
 FAP_GROUP_COUNT = 10
 BAP_GROUP_COUNT = 24
 
-BAP_STEP_TABLES = ("iso", "visage")
+BapTable = Literal["iso", "visage"]
+"""The name of a table of BAP steps."""
+BAP_STEP_TABLES: tuple[BapTable, ...] = ("iso", "visage")
 """`iso`: the standard's quantiser steps; `visage`: those of a vendor's tools. Streams do not say which."""
 BAP_STEPS_DEFAULT = BAP_STEP_TABLES[0]
-BAP_STEPS_AUTO = "auto"
+BAP_STEPS_AUTO: Final = "auto"
 """In place of a table's name: the table that the stream's mark names, or else that its motion shows."""
 
 VISEME_FIELDS = ("viseme_select1", "viseme_select2", "viseme_blend", "viseme_def")
@@ -229,7 +232,7 @@ def fap_steps() -> Int64:
 
 
 @cache
-def bap_steps(table: str = "iso") -> Int64:
+def bap_steps(table: BapTable = "iso") -> Int64:
     """(296,) quantiser steps before the predictive scale; table: "iso" or "visage"; read-only."""
     if table not in BAP_STEP_TABLES:
         raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {table!r}")

@@ -13,7 +13,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.persona.points.layout import PARTS
-from fba.persona.recognition import Labels, Recogniser
+from fba.persona.recognition import ClassRecogniser, Labels
 
 MIN_FRAMES = 4
 """Number of frames of a class that its curve needs."""
@@ -79,7 +79,7 @@ def _measure(moved: Float64) -> Float64:
 
 
 @lru_cache(maxsize=4)
-def general_curves(recogniser: Recogniser) -> dict[str, Curves]:
+def general_curves(recogniser: ClassRecogniser) -> dict[str, Curves]:
     """Return the curves of people in general by part, from a recogniser's examples."""
     result = {}
     for part in PARTS:

@@ -15,7 +15,7 @@ from fba.persona._persona import SHARE_OF_WIDTH, PartStyle, Persona, part_width
 from fba.persona.motion import Tally, flatten
 from fba.persona.points import TrackedFace, mask_distance
 from fba.persona.points.layout import PARTS, part_points, part_vertices
-from fba.persona.recognition import Labels, Recogniser
+from fba.persona.recognition import ClassRecogniser, Labels
 from fba.persona.recognition._faps import face_scale, measure_fapu
 
 MIN_MOTION = 1.5
@@ -30,7 +30,7 @@ def learn(
     *,
     neutral: Sequence[Neutral] | None = None,
     warm_up: int = 0,
-    recogniser: Recogniser | None = None,
+    recogniser: ClassRecogniser | None = None,
 ) -> Persona:
     """Return the Persona of an actor, from one or several recordings.
 
@@ -45,7 +45,7 @@ def learn(
     rests = [None] * len(faces) if neutral is None else list(neutral)
     if len(rests) != len(faces):
         raise OptionError(f"{len(faces)} recordings have {len(rests)} neutral faces")
-    recogniser = Recogniser.default() if recogniser is None else recogniser
+    recogniser = ClassRecogniser.default() if recogniser is None else recogniser
     takes = [
         observe(face, recogniser, rest, warm_up=warm_up) for face, rest in zip(faces, rests, strict=True)
     ]
@@ -84,7 +84,7 @@ def _learn_part(
     source: Intp,
     frame: Intp,
     still: Float64,
-    recogniser: Recogniser,
+    recogniser: ClassRecogniser,
 ) -> PartStyle:
     """Return the actor's style of a part. moved: (S, 86, 3), in all frames that are used."""
     component = recogniser.components[part]

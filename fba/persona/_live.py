@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64
+from fba.choices import Means
 from fba.errors import ModelError
 from fba.parameters import FAP_COUNT
 from fba.persona._performance import DEFAULT_MEANS, HEAD, MAPPED, choose_masks, usable_means, user_maps
@@ -15,7 +16,7 @@ from fba.persona._restyle import Follower, keep_shut
 from fba.persona.motion import flatten, unflatten
 from fba.persona.points._registration import MAX_MISFIT, MAX_TURN, register_points
 from fba.persona.points.layout import PARTS, TRACKED, VERTICES, flat_mask, part_vertices
-from fba.persona.recognition import Recogniser, decide
+from fba.persona.recognition import ClassRecogniser, decide
 from fba.persona.recognition._component import displacements
 from fba.persona.recognition._faps import face_scale, mask_faps, measure_fapu
 
@@ -34,13 +35,13 @@ class LivePersona:
         self,
         persona: Persona,
         *,
-        means: str = DEFAULT_MEANS,
+        means: Means = DEFAULT_MEANS,
         user: Persona | None = None,
         rate: float = 30.0,
-        recogniser: Recogniser | None = None,
+        recogniser: ClassRecogniser | None = None,
     ) -> None:
         self._persona, self._means = persona, usable_means(persona, means)
-        self._recogniser = Recogniser.default() if recogniser is None else recogniser
+        self._recogniser = ClassRecogniser.default() if recogniser is None else recogniser
         self._maps = user_maps(persona, self._recogniser, user) if self._means in MAPPED else {}
         self._followers: dict[str, Follower] = {}
         if self._means == "motion":

@@ -12,7 +12,7 @@ from fba.errors import FbaWarning, ModelError, OptionError, Remedy
 from fba.persona._rest import MIN_FRAMES, eye_opening, find_rest
 from fba.persona.points import Registered, TrackedFace, register
 from fba.persona.points.layout import PARTS, flat_mask
-from fba.persona.recognition import Labels, Recogniser, decide, displacements
+from fba.persona.recognition import ClassRecogniser, Labels, decide, displacements
 
 Neutral = int | tuple[float, float] | None
 MAX_EYE_RATIO = 1.35
@@ -36,7 +36,7 @@ class Observation:
     labels: dict[str, Labels]
     registered: Registered
 
-    def mask_motion(self, recogniser: Recogniser) -> Float64:
+    def mask_motion(self, recogniser: ClassRecogniser) -> Float64:
         """Return the displacements of the face's mask: float64 (S, 86, 3), millimetres.
 
         Depth, which pictures lack, is taken from the nearest examples of the mouth's class.
@@ -47,7 +47,7 @@ class Observation:
 
 
 def observe(
-    face: TrackedFace, recogniser: Recogniser, neutral: Neutral = None, *, warm_up: int = 0
+    face: TrackedFace, recogniser: ClassRecogniser, neutral: Neutral = None, *, warm_up: int = 0
 ) -> Observation:
     """Return the observation of a face.
 

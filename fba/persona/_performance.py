@@ -9,6 +9,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Intp
+from fba.choices import Means
 from fba.errors import FbaWarning, OptionError, did_you_mean
 from fba.parameters import FAP_COUNT
 from fba.persona._curves import CurveMap, fit_curves, general_curves
@@ -18,7 +19,7 @@ from fba.persona._restyle import keep_shut, restyle
 from fba.persona.motion import flatten, unflatten
 from fba.persona.points import TrackedFace, mask_distance
 from fba.persona.points.layout import PARTS, part_points, part_vertices, standard_mask
-from fba.persona.recognition import Labels, Recogniser
+from fba.persona.recognition import ClassRecogniser, Labels
 from fba.persona.recognition._faps import face_scale, mask_faps, measure_fapu, shown_numbers
 from fba.tracks import FaceTrack
 
@@ -28,7 +29,7 @@ KEY_INSET = 2
 """Frames from the start and from the end of a run of one mask to its keys; between keys, masks blend."""
 BLOCK = 256
 """Number of frames whose distances from masks are computed at once."""
-DEFAULT_MEANS = "motion"
+DEFAULT_MEANS: Means = "motion"
 MAPPED = ("motion", "curves")
 """Means without masks: every frame is a key."""
 
@@ -62,14 +63,14 @@ class Performance:
         return result
 
 
-def perform(
+def transfer(
     face: TrackedFace,
     persona: Persona,
     *,
-    means: str = DEFAULT_MEANS,
+    means: Means = DEFAULT_MEANS,
     neutral: Neutral = None,
     user: Persona | None = None,
-    recogniser: Recogniser | None = None,
+    recogniser: ClassRecogniser | None = None,
 ) -> Performance:
     """Return a user's performance in an actor's style.
 
@@ -79,7 +80,7 @@ def perform(
     OptionError. Warns where a Persona has no statistics of motion: "curves" then replace "motion".
     """
     means = usable_means(persona, means)
-    recogniser = Recogniser.default() if recogniser is None else recogniser
+    recogniser = ClassRecogniser.default() if recogniser is None else recogniser
     seen = observe(face, recogniser, neutral)
     own, here = seen.mask_motion(recogniser), measure_fapu(seen.neutral)
     acted = np.zeros_like(own)
@@ -113,7 +114,7 @@ def perform(
     return Performance(seen.rows, own, acted, labels, used, chosen, keys)
 
 
-def usable_means(persona: Persona, means: str) -> str:
+def usable_means(persona: Persona, means: Means) -> Means:
     """Return these means, or "curves", with a warning, where the Persona lacks statistics of motion.
 
     Raises OptionError for unknown means.
@@ -132,7 +133,9 @@ def usable_means(persona: Persona, means: str) -> str:
     return "curves"
 
 
-def user_maps(persona: Persona, recogniser: Recogniser, user: Persona | None = None) -> dict[str, CurveMap]:
+def user_maps(
+    persona: Persona, recogniser: ClassRecogniser, user: Persona | None = None
+) -> dict[str, CurveMap]:
     """Return the maps from a user's displacements to the actor's, by part.
 
     user: the user's Persona; None for people in general.
@@ -204,33 +207,33 @@ def bridge(style: PartStyle, chosen: Intp, keys: Bool, frames: Intp) -> Float64:
     return np.asarray((values[place] * (1 - share) + values[after] * share).reshape(len(chosen), *width))
 
 
-def play(
+def animate_as(
     face: TrackedFace,
     persona: Persona | None,
     *,
-    means: str = DEFAULT_MEANS,
+    means: Means = DEFAULT_MEANS,
     neutral: Neutral = None,
     user: Persona | None = None,
     head: bool = True,
-    recogniser: Recogniser | None = None,
+    recogniser: ClassRecogniser | None = None,
 ) -> Animation:
     """Return a user's performance in an actor's style, as FAPs that move any face.
 
     persona: None for the user's own style. head: whether the user's head turns, too. Other options and errors
-    as for `perform`. Frames in which the user is not seen are interpolated; before the first and after the
+    as for `transfer`. Frames in which the user is not seen are interpolated; before the first and after the
     last that is seen, the face stays still.
     """
-    recogniser = Recogniser.default() if recogniser is None else recogniser
+    recogniser = ClassRecogniser.default() if recogniser is None else recogniser
     if persona is None:
         seen = observe(face, recogniser, neutral)
         rows, values = seen.rows, own_faps(seen, recogniser)
     else:
-        performance = perform(face, persona, means=means, neutral=neutral, user=user, recogniser=recogniser)
+        performance = transfer(face, persona, means=means, neutral=neutral, user=user, recogniser=recogniser)
         rows, values = performance.rows, mask_faps(performance.acted, persona.fapu, recogniser.jaw)
     return make_animation(face, rows, values, head=head, name=face.name)
 
 
-def own_faps(seen: Observation, recogniser: Recogniser) -> Float64:
+def own_faps(seen: Observation, recogniser: ClassRecogniser) -> Float64:
     """Return the FAPs (S, 68) of a face in its own style."""
     return mask_faps(seen.mask_motion(recogniser), measure_fapu(seen.neutral), recogniser.jaw)
 

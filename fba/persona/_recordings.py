@@ -29,7 +29,7 @@ MAX_RATE = 10_000
 def read_recording(
     path: Path,
     *,
-    fps: Fraction | None = None,
+    source_rate: Fraction | None = None,
     face: str | None = None,
     aspect: float | None = None,
     limits: Limits = DEFAULT_LIMITS,
@@ -37,18 +37,18 @@ def read_recording(
     """Return the tracked face in a file of points.
 
     It is any file of 68, 70, 468 or 478 points that `fba.read` reads, or a NumPy archive (.npz) with 64
-    `points` and optionally `angles` (radians), `tracked` and `fps`. fps: for files without a rate. face:
-    which of several faces. Raises FormatError, LimitError.
+    `points` and optionally `angles` (radians), `tracked` and `fps`. source_rate: for files without a rate.
+    face: which of several faces. Raises FormatError, LimitError.
     """
     if read_head(path).startswith(ZIP):
         arrays = read_arrays(path, limits, single=POINTS)
         points = arrays.get(POINTS)
         if points is not None and points.ndim == 3 and points.shape[1:] == (TRACKED, 2):
-            return _tracked(arrays, path, fps)
+            return _tracked(arrays, path, source_rate)
     reader = format_of(path)
     if reader.read_face is None:
         raise FormatError(f"is not a file of tracked points, but {reader.description}", path=path)
-    given = {"fps": fps, "face": face}
+    given = {"source_rate": source_rate, "face": face}
     options = {
         name: value for name, value in given.items() if value is not None and name in reader.face_options
     }
@@ -61,7 +61,7 @@ def read_recording(
         return from_point_motion(motion, aspect=aspect)
 
 
-def write_recording(face: TrackedFace, path: Path) -> None:
+def write_recording(path: Path, face: TrackedFace) -> None:
     """Write the 64 points as a NumPy archive, atomically, with the rate in place of times."""
     arrays: dict[str, Array] = {
         POINTS: face.points.astype(np.float32),
@@ -73,9 +73,9 @@ def write_recording(face: TrackedFace, path: Path) -> None:
         np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
-def _tracked(arrays: dict[str, Float64], path: Path, fps: Fraction | None) -> TrackedFace:
+def _tracked(arrays: dict[str, Float64], path: Path, source_rate: Fraction | None) -> TrackedFace:
     count = len(arrays[POINTS])
-    rate = fps
+    rate = source_rate
     if rate is None:
         given = arrays.get(RATE, np.array(float(DEFAULT_RATE)))
         if given.size != 1 or not 0 < float(given.reshape(())) <= MAX_RATE:

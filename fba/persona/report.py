@@ -13,7 +13,7 @@ from fba.persona._persona import Persona
 from fba.persona.motion import describe_motion
 from fba.persona.points import TrackedFace
 from fba.persona.points.layout import PARTS, standard_mask, triangles
-from fba.persona.recognition import Recogniser
+from fba.persona.recognition import ClassRecogniser
 
 MASK_SIZE = (150, 170)
 """Width and height of the picture of a mask, pixels."""
@@ -38,10 +38,10 @@ def make_report(
     *,
     neutral: Neutral = None,
     warm_up: int = 0,
-    recogniser: Recogniser | None = None,
+    recogniser: ClassRecogniser | None = None,
 ) -> str:
     """Return an HTML page about a Persona learnt from these recordings; options as for `learn`."""
-    known = Recogniser.default() if recogniser is None else recogniser
+    known = ClassRecogniser.default() if recogniser is None else recogniser
     seen = [observe(face, known, neutral, warm_up=warm_up) for face in faces]
     name = html.escape(persona.name or "actor")
     body = [f"<h1>Persona of {name}</h1>", _counts(persona), "<h2>Classes and masks</h2>"]
@@ -86,7 +86,7 @@ def _motion(persona: Persona) -> str:
     )
 
 
-def _part_masks(persona: Persona, part: str, known: Recogniser) -> list[str]:
+def _part_masks(persona: Persona, part: str, known: ClassRecogniser) -> list[str]:
     style = persona.parts[part]
     missing = persona.missing({part: known.components[part].classes for part in PARTS})[part]
     result = [f"<h3>{part.replace('_', ' ')}: {len(style.rows)} classes, {len(style.labels)} masks</h3>"]
@@ -123,7 +123,7 @@ def draw_mask(mask: Float64, behind: Float64 | None = None) -> str:
     return f'<svg width="{MASK_SIZE[0]}" height="{MASK_SIZE[1]}">{lines}</svg>'
 
 
-def _variance(known: Recogniser) -> str:
+def _variance(known: ClassRecogniser) -> str:
     rows = [
         f"<tr><td>{part.replace('_', ' ')}</td>"
         + "".join(f"<td>{100 * share:.1f} %</td>" for share in np.cumsum(component.variance)[:5])
@@ -138,7 +138,7 @@ def _variance(known: Recogniser) -> str:
     )
 
 
-def _scatter(part: str, seen: Sequence[Observation], known: Recogniser, axes: tuple[int, int]) -> str:
+def _scatter(part: str, seen: Sequence[Observation], known: ClassRecogniser, axes: tuple[int, int]) -> str:
     """Return an SVG plot of two components of a part: examples, frames by class, and their path."""
     examples = known.scores[part][:, axes]
     frames = np.concatenate([take.scores[part] for take in seen])[:, axes]

@@ -13,7 +13,7 @@ from fba.body import Skeleton
 from fba.body.displacement import displacements
 from fba.body.solve.conventions import NO_BAP
 from fba.codec import EncoderOptions, decode, encode_with_statistics, step_scale
-from fba.codec.settings import QUANT_MAX
+from fba.encoder_options import QUANT_MAX
 from fba.errors import RangeError
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_steps, baps
 from fba.planning._body_rows import BodyTarget, all_rows, blocks

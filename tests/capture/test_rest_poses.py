@@ -77,7 +77,7 @@ def test_the_report_finds_up_by_those_who_stand() -> None:
            "LeftUpLeg": Rotation.from_euler("x", -80, degrees=True),
            "RightUpLeg": Rotation.from_euler("x", -80, degrees=True)}  # fmt: skip
     stretched = motion("T", 3, turns=dog)
-    mapped = find_bones(stretched, None, SKELETON)[1]
+    mapped = find_bones(stretched, None, SKELETON).joints
     assert find_up(replace(stretched, up="+y"), mapped) == pytest.approx(np.eye(3))
     lain = motion("T", 1, turns={"Hips": Rotation.from_euler("x", -90, degrees=True)})
     both = replace(stretched, rotations=np.concatenate([stretched.rotations, lain.rotations]),
@@ -89,7 +89,7 @@ def test_what_a_format_declares_is_not_overruled() -> None:
     """Somebody whom a VRM animation, or a glTF file, lays down lies."""
     lying = motion("T", 3, turns={"Hips": Rotation.from_euler("x", 90, degrees=True)})
     assert prepare(replace(lying, up="+y"), SKELETON).up == "+y"
-    names = find_bones(lying, None, SKELETON)[1].items()
+    names = find_bones(lying, None, SKELETON).joints.items()
     declared = replace(lying, up="+y", declared={lying.names[number]: joint for joint, number in names})
     assert prepare(declared, SKELETON).up == "+y"
     assert find_up(declared, dict(names)) == pytest.approx(np.eye(3))

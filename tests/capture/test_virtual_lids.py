@@ -15,7 +15,7 @@ from fba.capture.virtual_markers import (
     MarkerPerformance,
     VirtualMarker,
     head_of_model,
-    perform,
+    move_head,
     propose_mapping,
     read_head,
 )
@@ -45,7 +45,7 @@ def bound(point: str) -> int:
 def performed(gaze: str = "none", squint: float = 0.0) -> MarkerPerformance:
     motion = act(FaceModel.default(), 160, 50).motion
     mapping = replace(propose_mapping(motion, head()), gaze=gaze, squint=squint)
-    return perform(motion, head(), mapping)
+    return move_head(motion, head(), mapping)
 
 
 @pytest.mark.parametrize(("middle", "rows"), [(UPPER, (1, 0.9, 0.7, 0)), (LOWER, (1, 0.9, 0))])
@@ -190,7 +190,7 @@ def test_what_cannot_be_is_named(tmp_path: Path) -> None:
         (mapping, "is on no lid's margin"),
     ):
         with pytest.raises(ModelError, match=words):
-            perform(motion, shown, wanted)
+            move_head(motion, shown, wanted)
 
 
 def test_only_the_middle_of_a_margin_is_proposed_as_a_lid() -> None:

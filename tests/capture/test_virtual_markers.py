@@ -17,7 +17,7 @@ from fba.capture.virtual_markers import (
     VirtualMarker,
     find_influence,
     head_of_model,
-    perform,
+    move_head,
     propose_mapping,
 )
 from fba.capture.virtual_markers.influence import WalkedMesh, give_to_nearest
@@ -164,7 +164,7 @@ def capture(
 
 
 def test_centres_go_where_their_markers_go() -> None:
-    shown = perform(capture(), sheet(), mapping())
+    shown = move_head(capture(), sheet(), mapping())
     moved = shown.vertices(39) - sheet().vertices
     np.testing.assert_allclose(moved[MIDDLE], (0, 0, 1), atol=1e-9)
     np.testing.assert_allclose(moved[BESIDE], (2, 0, 0), atol=1e-9)
@@ -175,12 +175,12 @@ def test_centres_go_where_their_markers_go() -> None:
 
 
 def test_added_displacements_are_those_of_the_source() -> None:
-    moved = perform(capture(), sheet(), mapping(overlap="add")).vertices(39) - sheet().vertices
+    moved = move_head(capture(), sheet(), mapping(overlap="add")).vertices(39) - sheet().vertices
     away = np.linalg.norm(sheet().vertices - sheet().vertices[[MIDDLE, BESIDE]][:, None], axis=2)
     by_middle, by_beside = np.maximum(1 - away / 5, 0)
     np.testing.assert_allclose(moved[:, 2], by_middle, atol=1e-9)
     np.testing.assert_allclose(moved[:, 0], 2 * by_beside, atol=1e-9)
-    alone = perform(capture(), sheet(), mapping(overlap="add", assignment="exclusive")).vertices(39)
+    alone = move_head(capture(), sheet(), mapping(overlap="add", assignment="exclusive")).vertices(39)
     assert not ((alone[:, 2] > 0) & (alone[:, 0] != sheet().vertices[:, 0])).any()
 
 
@@ -188,8 +188,8 @@ QUARTERS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def test_axes_and_place_of_the_capture_do_not_matter() -> None:
-    expected = perform(capture(), sheet(), mapping()).vertices(39)
-    shown = perform(capture(3.0, QUARTERS, (5, -2, 9)), sheet(), mapping())
+    expected = move_head(capture(), sheet(), mapping()).vertices(39)
+    shown = move_head(capture(3.0, QUARTERS, (5, -2, 9)), sheet(), mapping())
     np.testing.assert_allclose(shown.vertices(39), expected, atol=1e-9)
     np.testing.assert_allclose(shown.rotation[39], np.eye(3), atol=1e-9)
     np.testing.assert_allclose(shown.cloud[0, 4], sheet().vertices[MIDDLE], atol=1e-9)
@@ -201,9 +201,9 @@ def test_the_head_s_motion_is_taken_off_and_given_back() -> None:
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     positions = motion.positions.copy()
     positions[30:] = positions[30:] @ turn.T + (0.02, 0.0, 0.01)
-    shown = perform(replace(motion, positions=positions), sheet(), mapping())
+    shown = move_head(replace(motion, positions=positions), sheet(), mapping())
     np.testing.assert_allclose(
-        shown.vertices(39), perform(motion, sheet(), mapping()).vertices(39), atol=1e-6
+        shown.vertices(39), move_head(motion, sheet(), mapping()).vertices(39), atol=1e-6
     )
     pose = shown.pose_between(39, 39, 0.0)
     np.testing.assert_allclose(pose[:3, :3], turn, atol=1e-6)
@@ -221,8 +221,8 @@ def test_gaps_are_filled() -> None:
     positions = motion.positions.copy()
     positions[18:22, 4] = np.nan
     positions[5:9, 0] = np.nan
-    shown = perform(replace(motion, positions=positions), sheet(), mapping())
-    whole = perform(motion, sheet(), mapping())
+    shown = move_head(replace(motion, positions=positions), sheet(), mapping())
+    whole = move_head(motion, sheet(), mapping())
     np.testing.assert_allclose(shown.displacements, whole.displacements, atol=0.02)
     assert np.isnan(shown.cloud[20, 4]).all()
 
@@ -230,7 +230,7 @@ def test_gaps_are_filled() -> None:
 def test_what_a_fixed_marker_does_by_itself_is_noise() -> None:
     positions = capture().positions.copy()
     positions[20:, 1, 2] += 0.002
-    shown = perform(replace(capture(), positions=positions), sheet(), mapping())
+    shown = move_head(replace(capture(), positions=positions), sheet(), mapping())
     for name in CORNERS:
         assert not shown.displacements[:, shown.names.index(name)].any()
     assert shown.displacements[39, shown.names.index("M"), 2] == pytest.approx(1.0, abs=0.1)
@@ -240,7 +240,7 @@ def test_a_marker_that_is_never_seen_stays_where_it_is() -> None:
     positions = capture().positions.copy()
     positions[:, 5] = np.nan
     with pytest.warns(FbaWarning, match="seen in less than 10% of the frames, and left out: N"):
-        shown = perform(replace(capture(), positions=positions), sheet(), mapping())
+        shown = move_head(replace(capture(), positions=positions), sheet(), mapping())
     np.testing.assert_allclose(shown.vertices(39)[BESIDE], sheet().vertices[BESIDE], atol=1e-9)
     np.testing.assert_allclose(shown.vertices(39)[MIDDLE, 2], 1.0, atol=1e-9)
 
@@ -252,22 +252,22 @@ def without(*names: str) -> MarkerMapping:
 
 def test_mappings_that_fit_neither_capture_nor_head() -> None:
     with pytest.raises(ModelError, match=r"needs 3 fixed markers .* the mapping has 2: mark more"):
-        perform(capture(), sheet(), without("A", "B"))
+        move_head(capture(), sheet(), without("A", "B"))
     with pytest.raises(ModelError, match="all markers of the mapping are fixed"):
-        perform(capture(), sheet(), without("M", "N"))
+        move_head(capture(), sheet(), without("M", "N"))
     other = mapping().changed("Chin", VirtualMarker(7, 1.0, 1.0))
     with pytest.raises(
         ModelError, match="the capture has no marker Chin, which the mapping names; it has A, B"
     ):
-        perform(capture(), sheet(), other)
+        move_head(capture(), sheet(), other)
     far = mapping().changed("M", VirtualMarker(441, 1.0, 1.0))
     with pytest.raises(ModelError, match="'M' is at vertex 441, but sheet has 441 vertices, counted from 0"):
-        perform(capture(), sheet(), far)
+        move_head(capture(), sheet(), far)
     three = replace(capture(), names=("A", "B", "C"), positions=capture().positions[:, :3])
     with pytest.raises(ModelError, match="the capture has no marker D, M, N"):
-        perform(three, sheet(), mapping())
+        move_head(three, sheet(), mapping())
     with pytest.raises(ModelError, match="all markers of the mapping are fixed"):
-        perform(three, sheet(), without("D", "M", "N"))
+        move_head(three, sheet(), without("D", "M", "N"))
 
 
 def test_fixed_markers_at_one_place_give_no_scale() -> None:
@@ -276,35 +276,35 @@ def test_fixed_markers_at_one_place_give_no_scale() -> None:
     with pytest.raises(
         ModelError, match="the markers of 'A' and 'D', which tell the scale, are at one place"
     ):
-        perform(replace(capture(), positions=positions), sheet(), mapping())
+        move_head(replace(capture(), positions=positions), sheet(), mapping())
     head = sheet()
     head.vertices[440] = head.vertices[0]
     with pytest.raises(
         ModelError, match="the vertices of 'A' and 'D', which tell the scale, are at one place"
     ):
-        perform(capture(), head, mapping())
+        move_head(capture(), head, mapping())
     caps = {
         name: replace(marker, vertex=None) if marker.fixed and name != "A" else marker
         for name, marker in mapping().markers.items()
     }
     with pytest.raises(ModelError, match="scale needs two fixed markers with a vertex; the mapping has 1"):
-        perform(capture(), sheet(), MarkerMapping(caps))
+        move_head(capture(), sheet(), MarkerMapping(caps))
     doubtful = mapping().changed("D", VirtualMarker(8 + 8 * 21, 2.0, 2.0, fixed=True))
     with pytest.warns(FbaWarning, match="by A and D the head is 40 times as large as the actor's, by all"):
-        perform(capture(), sheet(), replace(doubtful, scale=("A", "D")))
+        move_head(capture(), sheet(), replace(doubtful, scale=("A", "D")))
 
 
 def test_a_mesh_that_changed_is_found() -> None:
     made = mapping().for_head(sheet())
-    perform(capture(), sheet(), made)
+    move_head(capture(), sheet(), made)
     with pytest.raises(ModelError, match="441 vertices and 800 triangles there, 462 and 840 here"):
-        perform(capture(), sheet(21, 20), made)
+        move_head(capture(), sheet(21, 20), made)
     head = sheet()
     part = replace(head.parts[0], triangles=head.parts[0].triangles[::-1])
     with pytest.raises(ModelError, match=r"made for another mesh .*its triangles join other vertices"):
-        perform(capture(), replace(head, parts=(part,)), made)
+        move_head(capture(), replace(head, parts=(part,)), made)
     with pytest.warns(FbaWarning, match="vertices were moved since the mapping was made"):
-        perform(capture(), replace(head, vertices=head.vertices + 0.01), made)
+        move_head(capture(), replace(head, vertices=head.vertices + 0.01), made)
 
 
 def test_contradictions_within_a_mapping() -> None:
@@ -349,7 +349,7 @@ def proposed() -> MarkerMapping:
 
 def error_of(chosen: MarkerMapping) -> float:
     """Root mean square distance of the moving skin from where the FAPs put it, as a share of its motion."""
-    shown = perform(take().motion, head(), chosen)
+    shown = move_head(take().motion, head(), chosen)
     deformer = Deformer(FaceModel.default())
     faps = take().faps.astype(np.float32)
     faps[:, 47:50] = 0
@@ -375,7 +375,7 @@ def test_a_proposed_mapping_moves_a_head_as_its_actor_moved() -> None:
 
 
 def test_inner_lips_follow_the_outer_ones() -> None:
-    model, shown = FaceModel.default(), perform(take().motion, head(), proposed())
+    model, shown = FaceModel.default(), move_head(take().motion, head(), proposed())
     inner = {"LPT inner": "2.2", "LPB inner": "2.3", "LPL1 inner": "2.6", "LPR1 inner": "2.7",
              "LPL2 inner": "2.8", "LPR2 inner": "2.9"}  # fmt: skip
     following = {name for name, one in proposed().markers.items() if one.follows}
@@ -413,16 +413,16 @@ def test_lids_shut_along_their_whole_length() -> None:
 def test_a_marker_may_move_several_places() -> None:
     several = mapping().changed("M too", VirtualMarker(100, 3.0, 3.0, follows="M"))
     assert several.captured == ("A", "B", "C", "D", "M", "N")
-    moved = perform(capture(), sheet(), several).vertices(39) - sheet().vertices
+    moved = move_head(capture(), sheet(), several).vertices(39) - sheet().vertices
     np.testing.assert_allclose(moved[[100, MIDDLE]], [(0, 0, 1), (0, 0, 1)], atol=1e-9)
     without_own = several.changed("M", None)
-    moved = perform(capture(), sheet(), without_own).vertices(39) - sheet().vertices
+    moved = move_head(capture(), sheet(), without_own).vertices(39) - sheet().vertices
     np.testing.assert_allclose(moved[100], (0, 0, 1), atol=1e-9)
     lost = mapping().changed("Hat", VirtualMarker(100, 3.0, 3.0, follows="Cap"))
     with pytest.raises(ModelError, match="the capture has no marker Cap, which the mapping names"):
-        perform(capture(), sheet(), lost)
+        move_head(capture(), sheet(), lost)
     half = mapping().changed("M too", VirtualMarker(100, 3.0, 3.0, follows="M", share=0.5))
-    moved = perform(capture(), sheet(), half).vertices(39) - sheet().vertices
+    moved = move_head(capture(), sheet(), half).vertices(39) - sheet().vertices
     np.testing.assert_allclose(moved[100], (0, 0, 0.5), atol=1e-9)
     for share, follows in ((0.5, ""), (0.0, "M"), (-1.0, "M"), (float("nan"), "M"), (11.0, "M")):
         with pytest.raises(OptionError, match="a share, from above 0 to 10, is of what another"):
@@ -455,9 +455,9 @@ def test_markers_in_a_mirrored_capture_move_the_right_side() -> None:
     mirrored = replace(take().motion, positions=take().motion.positions * (1, 1, -1))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        expected = perform(take().motion, head(), proposed())
+        expected = move_head(take().motion, head(), proposed())
     with pytest.warns(FbaWarning, match="the capture is mirrored"):
-        shown = perform(mirrored, head(), proposed())
+        shown = move_head(mirrored, head(), proposed())
     np.testing.assert_allclose(shown.displacements, expected.displacements, atol=1e-6)
 
 

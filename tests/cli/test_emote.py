@@ -43,7 +43,18 @@ def brow(path: Path) -> Float32:
 def test_a_mood_for_a_while(run: Run, still: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.fba"
     done = run(
-        "emote", still, "-o", out, "--emotion", "angry=70", "--from", "1s", "--to", "3000ms", "--ease", "0.5s"
+        "emote",
+        still,
+        "-o",
+        out,
+        "--emotion",
+        "angry=70",
+        "--start",
+        "1s",
+        "--end",
+        "3000ms",
+        "--ease",
+        "0.5s",
     )
     assert (done.code, done.err) == (0, "")
     assert "anger; 100 frames, 4.00 s" in done.out
@@ -86,10 +97,10 @@ def test_side_by_side(run: Run, still: Path, tmp_path: Path) -> None:
         (("--emotion", "angre=50"), "did you mean 'angry'"),
         (("--emotion", "angry=150"), "0 to 100"),
         (("--emotion", "angry=5@2"), "write times as @2s-6s"),
-        (("--emotion", "angry=5", "--from", "soon"), "is no time"),
-        (("--emotion", "angry=5", "--from", "3", "--to", "2"), "give an end after that"),
-        (("--emotion", "angry=5", "--from", "50s"), "'anger' begins at 50 s, but the performance ends at"),
-        (("--emotion", "angry=5", "--to", "-2s"), "'anger' ends at -2 s: the performance begins at 0 s"),
+        (("--emotion", "angry=5", "--start", "soon"), "is no time"),
+        (("--emotion", "angry=5", "--start", "3", "--end", "2"), "give an end after that"),
+        (("--emotion", "angry=5", "--start", "50s"), "'anger' begins at 50 s, but the performance ends at"),
+        (("--emotion", "angry=5", "--end", "-2s"), "'anger' ends at -2 s: the performance begins at 0 s"),
         (("--emotion", "angry=5", "--emotion", "anger=9"), "at the same time"),
         (("--emotion", "angry=5", "--size", "64x64"), "--size goes with a picture"),
         (("--emotion", "angry=5", "--side-by-side"), "--side-by-side goes with a picture"),

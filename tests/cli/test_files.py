@@ -88,8 +88,12 @@ def test_a_header_can_be_supplied(run: Run, tmp_path: Path, face_file: Path) -> 
     headless.write_text("\n".join(line for line in lines if not line.startswith(("2.2", "#"))) + "\n")
     code, _, err = run("encode", headless, "-o", tmp_path / "x.fba")
     assert code == 1
-    assert "--fps" in err
-    assert run("encode", headless, "-o", tmp_path / "x.fba", "--fps", "25")[0] == 0
+    assert "--source-fps" in err
+    stream = tmp_path / "x.fba"
+    assert run("encode", headless, "-o", stream, "--source-fps", "25")[0] == 0
+    frames = len(fba.read(stream))
+    assert run("encode", headless, "-o", stream, "--source-fps", "25", "--fps", "50")[0] == 0
+    assert len(fba.read(stream)) == 2 * frames - 1
 
 
 def test_what_does_not_fit_is_named_or_clamped(run: Run, tmp_path: Path) -> None:

@@ -64,8 +64,8 @@ def test_a_rate_can_be_given_wherever_one_is_asked_for(
         words.append(str(headless))
     code, _, err = run(*words)
     assert code == 1
-    assert err.endswith("its frame rate is unknown; give one with --fps 25\n")
-    code, _, err = run(*words, "--fps", "25")
+    assert err.endswith("its frame rate is unknown; give one with --source-fps 25\n")
+    code, _, err = run(*words, "--source-fps", "25")
     if command[0] == "gait":
         assert "has no body" in err  # it was read
     else:
@@ -203,10 +203,10 @@ def test_a_misspelt_command(run: Run) -> None:
 
 
 def test_remedies_in_the_words_of_python(headless: Path, tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"; give one with fps=25$") as caught:
+    with pytest.raises(FormatError, match=r"; give one with source_rate=25$") as caught:
         fba.read(headless)
     assert caught.value.finding.endswith("its frame rate is unknown")
-    assert caught.value.remedies == (Remedy("fps", "give one with {}", "25"),)
+    assert caught.value.remedies == (Remedy("source_rate", "give one with {}", "25"),)
     (tmp_path / "a.txt").write_text("Hello.\n")
     with pytest.raises(FormatError, match=r"name it with format='bvh'$"):
         fba.read(tmp_path / "a.txt")

@@ -253,7 +253,7 @@ STANDARD = [
     "convert body.bap {} --to glb --no-mesh",
     "gait --cycles 1 -o {} --to bap",
     "express fear -o {} --to fap",
-    "emote face.fap -o {} --writing fap --emotion angry",
+    "emote face.fap -o {} --to fap --emotion angry",
     "emotion face.fap -o {}",
 ]
 

@@ -14,7 +14,7 @@ import pytest
 import fba
 from fba.errors import FormatError, LimitError, UnsupportedError
 from fba.face import FaceModel
-from fba.persona import load_persona, read_recording, write_recording
+from fba.persona import Persona, read_recording, write_recording
 from fba.persona.points.layout import PARTS
 from tools.captures import point_files
 from tools.captures.tracked_actor import film
@@ -28,8 +28,8 @@ SCRIPT = [("E_HAPPY", 0.6), ("E_HAPPY", 0.9), ("LFAU_27", 0.8), ("UFAU_43", 1.0)
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """actor.npz and user.npz."""
     here = tmp_path_factory.mktemp("persona")
-    write_recording(act(SCRIPT, Style(lopsided=0.5), seed=7).face, here / "actor.npz")
-    write_recording(act(SCRIPT[1:3], seed=8).face, here / "user.npz")
+    write_recording(here / "actor.npz", act(SCRIPT, Style(lopsided=0.5), seed=7).face)
+    write_recording(here / "user.npz", act(SCRIPT[1:3], seed=8).face)
     return here
 
 
@@ -53,7 +53,7 @@ def test_learn_says_what_is_missing_and_writes_a_report(folder: Path, run: Run, 
     assert "missing: " in said
     assert "LFAU_22" in said
     assert "<svg" in page.read_text()
-    assert load_persona(out).name == "Ann"
+    assert Persona.load(out).name == "Ann"
 
 
 def test_info_lists_masks(persona: Path, run: Run) -> None:
@@ -74,7 +74,7 @@ def test_a_persona_of_version_1_is_read_and_what_it_lacks_is_said(
 ) -> None:
     lacks = {f"_{part}.{name}": None for part in PARTS for name in ("seconds", "spread", "speed")}
     old = repacked(persona, tmp_path / "old.persona", version=1, **lacks)
-    assert load_persona(old).motions is None
+    assert Persona.load(old).motions is None
     assert "motion: not known, as the file is of version 1; learn it again" in run("persona", "info", old)[1]
     play = ("persona", "play", folder / "user.npz", "--persona")
     code, _, err = run(*play, old, "-o", tmp_path / "old.fap")
@@ -198,7 +198,7 @@ def test_hostile_personas(
     persona: Path, tmp_path: Path, changed: dict[str, object], error: type[Exception], said: str
 ) -> None:
     with pytest.raises(error, match=said):
-        load_persona(repacked(persona, tmp_path / "a.persona", **changed))
+        Persona.load(repacked(persona, tmp_path / "a.persona", **changed))
 
 
 def test_damaged_personas(persona: Path, run: Run, tmp_path: Path) -> None:
@@ -206,15 +206,15 @@ def test_damaged_personas(persona: Path, run: Run, tmp_path: Path) -> None:
     for part in (data[: len(data) // 2], data[:3000] + b"?" * 500 + data[3500:], b"PK\x03\x04", b"text"):
         path.write_bytes(part)
         with pytest.raises(FormatError, match=r"a\.persona: "):
-            load_persona(path)
+            Persona.load(path)
     code, _, err = run("persona", "info", path)
     assert (code, err) == (1, f"fba: error: {path}: is not a persona file\n")
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("header.json", json.dumps({"kind": "persona", "version": 1}))
         archive.writestr("neutral.npy", b"0" * 300_000_000)
     with pytest.raises(LimitError, match=r"a\.persona: neutral\.npy"):
-        load_persona(path)
+        Persona.load(path)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("header.json", b" " * 3_000_000)
     with pytest.raises(FormatError, match="header of 3000000 bytes"):
-        load_persona(path)
+        Persona.load(path)

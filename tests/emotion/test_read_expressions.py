@@ -12,7 +12,7 @@ import pytest
 import fba
 from fba import Animation, FaceTrack, emotion
 from fba.capture import ActionUnitMotion, from_action_units
-from fba.emotion import Reading, Recogniser
+from fba.emotion import ExpressionRecogniser, Reading
 from fba.errors import OptionError
 from fba.face import resolve
 from fba.parameters import fap_numbers
@@ -29,7 +29,7 @@ UNITS = {
 
 
 def read_one(faps: np.ndarray, known: np.ndarray | None = None) -> Reading:
-    return Recogniser(25, known=known).push(faps)
+    return ExpressionRecogniser(25, known=known).push(faps)
 
 
 def columns(*beginnings: str) -> np.ndarray:
@@ -270,7 +270,7 @@ def test_narrow_eyes_alone_are_no_anger() -> None:
     rows = np.full((75, 2), [0.22, 0.05])
     face = from_action_units(ActionUnitMotion((7, 10), rows, np.arange(75) / 25, 25)).face  # type: ignore[arg-type]
     assert face is not None
-    labels = Counter(one.label for one in Recogniser(25).push_frames(resolve(face)))
+    labels = Counter(one.label for one in ExpressionRecogniser(25).push_frames(resolve(face)))
     assert labels["neutral"] >= 70, labels
 
 
@@ -288,7 +288,7 @@ def test_zeros_of_a_picture_say_something() -> None:
 
 def test_labels_do_not_flicker() -> None:
     frames = list(talking(np.random.default_rng(5), 250))
-    recogniser = Recogniser(25)
+    recogniser = ExpressionRecogniser(25)
     steady = [recogniser.push(faps).label for faps in frames]
     single = [read_one(faps).label for faps in frames]
 
@@ -300,7 +300,7 @@ def test_labels_do_not_flicker() -> None:
 
 
 def test_a_change_is_seen_within_half_a_second() -> None:
-    recogniser = Recogniser(50)
+    recogniser = ExpressionRecogniser(50)
     for _ in range(50):
         assert recogniser.push(np.zeros(68)).label == "neutral"
     labels = [recogniser.push(emotion.expression("joy").faps).label for _ in range(25)]
@@ -309,7 +309,7 @@ def test_a_change_is_seen_within_half_a_second() -> None:
 
 def test_blinks_are_not_read() -> None:
     lids = columns("close_")
-    recogniser = Recogniser(25)
+    recogniser = ExpressionRecogniser(25)
     for frame in range(100):
         faps = np.zeros(68)
         faps[lids] = 900 if frame % 25 in (10, 11, 12, 13) else 0
@@ -319,7 +319,7 @@ def test_blinks_are_not_read() -> None:
 def test_pushing_frames_one_by_one_or_together_is_the_same() -> None:
     frames = np.array(list(talking(np.random.default_rng(1), 30)))
     frames[10:14, columns("close_")] = 900
-    one, other = Recogniser(25), Recogniser(25)
+    one, other = ExpressionRecogniser(25), ExpressionRecogniser(25)
     assert [reading.label for reading in one.push_frames(frames)] == [other.push(row).label for row in frames]
 
 
@@ -336,7 +336,7 @@ def test_a_baseline_is_subtracted() -> None:
 
 
 def test_frames_that_are_not_finite_keep_the_reading() -> None:
-    recogniser = Recogniser(25)
+    recogniser = ExpressionRecogniser(25)
     assert recogniser.push(np.full(68, np.nan)).label == "unknown"
     assert recogniser.push(emotion.expression("joy").faps).label == "joy"
     assert recogniser.push(np.full(68, np.inf)).label == "joy"
@@ -344,9 +344,9 @@ def test_frames_that_are_not_finite_keep_the_reading() -> None:
 
 def test_bad_arguments() -> None:
     with pytest.raises(OptionError, match="must have shape"):
-        Recogniser(25).push(np.zeros(67))
+        ExpressionRecogniser(25).push(np.zeros(67))
     with pytest.raises(OptionError, match="rate must be a positive"):
-        Recogniser(0)
+        ExpressionRecogniser(0)
     animation = Animation(25, np.arange(1), FaceTrack.empty(1))
     with pytest.raises(OptionError, match="baseline must be one of none, start, median"):
         emotion.read_expressions(animation, baseline="mean")

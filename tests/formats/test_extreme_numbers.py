@@ -163,4 +163,4 @@ def test_points_that_signal_are_not_seen(tmp_path: Path) -> None:
     points = np.load(CORPUS / "capture/points-points.npy.bin").astype(np.float32)
     points.ravel()[:1] = np.frombuffer(SIGNALS["<"], np.float32)
     np.save(tmp_path / "a.npy", points)
-    assert np.isnan(read_film(tmp_path / "a.npy", fps=25).positions[0, 0]).all()
+    assert np.isnan(read_film(tmp_path / "a.npy", source_rate=25).positions[0, 0]).all()

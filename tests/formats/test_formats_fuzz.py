@@ -65,7 +65,7 @@ def test_anything_at_all(tmp_path: Path, data: bytes) -> None:
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", FbaWarning)
         try:
-            animation = read(path, fps=25) if data[:4] not in (b"\0\0\1\xba", b"\0\0\1\1") else None
+            animation = read(path, source_rate=25) if data[:4] not in (b"\0\0\1\xba", b"\0\0\1\1") else None
             if animation is not None:
                 write_fap(tmp_path / "b.fap", animation)
         except FbaError:

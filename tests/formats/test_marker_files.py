@@ -75,9 +75,9 @@ def test_more_markers_than_a_list_of_labels_holds(tmp_path: Path) -> None:
 def test_a_rate_that_is_missing(tmp_path: Path) -> None:
     path = tmp_path / "a.c3d"
     path.write_bytes(marker_files.c3d(cloud(), rate=0.0))
-    with pytest.raises(FormatError, match="no frame rate; give one with fps=100"):
+    with pytest.raises(FormatError, match="no frame rate; give one with source_rate=100"):
         read(path)
-    assert read(path, fps=Fraction(120)).rate == 120
+    assert read(path, source_rate=Fraction(120)).rate == 120
 
 
 def test_times_that_are_not_regular_are_kept(tmp_path: Path) -> None:

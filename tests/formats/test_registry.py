@@ -45,7 +45,7 @@ def test_the_table() -> None:
         "markers",
     ]  # fmt: skip
     by_name = {entry.name: entry for entry in formats()}
-    assert by_name["fap"].read_options == ("fps", "name", "salvage", "angle_scale", "limits")
+    assert by_name["fap"].read_options == ("source_rate", "name", "salvage", "angle_scale", "limits")
     assert by_name["fap"].write_options == by_name["epf"].write_options == ()
     assert "bap_steps" in by_name["fba"].read_options
     assert "fap_quant" in by_name["fba"].write_options
@@ -129,17 +129,17 @@ def test_paths_that_are_no_readable_file(tmp_path: Path) -> None:
 
 def test_options(tmp_path: Path) -> None:
     path = file(tmp_path, "a.fap", *FAP[1:])
-    assert fba.read(path, fps=30, name="x").rate == 30
+    assert fba.read(path, source_rate=30, name="x").rate == 30
     with pytest.raises(
-        OptionError, match="reading fap takes no option 'speed'; it takes fps, name, salvage, angle"
+        OptionError, match="reading fap takes no option 'speed'; it takes source_rate, name, salvage, angle"
     ):
         fba.read(path, speed=3)
     with pytest.raises(TypeError, match="bap_steps"):
         fba.read(path, bap_steps="iso")
     with pytest.raises(OptionError, match="no format 'mp3'; known: fba, fap, bap, epf, bvh"):
         fba.read(path, format="mp3")
-    with pytest.raises(OptionError, match="writing fap takes no option 'fps'; it takes none"):
-        fba.write(tmp_path / "b.fap", performance(), fps=3)
+    with pytest.raises(OptionError, match="writing fap takes no option 'source_rate'; it takes none"):
+        fba.write(tmp_path / "b.fap", performance(), source_rate=3)
     with pytest.raises(OptionError, match="writing fba takes no option 'quant'; it takes options, fap_quant"):
         fba.write(tmp_path / "b.fba", performance(), quant=3)
     with pytest.raises(OptionError, match="either options or fap_quant"):

@@ -21,8 +21,8 @@ from tools.captures import marker_files
 
 
 def times_of(*codes: str) -> tuple[list[float], Fraction, float]:
-    times, rate, start = read_time_codes(codes, range(2, 2 + len(codes)), "a.csv")
-    return times.tolist(), rate, start
+    found = read_time_codes(codes, range(2, 2 + len(codes)), "a.csv")
+    return found.seconds.tolist(), found.rate, found.start
 
 
 def test_drop_frame_goes_with_the_clock() -> None:

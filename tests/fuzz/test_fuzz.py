@@ -146,7 +146,7 @@ READING = {
         "fba.formats.face_tables._points_csv", "fba.formats.face_tables._points_json",
     ),
     "smpl": ("fba.formats.smpl._reader", "fba.formats.numpy_archives"),
-    "persona": ("fba.persona._storage", "fba.persona.recognition._archive"),
+    "persona": ("fba.persona._persona", "fba.persona.recognition._archive"),
     "live": (
         "fba.live._protocols.livelink", "fba.live._protocols.ifacialmocap", "fba.live._protocols.vtube",
         "fba.live._protocols.vmc", "fba.live._protocols._osc",

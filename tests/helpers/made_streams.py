@@ -20,7 +20,7 @@ from fba import Animation, BodyTrack, EncoderOptions
 from fba.body import gait
 from fba.codec import encode_with_statistics
 from fba.formats.step_choice import UNSURE, choose_steps
-from fba.parameters import bap_numbers
+from fba.parameters import BapTable, bap_numbers
 
 KINDS = ("walk", "capture", "gesture", "idle", "keyed", "seated", "jump", "turn")
 RATES = (10, 12, 15, 24, 25, 30, 50, 60)
@@ -34,7 +34,7 @@ class Made:
     """A stream. kind: of its motion. table: with which it was made. unmarked, marked: its bytes."""
 
     kind: str
-    table: str
+    table: BapTable
     unmarked: bytes
     marked: bytes
 

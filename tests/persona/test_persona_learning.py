@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fba.errors import FbaWarning, ModelError, OptionError
-from fba.persona import LivePersona, Persona, Recogniser, learn, perform, play
+from fba.persona import ClassRecogniser, LivePersona, Persona, animate_as, learn, transfer
 from fba.persona._learning import prune
 from fba.persona._performance import bridge, find_keys
 from fba.persona._persona import part_width
@@ -32,7 +32,9 @@ def test_a_persona_has_the_classes_that_were_shown(persona: Persona) -> None:
     assert persona.name == "actor"
     assert {"E_HAPPY", "LFAU_27", "LFAU_18", "NEUTRAL"} <= set(persona.parts["mouth"].labels)
     assert {"UFAU_43", "NEUTRAL"} <= set(persona.parts["left_eye"].labels)
-    missing = persona.missing({part: one.classes for part, one in Recogniser.default().components.items()})
+    missing = persona.missing(
+        {part: one.classes for part, one in ClassRecogniser.default().components.items()}
+    )
     assert "CAU_A12A15" in missing["mouth"]
     assert "E_HAPPY" not in missing["mouth"]
     assert persona.kept == persona.frames
@@ -57,7 +59,7 @@ def test_pruning_keeps_the_first_of_masks_that_are_near() -> None:
 
 def test_play_shows_the_actors_way(user: Act, persona: Persona) -> None:
     """The actor's smile is lopsided: the left corner rises more. The user's is not."""
-    own, acted = play(user.face, None), play(user.face, persona)
+    own, acted = animate_as(user.face, None), animate_as(user.face, persona)
     assert len(acted) == len(own) == len(user.face)
     assert acted.face is not None
     assert own.face is not None
@@ -73,7 +75,7 @@ def test_play_shows_the_actors_way(user: Act, persona: Persona) -> None:
 
 def test_the_users_own_faps_are_those_that_were_performed(user: Act) -> None:
     """Tracked points, registered, become FAPs of the user's own FAPU: those that moved the face."""
-    track = play(user.face, None).face
+    track = animate_as(user.face, None).face
     assert track is not None
     jaw = at_apex(user, track.values, "LFAU_27")
     true = at_apex(user, user.faps, "LFAU_27")
@@ -86,7 +88,7 @@ def test_the_users_own_faps_are_those_that_were_performed(user: Act) -> None:
 
 @pytest.mark.parametrize("means", ["masks", "curves"])
 def test_other_means(user: Act, persona: Persona, means: str) -> None:
-    found = perform(user.face, persona, means=means)
+    found = transfer(user.face, persona, means=means)
     moments = dict(user.apex)
     smile = found.acted[np.searchsorted(found.rows, moments["E_HAPPY"])]
     assert smile[41, 1] > 1.5  # the left corner of the mouth rises, millimetres
@@ -99,7 +101,7 @@ def test_other_means(user: Act, persona: Persona, means: str) -> None:
 
 def test_means_that_do_not_exist(user: Act, persona: Persona) -> None:
     with pytest.raises(OptionError, match="did you mean 'curves'"):
-        perform(user.face, persona, means="curve")
+        transfer(user.face, persona, means="curve")
 
 
 def test_keys_are_near_the_ends_of_runs() -> None:
@@ -123,7 +125,7 @@ def test_frame_by_frame_is_as_in_one_piece(user: Act, persona: Persona) -> None:
         assert shown[:29] == [None] * 29
         assert live.ready
         if means == "curves":
-            whole = play(user.face, persona, means=means).face
+            whole = animate_as(user.face, persona, means=means).face
             assert whole is not None
             frames = [60, 100, 140]
             np.testing.assert_allclose([shown[n] for n in frames], whole.values[frames], atol=0.51)
@@ -138,13 +140,13 @@ def test_a_user_who_looks_away_throughout(user: Act, persona: Persona) -> None:
     with pytest.raises(
         ModelError, match=r"none of the \d+ frames can be used: \d+ with a head turned by more"
     ):
-        play(replace(user.face, angles=angles), persona)
+        animate_as(replace(user.face, angles=angles), persona)
 
 
 def test_frames_without_a_face_are_bridged(user: Act, persona: Persona) -> None:
     points = user.face.points.copy()
     points[60:66] = np.nan
-    found = play(replace(user.face, points=points), persona)
+    found = animate_as(replace(user.face, points=points), persona)
     assert found.face is not None
     jump = np.abs(np.diff(found.face.values[58:68, 11])).max()
     assert jump < 100
@@ -173,7 +175,7 @@ def test_neutral_frames_may_be_given(actor: Act) -> None:
 def test_eyes_that_are_half_closed_at_rest_are_told(actor: Act, persona: Persona) -> None:
     shut = dict(actor.apex)["UFAU_43"] / actor.face.rate
     with pytest.warns(FbaWarning, match="the eyes are half closed in the frames of the neutral face"):
-        play(actor.face, persona, neutral=(float(shut) - 0.1, float(shut) + 0.1))
+        animate_as(actor.face, persona, neutral=(float(shut) - 0.1, float(shut) + 0.1))
 
 
 def test_a_persona_brings_users_to_the_actor() -> None:

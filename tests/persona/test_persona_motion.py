@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fba.persona import LivePersona, Persona, learn, load_persona, perform, play, save_persona
+from fba.persona import LivePersona, Persona, animate_as, learn, transfer
 from fba.persona import _restyle as restyle
 from fba.persona.motion import Motion, Tally, find_gains, flatten, measure_motion
 from fba.persona.points.layout import PARTS, part_vertices, standard_points
@@ -104,7 +104,7 @@ def played(user: Act) -> dict[str, tuple[Persona, np.ndarray, np.ndarray]]:  # t
     result = {}
     for name, style in styles.items():
         persona = learn([act(script, style, seed=7).face], name)
-        found = perform(face, persona)
+        found = transfer(face, persona)
         result[name] = (persona, found.own, found.acted)
     return result
 
@@ -158,7 +158,7 @@ def test_lids_and_lips_that_shut_stay_shut(style: Style) -> None:
     contents = ("UFAU_43", "viseme 1 (p b m)", "LFAU_27", "E_SURPRISE")
     persona = learn([act(all_contents(4, np.random.default_rng(5), contents), style, seed=7).face])
     user = act([("LFAU_27", 0.9), ("UFAU_43", 1.0), ("viseme 1 (p b m)", 1.0), ("LFAU_27", 0.9)], seed=99)
-    shown = play(user.face, persona).face
+    shown = animate_as(user.face, persona).face
     assert shown is not None
     moment = dict(user.apex)
     lids = shown.values[moment["UFAU_43"], 18:22]
@@ -209,7 +209,7 @@ def test_a_quiet_take_of_a_known_user_stays_quiet(persona: Persona) -> None:
     usual = learn([act(script, seed=99).face], "user")
     quiet = act([(name, 0.4 * share) for name, share in script], seed=99).face
     sizes = [
-        float(np.abs(perform(quiet, persona, user=user).acted[:, part_vertices("mouth"), :2]).mean())
+        float(np.abs(transfer(quiet, persona, user=user).acted[:, part_vertices("mouth"), :2]).mean())
         for user in (None, usual)
     ]
     assert sizes[1] < 0.75 * sizes[0]
@@ -222,8 +222,8 @@ def test_live_comes_to_the_same_amplitude(
     face = act(all_contents(3, np.random.default_rng(4), NAMES), seed=99).face
     live = LivePersona(persona)
     shown = [live.push(one, turn) for one, turn in zip(face.points, face.angles, strict=True)]
-    whole = play(face, persona).face
-    plain = play(face, persona, means="curves").face
+    whole = animate_as(face, persona).face
+    plain = animate_as(face, persona, means="curves").face
     assert whole is not None
     assert plain is not None
     first = len(shown) // 2
@@ -236,8 +236,8 @@ def test_live_comes_to_the_same_amplitude(
 
 
 def test_statistics_come_back_from_a_file(persona: Persona, tmp_path: Path) -> None:
-    save_persona(persona, tmp_path / "a.persona")
-    back = load_persona(tmp_path / "a.persona")
+    persona.save(tmp_path / "a.persona")
+    back = Persona.load(tmp_path / "a.persona")
     for part in PARTS:
         one, other = (each.parts[part].motion for each in (persona, back))
         assert one is not None
@@ -247,8 +247,8 @@ def test_statistics_come_back_from_a_file(persona: Persona, tmp_path: Path) -> N
     without = replace(
         persona, parts={part: replace(style, motion=None) for part, style in persona.parts.items()}
     )
-    save_persona(without, tmp_path / "old.persona")
-    assert load_persona(tmp_path / "old.persona").motions is None
+    without.save(tmp_path / "old.persona")
+    assert Persona.load(tmp_path / "old.persona").motions is None
 
 
 def test_moods_differ_in_motion_and_keep_the_difference_when_played() -> None:

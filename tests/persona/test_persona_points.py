@@ -15,7 +15,7 @@ from fba.errors import FbaWarning, ModelError
 from fba.face import FaceModel, FeaturePointFace
 from fba.persona import TrackedFace, from_point_motion
 from fba.persona._rest import find_rest
-from fba.persona.points import fit_similarity, mask_distance, register
+from fba.persona.points import fit_face_points, mask_distance, register
 from fba.persona.points.layout import (
     PARTS,
     compute_vertices,
@@ -85,24 +85,24 @@ def test_computed_vertices_are_those_of_table_4_1() -> None:
 def test_procrustes_finds_what_was_done() -> None:
     points = RANDOM.normal(size=(3, 9, 2))
     turn = np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
-    found = fit_similarity(points, 2.5 * points @ turn.T + (4, -1))
+    found = fit_face_points(points, 2.5 * points @ turn.T + (4, -1))
     np.testing.assert_allclose(found.scale, 2.5)
     np.testing.assert_allclose(found.rotation, np.broadcast_to(turn, (3, 2, 2)), atol=1e-12)
     np.testing.assert_allclose(found.misfit, 0, atol=1e-12)
     np.testing.assert_allclose(found.apply(points), 2.5 * points @ turn.T + (4, -1), atol=1e-12)
-    flat = fit_similarity(points[0], np.concatenate([points[0], np.zeros((9, 1))], axis=1))  # padded
+    flat = fit_face_points(points[0], np.concatenate([points[0], np.zeros((9, 1))], axis=1))  # padded
     np.testing.assert_allclose(flat.apply(points[0])[:, :2], points[0], atol=1e-12)
 
 
 def test_the_misfit_is_that_of_scipy_and_mirrors_may_be_refused() -> None:
     points, others = RANDOM.normal(size=(2, 8, 3))
-    assert float(fit_similarity(points, others).misfit) == pytest.approx(procrustes(others, points)[2])
+    assert float(fit_face_points(points, others).misfit) == pytest.approx(procrustes(others, points)[2])
     mirrored = points * (-1, 1, 1)
-    assert float(fit_similarity(points, mirrored).misfit) == pytest.approx(0, abs=1e-12)
-    refused = fit_similarity(points, mirrored, mirror=False)
+    assert float(fit_face_points(points, mirrored).misfit) == pytest.approx(0, abs=1e-12)
+    refused = fit_face_points(points, mirrored, mirror=False)
     assert float(np.linalg.det(refused.rotation)) == pytest.approx(1)
     with pytest.raises(ModelError, match="all coincide"):
-        fit_similarity(np.ones((4, 2)), points[:4, :2])
+        fit_face_points(np.ones((4, 2)), points[:4, :2])
 
 
 def test_distances_of_sets() -> None:
@@ -151,7 +151,7 @@ def test_points_of_other_trackers(count: int) -> None:
     assert np.degrees(np.abs(off - off.mean(axis=0)).max()) < 4
     own = register(face).points[0]
     real = points_of_face(FaceModel.default().points)[:60, :2]
-    laid = fit_similarity(real, own[:60])
+    laid = fit_face_points(real, own[:60])
     assert np.linalg.norm(laid.apply(real) - own[:60], axis=1).mean() < 1.5  # millimetres
 
 

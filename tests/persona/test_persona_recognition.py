@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from fba.persona import Recogniser
+from fba.persona import ClassRecogniser
 from fba.persona.points.layout import PARTS
 from fba.persona.recognition import decide
 from tools.persona.training import __main__ as training
@@ -116,7 +116,7 @@ def test_training_writes_only_where_it_is_told(
 
 
 def test_the_default_is_as_good_as_the_source_asks(tmp_path: Path) -> None:
-    known = Recogniser.default()
+    known = ClassRecogniser.default()
     for part in PARTS:
         component = known.components[part]
         assert component.share > WANTED_ACCURACY[part], part
@@ -132,7 +132,7 @@ def test_the_default_is_as_good_as_the_source_asks(tmp_path: Path) -> None:
 
 def test_lips_that_push_forward_are_deep() -> None:
     """Depth, which no picture shows, is that of the nearest examples of the class."""
-    known = Recogniser.default()
+    known = ClassRecogniser.default()
     number = known.components["mouth"].classes.index("LFAU_18")
     pout = known.scores["mouth"][known.example_labels["mouth"][:, number]][:5]
     deep = known.find_depth(pout, np.full(5, number))
@@ -149,11 +149,11 @@ def test_examples_are_the_same_each_time(examples: Examples) -> None:
 
 
 def test_a_recogniser_comes_back_from_its_file(tmp_path: Path) -> None:
-    known = Recogniser.default()
+    known = ClassRecogniser.default()
     for name in ("one", "other"):
         known.save(tmp_path / name)
     assert (tmp_path / "one").read_bytes() == (tmp_path / "other").read_bytes()
-    back = Recogniser.load(tmp_path / "one")
+    back = ClassRecogniser.load(tmp_path / "one")
     moved = np.random.default_rng(0).normal(size=(9, 54))
     one, other = (each.components["mouth"].outputs(moved) for each in (known, back))
     np.testing.assert_array_equal(one, other)

@@ -7,7 +7,7 @@ import pytest
 
 from fba import Animation
 from fba.body.model import BodyModel
-from fba.formats.gltf.bodies import read_body
+from fba.formats.gltf.bodies import import_body
 from fba.parameters import fap_numbers
 from fba_player._figure.person import head_rows
 from fba_player.scene.scene import Scene
@@ -20,7 +20,7 @@ QUARTER = 157080
 
 @pytest.fixture(scope="module")
 def body(tmp_path_factory: pytest.TempPathFactory) -> BodyModel:
-    return read_body(write_person(tmp_path_factory.mktemp("people") / "person.glb"))
+    return import_body(write_person(tmp_path_factory.mktemp("people") / "person.glb"))
 
 
 def test_the_own_head_is_shown_and_turned(body: BodyModel) -> None:

@@ -70,7 +70,7 @@ def files_table(folder: Path, head: FaceModel, seconds: float) -> str:
     seen = film(head, 478, frames=round(seconds * 30), share=True)
     for name in LAYOUTS:
         (folder / name).write_bytes(LAYOUTS[name](seen.motion))
-        found = fba.read(folder / name, fps=30, aspect=16 / 9, neutral="first")
+        found = fba.read(folder / name, source_rate=30, aspect=16 / 9, neutral="first")
         errors = measure_animation(found, as_face(seen.faps, 30))
         rows.append([f"points: `{name}`", *_worst_cells(errors)])
     for name in FACE_FILES:

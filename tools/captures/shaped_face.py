@@ -217,7 +217,7 @@ FACE_FILES = {
     "openface_2.csv": FaceFile(lambda times: _openface(times, ""), _FILM, units=UNITS),
     "openface_2_windows.csv": FaceFile(lambda times: _openface(times, " "), _FILM, units=UNITS),
     "openface_3.csv": FaceFile(_openface_3, _FILM, units=tuple(UNITS_3.values())),
-    "pyfeat.csv": FaceFile(_pyfeat, _FILM, {"fps": 30}, UNITS, turned=False),
+    "pyfeat.csv": FaceFile(_pyfeat, _FILM, {"source_rate": 30}, UNITS, turned=False),
 }
 """Files by name, each in one way of one maker."""
 

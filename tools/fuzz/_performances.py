@@ -221,7 +221,7 @@ def _options(rng: np.random.Generator) -> EncoderOptions:
     options = EncoderOptions(
         fap_quant=int(rng.choice([0, 1, 1, 1, int(rng.integers(32))])),
         bap_quant=int(rng.choice([0, 1, 1, 1, int(rng.integers(32))])),
-        bap_steps=str(rng.choice(["iso", "visage"])),
+        bap_steps="visage" if rng.choice(["iso", "visage"]) == "visage" else "iso",
         unsent="interpolate" if rng.choice(["keep", "interpolate"]) == "interpolate" else "keep",
         gender=int(rng.integers(2)),
         clamp=bool(rng.random() < 0.7),

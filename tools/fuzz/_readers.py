@@ -35,7 +35,7 @@ from fba.formats.text.fap import read_fap, write_fap
 from fba.gltf import read_gltf
 from fba.live import KINDS, Capture, StreamFile, StreamRecorder
 from fba.mesh import read_mtl, read_obj, read_ply, read_vrml, read_wfm
-from fba.persona import load_persona
+from fba.persona import Persona
 from tools.fuzz._outcome import ContractError, Outcome
 from tools.fuzz._small_head import small_head_obj, small_head_points, small_head_vrml
 
@@ -118,7 +118,7 @@ def check_smpl(data: bytes, folder: Path) -> Outcome:
 
 def check_persona(data: bytes, folder: Path) -> Outcome:
     """Load a Persona."""
-    return _check_file(_with_checksums(data), folder / "input.persona", load_persona)
+    return _check_file(_with_checksums(data), folder / "input.persona", Persona.load)
 
 
 _MEMBER, _DIRECTORY = b"PK\3\4", b"PK\1\2"
@@ -150,9 +150,9 @@ def _read_with_rate(path: Path) -> object:
     try:
         return fba.read(path)
     except FbaError as error:
-        if not any(remedy.argument == "fps" for remedy in error.remedies):
+        if not any(remedy.argument == "source_rate" for remedy in error.remedies):
             raise
-        return fba.read(path, fps=30)
+        return fba.read(path, source_rate=30)
 
 
 def check_live(data: bytes, folder: Path) -> Outcome:

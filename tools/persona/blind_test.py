@@ -23,8 +23,9 @@ import numpy as np
 
 import fba
 from fba.arrays import Float64
+from fba.choices import Means
 from fba.parameters import FAP_COUNT
-from fba.persona import Persona, Recogniser, TrackedFace, learn, play
+from fba.persona import ClassRecogniser, Persona, TrackedFace, animate_as, learn
 from fba.persona._observation import Observation, observe
 from fba.persona.motion import Motion, flatten, measure_motion
 from fba.persona.points import mask_distance
@@ -50,7 +51,7 @@ WEIGHT = 0.5
 """Of classes against all frames, where they were seen long enough."""
 ENOUGH = 1.0
 """Seconds of a class that count by half."""
-MEANS = ("masks", "curves", "motion")
+MEANS: tuple[Means, ...] = ("masks", "curves", "motion")
 EVERY = 4
 """Frames from one that masks are compared with to the next."""
 
@@ -68,7 +69,7 @@ def main() -> None:
 
 
 def made_up(
-    takes: int = TAKES, learnt: int = LEARNT, user_takes: int = USER_TAKES, means: Sequence[str] = MEANS
+    takes: int = TAKES, learnt: int = LEARNT, user_takes: int = USER_TAKES, means: Sequence[Means] = MEANS
 ) -> list[Row]:
     """Return rows of the table for made-up moods."""
     filmed = {
@@ -133,7 +134,7 @@ def film_files(paths: Sequence[Path], seed: int) -> TrackedFace:
 
 
 def count_played(
-    users: Sequence[TrackedFace], personas: dict[str, Persona], means: Sequence[str] = MEANS
+    users: Sequence[TrackedFace], personas: dict[str, Persona], means: Sequence[Means] = MEANS
 ) -> list[Row]:
     """Return a row for each of `means`: users in each mood, by its Persona."""
     return [
@@ -143,13 +144,13 @@ def count_played(
 
 
 def performed(
-    users: Sequence[TrackedFace], personas: dict[str, Persona], means: str
+    users: Sequence[TrackedFace], personas: dict[str, Persona], means: Means
 ) -> list[tuple[str, TrackedFace]]:
     """Return films of a face on which each user is played with each Persona."""
     films = []
     for mood, persona in personas.items():
         for number, user in enumerate(users):
-            animation = play(user, persona, means=means, head=False)
+            animation = animate_as(user, persona, means=means, head=False)
             assert animation.face is not None
             values = animation.face.values.astype(np.float64)
             films.append((mood, film_faps(values, Fraction(animation.rate), seed=SCREEN, take=number)))
@@ -195,14 +196,14 @@ def compare(mood: str, face: TrackedFace, personas: dict[str, Persona]) -> Found
 
 def look(face: TrackedFace) -> tuple[Observation, dict[str, Float64]]:
     """Return the observation of a face, and displacements (S, V, 2) of each part on the standard face."""
-    seen = observe(face, Recogniser.default())
-    moved, fapu = seen.mask_motion(Recogniser.default()), measure_fapu(seen.neutral)
+    seen = observe(face, ClassRecogniser.default())
+    moved, fapu = seen.mask_motion(ClassRecogniser.default()), measure_fapu(seen.neutral)
     return seen, {part: moved[:, part_vertices(part), :2] / face_scale(fapu, part) for part in PARTS}
 
 
 def measure(seen: Observation, moved: dict[str, Float64], rate: float) -> dict[str, Motion]:
     """Return the statistics of a film's motion. They are about means: those do not count."""
-    known = Recogniser.default().components
+    known = ClassRecogniser.default().components
     return {
         part: measure_motion(
             flatten(moved[part]), seen.labels[part].first, seen.rows, rate, len(known[part].classes)
@@ -231,7 +232,7 @@ def distance_of_masks(seen: Observation, moved: dict[str, Float64], persona: Per
         still, masks = standard_mask()[rows, :2], style.moved[:, : len(rows), :2]
         masks, frames = masks / face_scale(persona.fapu, part), moved[part][:, : len(rows)]
         masks, frames = masks - masks.mean(axis=0), frames - frames.mean(axis=0)
-        names = seen.labels[part].names(Recogniser.default().components[part].classes)
+        names = seen.labels[part].names(ClassRecogniser.default().components[part].classes)
         for n in range(0, len(frames), EVERY):
             known = style.rows.get(names[n], style.rows.get(names[n].partition("/")[0]))
             if names[n] and known is not None:

@@ -13,12 +13,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.choices import Means
 from fba.cli.printing import print_table
-from fba.persona import Persona, Recogniser, learn, perform
+from fba.persona import ClassRecogniser, Persona, learn, transfer
 from fba.persona._observation import observe
 from fba.persona._persona import MEANS
 from fba.persona.points import mask_distance
@@ -110,14 +112,14 @@ def evaluate(
     users: int = 2,
     seed: int = 1,
     names: Sequence[str] | None = None,
-    recogniser: Recogniser | None = None,
+    recogniser: ClassRecogniser | None = None,
 ) -> Evaluation:
     """Return how near Personas bring users to actors of these styles, each with `users` users.
 
     names: of the contents that are performed; None for all.
     """
     performed = tuple(contents() if names is None else names)
-    known = Recogniser.default() if recogniser is None else recogniser
+    known = ClassRecogniser.default() if recogniser is None else recogniser
     chosen = named_styles() if styles is None else styles
     pairs = [
         _compare(style, performed, [seed, number, user], known)
@@ -154,7 +156,7 @@ class _Pair:
     counts: list[int]
 
 
-def _compare(style: Style, names: tuple[str, ...], seed: list[int], known: Recogniser) -> _Pair:
+def _compare(style: Style, names: tuple[str, ...], seed: list[int], known: ClassRecogniser) -> _Pair:
     """Return distances of one user to one actor."""
     random = np.random.default_rng(seed)
     actors, users = 1000 * seed[0] + seed[1], 1000 * seed[0] + 500 + 10 * seed[1] + seed[2]
@@ -179,10 +181,11 @@ def _compare(style: Style, names: tuple[str, ...], seed: list[int], known: Recog
         FACE: _distances(own, persona.neutral_mask, goal, at_rest),
         IN_STYLE: _distances(best, persona.neutral_mask, goal, at_rest),
     }
-    agreement = {}
+    agreement: dict[str, float] = {}
     for way in (*MEANS, KNOWN_USER):
-        means, user_known = ("motion", own_persona) if way == KNOWN_USER else (way, None)
-        played = perform(performed.face, persona, means=means, user=user_known, recogniser=known)
+        means: Means = "motion" if way == KNOWN_USER else cast("Means", way)
+        user_known = own_persona if way == KNOWN_USER else None
+        played = transfer(performed.face, persona, means=means, user=user_known, recogniser=known)
         acted = _hold(played.acted, played.rows, performed)
         distances[way] = _distances(acted, persona.neutral_mask, goal, at_rest)
         if way in MEANS:
@@ -221,7 +224,9 @@ def _rows(names: Sequence[str], pairs: Sequence[_Pair], which: int) -> tuple[Row
     )
 
 
-def _agreement(acted: Float64, persona: Persona, labels: dict[str, list[str]], known: Recogniser) -> float:
+def _agreement(
+    acted: Float64, persona: Persona, labels: dict[str, list[str]], known: ClassRecogniser
+) -> float:
     """Return the share of parts at some moments whose class, recognised anew, is one of the user's."""
     points = np.repeat(persona.neutral[None], len(acted), axis=0)
     points[:, :SAME] += acted[:, :SAME, :2]

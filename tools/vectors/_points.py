@@ -12,6 +12,7 @@ from fba.parameters import (
     EXPRESSION_SELECT_MAX,
     FAP_COUNT,
     VISEME_SELECT_MAX,
+    BapTable,
     bap_groups,
     baps,
     fap_groups,
@@ -106,12 +107,12 @@ _NOT_SENT = {("frame_rate", 0)}
 """0 with seconds 0 would be no rate; rate_slowest has it with seconds 1."""
 
 
-def points(elements: Sequence[Element], data: bytes, bap_steps: str, *, damaged: bool) -> set[str]:
+def points(elements: Sequence[Element], data: bytes, bap_steps: BapTable, *, damaged: bool) -> set[str]:
     """Return the points that a stream reaches. damaged: the trace ended with an error."""
     return set(_points(elements, data, bap_steps, damaged=damaged)).intersection(all_points())
 
 
-def _points(elements: Sequence[Element], data: bytes, bap_steps: str, *, damaged: bool) -> Iterator[str]:
+def _points(elements: Sequence[Element], data: bytes, bap_steps: BapTable, *, damaged: bool) -> Iterator[str]:
     if damaged:
         yield "damage"
     kind = ""
@@ -174,7 +175,7 @@ def _object_points(element: Element, following: Element | None, before: str) -> 
         yield f"ended by {name}"
 
 
-def _header_points(element: Element, bap_steps: str, lists: str) -> Iterator[str]:
+def _header_points(element: Element, bap_steps: BapTable, lists: str) -> Iterator[str]:
     """Yield points of the FAP or the BAP half of an I plane's header. lists: the last four list flags."""
     name, value, half = element.name, element.value, element.section[:3]
     groups = fap_groups() if half == "fap" else bap_groups()

@@ -18,6 +18,7 @@ from types import CodeType, ModuleType
 from typing import NamedTuple
 
 from fba.errors import FbaError, FbaWarning
+from fba.parameters import BapTable
 from fba_conformance import trace
 from fba_conformance._values import Listing, PlaneValues, trace_values
 from fba_conformance.suite.index import Vector, read_vectors
@@ -33,7 +34,7 @@ _MODULES = ("_textbook", "_reader", "_part", "listing", "trace")
 """Those of the independent decoder, each behind those that it imports."""
 _KEPT = "_KEPT"
 """A dictionary that a mistake may use, empty at the beginning of a stream."""
-Decoder = Callable[[bytes, str], Listing]
+Decoder = Callable[[bytes, BapTable], Listing]
 
 
 class Mistake(NamedTuple):
@@ -80,7 +81,7 @@ def broken_decoder(mistake: Mistake) -> Iterator[Decoder]:
         walker = sys.modules[names[-1]].__dict__["Walker"]
         kept = [sys.modules[name].__dict__.get(_KEPT, {}) for name in names]
 
-        def decode(data: bytes, bap_steps: str) -> Listing:
+        def decode(data: bytes, bap_steps: BapTable) -> Listing:
             for one in kept:
                 one.clear()
             return _decode(walker, data, bap_steps)
@@ -97,7 +98,7 @@ def _compiled(source: str, name: str) -> CodeType:
     return compile(source, f"<{name} with a mistake>", "exec")
 
 
-def _decode(walker: Callable[..., trace.Walker], data: bytes, bap_steps: str) -> Listing:
+def _decode(walker: Callable[..., trace.Walker], data: bytes, bap_steps: BapTable) -> Listing:
     """Return what a decoder finds; any exception is an error that it reports."""
     found: list[PlaneValues] = []
     try:
@@ -133,7 +134,8 @@ def main() -> None:
         name, stream, values, bap_steps = [*sys.argv[1:], "iso"][:4]
         warnings.simplefilter("ignore", FbaWarning)
         with broken_decoder(next(mistake for mistake in mistakes() if mistake.name == name)) as decode:
-            listing = decode(Path(stream).read_bytes(), bap_steps)
+            table: BapTable = "visage" if bap_steps == "visage" else "iso"
+            listing = decode(Path(stream).read_bytes(), table)
         Path(values).write_text(listing.text(), encoding="utf-8")
         return
     vectors = [(vector, expected_listing(vector)) for vector in read_vectors()]

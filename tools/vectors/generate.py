@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
+from fba.parameters import BapTable
 from fba_conformance._values import Listing, PlaneValues, trace_values
 from fba_conformance.suite.index import SHIPPED_VECTORS, index_text
 from fba_conformance.trace import Walker, planes
@@ -99,7 +100,7 @@ def damaged_entry(fault: Fault, data: bytes) -> Made:
     return entry, data, listing
 
 
-def _planes_of_aligned_reader(data: bytes, bap_steps: str) -> int | None:
+def _planes_of_aligned_reader(data: bytes, bap_steps: BapTable) -> int | None:
     """Return how many planes a byte-aligned reader finds; None for an error."""
     walker = Walker(data, bap_steps=bap_steps, byte_aligned=True)
     try:

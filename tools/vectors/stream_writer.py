@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from bitstring import BitArray
 
-from fba.parameters import Bap, Fap, baps, faps
+from fba.parameters import Bap, BapTable, Fap, baps, faps
 from fba_conformance._part import LISTS, MARKER_EVERY, RANGE_UNIT, HighLevel, Part, Slot
 from fba_conformance._textbook import FrequencyTable, encode_segment
 
@@ -72,7 +72,7 @@ class Plane:
 class StreamWriter:
     """Writes start codes and planes."""
 
-    def __init__(self, bap_steps: str = "iso") -> None:
+    def __init__(self, bap_steps: BapTable = "iso") -> None:
         self._bits = BitArray()
         self._fap, self._bap = Part("fap"), Part("bap", bap_steps)
         self._viseme, self._expression = HighLevel("viseme"), HighLevel("expression")
@@ -212,7 +212,7 @@ class StreamWriter:
 def write_stream(
     planes: Sequence[Plane],
     *,
-    bap_steps: str = "iso",
+    bap_steps: BapTable = "iso",
     object_code: int = OBJECT,
     end_code: int | None = END,
 ) -> bytes:

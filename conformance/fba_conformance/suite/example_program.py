@@ -21,12 +21,12 @@ import numpy as np
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.codec import Damage, Decoder, EncoderOptions, encode
 from fba.errors import FbaError, FbaWarning
-from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
+from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, BapTable
 from fba_conformance._values import HEADER, Listing, PlaneValues, block_values, read_values, trace_values
 from fba_conformance.trace import planes
 
 
-def decode_textbook(data: bytes, bap_steps: str) -> Iterator[str]:
+def decode_textbook(data: bytes, bap_steps: BapTable) -> Iterator[str]:
     """Yield the lines of a listing from the independent decoder, which stops at damage."""
     yield HEADER
     try:
@@ -37,7 +37,7 @@ def decode_textbook(data: bytes, bap_steps: str) -> Iterator[str]:
     yield "end"
 
 
-def decode_codec(data: bytes, bap_steps: str) -> Iterator[str]:
+def decode_codec(data: bytes, bap_steps: BapTable) -> Iterator[str]:
     """Yield the lines of a listing from this codec, which goes on behind damage."""
     decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
     damages: list[Damage] = []

@@ -11,9 +11,10 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from fba.errors import FormatError
+from fba.parameters import BapTable
 from fba_conformance._values import Listing, read_values
 
 SHIPPED_VECTORS = Path(__file__).parents[1] / "vectors"
@@ -39,9 +40,9 @@ class Vector:
         return str(self.entry.get("group", OTHER_GROUP))
 
     @property
-    def bap_steps(self) -> str:
+    def bap_steps(self) -> BapTable:
         """The table of BAP steps that the stream needs."""
-        return str(self.entry.get("bap_steps", "iso"))
+        return cast("BapTable", self.entry.get("bap_steps", "iso"))
 
     @property
     def damaged(self) -> bool:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fba.errors import FbaError, FbaWarning, FormatError
+from fba.parameters import BapTable
 from fba_conformance._values import Listing, read_values, trace_values
 from fba_conformance.suite._process import OUTPUT_LIMIT, Run, fill_in, run_program, split_command
 from fba_conformance.suite.index import Vector
@@ -127,7 +128,10 @@ def _try_encoder(program: Program, vector: Vector) -> tuple[str, str]:
         warnings.simplefilter("ignore", FbaWarning)
         records = decode_values(vector.data(), bap_steps=vector.bap_steps)
     expected = Listing(trace_values(records))
-    places = {"bap_steps": {vector.bap_steps}, "rate": {str(record["rate"]) for record in records}}
+    places: dict[str, set[str]] = {
+        "bap_steps": {vector.bap_steps},
+        "rate": {str(record["rate"]) for record in records},
+    }
     for name, part in (("fap_quant", 1), ("bap_quant", 2)):
         places[name] = {str(record[name]) for record in records if record["parts"] & part} or {"1"}
     several = [name for name, held in places.items() if len(held) > 1]
@@ -148,7 +152,7 @@ def _try_encoder(program: Program, vector: Vector) -> tuple[str, str]:
         return _stream_difference(expected, output.read_bytes(), vector.bap_steps), ""
 
 
-def _stream_difference(expected: Listing, data: bytes, bap_steps: str) -> str:
+def _stream_difference(expected: Listing, data: bytes, bap_steps: BapTable) -> str:
     """Return how a stream that an encoder wrote differs from the values given to it, "" if in nothing."""
     found = []
     try:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from fba.animation import Animation, Frame
 from fba.codec import Block, Decoder, PlaneSettings, encode_planes
 from fba.errors import BitstreamError, FbaError, FbaWarning, FormatError, UnsupportedError
+from fba.parameters import BapTable
 from fba_conformance._values import Listing, block_values, trace_values
 from fba_conformance.suite.index import Vector
 from fba_conformance.suite.result import Result
@@ -63,7 +64,7 @@ def independent_listing(vector: Vector) -> Listing:
     return Listing(trace_values(found, times=vector.times))
 
 
-def decode_blocks(data: bytes, bap_steps: str) -> tuple[list[Block], FbaError | None]:
+def decode_blocks(data: bytes, bap_steps: BapTable) -> tuple[list[Block], FbaError | None]:
     """Return the planes before the first damage, and its error; None if the stream is whole."""
     decoder = Decoder(bap_steps=bap_steps)
     blocks: list[Block] = []
@@ -76,7 +77,7 @@ def decode_blocks(data: bytes, bap_steps: str) -> tuple[list[Block], FbaError | 
     return blocks, None
 
 
-def salvage_blocks(data: bytes, bap_steps: str) -> list[Block]:
+def salvage_blocks(data: bytes, bap_steps: BapTable) -> list[Block]:
     """Return the planes that a salvaging decoder finds."""
     decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
     return [*decoder.push_blocks(data), *decoder.finish_blocks()]

@@ -8,7 +8,7 @@ finds cycles and poses in any body animation, `reduce` keeps only these poses.
 from fba.body.gait._characters import POSES, Character, Pose, characters
 from fba.body.gait._detection import Cycle, Gait, Step, detect
 from fba.body.gait._measure import Soles, advance, soles
-from fba.body.gait._reduction import Errors, Reduced, compare, reduce
+from fba.body.gait._reduction import Errors, Reduced, compare_walks, reduce
 from fba.body.gait._synthesis import walk
 
 __all__ = [
@@ -23,7 +23,7 @@ __all__ = [
     "Step",
     "advance",
     "characters",
-    "compare",
+    "compare_walks",
     "detect",
     "reduce",
     "soles",

@@ -11,6 +11,7 @@ from fba.arrays import Float64, Int32
 from fba.body.gait._limb import ELBOW, KNEE, Limb
 from fba.body.skeleton import ROOT, Skeleton
 from fba.body.solve.conventions import convention
+from fba.choices import Axes
 from fba.errors import ModelError
 
 HEEL_BEHIND = 0.054
@@ -109,7 +110,7 @@ def body_values(animation: Animation) -> Int32:
 class Writer:
     """Collects angles and positions as BAPs of a convention."""
 
-    def __init__(self, frames: int, axes: str = "iso") -> None:
+    def __init__(self, frames: int, axes: Axes = "iso") -> None:
         from fba.parameters import BAP_COUNT
 
         self._rules = convention(axes)

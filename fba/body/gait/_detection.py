@@ -22,6 +22,7 @@ from fba.body.gait._characters import POSES
 from fba.body.gait._measure import sole_points
 from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
+from fba.choices import Axes
 
 _NAMES = {"l": "left", "r": "right"}
 
@@ -268,7 +269,7 @@ class Gait:
         return result
 
 
-def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Gait:
+def detect(animation: Animation, skeleton: Skeleton | None = None, axes: Axes = "iso") -> Gait:
     """Return the steps, cycles and characteristic poses in which a body walks forward.
 
     skeleton: the one whose joints the BAPs turn, the default body where None. axes: a convention's name. Feet

@@ -12,6 +12,7 @@ from fba.body.gait._anatomy import Anatomy, body_values
 from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import convention
 from fba.body.solve.solver import BapSolver
+from fba.choices import Axes
 
 ON_GROUND = 0.002
 """Metres above the ground up to which a point counts as touching it."""
@@ -61,7 +62,7 @@ class Soles:
         return bool(self.touching.any(axis=(0, 1)).all())
 
 
-def soles(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Soles:
+def soles(animation: Animation, skeleton: Skeleton | None = None, axes: Axes = "iso") -> Soles:
     """Return the soles of an animation's body in every frame; ValueError without a body track."""
     values = body_values(animation)
     skeleton = Skeleton.default() if skeleton is None else skeleton
@@ -84,7 +85,7 @@ def sole_points(anatomy: Anatomy, matrices: Float64) -> Soles:
     return Soles(points)
 
 
-def advance(animation: Animation, axes: str = "iso") -> float:
+def advance(animation: Animation, axes: Axes = "iso") -> float:
     """Return the straight distance of the root over the ground from first frame to last, millimetres."""
     values = body_values(animation)
     columns = convention(axes).translation

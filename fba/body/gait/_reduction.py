@@ -99,7 +99,7 @@ def reduce(animation: Animation, gait: Gait | None = None, skeleton: Skeleton | 
     return Reduced(keyed, int(span.sum()), int((span & gait.walking).sum()), len(keys))
 
 
-def compare(animation: Animation, other: Animation, skeleton: Skeleton | None = None) -> Errors:
+def compare_walks(animation: Animation, other: Animation, skeleton: Skeleton | None = None) -> Errors:
     """Return the differences of two bodies in their common frames, over the joints that turn in the first.
 
     ValueError where the rates differ, or they have no frame in common.

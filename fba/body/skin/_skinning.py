@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -15,9 +16,10 @@ from fba.body.skin._girdle import Girdle, find_girdle
 from fba.body.skin._loops import Twisting
 from fba.body.skin._moving_normals import normal_rings
 from fba.body.skin._twisting import find_twists
+from fba.choices import SkinMethod
 from fba.mesh import result_array
 
-METHODS = ("dual", "linear")
+METHODS: tuple[SkinMethod, ...] = get_args(SkinMethod)
 """Ways to blend the motion of several joints."""
 BLOCK = 64
 """Frames per call of the compiled loop: Ctrl+C takes effect between calls only."""
@@ -58,7 +60,7 @@ class Skinner:
         matrices: npt.ArrayLike,
         out: Float32 | None = None,
         normals: Float32 | None = None,
-        method: str = "dual",
+        method: SkinMethod = "dual",
     ) -> Float32:
         """Return vertices for joint matrices: see `BodyModel.skin`."""
         return self._run(self.vertices, self.normals, matrices, out, normals, method)
@@ -70,7 +72,7 @@ class Skinner:
         matrices: npt.ArrayLike,
         out: Float32 | None = None,
         normals: Float32 | None = None,
-        method: str = "dual",
+        method: SkinMethod = "dual",
     ) -> Float32:
         """Return what `skin` does for other rest positions (V, 3), and their normals (V, 3) or None."""
         if normals is not None and rest_normals is None:
@@ -89,7 +91,7 @@ class Skinner:
         matrices: npt.ArrayLike,
         out: Float32 | None,
         normals: Float32 | None,
-        method: str,
+        method: SkinMethod,
     ) -> Float32:
         if method not in METHODS:
             raise ValueError(f"no skinning method {method!r}; there are {', '.join(METHODS)}")

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64, Int64
+from fba.choices import Axes
 from fba.parameters import baps
 
 NO_BAP = -1
@@ -33,7 +34,7 @@ class Convention:
     translation: int64 (3,), columns of the root's translation along x, y, z, and translation_sign.
     """
 
-    name: str
+    name: Axes
     about: str
     joints: tuple[str, ...]
     bap: Int64
@@ -55,7 +56,7 @@ def convention_names() -> tuple[str, ...]:
 
 
 @cache
-def convention(name: str = "iso") -> Convention:
+def convention(name: Axes = "iso") -> Convention:
     """Return the convention of a name; raises ValueError for an unknown one."""
     if name not in _table():
         raise ValueError(f"axes must be one of {', '.join(_table())}, not {name!r}")

@@ -1,9 +1,9 @@
 """Joint limits: the ranges of normal human motion, to report or clamp excesses. Off by default.
 
-The standard sets no limits to joints. `Limits.human()` is the table of typical limits in K. Karpouzis,
+The standard sets no limits to joints. `JointLimits.human()` is the table of typical limits in K. Karpouzis,
 Adaptive parametric models of human faces and bodies, table 4-1: there X is the subject's left, Z the long
 axis of the segment and Y = Z x X, so that a hanging limb flexes about -X, abducts about Y, forward, and
-twists about Z, down. limits.csv has it in BAPs, for the left side; `Limits.iso()` are the ranges of the
+twists about Z, down. limits.csv has it in BAPs, for the left side; `JointLimits.iso()` are the ranges of the
 standard's BAP table.
 """
 
@@ -26,7 +26,7 @@ FULL_TURN = 360.0
 
 
 @dataclass(frozen=True)
-class Limit:
+class JointLimit:
     """The range of one motion of a segment. baps: 0-based columns whose sum lies in low..high, degrees."""
 
     segment: str
@@ -45,7 +45,7 @@ class Limit:
 class Excess:
     """A motion beyond a limit: the number of frames, the first of them, and the largest excess in degrees."""
 
-    limit: Limit
+    limit: JointLimit
     frames: int
     first: int
     worst: float
@@ -58,21 +58,21 @@ class Excess:
         )
 
 
-class Limits:
+class JointLimits:
     """A set of limits. limits: its rows; a BAP in none of them is unlimited."""
 
-    def __init__(self, limits: tuple[Limit, ...]) -> None:
+    def __init__(self, limits: tuple[JointLimit, ...]) -> None:
         self.limits = limits
 
     @staticmethod
-    def human() -> Limits:
+    def human() -> JointLimits:
         """Return limits of normal human motion, by segment; some are limits of the sum over vertebrae."""
-        return Limits(_human())
+        return JointLimits(_human())
 
     @staticmethod
-    def iso() -> Limits:
+    def iso() -> JointLimits:
         """Return the ranges of the standard's BAP table at its own quantiser steps, joint by joint."""
-        return Limits(_iso())
+        return JointLimits(_iso())
 
     def check(self, values: npt.ArrayLike) -> tuple[Excess, ...]:
         """Return the limits that BAPs (T, 296) or (296,), 1e-5 rad, exceed; empty if they exceed none.
@@ -131,13 +131,13 @@ def widest_limits() -> Float64:
 def _frames(values: npt.ArrayLike) -> Float64:
     array = np.atleast_2d(np.asarray(values, dtype=np.float64))
     if array.ndim != 2 or array.shape[1] not in (BAP_STANDARD_COUNT, BAP_COUNT):
-        raise ValueError(f"Limits: needs BAPs of shape (T, {BAP_COUNT}), not {np.shape(values)}")
+        raise ValueError(f"JointLimits: needs BAPs of shape (T, {BAP_COUNT}), not {np.shape(values)}")
     if not np.isfinite(array).all():
-        raise ValueError("Limits: BAPs must be finite")
+        raise ValueError("JointLimits: BAPs must be finite")
     return array
 
 
-def _excess(limit: Limit, array: Float64) -> tuple[Float64, Float64]:
+def _excess(limit: JointLimit, array: Float64) -> tuple[Float64, Float64]:
     """Return totals (T,) in degrees, shifted by whole turns to the range if possible, and excess (T,)."""
     total = array[:, list(limit.baps)].sum(axis=1) * DEGREES
     if len(limit.baps) == 1:
@@ -146,7 +146,7 @@ def _excess(limit: Limit, array: Float64) -> tuple[Float64, Float64]:
 
 
 @cache
-def _human() -> tuple[Limit, ...]:
+def _human() -> tuple[JointLimit, ...]:
     text = (files(__package__) / "limits.csv").read_text(encoding="utf-8")
     numbers = bap_numbers()
     result = []
@@ -156,7 +156,7 @@ def _human() -> tuple[Limit, ...]:
             names = row["baps"].replace("?", side).split()
             flipped = side == "r" and row["right_side"] == "mirrored"
             result.append(
-                Limit(
+                JointLimit(
                     word + row["segment"],
                     row["motion"],
                     tuple(numbers[name] - 1 for name in names),
@@ -168,9 +168,9 @@ def _human() -> tuple[Limit, ...]:
 
 
 @cache
-def _iso() -> tuple[Limit, ...]:
+def _iso() -> tuple[JointLimit, ...]:
     return tuple(
-        Limit(
+        JointLimit(
             bap.joint,
             bap.freedom,
             (bap.number - 1,),

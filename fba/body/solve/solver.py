@@ -14,6 +14,7 @@ from fba.body.solve import _pose_loops as pose_loops
 from fba.body.solve import solver_loops
 from fba.body.solve.conventions import NO_BAP, Convention, convention
 from fba.body.solve.limits import widest_limits
+from fba.choices import Axes
 from fba.errors import ModelError
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, baps
 from fba.tracks import BodyColumns, BodyTrack
@@ -85,7 +86,7 @@ class BapSolver:
     skeleton lacks have no effect; `missing` lists those joints.
     """
 
-    def __init__(self, skeleton: Skeleton | None = None, axes: str = "iso") -> None:
+    def __init__(self, skeleton: Skeleton | None = None, axes: Axes = "iso") -> None:
         self.skeleton = skeleton if skeleton is not None else Skeleton.default()
         self.convention: Convention = convention(axes)
         self._tables = _make_tables(self.skeleton, self.convention)
@@ -149,8 +150,8 @@ class BapSolver:
 
         Of the angles that make a rotation, each frame takes those closest to the frame before, and the first
         frame those closest to previous, (296,): a smooth motion has smooth angles, which may leave +-pi (see
-        `wrapped`). Without previous, the first frame keeps within human limits (`fba.body.Limits`) where it
-        can, and as close to 0. At gimbal lock the outermost angle stays as it was.
+        `wrapped`). Without previous, the first frame keeps within human limits (`fba.body.JointLimits`) where
+        it can, and as close to 0. At gimbal lock the outermost angle stays as it was.
 
         ValueError on a wrong shape or values that are not finite; ModelError where a value does not
         fit 32 bits; KeyError for an unknown joint.

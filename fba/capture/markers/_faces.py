@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import get_args
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from fba.capture.markers._stabilisation import follow_head, relate_poses, remove
 from fba.capture.markers._targets import PUPILS, RIGID
 from fba.capture.markers.marker_maps import check_map, find_map
 from fba.capture.markers.motion import MarkerMotion
+from fba.choices import Gaze
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel, Fapu
 from fba.face.feature_points import row_of
@@ -35,7 +37,7 @@ from fba.tracks import BodyTrack, FaceTrack
 PATH = (181, 182, 183)
 """BAPs that move the body up, to its left, and to its front, millimetres."""
 Neutral = str | int | tuple[float, float] | slice
-GAZES = ("none", "camera")
+GAZES: tuple[Gaze, ...] = get_args(Gaze)
 MAX_FRAMES = 1_000_000
 """Frames of the longest capture: more than two hours at 120 frames/s."""
 FRAME_BYTES = 6000
@@ -108,7 +110,7 @@ def from_markers(
     *,
     markers: Mapping[str, str] | None = None,
     neutral: Neutral = "auto",
-    gaze: str = "none",
+    gaze: Gaze = "none",
     head_path: bool = True,
     model: FaceModel | None = None,
     traits: Traits = MARKERS,
@@ -165,7 +167,7 @@ def find_face(
     *,
     markers: Mapping[str, str] | None = None,
     neutral: Neutral = "auto",
-    gaze: str = "none",
+    gaze: Gaze = "none",
     model: FaceModel | None = None,
     traits: Traits = MARKERS,
     limits: Limits = DEFAULT_LIMITS,
@@ -332,7 +334,7 @@ def _turn_head(values: Float64, actor: _Actor, fapu: Fapu, traits: Traits) -> tu
 
 
 def _turn_eyes(
-    values: Float64, actor: _Actor, moved: Float64, points: Float64, fapu: Fapu, gaze: str
+    values: Float64, actor: _Actor, moved: Float64, points: Float64, fapu: Fapu, gaze: Gaze
 ) -> tuple[int, ...]:
     """Put the turns of the eyes into FAPs, float64 (T, 68), which hold the head's; return which these are."""
     eyes = find_gaze(moved, points, set(actor.places.values()), actor.where.scale)

@@ -27,6 +27,7 @@ from fba.capture.points.places import (
     take_points,
 )
 from fba.capture.sampling import find_gaps, interpolate
+from fba.choices import Gaze
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -52,7 +53,7 @@ def from_points(
     *,
     markers: Mapping[str, str] | None = None,
     neutral: Neutral = "auto",
-    gaze: str = "none",
+    gaze: Gaze = "none",
     head_path: bool = True,
     aspect: float | None = None,
     model: FaceModel | None = None,
@@ -81,7 +82,7 @@ def find_point_face(
     *,
     markers: Mapping[str, str] | None = None,
     neutral: Neutral = "auto",
-    gaze: str = "none",
+    gaze: Gaze = "none",
     aspect: float | None = None,
     model: FaceModel | None = None,
     limits: Limits = DEFAULT_LIMITS,

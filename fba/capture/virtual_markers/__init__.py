@@ -7,7 +7,7 @@ from fba.capture.virtual_markers._heads import MarkedHead, head_of_model, read_h
 from fba.capture.virtual_markers._mapping_files import read_mapping, write_mapping
 from fba.capture.virtual_markers.influence import Influence, find_influence
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
-from fba.capture.virtual_markers.performance import MarkerPerformance, perform
+from fba.capture.virtual_markers.performance import MarkerPerformance, move_head
 from fba.capture.virtual_markers.proposal import propose_mapping
 
 __all__ = [
@@ -18,7 +18,7 @@ __all__ = [
     "VirtualMarker",
     "find_influence",
     "head_of_model",
-    "perform",
+    "move_head",
     "propose_mapping",
     "read_head",
     "read_mapping",

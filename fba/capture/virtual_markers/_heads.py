@@ -14,6 +14,7 @@ import numpy as np
 
 from fba.arrays import Float64, Int32, Intp
 from fba.capture.virtual_markers.influence import WalkedMesh
+from fba.choices import UpAxis
 from fba.errors import ModelError
 from fba.face import Deformer, FaceModel, Part
 from fba.face import feature_point_names as names
@@ -179,7 +180,7 @@ def read_head(
     *,
     kind: str | None = None,
     points: object = None,
-    up: str = "y",
+    up: UpAxis = "y",
     kinds: Mapping[str, str] | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> MarkedHead:

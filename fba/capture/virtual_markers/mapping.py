@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import get_args
 
 from fba.capture.virtual_markers._heads import MarkedHead
+from fba.choices import Assignment, Gaze, Overlap
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.name_maps import list_names
 
-ASSIGNMENTS = ("shared", "exclusive")
-OVERLAPS = ("match", "add")
-GAZES = ("none", "camera")
+ASSIGNMENTS: tuple[Assignment, ...] = get_args(Assignment)
+OVERLAPS: tuple[Overlap, ...] = get_args(Overlap)
+GAZES: tuple[Gaze, ...] = get_args(Gaze)
 MOST_SHARE = 10.0
 """Largest share by which one marker goes with another."""
 MAX_SIZE = 1e9
@@ -91,10 +93,10 @@ class MarkerMapping:
     """
 
     markers: Mapping[str, VirtualMarker] = field(default_factory=dict)
-    assignment: str = "shared"
-    overlap: str = "match"
+    assignment: Assignment = "shared"
+    overlap: Overlap = "match"
     scale: tuple[str, ...] = ()
-    gaze: str = "none"
+    gaze: Gaze = "none"
     squint: float = 0.0
     made_for: MadeFor | None = None
 

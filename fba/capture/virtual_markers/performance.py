@@ -19,6 +19,7 @@ from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import Eye, find_eyes, narrow, turn_to_camera
 from fba.capture.virtual_markers.mapping import MarkerMapping
 from fba.capture.virtual_markers.weights import MarkerWeights, find_weights
+from fba.choices import Gaze
 from fba.errors import FbaWarning, ModelError
 from fba.name_maps import list_names
 
@@ -152,7 +153,7 @@ def steady(motion: MarkerMotion, mapping: MarkerMapping, neutral: Neutral = "aut
     return SteadyMarkers(names, local, rotation, shift, still, (rest.start, rest.stop))
 
 
-def perform(
+def move_head(
     motion: MarkerMotion, head: MarkedHead, mapping: MarkerMapping, neutral: Neutral = "auto"
 ) -> MarkerPerformance:
     """Return a head moved by a capture.
@@ -170,7 +171,7 @@ def perform(
 def perform_steady(
     motion: MarkerMotion, head: MarkedHead, mapping: MarkerMapping, markers: SteadyMarkers
 ) -> MarkerPerformance:
-    """Return a head moved by a capture whose markers are steady already: `perform` for a checked mapping."""
+    """Return a head moved by a capture whose markers are steady already. mapping: a checked one."""
     kept = mapping.centres
     placed = [n for n, name in enumerate(markers.names) if name in kept]
     vertices = [kept[markers.names[n]].vertex for n in placed]
@@ -205,7 +206,7 @@ def _find_rest(head: MarkedHead, squint: float) -> Float64:
     return head.vertices + narrow(head, squint) if squint else head.vertices
 
 
-def _find_looking(head: MarkedHead, gaze: str) -> tuple[Eye, ...]:
+def _find_looking(head: MarkedHead, gaze: Gaze) -> tuple[Eye, ...]:
     """Return the eyes that look at the camera; none if they stay in the head."""
     eyes = find_eyes(head) if gaze == "camera" else ()
     if gaze == "camera" and not eyes:

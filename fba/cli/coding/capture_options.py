@@ -8,33 +8,65 @@ from typing import Any
 
 import click
 
+from fba.choices import Gaze, Ground, Origin, SignedUpAxis, Spine, Swap
 from fba.cli import joint_options, marker_options, options
-from fba.cli.command import Decorated
 from fba.cli.inputs import Reading, check_capture_options
+from fba.cli.option_fields import option
+from fba.cli.outputs import further_output_option
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CaptureOptions:
-    """How a capture becomes BAPs and FAPs.
+    """How a capture becomes BAPs and FAPs: options of the readers of captures, and `maps` and `map_out`."""
 
-    maps, map_out: places of joints or markers. The other fields are options of the readers of captures.
-    """
-
-    maps: tuple[Path | joint_options.Pair, ...]
-    map_out: Path | None
-    spine: str
-    ground: str
-    plant: bool
-    origin: str
-    rest: str | int
-    up: str
-    scale: float | None
-    swap: str
-    face: str | None
-    neutral: marker_options.Neutral
-    gaze: str
-    head_path: bool | None
-    aspect: float | None
+    spine: Spine = option(
+        default="spread",
+        help="Motion capture: turn a dozen vertebrae, all, four, or one for each joint of the source.",
+    )
+    ground: Ground = option(
+        default="floor",
+        help="Motion capture: feet stand at height 0, at the height of the source's ground, or uncorrected.",
+    )
+    plant: bool = option(
+        default=True,
+        help="Motion capture: bend legs a little where feet would otherwise miss the ground, or slip on it.",
+    )
+    origin: Origin = option(default="source", help="Motion capture: what is placed at the default position.")
+    maps: joint_options.Maps = joint_options.map_option
+    map_out: Path | None = further_output_option(
+        "FILE.toml", "Motion capture: write the joints or markers that were found, for --map."
+    )
+    rest: str | int = option(
+        type=joint_options.RestType(),
+        default="auto",
+        metavar="auto|file|first|motion|N",
+        help="Motion capture: the rest pose is the file's own, its first frame, frame N, or found in the "
+        "motion.",
+    )
+    up: SignedUpAxis = option(default="auto", help="Motion capture: the axis that points up.")
+    scale: float | None = option(
+        type=click.FloatRange(1e-6, 1e6),
+        metavar="METRES",
+        help="Motion capture: metres of the person shown in one unit of the file, in place of what its legs "
+        "say.",
+    )
+    swap: Swap = option(
+        default="auto",
+        help="Live Link Face's tables: MouthLeft and MouthRight, JawLeft and JawRight change places.",
+    )
+    face: str | None = options.face_option
+    neutral: marker_options.Neutral = marker_options.neutral_option("Markers, points: the")
+    gaze: Gaze = option(
+        default="none",
+        help="Markers, points: eyes turn as their pupils say, if these are there, or keep looking at the "
+        "camera.",
+    )
+    aspect: float | None = marker_options.aspect_option(
+        "Points: width and height of the picture, 16:9 or 1920x1080; default: what makes them a face."
+    )
+    head_path: bool | None = option(
+        help="Markers: where the head goes moves the body; default: unless another file has a body."
+    )
 
     @property
     def map_files(self) -> list[Path]:
@@ -53,65 +85,3 @@ class CaptureOptions:
         if self.head_path is None:
             taken["head_path"] = len(inputs) == 1  # of two files, the other has a body
         return taken
-
-
-def capture_options(command: Decorated) -> Decorated:
-    """Add the options; the command takes them as keywords: the fields of `CaptureOptions`."""
-    for option in reversed(
-        (
-            options.choice_option(
-                "--spine",
-                "Motion capture: turn a dozen vertebrae, all, four, or one for each joint of the source.",
-                "spread", "full", "simple", "joints",
-            ),
-            options.choice_option(
-                "--ground",
-                "Motion capture: feet stand at height 0, at the height of the source's ground, or "
-                "uncorrected.",
-                "floor", "source", "none",
-            ),
-            click.option(
-                "--plant/--no-plant",
-                default=True,
-                show_default=True,
-                help="Motion capture: bend legs a little where feet would otherwise miss the ground, or "
-                "slip on it.",
-            ),
-            options.choice_option(
-                "--origin",
-                "Motion capture: what is placed at the default position.",
-                "source", "start", "middle",
-            ),
-            joint_options.map_options(out=True),
-            click.option(
-                "--rest",
-                type=joint_options.RestType(),
-                default="auto",
-                show_default=True,
-                metavar="auto|file|first|motion|N",
-                help="Motion capture: the rest pose is the file's own, its first frame, frame N, or found in "
-                "the motion.",
-            ),
-            options.choice_option(
-                "--up",
-                "Motion capture: the axis that points up.",
-                "auto", "+x", "-x", "+y", "-y", "+z", "-z",
-            ),
-            click.option(
-                "--scale",
-                type=click.FloatRange(1e-6, 1e6),
-                metavar="METRES",
-                help="Motion capture: metres of the person shown in one unit of the file, in place of what "
-                "its legs say.",
-            ),
-            options.choice_option(
-                "--swap",
-                "Live Link Face's tables: MouthLeft and MouthRight, JawLeft and JawRight change places.",
-                "auto", "yes", "no",
-            ),
-            options.face_option,
-            marker_options.marker_options,
-        )
-    ):  # fmt: skip
-        command = option(command)
-    return command

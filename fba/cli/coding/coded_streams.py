@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from fba.animation import Animation
-from fba.cli.clamped_values import clamped_values
-from fba.cli.coding.fit_options import fit_lines, fit_values
-from fba.cli.coding.rate_options import DEFAULT_BUFFER, HeldRate, rate_lines, rate_values
+from fba.cli.coding.clamped_values import clamped_values
+from fba.cli.coding.rate_options import HeldRate, rate_lines, rate_values
 from fba.cli.coding.size_options import Size
 from fba.cli.coding.tolerance_options import tolerance_in_metres, tolerance_lines, tolerance_values
 from fba.cli.inputs import input_file, read_model
@@ -19,6 +18,7 @@ from fba.cli.outputs import display_name
 from fba.cli.printing import rate_text, seconds_text
 from fba.errors import FbaWarning
 from fba.limits import Limits
+from fba.parameters import BapTable
 from fba.presets import PRESETS
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from fba.codec import ClampedParameter, EncoderOptions
     from fba.face import FaceModel
     from fba.planning import Encoded, Goal
+    from fba.planning.fit_streams import FitStream
     from fba.planning.rate import RateStatistics
 
 
@@ -122,8 +123,8 @@ def _goal(animation: Animation, size: Size, inputs: Inputs) -> Goal:
         return "fit"
     if size.tolerance is not None or size.body_tolerance is not None:
         return tolerance_in_metres(animation, size.tolerance, size.body_tolerance)
-    if size.bitrate is not None:
-        return BitRate(size.bitrate, DEFAULT_BUFFER if size.buffer is None else size.buffer)
+    if size.bit_rate is not None:
+        return BitRate(size.bit_rate, size.buffer)
     if size.preset is not None:
         return size.preset
     return "compact" if inputs.has_captured_face or size.model is not None else "exact"
@@ -158,7 +159,7 @@ def _nearness(encoded: Encoded, goal: Goal, animation: Animation) -> tuple[dict[
     if isinstance(errors, NearLossless):
         return {"tolerance": tolerance_values(errors)}, tolerance_lines(errors, animation)
     if isinstance(errors, FitStream):
-        return {"fit": fit_values(errors)}, fit_lines(errors)
+        return {"fit": _fit_values(errors)}, _fit_lines(errors)
     if isinstance(goal, BitRate):
         counts, quant = cast("RateStatistics", encoded.statistics), encoded.options.fap_quant
         held = HeldRate(goal.bits_per_second, goal.buffer, counts, quant, errors)
@@ -166,9 +167,28 @@ def _nearness(encoded: Encoded, goal: Goal, animation: Animation) -> tuple[dict[
     return {}, []
 
 
+def _fit_values(made: FitStream) -> dict[str, Any]:
+    """Return what is sent and how far the head is off, for programs; lengths in mm."""
+    off = made.errors
+    return {
+        "sent": list(made.sent),
+        "added": list(made.added),
+        "millimetres": {"mean": off.mean, "percentile_99": off.percentile_99, "largest": off.largest},
+    }
+
+
+def _fit_lines(made: FitStream) -> list[str]:
+    """Return the same for people."""
+    added = f", {len(made.added)} of them as the head would miss them" if made.added else ""
+    return [
+        f"face: {len(made.sent)} FAPs sent{added}; the head computes the others",
+        f"face: worst vertex of each frame {made.errors.text()}",
+    ]
+
+
 def _is_held_still(size: Size, inputs: Inputs) -> bool:
     """Whether levels of BAPs are those of `hold_still`."""
-    if size.tolerance is not None or size.body_tolerance is not None or size.bitrate is not None:
+    if size.tolerance is not None or size.body_tolerance is not None or size.bit_rate is not None:
         return False  # these choose levels of their own
     captured = "body" in inputs.formats and inputs.formats["body"].is_capture
     return captured if size.still is None else size.still
@@ -188,7 +208,7 @@ def _read_model_with_fit(path: Path | None) -> FaceModel | None:
 
 
 def encode_as_epf(
-    epf: Path, animation: Animation, table: str, limits: Limits, *, marked: bool
+    epf: Path, animation: Animation, table: BapTable, limits: Limits, *, marked: bool
 ) -> CodedStream:
     """Return the stream of an animation, coded plane by plane as an EPF file says.
 

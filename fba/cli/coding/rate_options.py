@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from fba.cli.command import Decorated
+from fba.cli.option_fields import option
 from fba.cli.options import is_given
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3}
 LARGEST = 1e9
 MOST_PARAMETERS = 3
 """Of which errors are named."""
-DEFAULT_BUFFER = 1.0
 
 
 class AmountType(click.ParamType[float]):
@@ -54,37 +53,34 @@ class AmountType(click.ParamType[float]):
         return amount
 
 
-def rate_options(command: Decorated) -> Decorated:
-    """Add `--bitrate` and `--buffer`; the command takes them as `bitrate` and `buffer`, None if not given."""
-    buffer = click.option(
-        "--buffer",
-        type=AmountType("buffer", SECONDS, "0.5s"),
-        metavar="SECONDS",
-        help="With --bitrate: how far ahead of the rate the stream may be at any time. Default: 1s.",
-    )
-    bitrate = click.option(
-        "--bitrate",
-        type=AmountType("bit rate", BITS, "1500 or 1.5kbit/s"),
-        metavar="BITS",
-        help="Send what loses least at this mean rate: 1500, 1500bit/s, 1.5kbit/s.",
-    )
-    decorated: Any = bitrate(buffer(command))
-    return decorated  # type: ignore[no-any-return]
+bit_rate_option = option(
+    "--bitrate",
+    type=AmountType("bit rate", BITS, "1500 or 1.5kbit/s"),
+    metavar="BITS",
+    help="Send what loses least at this mean rate: 1500, 1500bit/s, 1.5kbit/s.",
+)
+buffer_option = option(
+    type=AmountType("buffer", SECONDS, "0.5s"),
+    default=1.0,
+    typed="1s",
+    metavar="SECONDS",
+    help="With --bitrate: how far ahead of the rate the stream may be at any time.",
+)
 
 
 def check_buffer() -> None:
     """Raise click.UsageError for a buffer without a rate."""
-    if is_given("buffer") and not is_given("bitrate"):
+    if is_given("buffer") and not is_given("bit_rate"):
         raise click.UsageError("--buffer goes with --bitrate: it says how closely that is held")
 
 
 class HeldRate(NamedTuple):
     """What holding to a bit rate came to.
 
-    bitrate: bits a second. buffer: seconds. quant: of FAPs and BAPs. errors: None where they are not known.
+    bit_rate: bits a second. buffer: seconds. quant: of FAPs and BAPs. errors: None where they are not known.
     """
 
-    bitrate: float
+    bit_rate: float
     buffer: float
     statistics: RateStatistics
     quant: int
@@ -105,7 +101,7 @@ def rate_lines(held: HeldRate) -> list[str]:
     """Return what holding to a rate came to, for people."""
     counts = held.statistics
     text = (
-        f"held to {held.bitrate:g} bit/s: at most {counts.peak / held.bitrate:.2f} s ahead, of "
+        f"held to {held.bit_rate:g} bit/s: at most {counts.peak / held.bit_rate:.2f} s ahead, of "
         f"{held.buffer:g} s; quantiser {held.quant}"
     )
     if counts.left_out:
@@ -150,9 +146,9 @@ def rate_values(held: HeldRate) -> dict[str, Any]:
     """Return the same for programs."""
     counts = held.statistics
     values: dict[str, Any] = {
-        "bits_per_second": held.bitrate,
+        "bits_per_second": held.bit_rate,
         "buffer": held.buffer,
-        "most_ahead": round(counts.peak / held.bitrate, 6),
+        "most_ahead": round(counts.peak / held.bit_rate, 6),
         "quantiser": held.quant,
         "frames_left_out": counts.left_out,
         "longest_gap": round(counts.longest_gap, 6),

@@ -11,18 +11,20 @@ import click
 
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import EXISTING, input_file
+from fba.cli.inputs import Reading, input_file
+from fba.cli.option_fields import group, option, with_options
 from fba.cli.printing import print_json
-from fba.limits import Limits
 
 
 @click.command(cls=Command, epilog=examples("fba bench talk.fba", "fba bench talk.fba --rounds 20 --json"))
-@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=EXISTING)
-@click.option("--rounds", type=click.IntRange(1, 1000), default=9, show_default=True)
-@options.bap_steps_option
-@options.json_option
-@options.limit_option
-def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool, limit: Limits) -> None:
+@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=options.EXISTING)
+@with_options
+def command(
+    files: tuple[Path, ...],
+    rounds: int = option(type=click.IntRange(1, 1000), default=9),
+    reading: Reading = group("bap_steps", "limit"),
+    as_json: bool = options.json_option,
+) -> None:
     """Measure decoding and encoding of streams on one core: medians over several rounds.
 
     A symbol is one coded value of one plane. The source's bench/ folder compares the codec with a textbook's.
@@ -31,7 +33,7 @@ def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool,
     results = []
     for path in files:
         with each.file(path):
-            results.append(_measure(path, rounds, bap_steps, limit))
+            results.append(_measure(path, rounds, reading))
             if not as_json:
                 _print(results[-1])
     if as_json:
@@ -39,14 +41,15 @@ def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool,
     each.finish()
 
 
-def _measure(file: Path, rounds: int, bap_steps: str, limits: Limits) -> dict[str, Any]:
+def _measure(file: Path, rounds: int, reading: Reading) -> dict[str, Any]:
     """Return the symbols of a stream, and seconds and symbols per second of decoding and encoding it."""
     from fba.codec import Decoder, EncoderOptions, decode, encode_with_statistics
     from fba.compiled import is_compiled
 
     with input_file(file) as path:
         data = path.read_bytes()
-    bap_steps = step_tables.table_to_read(file, data, bap_steps, limits)
+    limits = reading.limit
+    bap_steps = step_tables.table_to_read(file, data, reading.bap_steps, limits)
     animation = decode(data, bap_steps=bap_steps, limits=limits)
     tracks = [track for track in (animation.face, animation.body) if track is not None]
     symbols = sum(int(track.mask.sum()) for track in tracks)

@@ -10,48 +10,62 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from fba.cli import options
-from fba.cli.clamped_values import clamped_lines
 from fba.cli.coding import rate_options
+from fba.cli.coding.clamped_values import clamped_lines
 from fba.cli.command import Command, examples
-from fba.cli.inputs import ExistingPath
 from fba.cli.interruptions import raise_delayed
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.option_fields import option, option_like, with_options
+from fba.cli.outputs import STANDARD, Output, Outputs, display_name, output_option
 from fba.cli.printing import rate_text, seconds_text
+from fba.encoder_options import QUANT_MAX, EncoderOptions
 from fba.errors import FbaError
-from fba.presets import PRESETS as ALL_PRESETS
 
 if TYPE_CHECKING:
     from fba.live import Capture, Receiver, StreamRecorder, Summary
     from fba.live.recording import Target
 
 KINDS = ("livelink", "ifacialmocap", "vtube", "vmc")
-PRESETS = tuple(name for name in ALL_PRESETS if name != "exact")  # who knows what will never move?
 LONGEST_NEUTRAL = 60.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Network:
-    """Where data come from: see `fba.live.Receiver`. sender: of several, the one to use."""
+    """Where data come from: see `fba.live.Receiver`."""
 
-    host: str
-    port: int | None
-    ask: str | None
-    sender: str | None
+    port: int | None = option(
+        type=click.IntRange(0, 65_535),
+        help="UDP port to listen on; 0: any that is free. Default: 11111 for livelink, 49983 for "
+        "ifacialmocap, 11125 for vtube, 39539 for vmc.",
+    )
+    host: str = option(
+        default="", metavar="ADDRESS", help="Own address to listen on. Default: all of this computer's."
+    )
+    ask: str | None = option(
+        metavar="ADDRESS[:PORT]",
+        help="Telephone to ask for data: vtube needs it; ifacialmocap can be told our address in the app.",
+    )
+    sender: str | None = option(
+        "--sender", "--subject", metavar="NAME",
+        help="Of several senders, the one to use: its subject's name or its address. Default: the first.",
+    )  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Coding:
     """How the stream is coded: by a preset and a quantiser, or at a bit rate with a buffer in seconds."""
 
-    preset: str | None
-    fap_quant: int
-    bitrate: float | None
-    buffer: float | None
+    preset: Literal["reference", "compact"] | None = option(
+        help="What is sent: all that comes (reference, the default), or only what players do not derive from "
+        "other FAPs, and nothing that never moved so far (compact)."
+    )
+    fap_quant: int = option_like(EncoderOptions, "fap_quant", "--quant", type=click.IntRange(0, QUANT_MAX))
+    bit_rate: float | None = rate_options.bit_rate_option
+    buffer: float = rate_options.buffer_option
 
     @property
     def is_compact(self) -> bool:
@@ -60,34 +74,44 @@ class _Coding:
 
     def recorder(self, targets: list[Target]) -> StreamRecorder:
         """Return what encodes frames and writes them to the targets."""
-        from fba.codec import EncoderOptions
         from fba.live import StreamRecorder
 
         return StreamRecorder(
             targets,
             EncoderOptions(fap_quant=self.fap_quant, clamp=True, bap_steps="visage"),
-            bit_rate=self.bitrate,
-            buffer=rate_options.DEFAULT_BUFFER if self.buffer is None else self.buffer,
+            bit_rate=self.bit_rate,
+            buffer=self.buffer,
             compact=self.is_compact,
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Request:
-    """What the command line asks for. seconds: after which it stops. neutral: seconds of a neutral face."""
+    """What the command line asks for."""
 
     kind: str
-    output: Path | None
-    no_clobber: bool
-    play: bool
-    seconds: Fraction | None
-    fps: Fraction | None
-    neutral: float | None
-    swap: bool
-    model: Path | None
-    as_json: bool
+    output: Path | None = output_option("OUT.fba", "Stream to write while it comes; - for standard output.")
+    no_clobber: bool = options.no_clobber_option
+    play: bool = option(default=False, help="Show it in a window.")
     network: _Network
+    seconds: Fraction | None = option(
+        type=options.PeriodType(), metavar="SECONDS", help="Stop after that; default: on Ctrl-C."
+    )
+    rate: Fraction | None = options.rate_option(
+        "Frame rate of the stream. Default: the sender's own, else 60; vmc: that of its first second."
+    )
+    neutral: float | None = option(
+        type=click.FloatRange(0, LONGEST_NEUTRAL, min_open=True),
+        metavar="SECONDS",
+        help="The first seconds show the neutral face: their median is subtracted. vmc: the first moment is "
+        "a T-pose. Default: all counts as it is sent.",
+    )
+    swap: bool = option(default=False, help="MouthLeft and MouthRight, JawLeft and JawRight change places.")
     coding: _Coding
+    model: Path | None = options.model_option(
+        "With --play, the face that is shown. Default: the built-in head."
+    )
+    as_json: bool = options.json_option
 
 
 @click.command(
@@ -103,67 +127,7 @@ class _Request:
     ),
 )
 @click.argument("kind", type=click.Choice(KINDS), metavar=f"[{'|'.join(KINDS)}]")
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT.fba",
-    type=OutputType(),
-    help="Stream to write while it comes; - for standard output.",
-)
-@options.no_clobber_option
-@click.option("--play", is_flag=True, help="Show it in a window.")
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65_535),
-    help="UDP port to listen on; 0: any that is free. Default: 11111 for livelink, 49983 for ifacialmocap, "
-    "11125 for vtube, 39539 for vmc.",
-)
-@click.option(
-    "--host", default="", metavar="ADDRESS", help="Own address to listen on. Default: all of this computer's."
-)
-@click.option(
-    "--ask",
-    metavar="ADDRESS[:PORT]",
-    help="Telephone to ask for data: vtube needs it; ifacialmocap can be told our address in the app.",
-)
-@click.option(
-    "--sender",
-    "--subject",
-    "sender",
-    metavar="NAME",
-    help="Of several senders, the one to use: its subject's name or its address. Default: the first.",
-)
-@click.option(
-    "--seconds", type=options.PeriodType(), metavar="SECONDS", help="Stop after that; default: on Ctrl-C."
-)
-@options.fps_option(
-    "Frame rate of the stream. Default: the sender's own, else 60; vmc: that of its first second."
-)
-@click.option(
-    "--neutral",
-    type=click.FloatRange(0, LONGEST_NEUTRAL, min_open=True),
-    metavar="SECONDS",
-    help="The first seconds show the neutral face: their median is subtracted. vmc: the first moment is a "
-    "T-pose. Default: all counts as it is sent.",
-)
-@click.option("--swap", is_flag=True, help="MouthLeft and MouthRight, JawLeft and JawRight change places.")
-@click.option(
-    "--preset",
-    type=click.Choice(PRESETS),
-    help="What is sent: all that comes (reference, the default), or only what players do not derive from "
-    "other FAPs, and nothing that never moved so far (compact).",
-)
-@options.fap_quant_option
-@rate_options.rate_options
-@click.option(
-    "--model",
-    type=ExistingPath(),
-    metavar="FILE",
-    help="With --play, the face that is shown. Default: the built-in head.",
-)
-@options.json_option
-@options.gather(network=_Network, coding=_Coding)
-@options.gather(request=_Request)
+@with_options
 def command(request: _Request) -> None:
     """Receive a captured face or person over the network, show it, and record it as an FBA stream.
 
@@ -185,12 +149,12 @@ def command(request: _Request) -> None:
     kind = find_kind(request.kind)
     if network.ask is not None and not kind.asked_port:
         raise click.UsageError(f"--ask: {kind.description} sends by itself; enter our address in the app")
-    warm_up(bodies=kind.bodies, rated=coding.bitrate is not None, compact=coding.is_compact)
+    warm_up(bodies=kind.bodies, rated=coding.bit_rate is not None, compact=coding.is_compact)
     raise_delayed()  # from here on, Ctrl-C ends the capture and not the command
     targets, stream = _targets(output, play=request.play)
     recorder = coding.recorder(targets)
     capture = Capture(
-        kind, recorder.push, sender=network.sender, rate=request.fps, swap=request.swap,
+        kind, recorder.push, sender=network.sender, rate=request.rate, swap=request.swap,
         neutral=request.neutral, say=lambda text: click.echo(f"fba: {text}", err=True),
     )  # fmt: skip
     with Receiver(capture, host=network.host, port=network.port, ask=network.ask) as receiver:
@@ -218,9 +182,9 @@ def _check(request: _Request) -> None:
     if request.model is not None and not request.play:
         raise click.UsageError("--model goes with --play")
     rate_options.check_buffer()
-    if coding.bitrate is not None and options.is_given("fap_quant"):
+    if coding.bit_rate is not None and options.is_given("fap_quant"):
         raise click.UsageError("--quant and --bitrate contradict each other: the bit rate decides how finely")
-    if coding.bitrate is not None and coding.preset is not None:
+    if coding.bit_rate is not None and coding.preset is not None:
         raise click.UsageError(
             "--preset and --bitrate contradict each other: the bit rate decides what is sent"
         )

@@ -13,8 +13,8 @@ import click
 from fba.atomic import atomic
 from fba.cli import options
 from fba.cli.command import Command, examples
-from fba.cli.inputs import ExistingPath
-from fba.cli.outputs import Output, Outputs, OutputType, display_name
+from fba.cli.option_fields import option, with_options
+from fba.cli.outputs import Output, Outputs, display_name, further_output_option
 from fba.cli.printing import Progress
 
 if TYPE_CHECKING:
@@ -23,13 +23,26 @@ if TYPE_CHECKING:
     from fba_conformance.suite.result import Result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Programs:
-    """Command lines of the programs to test, None for this codec, and the seconds that they may take."""
+    """Command lines of the programs to test, None for this codec."""
 
-    decoder: str | None
-    encoder: str | None
-    timeout: float
+    decoder: str | None = option(
+        metavar="COMMAND",
+        help="Test this decoder: it reads the stream {in} and writes values to {out}; {bap_steps}: iso, "
+        "visage.",
+    )
+    encoder: str | None = option(
+        metavar="COMMAND",
+        help="Test this encoder: it reads values from {in} and writes a stream to {out}, with {rate}, "
+        "{fap_quant}, {bap_quant} and {bap_steps}.",
+    )
+    timeout: float = option(
+        type=click.FloatRange(min=0, min_open=True),
+        default=20.0,
+        metavar="SECONDS",
+        help="How long a program may take for a vector.",
+    )
 
     @property
     def name(self) -> str:
@@ -51,13 +64,15 @@ class _Programs:
         return made or [check]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Report:
-    """How results are shown. junit: a file, too. verbose: a line for every vector."""
+    """How results are shown."""
 
-    junit: Path | None
-    verbose: bool
-    as_json: bool
+    junit: Path | None = further_output_option("FILE", "Write JUnit XML, too.")
+    verbose: bool = option(
+        "--verbose", "-v", default=False, help="Print a line for every vector, not only for failures."
+    )
+    as_json: bool = options.json_option
 
     def write(self, results: list[Result], outputs: Outputs, name: str) -> None:
         """Print the results. name: of what was tested."""
@@ -84,48 +99,21 @@ class _Report:
         "fba conformance ../vectors                        # a folder with an index.json",
     ),
 )
-@click.argument("folder", required=False, type=ExistingPath(file_okay=False))
-@click.option(
-    "--decoder",
-    metavar="COMMAND",
-    help="Test this decoder: it reads the stream {in} and writes values to {out}; {bap_steps}: iso, visage.",
-)
-@click.option(
-    "--encoder",
-    metavar="COMMAND",
-    help="Test this encoder: it reads values from {in} and writes a stream to {out}, with {rate}, "
-    "{fap_quant}, {bap_quant} and {bap_steps}.",
-)
-@click.option(
-    "--timeout",
-    type=click.FloatRange(min=0, min_open=True),
-    default=20.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="How long a program may take for a vector.",
-)
-@click.option(
-    "--only", multiple=True, metavar="NAME", help="Only vectors or groups of this name; may be repeated."
-)
-@click.option("--junit", type=OutputType(), metavar="FILE", help="Write JUnit XML, too.")
-@click.option(
-    "--zip",
-    "archive",
-    type=OutputType(),
-    metavar="FILE",
-    help="Write the vectors that come with fba as a zip, with all values as text, and test nothing.",
-)
-@click.option("--verbose", "-v", is_flag=True, help="Print a line for every vector, not only for failures.")
-@options.no_clobber_option
-@options.json_option
-@options.gather(programs=_Programs, report=_Report)
+@click.argument("folder", required=False, type=options.ExistingPath(file_okay=False))
+@with_options
 def command(
     folder: Path | None,
     programs: _Programs,
-    only: Sequence[str],
-    archive: Path | None,
     report: _Report,
-    no_clobber: bool,
+    only: tuple[str, ...] = option(
+        default=(), metavar="NAME", help="Only vectors or groups of this name; may be repeated."
+    ),
+    archive: Path | None = further_output_option(
+        "FILE",
+        "Write the vectors that come with fba as a zip, with all values as text, and test nothing.",
+        "--zip",
+    ),
+    no_clobber: bool = options.no_clobber_option,
 ) -> None:
     """Check this codec, or the programs of --decoder and --encoder, against test vectors.
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import click
 
+from fba.choices import BapTableOrAuto
 from fba.cli import joint_options, marker_options, options, step_tables, writer_options
 from fba.cli.coding.coded_streams import encode_stream
 from fba.cli.coding.size_options import Size
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, ReadFile, Reading, check_clip, has_markers, has_skeleton, read_file
+from fba.cli.inputs import ReadFile, Reading, check_clip, has_markers, has_skeleton, read_file
+from fba.cli.option_fields import group, with_options
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
@@ -23,7 +24,9 @@ from fba.cli.outputs import (
     opening_for,
 )
 from fba.cli.recordings.inputs import Inputs
+from fba.encoder_options import EncoderOptions
 from fba.errors import FormatError
+from fba.parameters import BapTable
 from fba.source import naming_file
 
 
@@ -38,30 +41,19 @@ from fba.source import naming_file
         "fba convert walk.bvh - --to bap | less",
     ),
 )
-@click.argument("source", metavar="IN", type=EXISTING)
+@click.argument("source", metavar="IN", type=options.EXISTING)
 @click.argument("target", metavar="OUT", type=OutputType())
-@options.fps_option("Resample to this frame rate; default: the input's own.")
-@options.from_option
-@options.clip_option
-@options.to_option
-@options.no_clobber_option
-@joint_options.map_options(out=False)
-@writer_options.writer_options
-@options.written_bap_steps_option
-@options.mark_option
-@options.salvage_option
-@options.limit_option
-@options.gather(reading=Reading)
+@with_options
 def command(
     source: Path,
     target: Path,
-    reading: Reading,
-    fps: Fraction | None,
-    to: str | None,
-    no_clobber: bool,
-    maps: tuple[Path | joint_options.Pair, ...],
-    mark: bool | None,
-    **given: Any,
+    rate: Fraction | None = options.rate_option("Resample to this frame rate; default: the input's own."),
+    to: str | None = options.to_option,
+    no_clobber: bool = options.no_clobber_option,
+    maps: joint_options.Maps = joint_options.map_option,
+    given: writer_options.WriterOptions = group(),
+    mark: bool | None = options.mark_option,
+    reading: Reading = group(bap_steps=options.written_steps_option),
 ) -> None:
     """Convert a file into another format; the content of IN and the suffix of OUT say which.
 
@@ -72,13 +64,13 @@ def command(
     writing = find_writer(target, to)  # refuses what cannot be written before anything is read
     outputs = Outputs(
         [Output("OUT", target, writing.name in TEXT_FORMATS)],
-        [source, given["model"], given["body"]],
+        [source, given.model, given.body],
         no_clobber=no_clobber,
     )
     captures = [source] if has_skeleton(source, reading.format) else []
     with_markers = has_markers(source, reading.format)
-    bodies_map = maps if given["body"] is not None and not captures and not with_markers else ()
-    joints_of_body = joint_options.read_body_joints(bodies_map, given["body"], reading.limit)
+    bodies_map = maps if given.body is not None and not captures and not with_markers else ()
+    joints_of_body = joint_options.read_body_joints(bodies_map, given.body, reading.limit)
     extra = writer_options.settings(target, writing, given, joints_of_body)
     check_clip(reading, [source])
     if mark is not None and writing.name != "fba":
@@ -88,7 +80,7 @@ def command(
         places = marker_options.read_places(maps, [source], reading)
     elif not bodies_map:
         joints = joint_options.read_joints(maps, captures, reading)
-    read = read_file(source, reading, fps=fps, capture={"joints": joints, "markers": places})
+    read = read_file(source, reading, rate=rate, capture={"joints": joints, "markers": places})
     about = f"{display_name(target)}: {len(read.animation)} frames, {writing.written or writing.description}"
     if writing.name == "fba":
         marked = mark is not False
@@ -103,10 +95,10 @@ def command(
     outputs.say(about)
 
 
-def _write_stream(read: ReadFile, target: Path, outputs: Outputs, bap_steps: str, *, marked: bool) -> str:
+def _write_stream(
+    read: ReadFile, target: Path, outputs: Outputs, bap_steps: BapTableOrAuto, *, marked: bool
+) -> BapTable:
     """Write what was read as a stream; return its table of BAP steps."""
-    from fba.codec import EncoderOptions
-
     animation = read.animation
     taken = Inputs(animation, None, None, (read,), animation.rate != read.rate)
     table = step_tables.table_to_write(bap_steps, made=taken.is_captured, marked=marked, read=read.table)

@@ -12,7 +12,8 @@ import click
 from fba.animation import Animation
 from fba.cli import options, step_tables, writer_options
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import EXISTING, Reading, input_file, read_model
+from fba.cli.inputs import Reading, input_file, read_model
+from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import (
     STANDARD,
     TEXT_FORMATS,
@@ -24,7 +25,7 @@ from fba.cli.outputs import (
 )
 from fba.cli.printing import Progress
 from fba.cli.program import as_typed
-from fba.parameters import BAP_STEPS_AUTO
+from fba.parameters import BAP_STEPS_AUTO, BapTable
 
 if TYPE_CHECKING:
     from fba.animation import FaceTrack
@@ -62,21 +63,36 @@ class _Target:
         return Output(self.flag, self.file(source), text, source if self.folder else None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Writing:
-    """The files or folders to write, by option. to: the format of `--output`."""
+    """The files or folders to write, and how."""
 
-    fap: Path | None
-    bap: Path | None
-    epf: Path | None
-    output: Path | None
-    to: str | None
+    fap: Path | None = option(
+        type=_FOLDER_OR_FILE,
+        metavar="OUT.fap",
+        help="File for the FAPs; a folder if there are several inputs.",
+    )
+    bap: Path | None = option(type=_FOLDER_OR_FILE, metavar="OUT.bap", help="File for the BAPs, or a folder.")
+    epf: Path | None = option(
+        type=_FOLDER_OR_FILE,
+        metavar="OUT.epf",
+        help="File for the settings of the planes, for fba encode --epf, or a folder.",
+    )
+    output: Path | None = option(
+        "-o", "--output", type=_FOLDER_OR_FILE, metavar="OUT.bvh|OUT.glb|OUT.csv",
+        help="File for other programs, in the format of its suffix, or a folder with --to.",
+    )  # fmt: skip
+    to: str | None = options.to_option
+    shown: bool = option(
+        default=False,
+        help="Write what a face shows, as low-level FAPs: also those that a player derives from others, or "
+        "that the face of --model gives.",
+    )
+    no_clobber: bool = options.no_clobber_option
+    options: writer_options.WriterOptions
 
-    def targets(self, given: dict[str, Any]) -> list[_Target]:
-        """Return all files to write; click.UsageError without files, or for options that fit no file.
-
-        given: options of the writer of `--output`, None where they were not given.
-        """
+    def targets(self) -> list[_Target]:
+        """Return all files to write; click.UsageError without files, or for options that fit no file."""
         targets = []
         for name in ("fap", "bap", "epf"):
             place = getattr(self, name)
@@ -93,7 +109,7 @@ class _Writing:
                 raise click.UsageError(f"{output}: streams are decoded here; {others} write them")
             targets.append(_Target("--output", output, writing.suffixes[0], writing))
         else:
-            lonely = [writer_options.FLAGS.get(name, "--to") for name in given if given[name] is not None]
+            lonely = [writer_options.flag(name) for name in self.options.given]
             if to is not None or lonely:
                 raise click.UsageError(
                     f"{', '.join(lonely) or '--to'} says how to write --output; give that too"
@@ -175,59 +191,23 @@ class _Decoding:
         "fba decode archive/*.fba -o decoded/ --to glb",
     ),
 )
-@click.argument("inputs", metavar="IN.fba...", nargs=-1, required=True, type=EXISTING)
-@click.option(
-    "--fap",
-    type=_FOLDER_OR_FILE,
-    metavar="OUT.fap",
-    help="File for the FAPs; a folder if there are several inputs.",
-)
-@click.option("--bap", type=_FOLDER_OR_FILE, metavar="OUT.bap", help="File for the BAPs, or a folder.")
-@click.option(
-    "--epf",
-    type=_FOLDER_OR_FILE,
-    metavar="OUT.epf",
-    help="File for the settings of the planes, for fba encode --epf, or a folder.",
-)
-@click.option(
-    "-o",
-    "--output",
-    type=_FOLDER_OR_FILE,
-    metavar="OUT.bvh|OUT.glb|OUT.csv",
-    help="File for other programs, in the format of its suffix, or a folder with --to.",
-)
-@options.to_option
-@click.option(
-    "--shown",
-    is_flag=True,
-    help="Write what a face shows, as low-level FAPs: also those that a player derives from others, or that "
-    "the face of --model gives.",
-)
-@options.no_clobber_option
-@writer_options.writer_options
-@options.bap_steps_option
-@options.salvage_option
-@options.limit_option
-@options.json_option
-@options.gather(writing=_Writing, reading=Reading)
+@click.argument("inputs", metavar="IN.fba...", nargs=-1, required=True, type=options.EXISTING)
+@with_options
 def command(
     inputs: tuple[Path, ...],
     writing: _Writing,
-    reading: Reading,
-    shown: bool,
-    no_clobber: bool,
-    as_json: bool,
-    **given: Any,
+    reading: Reading = group("bap_steps", "salvage", "limit"),
+    as_json: bool = options.json_option,
 ) -> None:
     """Decode FBA streams: to ASCII FAP and BAP files, to EPF files with the settings of their planes, and to
     BVH, glTF and tables of blendshapes (CSV) for other programs.
 
     One of the files can be -, standard output.
     """
-    face = given["model"] if shown else None
-    if face is not None and not writing.takes_model():
-        given = given | {"model": None}  # it is for --shown alone
-    targets = writing.targets(given)
+    face = writing.options.model if writing.shown else None
+    if face is not None and not writing.takes_model():  # it is for --shown alone
+        writing = replace(writing, options=replace(writing.options, model=None))
+    targets = writing.targets()
     several = len(inputs) > 1
     for target in targets:
         if several and not target.folder:
@@ -236,14 +216,14 @@ def command(
             )
     outputs = Outputs(
         [target.output(path) for target in targets for path in inputs],
-        [*inputs, face, given["model"], given["body"]],
-        no_clobber=no_clobber,
+        [*inputs, face, writing.options.model, writing.options.body],
+        no_clobber=writing.no_clobber,
     )
     written_as = targets[-1].writing
     settings: dict[str, Any] = {}
     if writing.output is not None and written_as is not None:
-        settings = writer_options.settings(writing.output, written_as, given)
-    decoding = _Decoding(targets, outputs, settings, reading, _shows(face) if shown else None)
+        settings = writer_options.settings(writing.output, written_as, writing.options)
+    decoding = _Decoding(targets, outputs, settings, reading, _shows(face) if writing.shown else None)
     reports = []
     each = EachFile(inputs)
     with Progress("decoding", len(inputs)) as step:
@@ -279,7 +259,7 @@ def _only(animation: Animation, parts: tuple[str, ...]) -> Animation:
 
 
 def _read(
-    data: bytes, name: str, with_settings: bool, table: str, reading: Reading
+    data: bytes, name: str, with_settings: bool, table: BapTable, reading: Reading
 ) -> tuple[Animation, list[PlaneSettings]]:
     """Return the animation, and if with_settings, how each plane was coded. table: of BAP steps."""
     from fba.codec import Decoder, decode

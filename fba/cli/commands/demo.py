@@ -16,12 +16,15 @@ import click
 from fba.animation import Animation
 from fba.cli import options
 from fba.cli.command import Command, examples
+from fba.cli.option_fields import option, with_options
 from fba.cli.outputs import Output, Outputs
 from fba.cli.printing import Progress, rate_text, seconds_text
 from fba.cli.program import as_typed
+from fba.encoder_options import EncoderOptions
 from fba.errors import DisplayError
+from fba.parameters import BapTable
 
-BAP_STEPS = "visage"
+BAP_STEPS: BapTable = "visage"
 """The standard's own table moves the root in steps of 64 mm, which is visible."""
 SAMPLES = ("hello.bvh", "hello.fap")
 """A body and a face, which come with fba."""
@@ -33,14 +36,15 @@ COMPILING = "compiling for this machine, on the first run only: about half a min
 
 
 @click.command(cls=Command, epilog=examples("fba demo", "fba demo --no-play --out demo/"))
-@click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the samples and the files made from them; default: a new temporary one.",
-)
-@options.no_clobber_option
-@click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
-def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
+@with_options
+def command(
+    out: Path | None = option(
+        type=click.Path(file_okay=False, path_type=Path),
+        help="Folder for the samples and the files made from them; default: a new temporary one.",
+    ),
+    no_clobber: bool = options.no_clobber_option,
+    play: bool | None = option(help="Open a window; default: where there is a display."),
+) -> None:
     """Encode the samples, print their sizes, and play the first.
 
     hello.bvh (a body) and hello.fap (a face) become one stream; talk.c3d (markers on a face) becomes
@@ -48,7 +52,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     made instead. The sample files are copied into the folder.
     """
     from fba import player
-    from fba.codec import EncoderOptions, encode, probe_stream
+    from fba.codec import encode, probe_stream
     from fba.formats import merge, read
 
     folder = out if out is not None else Path(tempfile.mkdtemp(prefix="fba-demo-"))
@@ -94,7 +98,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
 
 def _encode_capture(capture: Path, stream: Path, outputs: Outputs) -> None:
     """Encode markers on a face, with the path of the head, and print what became of them."""
-    from fba.codec import EncoderOptions, encode
+    from fba.codec import encode
     from fba.formats import read
 
     face = read(capture, rate=25)

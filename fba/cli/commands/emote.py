@@ -14,19 +14,25 @@ import numpy as np
 
 from fba.cli import options
 from fba.cli.command import Command, examples, usage_errors
-from fba.cli.emotions.pictures import draw, option_errors, picture_kind
-from fba.cli.inputs import EXISTING, ExistingPath, Reading, read_input, read_model
-from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.emotions.pictures import OUTPUT_TEXT, draw, option_errors, picture_kind
+from fba.cli.inputs import Reading, read_input, read_model
+from fba.cli.option_fields import group, option, with_options
+from fba.cli.outputs import (
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    display_name,
+    find_writer,
+    output_option,
+)
 from fba.cli.printing import Progress, seconds_text
 from fba.errors import SAVE_AS_UTF8, FormatError
-from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.emotion import Mood, MoodCurve
     from fba.face import FaceModel
 
-DEFAULT_EASE = 0.5
 MOST_KEYS = 1_000_000
 KEY_HEADER = ("seconds", "emotion", "intensity")
 _Typed = tuple[str, float | None, float | None]
@@ -74,111 +80,93 @@ class MoodType(click.ParamType[tuple[str, float | None, float | None]]):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Asked:
-    """Moods as they are typed, with times in seconds or None. start, end: of those without times."""
+    """Moods as they are typed, with times in seconds or None."""
 
-    moods: tuple[_Typed, ...]
-    start: float | None
-    end: float | None
-    ease: float | None
-    keys: Path | None
+    moods: tuple[_Typed, ...] = option(
+        "--emotion",
+        default=(),
+        type=MoodType(),
+        multiple=True,
+        metavar="NAME=INTENSITY[@FROM-TO]",
+        help="An expression and its intensity, 0 to 100; repeatable. `fba express --list` lists all.",
+    )
+    start: float | None = option(
+        type=SecondsType(), metavar="TIME", help="When it begins; default: with the performance."
+    )
+    end: float | None = option(
+        type=SecondsType(), metavar="TIME", help="When it ends; default: with the performance."
+    )
+    ease: float = option(
+        default=0.5,
+        typed="0.5s",
+        type=SecondsType(),
+        metavar="TIME",
+        help="From none to full, and back. Not at either end of the performance.",
+    )
+    keys: Path | None = option(
+        type=options.EXISTING,
+        metavar="FILE.csv",
+        help=f"Intensities over time: a table with the columns {', '.join(KEY_HEADER)}.",
+    )
 
     def parse(self, moods: tuple[_Typed, ...]) -> list[Mood]:
         """Return some of the moods, with their times."""
         from fba.emotion import Mood, parse_weights
 
-        ease = DEFAULT_EASE if self.ease is None else self.ease
         result = []
         for text, start, end in moods:
             span = (self.start, self.end) if start is None and end is None else (start, end)
-            result += [Mood(name, intensity, *span, ease) for name, intensity in parse_weights(text).items()]
+            result += [
+                Mood(name, intensity, *span, self.ease) for name, intensity in parse_weights(text).items()
+            ]
         return result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Target:
-    """Where the performance goes. writing: the format. model, size: the face and the size of pictures."""
+    """Where the performance goes."""
 
-    output: Path
-    writing: str | None
-    no_clobber: bool
-    model: Path | None
-    size: tuple[int, int] | None
+    output: Path = output_option("OUT", OUTPUT_TEXT, required=True)
+    to: str | None = options.to_option
+    no_clobber: bool = options.no_clobber_option
+    model: Path | None = options.model_option(
+        "The face whose visemes and expressions IN means, and that is drawn; default: the built-in head."
+    )
+    size: tuple[int, int] | None = option(
+        type=options.SizeType(),
+        metavar="WIDTHxHEIGHT",
+        help="Pictures: default 1280x720; of each side by side, 320x320.",
+    )
 
 
 @click.command(
     cls=Command,
     epilog=examples(
-        "fba emote talk.fba -o angry.fba --emotion angry=70 --from 2s --to 6s --ease 0.5s",
+        "fba emote talk.fba -o angry.fba --emotion angry=70 --start 2s --end 6s --ease 0.5s",
         "fba emote talk.fba -o moods.mp4 --emotion happy=60@0s-3s --emotion sleepy=80@3s-",
         "fba emote talk.fap -o talk2.fap --keys moods.csv",
         "fba emote talk.fba -o moods.mp4 --side-by-side --emotion neutral --emotion angry=80",
     ),
 )
-@click.argument("source", metavar="IN", type=EXISTING)
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT",
-    type=OutputType(),
-    required=True,
-    help="File to write: .fba, .fap or another format of animations, .png, .jpg, .mp4, .gif. - for standard "
-    "output.",
-)
-@click.option(
-    "--emotion",
-    "moods",
-    type=MoodType(),
-    multiple=True,
-    metavar="NAME=INTENSITY[@FROM-TO]",
-    help="An expression and its intensity, 0 to 100; repeatable. `fba express --list` lists all.",
-)
-@click.option("--from", "start", type=SecondsType(), help="When it begins; default: with the performance.")
-@click.option("--to", "end", type=SecondsType(), help="When it ends; default: with the performance.")
-@click.option(
-    "--ease",
-    type=SecondsType(),
-    help=f"From none to full, and back; default: {DEFAULT_EASE:g}s. Not at either end of the performance.",
-)
-@click.option(
-    "--keys",
-    type=EXISTING,
-    metavar="FILE.csv",
-    help=f"Intensities over time: a table with the columns {', '.join(KEY_HEADER)}.",
-)
-@click.option(
-    "--side-by-side",
-    is_flag=True,
-    help="Pictures and films: draw IN once for each --emotion, beside each other; --emotion neutral draws IN "
-    "as it is.",
-)
-@click.option("--reading", metavar="FORMAT", help="Input format, if neither content nor suffix shows it.")
-@click.option(
-    "--writing", metavar="FORMAT", help="Output format, if OUT is - or its suffix does not show it."
-)
-@options.no_clobber_option
-@click.option(
-    "--model",
-    type=ExistingPath(),
-    metavar="FILE",
-    help="The face whose visemes and expressions IN means, and that is drawn; default: the built-in head.",
-)
-@click.option(
-    "--size",
-    type=options.SizeType(),
-    metavar="WIDTHxHEIGHT",
-    help="Pictures: default 1280x720; of each side by side, 320x320.",
-)
-@options.limit_option
-@options.gather(asked=_Asked, target=_Target)
+@click.argument("source", metavar="IN", type=options.EXISTING)
+@with_options
 def command(
-    source: Path, asked: _Asked, target: _Target, side_by_side: bool, reading: str | None, limit: Limits
+    source: Path,
+    asked: _Asked,
+    target: _Target,
+    side_by_side: bool = option(
+        default=False,
+        help="Pictures and films: draw IN once for each --emotion, beside each other; --emotion neutral "
+        "draws IN as it is.",
+    ),
+    reading: Reading = group("format", "limit"),
 ) -> None:
     """Put a performance into a mood: angry, surprised, sad, sleepy, happy, or any named expression.
 
     The mood moves the face at rest, and the performance is added, less where a feature is near its limit
-    already. Lips that touch still touch, eyes that close still close. --from, --to and --ease are for
+    already. Lips that touch still touch, eyes that close still close. --start, --end and --ease are for
     emotions without times of their own.
     """
     from fba.emotion import emote
@@ -186,20 +174,20 @@ def command(
     keys, moods, output, model = asked.keys, asked.moods, target.output, target.model
     if not moods and keys is None:
         raise click.UsageError("give a mood: --emotion angry=70, or --keys FILE.csv")
-    kind = picture_kind(output, target.writing)
-    for option, wanted in (("--size", target.size is not None), ("--side-by-side", side_by_side)):
+    kind = picture_kind(output, target.to)
+    for flag, wanted in (("--size", target.size is not None), ("--side-by-side", side_by_side)):
         if wanted and not kind:
-            raise click.UsageError(f"{option} goes with a picture or a film")
+            raise click.UsageError(f"{flag} goes with a picture or a film")
     if side_by_side and (keys is not None or not moods):
         raise click.UsageError("--side-by-side draws one performance for each --emotion; leave --keys out")
-    format = None if kind else find_writer(output, target.writing)
+    format = None if kind else find_writer(output, target.to)
     text = format is not None and format.name in TEXT_FORMATS
     outputs = Outputs([Output("--output", output, text)], [source, keys, model], no_clobber=target.no_clobber)
     with option_errors():
         given: list[Mood | MoodCurve] = [*asked.parse(moods)]
         if keys is not None:
             given += _read_keys(keys)
-    animation = read_input(source, Reading(format=reading, limit=limit))
+    animation = read_input(source, reading)
     face = read_model(model)
     if side_by_side:
         with option_errors():

@@ -5,34 +5,33 @@ from __future__ import annotations
 import csv
 import io
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from fba.choices import Baseline
 from fba.cli import options
 from fba.cli.command import Command, examples
 from fba.cli.emotions import tables
-from fba.cli.inputs import EXISTING, ExistingPath, Reading, read_input, read_model
-from fba.cli.outputs import Output, Outputs, OutputType, display_name
+from fba.cli.inputs import Reading, read_input, read_model
+from fba.cli.option_fields import group, option, with_options
+from fba.cli.outputs import Output, Outputs, display_name, output_option
 from fba.cli.printing import print_json
 from fba.errors import FormatError
 
 if TYPE_CHECKING:
     from fba.emotion import Readings
 
-BASELINES = ("none", "start", "median")
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Target:
-    """Where readings go: a table; None prints them. frames: print a row for each frame, too."""
+    """Where readings go: a table; else they are printed."""
 
-    output: Path | None
-    no_clobber: bool
-    frames: bool
-    as_json: bool
+    frames: bool = option(default=False, help="Print a row a frame, not only the summary and the changes.")
+    output: Path | None = output_option("OUT.csv", "Write a row a frame as CSV. - for standard output.")
+    no_clobber: bool = options.no_clobber_option
+    as_json: bool = options.json_option
 
 
 @click.command(
@@ -44,43 +43,20 @@ class _Target:
         "fba emotion face.csv --baseline median --json",
     ),
 )
-@click.argument("file", type=EXISTING)
-@click.option("--frames", is_flag=True, help="Print a row a frame, not only the summary and the changes.")
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT.csv",
-    type=OutputType(),
-    help="Write a row a frame as CSV. - for standard output.",
-)
-@options.no_clobber_option
-@click.option(
-    "--baseline",
-    type=click.Choice(BASELINES),
-    default=BASELINES[0],
-    show_default=True,
-    help="The face at rest: none: as FAPs count from it; start: the first half second, for films that begin "
-    "at rest; median: of each FAP, where a face is mostly at rest.",
-)
-@click.option(
-    "--model",
-    type=ExistingPath(),
-    metavar="FILE",
-    help="The face whose visemes and expressions a stream shows; default: the built-in head.",
-)
-@options.fps_option("Frame rate of a file that has none.")
-@options.from_option
-@options.salvage_option
-@options.json_option
-@options.limit_option
-@options.gather(target=_Target, reading=Reading)
+@click.argument("file", type=options.EXISTING)
+@with_options
 def command(
     file: Path,
     target: _Target,
-    baseline: str,
-    model: Path | None,
-    fps: Fraction | None,
-    reading: Reading,
+    baseline: Baseline = option(
+        default="none",
+        help="The face at rest: none: as FAPs count from it; start: the first half second, for films that "
+        "begin at rest; median: of each FAP, where a face is mostly at rest.",
+    ),
+    model: Path | None = options.model_option(
+        "The face whose visemes and expressions a stream shows; default: the built-in head."
+    ),
+    reading: Reading = group("format", "source_rate", "salvage", "limit"),
 ) -> None:
     """Read the expressions of a face: families, named expressions, intensities, activation, evaluation.
 
@@ -95,7 +71,7 @@ def command(
         outputs = Outputs(
             [Output("--output", output, text=True)], [file, model], no_clobber=target.no_clobber
         )
-    animation = read_input(file, reading, header_fps=fps)
+    animation = read_input(file, reading)
     if animation.face is None:
         raise FormatError("has no face: it sends no FAPs, from which expressions are read", path=file)
     from fba.emotion import read_expressions

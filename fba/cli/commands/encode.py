@@ -6,28 +6,31 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
 from fba.animation import Animation
+from fba.choices import Unsent
 from fba.cli import capture_report, joint_options, marker_options, options, step_tables
-from fba.cli.clamped_values import bring_near, clamped_lines
 from fba.cli.coding import capture_options, size_options
+from fba.cli.coding.clamped_values import bring_near, clamped_lines
 from fba.cli.coding.coded_streams import CodedStream, encode_as_epf, encode_stream
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, Reading, check_clip, has_markers, has_skeleton
-from fba.cli.outputs import Output, Outputs, OutputType, display_name, opening_for
+from fba.cli.inputs import Reading, check_clip, has_markers, has_skeleton
+from fba.cli.option_fields import group, option, option_like, with_options
+from fba.cli.outputs import Output, Outputs, display_name, opening_for, output_option
 from fba.cli.printing import Progress
 from fba.cli.recordings import voice
 from fba.cli.recordings.inputs import (
     Inputs,
-    Sync,
+    SyncOptions,
     read_inputs,
-    sync_options,
     together_lines,
     together_values,
 )
+from fba.encoder_options import EncoderOptions
+from fba.parameters import BapTable
 
 
 class _EncodeCommand(Command):
@@ -42,41 +45,61 @@ class _EncodeCommand(Command):
         return super().parse_args(ctx, words)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Planes:
-    """How planes are coded: see `fba.codec.EncoderOptions`. clamp: None for motion capture only."""
+    """How planes are coded: see `fba.EncoderOptions`. clamp: None for motion capture only."""
 
-    intra_period: Fraction | None
-    start_codes: bool
-    time_codes: bool
-    unsent: str
-    gender: int
-    clamp: bool | None
+    intra_period: Fraction | None = option_like(
+        EncoderOptions, "intra_period", type=options.PeriodType(), metavar="SECONDS"
+    )
+    start_codes: bool = option_like(EncoderOptions, "start_codes")
+    time_codes: bool = option_like(EncoderOptions, "time_codes")
+    unsent: Unsent = option_like(EncoderOptions, "unsent")
+    gender: int = option(
+        default=0,
+        typed="female",
+        show_default=True,
+        type=click.Choice(["female", "male"]),
+        callback=lambda _, __, gender: int(gender == "male"),
+        help="Gender of the figure that the stream suggests (suggested_gender).",
+    )
+    clamp: bool | None = option_like(
+        EncoderOptions, "clamp", default=None, by_default="for motion capture only"
+    )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Request:
-    """What the command line asks for.
-
-    fps: to resample to; None for the inputs' own. name: of input without a header. mark: None: by default.
-    """
+    """What the command line asks for."""
 
     inputs: tuple[Path, ...]
-    output: Path
-    no_clobber: bool
-    fps: Fraction | None
-    name: str | None
-    epf: Path | None
-    mark: bool | None
-    limits: str
-    report: str | None
-    as_json: bool
-    reading: Reading
+    output: Path = output_option("OUT.fba", "Stream to write; - for standard output.", required=True)
+    no_clobber: bool = options.no_clobber_option
+    rate: Fraction | None = options.rate_option(
+        "Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own."
+    )
+    name: str | None = option(help="Name of the sequence, for input without a header.")
     size: size_options.Size
     planes: _Planes
+    mark: bool | None = options.mark_option
+    epf: Path | None = option(
+        type=options.EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says."
+    )
     capture: capture_options.CaptureOptions
-    sync: Sync
+    sync: SyncOptions
     sound: voice.VoiceOptions
+    limits: Literal["off", "report", "clamp"] = option(
+        default="off", help="Report where joints exceed normal human motion, or clamp them to it."
+    )
+    report: str | None = option(
+        is_flag=False,
+        flag_value="",
+        metavar="[FILE.html|.png]",
+        help="Motion capture: print how the result differs from the source; with FILE, show it in pictures, "
+        "too.",
+    )
+    reading: Reading = group(bap_steps=options.written_steps_option)
+    as_json: bool = options.json_option
 
     @property
     def marked(self) -> bool:
@@ -100,84 +123,8 @@ class _Request:
         "fba encode face.csv body.bvh -o both.fba --offset 2.4 --audio speech.wav",
     ),
 )
-@click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=EXISTING)
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT.fba",
-    required=True,
-    type=OutputType(),
-    help="Stream to write; - for standard output.",
-)
-@options.no_clobber_option
-@options.fps_option("Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own.")
-@options.from_option
-@options.clip_option
-@click.option("--name", help="Name of the sequence, for input without a header.")
-@size_options.size_options
-@click.option(
-    "--intra-period",
-    type=options.PeriodType(),
-    metavar="SECONDS",
-    help="Write an I plane at least this often.",
-)
-@click.option(
-    "--start-codes",
-    is_flag=True,
-    help="Write start codes before I planes, where a decoder can seek to or resume.",
-)
-@click.option(
-    "--time-codes/--no-time-codes",
-    default=True,
-    show_default=True,
-    help="With --start-codes: I planes at whole seconds with a time code: damage shifts nothing behind it.",
-)
-@options.written_bap_steps_option
-@options.mark_option
-@options.choice_option("--unsent", "What a player shows for FAPs that are not sent.", "keep", "interpolate")
-@click.option(
-    "--gender",
-    type=click.Choice(["female", "male"]),
-    default="female",
-    show_default=True,
-    callback=lambda _, __, gender: int(gender == "male"),
-    help="Gender of the figure that the stream suggests (suggested_gender).",
-)
-@click.option(
-    "--clamp/--no-clamp",
-    default=None,
-    help="Limit values to the codable range instead of failing; default: for motion capture only.",
-)
-@click.option("--epf", type=EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says.")
-@capture_options.capture_options
-@sync_options
-@voice.audio_options
-@options.choice_option(
-    "--limits",
-    "Report where joints exceed normal human motion, or clamp them to it.",
-    "off",
-    "report",
-    "clamp",
-)
-@click.option(
-    "--report",
-    is_flag=False,
-    flag_value="",
-    metavar="[FILE.html|.png]",
-    help="Motion capture: print how the result differs from the source; with FILE, show it in pictures, too.",
-)
-@options.salvage_option
-@options.limit_option
-@options.json_option
-@options.gather(
-    reading=Reading,
-    size=size_options.Size,
-    planes=_Planes,
-    capture=capture_options.CaptureOptions,
-    sync=Sync,
-    sound=voice.VoiceOptions,
-)
-@options.gather(request=_Request)
+@click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=options.EXISTING)
+@with_options
 def command(request: _Request) -> None:
     """Encode FAP and BAP files, motion capture or captured faces as an FBA stream.
 
@@ -223,7 +170,7 @@ class _Encoded:
 
     taken: Inputs
     animation: Animation
-    table: str
+    table: BapTable
     coded: CodedStream
     spoken: voice.Voice | None
     limits: dict[str, Any]
@@ -266,7 +213,7 @@ def _execute(plan: _Plan) -> _Encoded:
         request.reading,
         capture=plan.capture,
         sync=request.sync,
-        fps=request.fps,
+        rate=request.rate,
         name=request.name,
     )
     spoken = None if plan.sound is None else voice.place_voice(request.sound, taken, plan.sound)
@@ -295,10 +242,8 @@ def _execute(plan: _Plan) -> _Encoded:
     return _Encoded(taken, animation, table, coded, spoken, limits, reports)
 
 
-def _encode(request: _Request, animation: Animation, taken: Inputs, table: str) -> CodedStream:
+def _encode(request: _Request, animation: Animation, taken: Inputs, table: BapTable) -> CodedStream:
     """Return the stream. table: of BAP steps."""
-    from fba.codec import EncoderOptions
-
     with Progress("encoding", None):
         if request.epf is not None:
             return encode_as_epf(request.epf, animation, table, request.reading.limit, marked=request.marked)
@@ -328,7 +273,7 @@ def _write_map(plan: _Plan, taken: Inputs) -> None:
 
 
 def _compare(
-    plan: _Plan, taken: Inputs, animation: Animation, coded: CodedStream, table: str
+    plan: _Plan, taken: Inputs, animation: Animation, coded: CodedStream, table: BapTable
 ) -> list[capture_report.CaptureReport]:
     """Return how captured bodies differ from what a decoder shows; write the page of `--report`."""
     from fba.codec import decode

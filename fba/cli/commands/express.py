@@ -9,12 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fba.choices import Sending
 from fba.cli import options
 from fba.cli.command import Command, examples
 from fba.cli.emotions import tables
-from fba.cli.emotions.pictures import PICTURES, draw, option_errors, picture_kind
-from fba.cli.inputs import ExistingPath
-from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.emotions.pictures import OUTPUT_TEXT, PICTURES, draw, option_errors, picture_kind
+from fba.cli.option_fields import option, with_options
+from fba.cli.outputs import (
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    display_name,
+    find_writer,
+    output_option,
+)
 from fba.cli.printing import seconds_text
 
 if TYPE_CHECKING:
@@ -24,7 +32,6 @@ if TYPE_CHECKING:
 DEFAULT_RATE = Fraction(25)
 DEFAULT_SECONDS, DEFAULT_EASE = 3.0, 0.5
 """Length of an animation, and how long it takes from neutral to the expression and back."""
-SENDING = ("auto", "expression", "faps")
 
 
 class PointType(click.ParamType[tuple[float, float]]):
@@ -42,46 +49,61 @@ class PointType(click.ParamType[tuple[float, float]]):
         return activation, evaluation
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Asked:
     """Which expression: names with intensities, or a point of the plane; and the rules that mix them."""
 
     weights: tuple[str, ...]
-    point: tuple[float, float] | None
-    interpolation: float | None
-    reduction: float | None
-    nearness: float | None
+    point: tuple[float, float] | None = option(
+        "--at",
+        type=PointType(),
+        metavar="A,E",
+        help="Instead of names: activation and evaluation, 1 to 7 each; the named expressions around that "
+        "point are mixed.",
+    )
+    interpolation: float | None = option(help="One family: share of the second; default: by intensities.")
+    reduction: float | None = option(help="What remains of a FAP that only one expression moves; 0 to 1.")
+    nearness: float | None = option(help="One family: how near such a FAP must be to stay; 0 to 1.")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Motion:
-    """How an expression comes and goes, in seconds, and how it is sent."""
+    """How an expression comes and goes, and how it is sent."""
 
-    seconds: float | None
-    ease: float | None
-    fps: Fraction | None
-    send: str
+    seconds: float | None = option(help=f"Length of a stream or a film; default: {DEFAULT_SECONDS:g}.")
+    ease: float | None = option(
+        metavar="SECONDS",
+        help=f"Time from neutral to the expression, and back at the end; default: {DEFAULT_EASE:g}.",
+    )
+    rate: Fraction | None = options.rate_option(f"Frame rate; default: {DEFAULT_RATE}.")
+    send: Sending = option(
+        default="auto",
+        help="expression: by FAP 2, which adds up two of its six expressions. faps: by low-level FAPs, "
+        "mixed by the rules. auto: by FAP 2 where that can say it.",
+    )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Target:
-    """Where an expression goes. to: the format. model, size: of a picture or a film."""
+    """Where an expression goes."""
 
-    output: Path | None
-    to: str | None
-    no_clobber: bool
-    model: Path | None
-    size: tuple[int, int] | None
+    output: Path | None = output_option("OUT", OUTPUT_TEXT)
+    to: str | None = options.to_option
+    no_clobber: bool = options.no_clobber_option
+    model: Path | None = options.model_option("Pictures: the face; default: the built-in head.")
+    size: tuple[int, int] | None = option(
+        type=options.SizeType(), metavar="WIDTHxHEIGHT", help="Pictures: default 1280x720."
+    )
 
     def check(self, motion: _Motion) -> str:
         """Return the kind of a picture or a film, else ""; click.UsageError for options that do not fit."""
         kind = "" if self.output is None else picture_kind(self.output, self.to)
         drawn = {"--model": self.model, "--size": self.size}
-        moving = {"--seconds": motion.seconds, "--ease": motion.ease, "--fps": motion.fps, "--to": self.to}
-        for option, value in {**({} if kind else drawn), **(moving if self.output is None else {})}.items():
+        moving = {"--seconds": motion.seconds, "--ease": motion.ease, "--fps": motion.rate, "--to": self.to}
+        for flag, value in {**({} if kind else drawn), **(moving if self.output is None else {})}.items():
             if value is not None:
-                what = "a picture or a film" if option in drawn else "-o"
-                raise click.UsageError(f"{option} goes with {what}")
+                what = "a picture or a film" if flag in drawn else "-o"
+                raise click.UsageError(f"{flag} goes with {what}")
         return kind
 
 
@@ -96,54 +118,14 @@ class _Target:
     ),
 )
 @click.argument("weights", nargs=-1, metavar="[NAME=INTENSITY...]")
-@click.option(
-    "--at",
-    "point",
-    type=PointType(),
-    metavar="A,E",
-    help="Instead of names: activation and evaluation, 1 to 7 each; the named expressions around that point "
-    "are mixed.",
-)
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT",
-    type=OutputType(),
-    help="File to write: .fba, .fap or another format of animations, .png, .jpg, .mp4, .gif. - for standard "
-    "output.",
-)
-@options.to_option
-@options.no_clobber_option
-@click.option("--seconds", type=float, help=f"Length of a stream or a film; default: {DEFAULT_SECONDS:g}.")
-@click.option(
-    "--ease",
-    type=float,
-    metavar="SECONDS",
-    help=f"Time from neutral to the expression, and back at the end; default: {DEFAULT_EASE:g}.",
-)
-@options.fps_option(f"Frame rate; default: {DEFAULT_RATE}.")
-@click.option(
-    "--send",
-    type=click.Choice(SENDING),
-    default=SENDING[0],
-    show_default=True,
-    help="expression: by FAP 2, which adds up two of its six expressions. faps: by low-level FAPs, mixed by "
-    "the rules. auto: by FAP 2 where that can say it.",
-)
-@click.option("--interpolation", type=float, help="One family: share of the second; default: by intensities.")
-@click.option("--reduction", type=float, help="What remains of a FAP that only one expression moves; 0 to 1.")
-@click.option("--nearness", type=float, help="One family: how near such a FAP must be to stay; 0 to 1.")
-@click.option(
-    "--model",
-    type=ExistingPath(),
-    metavar="FILE",
-    help="Pictures: the face; default: the built-in head.",
-)
-@click.option("--size", type=options.SizeType(), metavar="WIDTHxHEIGHT", help="Pictures: default 1280x720.")
-@click.option("--list", "listed", is_flag=True, help="List the named expressions.")
-@options.json_option
-@options.gather(asked=_Asked, motion=_Motion, target=_Target)
-def command(asked: _Asked, motion: _Motion, target: _Target, listed: bool, as_json: bool) -> None:
+@with_options
+def command(
+    asked: _Asked,
+    target: _Target,
+    motion: _Motion,
+    listed: bool = option("--list", default=False, help="List the named expressions."),
+    as_json: bool = options.json_option,
+) -> None:
     """Show expressions: named ones, mixtures of them, or a point of the plane of activation and evaluation.
 
     NAME=INTENSITY: an intensity of 0 to 100; a name alone has 100. Without -o, what moves is printed.
@@ -202,12 +184,12 @@ def _make_blend(asked: _Asked) -> Blend:
         return emotion.combine(emotion.parse_weights(" ".join(asked.weights)), rules)
 
 
-def _perform(blend: Blend, motion: _Motion, send: str) -> Animation:
-    from fba.emotion import perform
+def _perform(blend: Blend, motion: _Motion, send: Sending) -> Animation:
+    from fba.emotion import animate
 
     seconds = DEFAULT_SECONDS if motion.seconds is None else motion.seconds
     ease = min(DEFAULT_EASE, seconds / 2) if motion.ease is None else motion.ease
-    return perform(blend, seconds=seconds, ease=ease, rate=motion.fps or DEFAULT_RATE, send=send)
+    return animate(blend, seconds=seconds, ease=ease, rate=motion.rate or DEFAULT_RATE, send=send)
 
 
 def _count_bits(blend: Blend, motion: _Motion) -> dict[str, int | None]:
@@ -215,7 +197,7 @@ def _count_bits(blend: Blend, motion: _Motion) -> dict[str, int | None]:
     from fba.codec import EncoderOptions, encode
 
     bare = EncoderOptions(mark=False)
-    ways = {"expression": blend.fields is not None, "faps": True}
+    ways: dict[Sending, bool] = {"expression": blend.fields is not None, "faps": True}
     return {
         way: 8 * len(encode(_perform(blend, motion, way), bare)) if possible else None
         for way, possible in ways.items()

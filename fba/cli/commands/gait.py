@@ -9,19 +9,23 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fba.choices import BapTableOrAuto
 from fba.cli import options, step_tables
 from fba.cli.command import Command, examples, usage_errors
-from fba.cli.inputs import EXISTING, Reading, read_input
+from fba.cli.inputs import Reading, read_input
+from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
     Outputs,
-    OutputType,
     display_name,
     find_writer,
     opening_for,
+    output_option,
 )
 from fba.cli.printing import print_json, seconds_text
+from fba.encoder_options import EncoderOptions
+from fba.parameters import BapTable
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -29,15 +33,19 @@ if TYPE_CHECKING:
 DEFAULT_RATE = Fraction(30)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Walk:
     """The walk to make: arguments of `fba.body.gait.walk`."""
 
-    stride: float | None
-    character: str
-    cycles: float | None
-    seconds: float | None
-    in_place: bool
+    stride: float | None = option(
+        metavar="METRES",
+        help="Length of two steps, from one contact of a foot to its next; sets the speed. Default: the "
+        "character's own.",
+    )
+    character: str = option(default="normal", metavar="NAME", help="One of --list.")
+    cycles: float | None = option(metavar="N", help="Number of strides; default: 4.")
+    seconds: float | None = option(metavar="SECONDS", help="Duration, instead of --cycles.")
+    in_place: bool = option(default=False, help="Walk on the spot.")
 
     def check(self, *, made: bool) -> None:
         """Raise click.UsageError for options that contradict each other, or for any where no walk is made."""
@@ -45,22 +53,24 @@ class _Walk:
             raise click.UsageError("give either --cycles or --seconds, not both")
         lengths = {"--cycles": self.cycles, "--seconds": self.seconds}
         given = {"--stride": self.stride, **lengths, "--in-place": self.in_place or None}
-        for option, value in given.items() if not made else ():
+        for flag, value in given.items() if not made else ():
             if value is not None:
-                raise click.UsageError(f"{option} goes with -o: it is of a walk that is made")
-        for option, length in lengths.items():
+                raise click.UsageError(f"{flag} goes with -o: it is of a walk that is made")
+        for flag, length in lengths.items():
             if length is not None and not length > 0:
-                raise click.UsageError(f"{option} must be a positive number, not {length:g}")
+                raise click.UsageError(f"{flag} must be a positive number, not {length:g}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Target:
-    """Where a walk goes. to: its format. mark: whether a stream names its table of BAP steps."""
+    """Where a walk goes."""
 
-    output: Path | None
-    to: str | None
-    no_clobber: bool
-    mark: bool | None
+    output: Path | None = output_option(
+        "OUT", "File to write; its suffix says in which format. - for standard output."
+    )
+    to: str | None = options.to_option
+    no_clobber: bool = options.no_clobber_option
+    mark: bool | None = options.mark_option
 
 
 @click.command(
@@ -72,48 +82,19 @@ class _Target:
         "fba gait --find walk.bap",
     ),
 )
-@click.option(
-    "--stride",
-    type=float,
-    metavar="METRES",
-    help="Length of two steps, from one contact of a foot to its next; sets the speed. "
-    "Default: the character's own.",
-)
-@click.option("--character", default="normal", show_default=True, metavar="NAME", help="One of --list.")
-@click.option("--cycles", type=float, metavar="N", help="Number of strides; default: 4.")
-@click.option("--seconds", type=float, metavar="SECONDS", help="Duration, instead of --cycles.")
-@options.fps_option("Frame rate; default: 30. With --find: that of a file without a header.")
-@options.from_option
-@click.option("--in-place", is_flag=True, help="Walk on the spot.")
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT",
-    type=OutputType(),
-    help="File to write; its suffix says in which format. - for standard output.",
-)
-@options.to_option
-@options.no_clobber_option
-@options.written_bap_steps_option
-@options.mark_option
-@click.option("--list", "listed", is_flag=True, help="List the characters.")
-@click.option(
-    "--find",
-    type=EXISTING,
-    metavar="FILE",
-    help="Print the cycles and poses in a walk.",
-)
-@options.json_option
-@options.limit_option
-@options.gather(walk=_Walk, target=_Target, reading=Reading)
+@with_options
 def command(
     walk: _Walk,
     target: _Target,
-    reading: Reading,
-    fps: Fraction | None,
-    listed: bool,
-    find: Path | None,
-    as_json: bool,
+    rate: Fraction = option(
+        "--fps", type=options.RateType(), default=DEFAULT_RATE, metavar="RATE", help="Frame rate of the walk."
+    ),
+    listed: bool = option("--list", default=False, help="List the characters."),
+    find: Path | None = option(
+        type=options.EXISTING, metavar="FILE", help="Print the cycles and poses in a walk."
+    ),
+    reading: Reading = group("format", "source_rate", "limit", bap_steps=options.written_steps_option),
+    as_json: bool = options.json_option,
 ) -> None:
     """Generate a walk: body animation from four characteristic poses and a character.
 
@@ -128,14 +109,16 @@ def command(
     if listed:
         _print_characters(as_json)
     elif find is not None:
-        _print_steps(find, fps, reading, as_json)
+        _print_steps(find, reading, as_json)
     elif target.output is not None:
         if as_json:
             raise click.UsageError("--json goes with --list and --find")
-        _write_walk(walk, fps or DEFAULT_RATE, target.output, target, reading.bap_steps)
+        _write_walk(walk, rate, target.output, target, reading.bap_steps)
 
 
-def _write_walk(walk: _Walk, rate: Fraction, output: Path, target: _Target, bap_steps: str) -> None:
+def _write_walk(
+    walk: _Walk, rate: Fraction, output: Path, target: _Target, bap_steps: BapTableOrAuto
+) -> None:
     """Make a walk, write it to the output and print a summary."""
     from fba.body import gait
     from fba.formats import write
@@ -157,8 +140,10 @@ def _write_walk(walk: _Walk, rate: Fraction, output: Path, target: _Target, bap_
         step_tables.remind(output, animation, table, marked=marked)
 
 
-def _write_stream(animation: Animation, output: Path, outputs: Outputs, table: str, *, marked: bool) -> None:
-    from fba.codec import EncoderOptions, encode
+def _write_stream(
+    animation: Animation, output: Path, outputs: Outputs, table: BapTable, *, marked: bool
+) -> None:
+    from fba.codec import encode
 
     step_tables.warn_of_coarse_steps(animation, table)
     options = EncoderOptions(bap_steps=table, mark=marked, clamp=True)
@@ -193,11 +178,11 @@ def _print_characters(as_json: bool) -> None:
         click.echo(f"{c.name:{width}}  {pace}  {c.about}")
 
 
-def _print_steps(file: Path, fps: Fraction | None, reading: Reading, as_json: bool) -> None:
+def _print_steps(file: Path, reading: Reading, as_json: bool) -> None:
     from fba.body import gait
     from fba.errors import FormatError
 
-    animation = read_input(file, reading, header_fps=fps)
+    animation = read_input(file, reading)
     if animation.body is None:
         raise FormatError("has no body to walk with", path=file)
     detected = gait.detect(animation)

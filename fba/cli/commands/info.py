@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fba.choices import BapTableOrAuto
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import (
-    EXISTING,
     Reading,
     check_clip,
     describe_person,
@@ -23,6 +23,7 @@ from fba.cli.inputs import (
     probe_input,
     read_face,
 )
+from fba.cli.option_fields import option, with_options
 from fba.cli.printing import clock_text, print_json, rate_text, seconds_text
 from fba.codec import PartInfo, StreamInfo
 from fba.errors import FbaWarning, ModelError
@@ -45,28 +46,17 @@ SHOWN = 8
         "fba info --trace talk.fba | less",
     ),
 )
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=EXISTING)
-@options.bap_steps_option
-@options.json_option
-@click.option(
-    "--trace", is_flag=True, help="List every syntax element of an FBA stream with its bit position."
-)
-@options.fps_option("Frame rate of a file without a header.")
-@options.from_option
-@options.clip_option
-@options.face_option
-@options.salvage_option
-@options.limit_option
-@click.option("--values", is_flag=True, help="With --trace: the decoded symbols of every segment as well.")
-@options.gather(reading=Reading)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.EXISTING)
+@with_options
 def command(
     files: tuple[Path, ...],
     reading: Reading,
-    as_json: bool,
-    trace: bool,
-    values: bool,
-    fps: Fraction | None,
-    face: str | None,
+    as_json: bool = options.json_option,
+    trace: bool = option(
+        default=False, help="List every syntax element of an FBA stream with its bit position."
+    ),
+    values: bool = option(default=False, help="With --trace: the decoded symbols of every segment as well."),
+    face: str | None = options.face_option,
 ) -> None:
     """Show what a file holds: frames, rate, parameters, bits. Any format is recognised by content.
 
@@ -85,18 +75,16 @@ def command(
     reports = []
     for path in files:
         with each.file(path), input_file(path) as file:
-            reports.append(_report(path, file, reading, fps, face, printed=not as_json))
+            reports.append(_report(path, file, reading, face, printed=not as_json))
     if as_json:
         print_json(reports if len(files) > 1 else reports[0])
     each.finish()
 
 
-def _report(
-    path: Path, file: Path, reading: Reading, fps: Fraction | None, face: str | None, *, printed: bool
-) -> dict[str, Any]:
+def _report(path: Path, file: Path, reading: Reading, face: str | None, *, printed: bool) -> dict[str, Any]:
     """Return what a file holds, for programs; print it for people as well if `printed`.
 
-    path: as it was typed; file: that to read. fps, face: see `probe_input`.
+    path: as it was typed; file: that to read. face: see `probe_input`.
     """
     if (person := describe_person(file, reading.format, reading.limit)) is not None:
         if reading.clip is not None:
@@ -105,7 +93,7 @@ def _report(
         if printed:
             _print_person(path, size, person)
         return {"file": str(path), "format": "gltf", "size": size, "person": asdict(person)}
-    kind, captured = read_face(file, fps, reading, {"face": face}) or ("", None)
+    kind, captured = read_face(file, reading, {"face": face}) or ("", None)
     if captured is not None and (markers := _summarise_markers(captured)) is not None:
         size = file.stat().st_size
         if printed:
@@ -116,7 +104,7 @@ def _report(
     with warnings.catch_warnings():
         if capture is not None:  # which lists what would be warned of
             warnings.simplefilter("ignore", FbaWarning)
-        info = probe_input(file, reading, fps=fps, face=face)
+        info = probe_input(file, reading, face=face)
     clips = list_clips(file, info.format, reading.limit)
     steps = ""
     if info.format == "fba" and info.body is not None:
@@ -132,7 +120,7 @@ def _report(
     return report | ({"capture": capture} if capture is not None else {})
 
 
-def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:
+def _trace(path: Path, *, bap_steps: BapTableOrAuto, as_json: bool, values: bool) -> None:
     import json
 
     from fba_conformance.listing import element_dict, format_trace

@@ -6,16 +6,25 @@ import warnings
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
+from fba.choices import Assignment, Gaze, Overlap, UpAxis
 from fba.cli import options
 from fba.cli.command import Command, examples, usage_errors
-from fba.cli.inputs import ExistingPath, Reading
-from fba.cli.joint_options import MapType, Pair
-from fba.cli.marker_options import Neutral, NeutralType
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.inputs import Reading
+from fba.cli.joint_options import Maps, MapType
+from fba.cli.marker_options import Neutral, neutral_option
+from fba.cli.option_fields import group, option, with_options
+from fba.cli.outputs import (
+    STANDARD,
+    Output,
+    Outputs,
+    display_name,
+    further_output_option,
+    output_option,
+)
 from fba.cli.printing import Progress
 from fba.errors import FbaWarning, ModelError, OptionError
 
@@ -28,14 +37,27 @@ if TYPE_CHECKING:
 PICTURES, FILMS, OTHERS = (".png", ".jpg", ".jpeg"), (".mp4", ".gif"), (".glb", ".toml")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Tuning:
-    """What changes a mapping; None keeps what it says. squint: percent."""
+    """What changes a mapping; None keeps what it says."""
 
-    assignment: str | None
-    overlap: str | None
-    gaze: str | None
-    squint: float | None
+    assignment: Assignment | None = option(
+        help="A vertex belongs to all markers in whose reach it is, or to the nearest alone. Default: as the "
+        "mapping says, shared in a new one."
+    )
+    overlap: Overlap | None = option(
+        help="Shared vertices move so that centres meet their markers, or displacements are added. Default: "
+        "as the mapping says, match in a new one."
+    )
+    gaze: Gaze | None = option(
+        help="Eyes stay in the head as they are, or keep looking at the camera while it turns. Default: as "
+        "the mapping says, none in a new one."
+    )
+    squint: float | None = option(
+        type=click.FloatRange(0, 100),
+        metavar="PERCENT",
+        help="Narrow the eyes by this share of their opening. Default: as the mapping says, 0 in a new one.",
+    )
 
     def applied(self, mapping: MarkerMapping) -> MarkerMapping:
         """Return the changed mapping."""
@@ -48,36 +70,59 @@ class _Tuning:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Drawing:
-    """How a picture or a film is drawn; times in seconds, size in pixels."""
+    """How a picture or a film is drawn."""
 
-    cloud: str | None
-    camera: str
-    time: float | None
-    start: float | None
-    end: float | None
-    fps: Fraction | None
-    size: tuple[int, int] | None
+    cloud: Literal["beside", "over", "none"] | None = option(
+        help="Where a picture or film shows the markers themselves. Default: beside."
+    )
+    camera: Literal["front", "three-quarter", "profile"] = option(default="front")
+    time: float | None = option(type=options.MomentType(), metavar="SECONDS", help="For a picture: its time.")
+    start: float | None = option(type=options.MomentType(), metavar="SECONDS", help="For a film: start time.")
+    end: float | None = option(type=options.MomentType(), metavar="SECONDS", help="For a film: end time.")
+    rate: Fraction | None = options.rate_option(
+        "Frame rate of a film. Default: the capture's own, or a whole fraction of it."
+    )
+    size: tuple[int, int] | None = options.size_option()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Request:
     """What the command line asks for."""
 
     capture: Path
     head: Path | None
-    output: Path | None
-    maps: tuple[Path | Pair, ...]
-    map_out: Path | None
-    no_clobber: bool
-    points: Path | None
-    up: str
-    neutral: Neutral
-    marker: str | None
+    output: Path | None = output_option(
+        "OUT.png|.jpg|.mp4|.gif|.glb|.toml",
+        "A picture, a film, the head with its animation, or the mapping, instead of a window.",
+    )
+    maps: Maps = option(
+        "--map",
+        default=(),
+        type=MapType(),
+        multiple=True,
+        metavar="FILE.toml|MARKER=PLACE",
+        help="A saved mapping, in place of the proposed one. Or where a marker is: a feature point, "
+        "Chin=2.1, or a vertex, Chin=1234; nowhere: Chin=. Repeatable.",
+    )
+    map_out: Path | None = further_output_option(
+        "FILE.toml",
+        "Write the mapping beside OUT; in the window, Ctrl+S does. Default there: the file of --map, "
+        "else the capture's name with .virtual.toml.",
+    )
+    no_clobber: bool = options.no_clobber_option
+    points: Path | None = options.model_option(
+        "Feature points of HEAD (CSV, JSON, FDP). Default: a file beside HEAD with the same name, else what "
+        "is found.",
+        "--points",
+    )
+    up: UpAxis = option(default="y", help="Vertical axis of HEAD.")
+    neutral: Neutral = neutral_option("The")
     tuning: _Tuning
+    marker: str | None = option(metavar="NAME", help="Marker whose reach is shown in colours.")
     drawing: _Drawing
-    reading: Reading
+    reading: Reading = group("format", "limit")
 
     @property
     def saved(self) -> list[Path]:
@@ -96,88 +141,9 @@ class _Request:
         "fba markers face.csv scan.obj --map mapping.toml -o moved.glb",
     ),
 )
-@click.argument("capture", metavar="CAPTURE", type=ExistingPath(dir_okay=False))
-@click.argument("head", metavar="[HEAD]", required=False, type=ExistingPath())
-@click.option(
-    "-o",
-    "--output",
-    type=OutputType(),
-    metavar="OUT.png|.jpg|.mp4|.gif|.glb|.toml",
-    help="A picture, a film, the head with its animation, or the mapping, instead of a window.",
-)
-@click.option(
-    "--map",
-    "maps",
-    type=MapType(),
-    multiple=True,
-    metavar="FILE.toml|MARKER=PLACE",
-    help="A saved mapping, in place of the proposed one. Or where a marker is: a feature point, Chin=2.1, or "
-    "a vertex, Chin=1234; nowhere: Chin=. Repeatable.",
-)
-@click.option(
-    "--map-out",
-    type=OutputType(),
-    metavar="FILE.toml",
-    help="Write the mapping beside OUT; in the window, Ctrl+S does. Default there: the file of --map, else "
-    "the capture's name with .virtual.toml.",
-)
-@options.no_clobber_option
-@click.option("--points", type=ExistingPath(), metavar="FILE",
-              help="Feature points of HEAD (CSV, JSON, FDP). Default: a file beside HEAD with the same name, "
-              "else what is found.")  # fmt: skip
-@click.option(
-    "--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis of HEAD."
-)
-@click.option(
-    "--assignment",
-    type=click.Choice(["shared", "exclusive"]),
-    help="A vertex belongs to all markers in whose reach it is, or to the nearest alone. Default: as the "
-    "mapping says, shared in a new one.",
-)
-@click.option(
-    "--overlap",
-    type=click.Choice(["match", "add"]),
-    help="Shared vertices move so that centres meet their markers, or displacements are added. Default: as "
-    "the mapping says, match in a new one.",
-)
-@click.option(
-    "--neutral",
-    type=NeutralType(),
-    default="auto",
-    show_default=True,
-    metavar="auto|first|N|FROM-TO",
-    help="The neutral face is found, the first moment, frame N, or between two times.",
-)
-@click.option(
-    "--gaze",
-    type=click.Choice(["none", "camera"]),
-    help="Eyes stay in the head as they are, or keep looking at the camera while it turns. Default: as the "
-    "mapping says, none in a new one.",
-)
-@click.option(
-    "--squint",
-    type=click.FloatRange(0, 100),
-    metavar="PERCENT",
-    help="Narrow the eyes by this share of their opening. Default: as the mapping says, 0 in a new one.",
-)
-@click.option("--marker", metavar="NAME", help="Marker whose reach is shown in colours.")
-@click.option(
-    "--cloud",
-    type=click.Choice(["beside", "over", "none"]),
-    help="Where a picture or film shows the markers themselves. Default: beside.",
-)
-@click.option(
-    "--camera", type=click.Choice(["front", "three-quarter", "profile"]), default="front", show_default=True
-)
-@click.option("--time", type=options.MomentType(), metavar="SECONDS", help="For a picture: its time.")
-@click.option("--start", type=options.MomentType(), metavar="SECONDS", help="For a film: start time.")
-@click.option("--end", type=options.MomentType(), metavar="SECONDS", help="For a film: end time.")
-@options.fps_option("Frame rate of a film. Default: the capture's own, or a whole fraction of it.")
-@click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
-@options.from_option
-@options.limit_option
-@options.gather(tuning=_Tuning, drawing=_Drawing, reading=Reading)
-@options.gather(request=_Request)
+@click.argument("capture", metavar="CAPTURE", type=options.FILE)
+@click.argument("head", metavar="[HEAD]", required=False, type=options.ExistingPath())
+@with_options
 def command(request: _Request) -> None:
     """Let captured markers move any head, in a window or into a file.
 
@@ -230,10 +196,10 @@ def _write_moved(
     outputs: Outputs,
 ) -> None:
     """Write the head that markers move: its animation as glTF, a picture or a film."""
-    from fba.capture.virtual_markers import perform
+    from fba.capture.virtual_markers import move_head
 
     with Progress("preparing", None):
-        performance = perform(motion, head, mapping, request.neutral)  # says what is wrong or odd
+        performance = move_head(motion, head, mapping, request.neutral)  # says what is wrong or odd
     if output.suffix.lower() == ".glb":
         from fba.formats.gltf.moved_head import write_moved_head
 
@@ -251,7 +217,7 @@ def _write_moved(
 
 def _check_options(output: Path | None, drawing: _Drawing) -> None:
     """Raise click.UsageError for options that the output does not take."""
-    films = {"--start": drawing.start, "--end": drawing.end, "--fps": drawing.fps}
+    films = {"--start": drawing.start, "--end": drawing.end, "--fps": drawing.rate}
     drawn = {"--cloud": drawing.cloud, "--time": drawing.time, **films, "--size": drawing.size}
     suffix = "" if output is None else output.suffix.lower()
     if output == STANDARD:
@@ -425,7 +391,7 @@ def _draw(
             time=drawing.time,
             start=drawing.start,
             end=drawing.end,
-            fps=drawing.fps,
+            rate=drawing.rate,
             size=drawing.size,
             progress=step.show,
         )

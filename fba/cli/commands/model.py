@@ -6,14 +6,22 @@ import shlex
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from fba.choices import Adaptation, UpAxis
 from fba.cli import options
 from fba.cli.command import Group, examples
-from fba.cli.inputs import ExistingPath
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.option_fields import group, option, with_options
+from fba.cli.outputs import (
+    STANDARD,
+    Output,
+    Outputs,
+    display_name,
+    further_output_option,
+    output_option,
+)
 from fba.cli.printing import Progress, colour_grade, print_json
 from fba.cli.subcommands import model_learn_fit
 from fba.errors import FbaWarning
@@ -23,36 +31,42 @@ if TYPE_CHECKING:
     from fba.face import FaceModel
     from fba.face.checks import Finding
 
-SOURCE = ExistingPath()
-KINDS = ("makehuman", "gltf", "obj", "ply", "wfm", "fdp")
+SOURCE = options.ExistingPath()
 POINT_FILES = "FDP, CSV or JSON file"
-PART = click.option(
-    "--part",
-    "kinds",
-    multiple=True,
-    metavar="NAME=KIND",
-    help="Kind of a group, object, mesh or material: skin, eye, teeth, tongue, ..., or none to leave it out; "
-    "repeatable.",
-)
+DEFAULT_OPTION = option(default=False, help="Use the built-in head instead of FILE.")
+OUTPUT_OPTION = output_option("OUT.glb", "Model to write; - for standard output.", required=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Target:
     """Where a model goes, and a picture of its face."""
 
-    output: Path
-    sheet: Path | None
-    no_clobber: bool
+    output: Path = OUTPUT_OPTION
+    no_clobber: bool = options.no_clobber_option
+    sheet: Path | None = further_output_option(
+        "FILE.png|.jpg",
+        "Picture that shows the face at rest and in its main motions, visemes and expressions.",
+    )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Mesh:
-    """How a mesh is read, see `fba.face.importers.import_model`; kinds: NAME=KIND of its parts."""
+    """How a mesh is read, see `fba.face.importers.import_model`."""
 
-    points: Path | None
-    kind: str | None
-    up: str
-    kinds: tuple[str, ...]
+    points: Path | None = options.model_option(
+        f"{POINT_FILES} with the feature points. Default: a file beside IN with the same name.", "--points"
+    )
+    kind: Literal["makehuman", "gltf", "obj", "ply", "wfm", "fdp"] | None = option(
+        help="Kind of the mesh. Default: recognised from its content."
+    )
+    up: UpAxis = option(default="y", help="Vertical axis.")
+    kinds: tuple[str, ...] = option(
+        "--part",
+        default=(),
+        metavar="NAME=KIND",
+        help="Kind of a group, object, mesh or material: skin, eye, teeth, tongue, ..., or none to leave it "
+        "out; repeatable.",
+    )
 
     def options(self) -> dict[str, Any]:
         """Return arguments of `import_model`; click.UsageError for a kind that does not exist."""
@@ -96,16 +110,6 @@ def command() -> None:
 command.add_command(model_learn_fit.command)
 
 
-_output_option = click.option(
-    "-o",
-    "--output",
-    metavar="OUT.glb",
-    required=True,
-    type=OutputType(),
-    help="Model to write; - for standard output.",
-)
-
-
 def _read_or_default(file: Path | None, default: bool) -> FaceModel:
     if (file is None) != default:
         raise click.UsageError("give either the FILE of a face model, or --default for the built-in head")
@@ -127,9 +131,8 @@ def _read(file: Path | None) -> FaceModel:
     epilog=examples("fba model info --default", "fba model info --json head.glb"),
 )
 @click.argument("file", metavar="[FILE]", required=False, type=SOURCE)
-@click.option("--default", is_flag=True, help="Use the built-in head instead of FILE.")
-@options.json_option
-def info(file: Path | None, default: bool, as_json: bool) -> None:
+@with_options
+def info(file: Path | None, default: bool = DEFAULT_OPTION, as_json: bool = options.json_option) -> None:
     """Show what a face model contains: parts, units, feature points and FAPs.
 
     FILE is a face model (.glb), or any file that `fba model import` reads.
@@ -148,12 +151,13 @@ def info(file: Path | None, default: bool, as_json: bool) -> None:
     epilog=examples("fba model validate head.glb", "fba model validate --json --default"),
 )
 @click.argument("file", metavar="[FILE]", required=False, type=SOURCE)
-@click.option("--default", is_flag=True, help="Use the built-in head instead of FILE.")
-@click.option(
-    "--only", type=click.Choice(["neutral", "faps"]), help="Check only the rest position, or only the FAPs."
-)
-@options.json_option
-def validate(file: Path | None, default: bool, only: str | None, as_json: bool) -> None:
+@with_options
+def validate(
+    file: Path | None,
+    default: bool = DEFAULT_OPTION,
+    only: Literal["neutral", "faps"] | None = option(help="Check only the rest position, or only the FAPs."),
+    as_json: bool = options.json_option,
+) -> None:
     """Check a face model against the standard: its neutral face, and the effect of every FAP.
 
     Every finding gives the measured and the expected value. Errors are faults with which streams play
@@ -188,43 +192,20 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     ),
 )
 @click.argument("source", metavar="IN", type=SOURCE)
-@_output_option
-@options.no_clobber_option
-@click.option(
-    "--points",
-    metavar="FILE",
-    type=SOURCE,
-    help=f"{POINT_FILES} with the feature points. Default: a file beside IN with the same name.",
-)
-@click.option("--kind", type=click.Choice(KINDS), help="Kind of IN. Default: recognised from its content.")
-@click.option(
-    "--unit",
-    type=float,
-    metavar="METRES",
-    help="Metres per unit of IN. Default: estimated from the distance between the pupils.",
-)
-@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis.")
-@PART
-@click.option("--name", help="Name of the model. Default: the name of the file.")
-@click.option(
-    "--wrinkles",
-    is_flag=True,
-    help="Let players draw wrinkles on the skin as it moves. For lifelike heads, not for drawn ones.",
-)
-@click.option(
-    "--sheet",
-    metavar="FILE.png|.jpg",
-    type=OutputType(),
-    help="Picture that shows the face at rest and in its main motions, visemes and expressions.",
-)
-@options.gather(mesh=_Mesh, target=_Target)
+@with_options
 def import_(
     source: Path,
-    mesh: _Mesh,
     target: _Target,
-    unit: float | None,
-    name: str | None,
-    wrinkles: bool,
+    mesh: _Mesh,
+    unit: float | None = option(
+        metavar="METRES",
+        help="Metres per unit of IN. Default: estimated from the distance between the pupils.",
+    ),
+    name: str | None = option(help="Name of the model. Default: the name of the file."),
+    wrinkles: bool = option(
+        default=False,
+        help="Let players draw wrinkles on the skin as it moves. For lifelike heads, not for drawn ones.",
+    ),
 ) -> None:
     """Turn a mesh into a face model that plays FAPs, and write it as glTF.
 
@@ -270,24 +251,21 @@ def import_(
         "fba model points avatar.glb -o avatar.points.csv",
     ),
 )
-@click.argument("head", metavar="HEAD", type=ExistingPath(dir_okay=False))
-@click.option(
-    "-o", "--output", metavar="POINTS.csv", required=True, type=OutputType(), help="File of points to write."
-)
-@options.no_clobber_option
-@click.option(
-    "--points",
-    metavar="FILE",
-    type=SOURCE,
-    help=f"{POINT_FILES} to begin from. Default: a file beside HEAD with the same name, else the points that "
-    "`fba model import` finds.",
-)
-@click.option("--kind", type=click.Choice(KINDS), help="Kind of HEAD. Default: recognised from its content.")
-@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis.")
-@PART
-@click.option("--size", type=options.SizeType(), default="1280x800", show_default=True, metavar="WxH")
-@options.gather(mesh=_Mesh)
-def points_(head: Path, mesh: _Mesh, output: Path, no_clobber: bool, size: tuple[int, int]) -> None:
+@click.argument("head", metavar="HEAD", type=options.FILE)
+@with_options
+def points_(
+    head: Path,
+    output: Path = output_option("POINTS.csv", "File of points to write.", required=True),
+    no_clobber: bool = options.no_clobber_option,
+    mesh: _Mesh = group(
+        points=options.model_option(
+            f"{POINT_FILES} to begin from. Default: a file beside HEAD with the same name, else the points "
+            "that `fba model import` finds.",
+            "--points",
+        )
+    ),
+    size: tuple[int, int] = options.size_option(default=(1280, 800), typed="1280x800", show_default=True),
+) -> None:  # fmt: skip
     """Open a window in which you place the feature points of a head, for `fba model import --points`.
 
     HEAD is a mesh that lacks shapes, or whose points are not found: OBJ, PLY, Candide or glTF. The list
@@ -343,32 +321,23 @@ def _draw_sheet(model: FaceModel, file: Path) -> None:
         "fba model fit points.csv --unit cm --model head.glb --name Ada -o ada.glb",
     ),
 )
-@click.argument("points", metavar="POINTS", type=ExistingPath(dir_okay=False))
-@_output_option
-@options.no_clobber_option
-@click.option(
-    "--model", "base", metavar="FILE", type=SOURCE, help="Face model to fit. Default: the built-in head."
-)
-@click.option(
-    "--unit",
-    metavar="mm|cm|m|in",
-    help="Unit of POINTS, or metres for one unit. Default: estimated from the size.",
-)
-@options.choice_option(
-    "--tables",
-    "How the motions of FAPs are adapted: carried over with the surface, computed again from the mesh, "
-    "or whichever meets the standard better.",
-    "auto", "carry", "author",
-)  # fmt: skip
-@click.option("--name", help="Name of the fitted model. Default: the name of the file.")
+@click.argument("points", metavar="POINTS", type=options.FILE)
+@with_options
 def fit(
     points: Path,
-    output: Path,
-    no_clobber: bool,
-    base: Path | None,
-    unit: str | None,
-    tables: Any,
-    name: str | None,
+    output: Path = OUTPUT_OPTION,
+    no_clobber: bool = options.no_clobber_option,
+    base: Path | None = options.model_option("Face model to fit. Default: the built-in head.", "--model"),
+    unit: str | None = option(
+        metavar="mm|cm|m|in",
+        help="Unit of POINTS, or metres for one unit. Default: estimated from the size.",
+    ),
+    tables: Adaptation = option(
+        default="auto",
+        help="How the motions of FAPs are adapted: carried over with the surface, computed again from the "
+        "mesh, or whichever meets the standard better.",
+    ),
+    name: str | None = option(help="Name of the fitted model. Default: the name of the file."),
 ) -> None:
     """Fit a face to a person's feature points, and write it as glTF.
 
@@ -388,14 +357,14 @@ def fit(
 
 def _read_points(path: Path, model: FaceModel) -> Float64:
     """Return feature points of a file; for an Xface file without its mesh, those that its distances imply."""
-    from fba.face.importers.points.fdp import load_fdp
+    from fba.face.importers.points.fdp import read_fdp
     from fba.face.importers.points.points_file import read_points
     from fba.face.importers.points.xface import xface_points
     from fba.text_files import find_beside
 
     if path.suffix.lower() in (".json", ".csv"):
         return read_points(path).points
-    fdp = load_fdp(path)
+    fdp = read_fdp(path)
     if fdp.format != "xface":
         return fdp.points
     meshes = sorted({mesh.rpartition("_")[0] for mesh, _ in fdp.vertices.values()})

@@ -9,11 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fba.choices import Means
 from fba.cli import options
 from fba.cli.command import Group, examples
-from fba.cli.inputs import EXISTING, input_file
-from fba.cli.marker_options import AspectType
-from fba.cli.outputs import TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.inputs import input_file
+from fba.cli.marker_options import aspect_option
+from fba.cli.option_fields import group, option, with_options
+from fba.cli.outputs import (
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    display_name,
+    find_writer,
+    further_output_option,
+    output_option,
+)
 from fba.cli.printing import print_json
 from fba.limits import Limits
 
@@ -21,7 +31,6 @@ if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.persona import Persona, TrackedFace
 
-MEANS = ("motion", "curves", "masks")
 REPORTS = (".html",)
 
 
@@ -43,55 +52,62 @@ class SpanType(click.ParamType[tuple[float, float]]):
         return span
 
 
-_neutral_option = click.option(
-    "--neutral",
-    type=SpanType(),
-    metavar="FROM-TO",
-    help="Seconds of each recording in which the face rests; default: the first second.",
-)
-_aspect_option = click.option(
-    "--aspect",
-    type=AspectType(),
-    metavar="W:H",
-    help="Width and height of the picture, 16:9 or 1920x1080; default: what makes the points a face.",
-)
-_fps_option = options.fps_option("Frame rate of recordings that do not say theirs.")
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Tracking:
-    """How recordings of tracked points are read. neutral: seconds in which the face rests."""
+    """How recordings of tracked points are read."""
 
-    neutral: tuple[float, float] | None
-    aspect: float | None
-    fps: Fraction | None
-    face: str | None
-    limit: Limits
+    neutral: tuple[float, float] | None = option(
+        type=SpanType(),
+        metavar="FROM-TO",
+        help="Seconds of each recording in which the face rests; default: the first second.",
+    )
+    aspect: float | None = aspect_option(
+        "Width and height of the picture, 16:9 or 1920x1080; default: what makes the points a face."
+    )
+    source_rate: Fraction | None = option(
+        "--source-fps", type=options.RateType(), metavar="RATE",
+        help="Frame rate of recordings that do not say theirs.",
+    )  # fmt: skip
+    face: str | None = options.face_option
+    limit: Limits = options.limit_option
 
     def read(self, path: Path) -> TrackedFace:
         """Return the face in a recording."""
         from fba.persona import read_recording
 
         with input_file(path) as file:
-            return read_recording(file, fps=self.fps, face=self.face, aspect=self.aspect, limits=self.limit)
+            return read_recording(
+                file,
+                source_rate=self.source_rate,
+                face=self.face,
+                aspect=self.aspect,
+                limits=self.limit,
+            )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Performer:
-    """Whose Personas are used, and how. no_head: leave out how the user's head turns."""
+    """Whose Personas are used, and how."""
 
-    persona_file: Path | None
-    user_file: Path | None
-    means: str
-    no_head: bool
+    persona_file: Path | None = option(
+        "--persona", type=options.EXISTING, metavar="FILE.persona", help="The actor's way."
+    )
+    user_file: Path | None = option(
+        "--user", type=options.EXISTING, metavar="FILE.persona", help="The user's own Persona."
+    )
+    means: Means = option(
+        default="motion",
+        help="How a face becomes the actor's: by maps and how it moves, by maps alone, or by masks.",
+    )
+    no_head: bool = option(default=False, help="Leave out how the user's head turns.")
 
     def play(self, file: Path, tracking: _Tracking) -> tuple[Persona | None, Animation]:
         """Return the actor's Persona, if any, and a user's recording played by it."""
-        from fba.persona import play
+        from fba.persona import animate_as
 
         persona = None if self.persona_file is None else _load(self.persona_file, tracking.limit)
         user = None if self.user_file is None else _load(self.user_file, tracking.limit)
-        return persona, play(
+        return persona, animate_as(
             tracking.read(file),
             persona,
             means=self.means,
@@ -118,41 +134,24 @@ def command() -> None:
     "learn",
     epilog=examples("fba persona learn scene1.csv scene2.csv -o actor.persona --report actor.html"),
 )
-@click.argument("actors", metavar="ACTOR...", nargs=-1, required=True, type=EXISTING)
-@click.option(
-    "-o", "--output", metavar="OUT.persona", required=True, type=OutputType(), help="Persona to write."
-)
-@click.option("--name", default="", metavar="NAME", help="Name of the actor; default: that of the file.")
-@_neutral_option
-@click.option(
-    "--warm-up",
-    type=click.IntRange(0),
-    default=0,
-    metavar="N",
-    help="Leave out the first N frames of each recording, in which the tracker looks for the face.",
-)
-@click.option(
-    "--report",
-    metavar="FILE.html",
-    type=OutputType(),
-    help="Also write a page with masks, classes and plots.",
-)
-@_aspect_option
-@_fps_option
-@options.face_option
-@options.no_clobber_option
-@options.json_option
-@options.limit_option
-@options.gather(tracking=_Tracking)
+@click.argument("actors", metavar="ACTOR...", nargs=-1, required=True, type=options.EXISTING)
+@with_options
 def learn_command(
     actors: tuple[Path, ...],
-    output: Path,
-    name: str,
-    tracking: _Tracking,
-    warm_up: int,
-    report: Path | None,
-    no_clobber: bool,
-    as_json: bool,
+    output: Path = output_option("OUT.persona", "Persona to write.", required=True),
+    no_clobber: bool = options.no_clobber_option,
+    name: str = option(default="", metavar="NAME", help="Name of the actor; default: that of the file."),
+    warm_up: int = option(
+        type=click.IntRange(0),
+        default=0,
+        metavar="N",
+        help="Leave out the first N frames of each recording, in which the tracker looks for the face.",
+    ),
+    report: Path | None = further_output_option(
+        "FILE.html", "Also write a page with masks, classes and plots."
+    ),
+    tracking: _Tracking = group(),
+    as_json: bool = options.json_option,
 ) -> None:
     """Learn how an actor moves the face, from points that a tracker found in films.
 
@@ -165,13 +164,13 @@ def learn_command(
     if report is not None:
         written.append(Output("--report", report, text=True))
     outputs = Outputs(written, actors, no_clobber=no_clobber)
-    from fba.persona import learn, save_persona
+    from fba.persona import learn
 
     neutral = tracking.neutral
     faces = [tracking.read(path) for path in actors]
     persona = learn(faces, name or actors[0].stem, neutral=[neutral] * len(faces), warm_up=warm_up)
     with outputs.file(output) as file:
-        save_persona(persona, file)
+        persona.save(file)
     if report is not None:
         from fba.persona.report import make_report
 
@@ -185,10 +184,11 @@ def learn_command(
 
 
 @command.command("info", epilog=examples("fba persona info actor.persona"))
-@click.argument("file", metavar="FILE.persona", type=EXISTING)
-@options.json_option
-@options.limit_option
-def info_command(file: Path, as_json: bool, limit: Limits) -> None:
+@click.argument("file", metavar="FILE.persona", type=options.EXISTING)
+@with_options
+def info_command(
+    file: Path, as_json: bool = options.json_option, limit: Limits = options.limit_option
+) -> None:
     """Show what a Persona holds: frames, classes, masks, and the classes that are missing."""
     persona = _load(file, limit)
     if as_json:
@@ -210,35 +210,18 @@ def info_command(file: Path, as_json: bool, limit: Limits) -> None:
         "fba persona play user.csv -o own.fba      # the user's own way, to compare",
     ),
 )
-@click.argument("file", metavar="USER", type=EXISTING)
-@click.option("--persona", "persona_file", type=EXISTING, metavar="FILE.persona", help="The actor's way.")
-@click.option("--user", "user_file", type=EXISTING, metavar="FILE.persona", help="The user's own Persona.")
-@click.option(
-    "-o", "--output", metavar="OUT", required=True, type=OutputType(),
-    help="File to write; its suffix says in which format. - for standard output.",
-)  # fmt: skip
-@options.to_option
-@options.choice_option(
-    "--means",
-    "How a face becomes the actor's: by maps and how it moves, by maps alone, or by masks.",
-    *MEANS,
-)
-@_neutral_option
-@click.option("--no-head", is_flag=True, help="Leave out how the user's head turns.")
-@_aspect_option
-@_fps_option
-@options.face_option
-@options.no_clobber_option
-@options.limit_option
-@options.gather(performer=_Performer, tracking=_Tracking)
+@click.argument("file", metavar="USER", type=options.EXISTING)
+@with_options
 def play_command(
     file: Path,
     performer: _Performer,
-    tracking: _Tracking,
-    output: Path,
-    to: str | None,
-    no_clobber: bool,
-) -> None:
+    output: Path = output_option(
+        "OUT", "File to write; its suffix says in which format. - for standard output.", required=True
+    ),
+    to: str | None = options.to_option,
+    no_clobber: bool = options.no_clobber_option,
+    tracking: _Tracking = group(),
+) -> None:  # fmt: skip
     """Play a user's performance in an actor's way: tracked points to FAPs, which move any face.
 
     Without --persona, the FAPs are those of the user's own way.
@@ -261,10 +244,10 @@ def play_command(
 
 
 def _load(path: Path, limits: Limits) -> Persona:
-    from fba.persona import load_persona
+    from fba.persona import Persona
 
     with input_file(path) as file:
-        return load_persona(file, limits=limits)
+        return Persona.load(file, limits=limits)
 
 
 def _describe(persona: Persona) -> dict[str, Any]:
@@ -288,9 +271,9 @@ def _describe(persona: Persona) -> dict[str, Any]:
 
 
 def _missing(persona: Persona) -> dict[str, list[str]]:
-    from fba.persona import Recogniser
+    from fba.persona import ClassRecogniser
 
-    known = Recogniser.default().components
+    known = ClassRecogniser.default().components
     return persona.missing({part: component.classes for part, component in known.items()})
 
 

@@ -11,6 +11,7 @@ import click
 from fba.cli import options, scene_options
 from fba.cli.command import Command, examples
 from fba.cli.inputs import ReadFile
+from fba.cli.option_fields import group, option, with_options
 from fba.cli.scene_options import MOST, SceneOptions, SoundOptions, check_files
 from fba.parameters import BAP_STEPS_DEFAULT
 
@@ -20,14 +21,14 @@ if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Window:
-    """Options of the window, which dropped files keep. size: pixels. speed: 1 as recorded."""
+    """Options of the window, which dropped files keep."""
 
-    size: tuple[int, int]
-    loop: bool
-    speed: float
-    interpolate: bool
+    speed: float = option(type=click.FloatRange(0.1, 4.0), default=1.0, help="1: as recorded.")
+    loop: bool = option(default=False, help="Start again at the end.")
+    interpolate: bool = option(default=True, help="Smooth motion between frames, or frame by frame.")
+    size: tuple[int, int] = options.size_option(default=(1280, 720), typed="1280x720", show_default=True)
 
 
 @click.command(
@@ -43,40 +44,25 @@ class _Window:
     ),
 )
 @scene_options.files_argument
-@click.option(
-    "--compare",
-    is_flag=True,
-    help="Two files or more: the others as drawings over the first, and by how much each parameter differs.",
-)
-@scene_options.sound_options()
-@click.option(
-    "--speed", type=click.FloatRange(0.1, 4.0), default=1.0, show_default=True, help="1: as recorded."
-)
-@click.option("--loop", is_flag=True, help="Start again at the end.")
-@click.option(
-    "--start", type=options.MomentType(), metavar="SECONDS", help="Start time, in the file's own times."
-)
-@click.option("--paused", is_flag=True, help="Start paused; the space key plays.")
-@click.option(
-    "--interpolate/--no-interpolate",
-    default=True,
-    show_default=True,
-    help="Smooth motion between frames, or frame by frame.",
-)
-@click.option("--size", type=options.SizeType(), default="1280x720", show_default=True, metavar="WxH")
-@scene_options.scene_options(
-    fps="Frame rate of a file without a header.",
-    arrange="Several files: side by side (default), or over each other (default with --compare).",
-)
-@options.gather(window=_Window)
+@with_options
 def command(
     files: tuple[Path, ...],
-    compare: bool,
     sound: SoundOptions,
-    start: float | None,
-    paused: bool,
     window: _Window,
-    how: SceneOptions,
+    compare: bool = option(
+        default=False,
+        help="Two files or more: the others as drawings over the first, and by how much each parameter "
+        "differs.",
+    ),
+    start: float | None = option(
+        type=options.MomentType(), metavar="SECONDS", help="Start time, in the file's own times."
+    ),
+    paused: bool = option(default=False, help="Start paused; the space key plays."),
+    how: SceneOptions = group(
+        arrange=option(
+            help="Several files: side by side (default), or over each other (default with --compare)."
+        )
+    ),
 ) -> None:
     """Play files in a window: space plays and pauses, arrows step, F1 shows all keys.
 
@@ -102,7 +88,7 @@ def command(
     else:
         dropped = _play(files, how, sound, window, compare=compare, start=start, paused=paused)
     while dropped:
-        beside = SoundOptions(None, sound.no_audio, 0.0)
+        beside = SoundOptions(no_audio=sound.no_audio)
         dropped = _play(dropped[:MOST], replace(how, arrange=None), beside, window)
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from fba.cli import options, scene_options
 from fba.cli.command import Command, examples, usage_errors
 from fba.cli.inputs import read_input, read_model
+from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.pose_options import Pose, still_animation
 from fba.cli.printing import Progress
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
     from fba_player.export.image_files import Numbered
     from fba_player.view.protocols import Showable
 
-KINDS = ("png", "jpg", "mp4", "gif")
 SHEETS = ("faps", "visemes", "expressions", "all")
 
 
@@ -40,14 +41,18 @@ class SheetType(click.ParamType[str | int]):
         return int(value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Moment:
-    """Which frames are drawn: of a picture, one by its number or time; of a film, a span in seconds."""
+    """Which frames are drawn: of a picture, one by its number or time; of a film, a span."""
 
-    frame: int | None
-    time: float | None
-    start: float | None
-    end: float | None
+    frame: int | None = option(help="For a picture: number of the frame; -1 is the last.")
+    time: float | None = option(type=options.MomentType(), metavar="SECONDS", help="For a picture: its time.")
+    start: float | None = option(
+        type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: start time."
+    )
+    end: float | None = option(
+        type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: end time."
+    )
 
     @property
     def is_one(self) -> bool:
@@ -55,28 +60,50 @@ class _Moment:
         return self.frame is not None or self.time is not None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Writing:
-    """How files are written. to: their format. replace: numbered pictures, too."""
+    """How files are written."""
 
-    to: str | None
-    no_clobber: bool
-    replace: bool
+    to: Literal["png", "jpg", "mp4", "gif"] | None = option(
+        help="Output format, if OUT is - or its suffix does not show it."
+    )
+    no_clobber: bool = options.no_clobber_option
+    replace: bool = option(default=False, help="Overwrite numbered pictures that exist.")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Request:
-    """What the command line asks for. sheet: which kind of contact sheet, or its number of frames."""
+    """What the command line asks for."""
 
     files: tuple[Path, ...]
-    output: str
-    sheet: str | int | None
-    size: tuple[int, int] | None
-    transparent: bool
-    pose: Pose
-    moment: _Moment
+    output: str = option(
+        "-o", "--output", required=True, metavar="OUT.png|.jpg|.mp4|.gif|FOLDER/%05d.png",
+        help="A picture, a film, or numbered pictures (also: a folder with a slash at its end). - for "
+        "standard output.",
+    )  # fmt: skip
     writing: _Writing
-    sound: SoundOptions
+    pose: Pose
+    sheet: str | int | None = option(
+        "--contact-sheet",
+        type=SheetType(),
+        metavar="N|" + "|".join(SHEETS),
+        help="With a file: N of its frames, at even intervals, on one sheet. Without: all FAPs, visemes or "
+        "expressions. --size is that of one picture.",
+    )
+    size: tuple[int, int] | None = options.size_option()
+    moment: _Moment
+    rate: Fraction | None = options.rate_option(
+        "Frame rate of the film; default: the input's own, or a whole fraction of it, at most 60 (GIF: 25)."
+    )
+    transparent: bool = option(default=False, help="PNG without a background.")
+    sound: SoundOptions = group(
+        audio=option(
+            type=options.FILE,
+            metavar="FILE",
+            help="Sound of an MP4, from the first frame. Default: the WAV file of the same name beside the "
+            "input.",
+        )
+    )
     how: SceneOptions
 
 
@@ -96,64 +123,7 @@ class _Request:
     ),
 )
 @scene_options.files_argument
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="OUT.png|.jpg|.mp4|.gif|FOLDER/%05d.png",
-    help="A picture, a film, or numbered pictures (also: a folder with a slash at its end). - for standard "
-    "output.",
-)
-@click.option(
-    "--to", type=click.Choice(KINDS), help="Output format, if OUT is - or its suffix does not show it."
-)
-@options.no_clobber_option
-@click.option(
-    "--fap",
-    "faps",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Without a file: a FAP of the face, by name or number; repeatable. A left or right FAP alone "
-    "moves both sides, as in a stream; give its counterpart as well to move them apart.",
-)
-@click.option(
-    "--viseme",
-    "visemes",
-    multiple=True,
-    metavar="NAME[=BLEND]",
-    help="Without a file: a viseme by number, name or sound; of two, BLEND (0..63) is the share of one.",
-)
-@click.option(
-    "--expression",
-    "expressions",
-    multiple=True,
-    metavar="NAME[=INTENSITY]",
-    help="Without a file: an expression, 0..63; up to two.",
-)
-@click.option(
-    "--contact-sheet",
-    "sheet",
-    type=SheetType(),
-    metavar="N|" + "|".join(SHEETS),
-    help="With a file: N of its frames, at even intervals, on one sheet. Without: all FAPs, visemes or "
-    "expressions. --size is that of one picture.",
-)
-@click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
-@click.option("--frame", type=int, help="For a picture: number of the frame; -1 is the last.")
-@click.option("--time", type=options.MomentType(), metavar="SECONDS", help="For a picture: its time.")
-@click.option(
-    "--start", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: start time."
-)
-@click.option("--end", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: end time.")
-@scene_options.sound_options("Sound of an MP4")
-@click.option("--transparent", is_flag=True, help="PNG without a background.")
-@click.option("--replace", is_flag=True, help="Overwrite numbered pictures that exist.")
-@scene_options.scene_options(
-    fps="Frame rate of the film; default: the input's own, or a whole fraction of it, at most 60 (GIF: 25).",
-    arrange="Several files: side by side (default), or the others as drawings over the first.",
-)
-@options.gather(pose=Pose, moment=_Moment, writing=_Writing)
-@options.gather(request=_Request)
+@with_options
 def command(request: _Request) -> None:
     """Render files, or a face in a given pose, to a picture, numbered pictures, or a film (MP4 or GIF).
 
@@ -210,7 +180,7 @@ def _check_still(request: _Request, given: list[str]) -> None:
             "is shown at rest"
         )
     moments = {f"--{name}": value for name, value in asdict(moment).items()}
-    for name, value in {**moments, "--fps": how.fps, "--audio": request.sound.audio}.items():
+    for name, value in {**moments, "--fps": request.rate, "--audio": request.sound.audio}.items():
         if value is not None:
             shown = given[0] if given else "--model alone"
             raise click.UsageError(f"{name} goes with a file; {shown} makes a single picture")
@@ -234,7 +204,7 @@ def _draw_scene(request: _Request, target: _Target) -> None:
     audio = scene_loading.find_sound(files, sound, "the film has no sound") if mp4 else None
     outputs = target.outputs([*files, how.model, how.body, audio], request.writing)
     with Progress("preparing", None):
-        animations = [read_input(file, how, header_fps=how.fps) for file in files]
+        animations = [read_input(file, how) for file in files]
         names = scene_loading.display_names(files) or [""]
         scene = scene_loading.build_scene(animations or [still_animation(request.pose)], names, how)
     with target.file(outputs) as name:
@@ -251,13 +221,13 @@ def _picture(scene: Showable, output: str, request: _Request, audio: Path | None
     from fba_player.export.render import render
 
     how = request.how
-    made = _size(request.size, output) + (_rate_text(scene, output) if film and how.fps is None else "")
+    made = _size(request.size, output) + (_rate_text(scene, output) if film and request.rate is None else "")
     with Progress("rendering", None) as step, usage_errors():
         render(
             scene,
             output,
             size=request.size,
-            fps=how.fps if film else None,
+            rate=request.rate if film else None,
             camera=how.camera,
             **asdict(request.moment),
             audio=audio,
@@ -294,7 +264,7 @@ class _Target:
             return _Target(output, pictures.folder, "", pictures)
         path = OutputType().convert(output, None, None)
         if path == STANDARD and to is None:
-            raise click.UsageError(f"name the format for standard output with --to: {', '.join(KINDS)}")
+            raise click.UsageError("name the format for standard output with --to: png, jpg, mp4, gif")
         return _Target(output, path, f".{to}" if to is not None else path.suffix.lower())
 
     @property

@@ -9,7 +9,8 @@ import click
 
 from fba.cli import options
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, Reading, read_input
+from fba.cli.inputs import Reading, read_input
+from fba.cli.option_fields import group, option, with_options
 
 
 @click.command(
@@ -19,26 +20,18 @@ from fba.cli.inputs import EXISTING, Reading, read_input
         "fba send talk.fba 127.0.0.1:11111 --name Anna --loop",
     ),
 )
-@click.argument("file", type=EXISTING)
+@click.argument("file", type=options.EXISTING)
 @click.argument("address", metavar="ADDRESS[:PORT]")
-@click.option("--name", default="fba", show_default=True, help="Name of the subject, for the receiver.")
-@click.option("--loop", is_flag=True, help="Start again at the end.")
-@click.option(
-    "--seconds", type=options.PeriodType(), metavar="SECONDS", help="Stop after that; default: at the end."
-)
-@options.fps_option("Frame rate of a file without a header.")
-@options.from_option
-@options.clip_option
-@options.limit_option
-@options.gather(reading=Reading)
+@with_options
 def command(
     file: Path,
     address: str,
-    name: str,
-    loop: bool,
-    seconds: Fraction | None,
-    fps: Fraction | None,
-    reading: Reading,
+    name: str = option(default="fba", help="Name of the subject, for the receiver."),
+    loop: bool = option(default=False, help="Start again at the end."),
+    seconds: Fraction | None = option(
+        type=options.PeriodType(), metavar="SECONDS", help="Stop after that; default: at the end."
+    ),
+    reading: Reading = group("format", "source_rate", "clip", "limit"),
 ) -> None:
     """Send a face, at its own pace, as Live Link Face sends it from a telephone.
 
@@ -48,7 +41,7 @@ def command(
     from fba.live.receiver import split_address
     from fba.live.sending import send
 
-    animation = read_input(file, reading, header_fps=fps)
+    animation = read_input(file, reading)
     target = split_address(address, 11111)
     limit_seconds = None if seconds is None else float(seconds)
     count = send(animation, target, subject=name, loop=loop, seconds=limit_seconds)

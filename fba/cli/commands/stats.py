@@ -10,19 +10,21 @@ import numpy as np
 
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import EXISTING, input_file
+from fba.cli.inputs import Reading, input_file
+from fba.cli.option_fields import group, with_options
 from fba.cli.printing import print_json, print_table
 from fba.codec import StreamInfo
-from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO
 
 
 @click.command(cls=Command, epilog=examples("fba stats talk.fba", "fba stats --json *.fba"))
-@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=EXISTING)
-@options.bap_steps_option
-@options.json_option
-@options.limit_option
-def command(files: tuple[Path, ...], bap_steps: str, as_json: bool, limit: Limits) -> None:
+@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=options.EXISTING)
+@with_options
+def command(
+    files: tuple[Path, ...],
+    reading: Reading = group("bap_steps", "limit"),
+    as_json: bool = options.json_option,
+) -> None:
     """Show where the bits of FBA streams go: I and P planes, mean and peak rates."""
     from fba.codec import probe_stream
 
@@ -31,9 +33,9 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool, limit: Limit
     for path in files:
         with each.file(path), input_file(path) as file:
             data = file.read_bytes()
-            info = probe_stream(data, limits=limit)
-            if info.body is not None and bap_steps != BAP_STEPS_AUTO:
-                step_tables.warn_of_doubtful_stream(path, data, bap_steps)
+            info = probe_stream(data, limits=reading.limit)
+            if info.body is not None and reading.bap_steps != BAP_STEPS_AUTO:
+                step_tables.warn_of_doubtful_stream(path, data, reading.bap_steps)
             rows.append({"file": str(path), **statistics(info)})
     if as_json:
         print_json(rows if len(files) > 1 else rows[0])

@@ -10,10 +10,10 @@ import click
 
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import EXISTING, input_file
+from fba.cli.inputs import Reading, input_file
+from fba.cli.option_fields import group, option, with_options
 from fba.cli.printing import Progress, print_json, print_table
 from fba.errors import FormatError
-from fba.limits import Limits
 
 _SHOWN = 16
 """Digits of a digest in the table; --json has all 64."""
@@ -27,18 +27,17 @@ _SHOWN = 16
         "fba verify archive/*.fba --against archive.json    # a year later",
     ),
 )
-@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=EXISTING)
-@click.option(
-    "--against",
-    type=EXISTING,
-    metavar="REPORT.json",
-    help="Also compare the digests with those of an earlier --json report.",
-)
-@options.bap_steps_option
-@options.json_option
-@options.limit_option
+@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=options.EXISTING)
+@with_options
 def command(
-    files: tuple[Path, ...], against: Path | None, bap_steps: str, as_json: bool, limit: Limits
+    files: tuple[Path, ...],
+    against: Path | None = option(
+        type=options.EXISTING,
+        metavar="REPORT.json",
+        help="Also compare the digests with those of an earlier --json report.",
+    ),
+    reading: Reading = group("bap_steps", "limit"),
+    as_json: bool = options.json_option,
 ) -> None:
     """Check FBA streams: end code, damage, frames lost and in doubt, and a digest of the decoded values.
 
@@ -54,8 +53,8 @@ def command(
         for path in files:
             with each.file(path), input_file(path) as file:
                 data = file.read_bytes()
-                table = step_tables.table_to_read(path, data, bap_steps, limit)
-                found = verify_stream(data, bap_steps=table, limits=limit)
+                table = step_tables.table_to_read(path, data, reading.bap_steps, reading.limit)
+                found = verify_stream(data, bap_steps=table, limits=reading.limit)
                 report = {"file": str(path), **found.to_dict()}
                 if against is not None:
                     earlier = known.get(str(path))

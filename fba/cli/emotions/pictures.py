@@ -18,6 +18,11 @@ from fba.errors import OptionError
 if TYPE_CHECKING:
     from fba.animation import Animation
 
+OUTPUT_TEXT = (
+    "File to write: .fba, .fap or another format of animations, .png, .jpg, .mp4, .gif. - for standard "
+    "output."
+)
+"""Help of --output."""
 PICTURES, FILMS = ("png", "jpg", "jpeg"), ("mp4", "gif")
 
 

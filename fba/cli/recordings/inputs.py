@@ -12,13 +12,16 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from fba.animation import Animation
-from fba.cli.command import STANDARD_INPUT, Decorated
+from fba.choices import Sync
+from fba.cli.command import STANDARD_INPUT
 from fba.cli.inputs import ReadFile, Reading, read_file
+from fba.cli.option_fields import option
 from fba.cli.printing import Progress, rate_text
 from fba.errors import FormatError, OptionError
 from fba.formats import merge
-from fba.formats.synchronisation import SYNCS, Recording, Together, join
+from fba.formats.synchronisation import Recording, Together, join
 from fba.formats.time_codes import parse_time_code, parse_time_of_day
+from fba.parameters import BapTable
 
 if TYPE_CHECKING:
     from fba.capture import FaceCapture
@@ -60,34 +63,22 @@ class OffsetType(click.ParamType[Moment]):
         return Moment(text, seconds)
 
 
-@dataclass(frozen=True)
-class Sync:
-    """How two recordings go together: `--sync`, `--offset` and `--trim`."""
+@dataclass(frozen=True, kw_only=True)
+class SyncOptions:
+    """How two recordings go together."""
 
-    sync: str | None
-    offset: Moment | None
-    trim: bool
-
-
-def sync_options(command: Decorated) -> Decorated:
-    """Add the options that say how two recordings go together."""
-    sync = click.option(
-        "--sync",
-        type=click.Choice(SYNCS),
+    sync: Sync | None = option(
         help="A face and a body: by the times of day at which they were recorded, or both from the start on; "
-        "default: time codes where both have them.",
+        "default: time codes where both have them."
     )
-    offset = click.option(
-        "--offset",
+    offset: Moment | None = option(
         type=OffsetType(),
         metavar="SECONDS|HH:MM:SS:FF",
         help="When the second input begins: seconds after the first, or the time code of its first frame.",
     )
-    trim = click.option(
-        "--trim", is_flag=True, help="Leave out what only one of the two inputs covers; else it is kept."
+    trim: bool = option(
+        default=False, help="Leave out what only one of the two inputs covers; else it is kept."
     )
-    decorated: Any = sync(offset(trim(command)))
-    return decorated  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +97,7 @@ class Inputs:
     is_resampled: bool
 
     @property
-    def tables(self) -> tuple[str, ...]:
+    def tables(self) -> tuple[BapTable, ...]:
         """Tables of BAP steps, of the streams among the inputs."""
         return tuple(one.table for one in self.files if one.table is not None)
 
@@ -163,11 +154,11 @@ def read_inputs(
     reading: Reading,
     *,
     capture: Mapping[str, object],
-    sync: Sync,
-    fps: Fraction | None,
+    sync: SyncOptions,
+    rate: Fraction | None,
     name: str | None,
 ) -> Inputs:
-    """Return face and body of one or two files as one animation. capture, fps, name: see `read_file`.
+    """Return face and body of one or two files as one animation. capture, rate, name: see `read_file`.
 
     Raises click.UsageError for two faces, two bodies, and rates that differ where nothing was captured.
     """
@@ -177,7 +168,7 @@ def read_inputs(
     faces: list[FaceCapture | None] = []
     with Progress("reading", len(files)) as step:
         for path in files:
-            read.append(read_file(path, reading, fps=fps, name=name, capture=capture))
+            read.append(read_file(path, reading, rate=rate, name=name, capture=capture))
             animation = read[-1].animation
             step.advance()
             if not len(animation):
@@ -208,7 +199,7 @@ def read_inputs(
         )
     except OptionError as error:
         raise click.UsageError(str(error)) from error
-    resampled = any(rate != together.animation.rate for rate in rates)
+    resampled = any(one != together.animation.rate for one in rates)
     return Inputs(together.animation, together.start, together, tuple(read), resampled)
 
 
@@ -259,7 +250,7 @@ def _time_of_day(offset: Moment, first: FaceCapture | None) -> float:
     return seconds
 
 
-def _check_sync(files: tuple[Path, ...], given: Sync) -> None:
+def _check_sync(files: tuple[Path, ...], given: SyncOptions) -> None:
     """Raise click.UsageError for options that contradict each other or the number of files."""
     sync, offset = given.sync, given.offset
     typed = [f"--{name}" for name in ("sync", "offset", "trim") if getattr(given, name)]

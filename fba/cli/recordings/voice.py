@@ -11,8 +11,7 @@ import click
 
 from fba.animation import Animation
 from fba.cli import options
-from fba.cli.command import Decorated
-from fba.cli.inputs import ExistingPath
+from fba.cli.option_fields import option
 from fba.cli.outputs import STANDARD, Output, Outputs
 from fba.cli.printing import clock_text, seconds_text
 from fba.errors import FormatError
@@ -38,10 +37,20 @@ class Voice:
 
 @dataclass(frozen=True)
 class VoiceOptions:
-    """The sound beside the stream. audio_offset: seconds from the first frame to the sound's start."""
+    """The sound beside the stream."""
 
-    audio: Path | None
-    audio_offset: float | None
+    audio: Path | None = option(
+        type=options.FILE,
+        metavar="FILE",
+        help="A sound that was recorded with the capture: the part that goes with the stream is written "
+        "beside it, OUT.wav, where fba play and fba render find it.",
+    )
+    audio_offset: float | None = option(
+        type=options.MomentType(),
+        metavar="SECONDS",
+        help="When the sound begins, after the first frame; default: by time codes where both have them, "
+        "else 0.",
+    )
 
     def check(self, output: Path) -> list[Output]:
         """Return the WAV file that will be written, or nothing; click.UsageError where it cannot be."""
@@ -58,26 +67,6 @@ class VoiceOptions:
                 "on, or give the stream another name"
             )
         return [Output("--audio", target)]
-
-
-def audio_options(command: Decorated) -> Decorated:
-    """Add the options that put a sound beside the stream."""
-    audio = click.option(
-        "--audio",
-        type=ExistingPath(dir_okay=False),
-        metavar="FILE",
-        help="A sound that was recorded with the capture: the part that goes with the stream is written "
-        "beside it, OUT.wav, where fba play and fba render find it.",
-    )
-    offset = click.option(
-        "--audio-offset",
-        type=options.MomentType(),
-        metavar="SECONDS",
-        help="When the sound begins, after the first frame; default: by time codes where both have them, "
-        "else 0.",
-    )
-    decorated: Any = audio(offset(command))
-    return decorated  # type: ignore[no-any-return]
 
 
 def place_voice(given: VoiceOptions, taken: Inputs, target: Path) -> Voice:

@@ -12,8 +12,16 @@ import click
 from fba.cli import options
 from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.command import Command, examples
-from fba.cli.inputs import EXISTING, ExistingPath, Reading, read_input
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.inputs import Reading, read_input
+from fba.cli.option_fields import group, option, with_options
+from fba.cli.outputs import (
+    STANDARD,
+    Output,
+    Outputs,
+    display_name,
+    further_output_option,
+    output_option,
+)
 from fba.cli.printing import Progress
 from fba.errors import FbaError
 
@@ -22,21 +30,32 @@ if TYPE_CHECKING:
     from fba.face.learning import LearntFit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Target:
     """Where the model goes, and its table by itself."""
 
-    output: Path
-    fit: Path | None
-    no_clobber: bool
+    output: Path = output_option("OUT.glb", "The model with the table; - for standard output.", required=True)
+    no_clobber: bool = options.no_clobber_option
+    fit: Path | None = further_output_option(
+        "FIT.json", "Write the table by itself, too: the fields of the standard's node FIT."
+    )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Goal:
     """How many FAPs to send: a count, or as many as keep within a tolerance in metres."""
 
-    count: int | None
-    tolerance: float | None
+    count: int | None = option(
+        "--faps",
+        type=click.IntRange(1, 66),
+        metavar="N",
+        help="FAPs to send, those of the head's rotation among them. Default: 10.",
+    )
+    tolerance: float | None = option(
+        type=LengthType(),
+        metavar="1mm",
+        help="Send as many FAPs as it takes to keep every vertex this near in 99 % of the frames held out.",
+    )
 
 
 @click.command(
@@ -49,40 +68,17 @@ class _Goal:
         "fba model learn-fit talk.fba --tolerance 1mm -o ada.glb",
     ),
 )
-@click.argument("streams", metavar="STREAM...", nargs=-1, required=True, type=EXISTING)
-@click.option(
-    "-o", "--output", metavar="OUT.glb", required=True, type=OutputType(),
-    help="The model with the table; - for standard output.",
-)  # fmt: skip
-@options.no_clobber_option
-@click.option(
-    "--model", metavar="FILE", type=ExistingPath(),
-    help="Model that gets the table, in place of one that it has. Default: the built-in head.",
-)  # fmt: skip
-@click.option(
-    "--faps", "count", type=click.IntRange(1, 66), metavar="N",
-    help="FAPs to send, those of the head's rotation among them. Default: 10.",
-)  # fmt: skip
-@click.option(
-    "--tolerance", type=LengthType(), metavar="1mm",
-    help="Send as many FAPs as it takes to keep every vertex this near in 99 % of the frames held out.",
-)  # fmt: skip
-@click.option(
-    "--fit", metavar="FIT.json", type=OutputType(),
-    help="Write the table by itself, too: the fields of the standard's node FIT.",
-)  # fmt: skip
-@options.from_option
-@options.salvage_option
-@options.limit_option
-@options.json_option
-@options.gather(target=_Target, goal=_Goal, reading=Reading)
+@click.argument("streams", metavar="STREAM...", nargs=-1, required=True, type=options.EXISTING)
+@with_options
 def command(
     streams: tuple[Path, ...],
     target: _Target,
-    model: Path | None,
     goal: _Goal,
-    reading: Reading,
-    as_json: bool,
+    model: Path | None = options.model_option(
+        "Model that gets the table, in place of one that it has. Default: the built-in head."
+    ),
+    reading: Reading = group("format", "salvage", "limit"),
+    as_json: bool = options.json_option,
 ) -> None:
     """Learn an interpolation table (FIT) from streams of a performer, and store it with a face model.
 

@@ -12,7 +12,7 @@ from fba.codec._plane.arithmetic import STRIDE
 from fba.codec._plane.header_loops import begin_models
 from fba.codec._plane.loops import State
 from fba.codec.settings import RANGE_UNIT, PartSettings
-from fba.parameters import EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, baps, faps
+from fba.parameters import EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, BapTable, baps, faps
 
 UNDEFINED = -1
 """Limit of a parameter without a default range, for which none was sent."""
@@ -49,7 +49,7 @@ class Models:
     step, last = _row(loops.STEP), _row(loops.LAST)
     lowest, highest = _row(loops.LOWEST), _row(loops.HIGHEST)
 
-    def __init__(self, bap_table: str = "iso") -> None:
+    def __init__(self, bap_table: BapTable = "iso") -> None:
         self.bap_table = bap_table
         self.limits = default_limits().copy()
         numbers = np.zeros((loops.NUMBERS, slots.SLOTS), dtype=np.int64)

@@ -8,8 +8,9 @@ import numpy as np
 
 from fba.arrays import Int64, Integer
 from fba.codec._plane import slots
-from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT
-from fba.parameters import INTENSITY_MAX, bap_steps, fap_steps
+from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
+from fba.encoder_options import QUANT_MAX
+from fba.parameters import INTENSITY_MAX, BapTable, bap_steps, fap_steps
 
 BAP_PREDICTIVE_SCALE = (
     0, 1, 2, 3, 5, 7, 9, 11, 14, 17, 20, 23, 27, 31, 35, 39, 43, 47, 52, 57, 62, 67, 72, 77, 82, 88, 94, 100,
@@ -27,7 +28,7 @@ def scale(part: int, quant: int) -> int:
 
 
 @cache
-def steps(part: int, quant: int, bap_table: str) -> Int64:
+def steps(part: int, quant: int, bap_table: BapTable) -> Int64:
     """Return the steps of a part, int64 (73,) or (296,) in slot order; 1 for unquantised values."""
     factor = scale(part, quant)
     if part == slots.BODY_BIT:
@@ -47,7 +48,7 @@ def levels(values: Integer, step: Int64) -> Int64:
     return quantised
 
 
-def largest(part: int, slot: int, quant: int, bap_table: str) -> int:
+def largest(part: int, slot: int, quant: int, bap_table: BapTable) -> int:
     """Return the largest value that an I plane can carry in a slot with this quantiser."""
     step = int(steps(part, quant, bap_table)[slot if part == slots.FACE_BIT else slot - slots.BAPS.start])
     limit = RANGE_CODE_MAX * RANGE_UNIT // scale(part, quant)

@@ -14,6 +14,7 @@ from fba.codec._plane.coder_state import Models
 from fba.codec._plane.loops import Layout, Layouts
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, TimeCode
 from fba.errors import BitstreamError, UnsupportedError
+from fba.parameters import BapTable
 
 _RUN = 512
 """Largest number of planes that a call of the compiled loop decodes."""
@@ -96,7 +97,7 @@ class PlaneReader:
     Bits in errors count from the start of the data that was passed in.
     """
 
-    def __init__(self, bap_table: str = "iso") -> None:
+    def __init__(self, bap_table: BapTable = "iso") -> None:
         self._models = Models(bap_table)
         self._settings: dict[int, PartSettings] = {}
         self._doubtful_ranges = 0  # parts, added up, whose ranges may have been replaced in a lost plane
@@ -111,7 +112,7 @@ class PlaneReader:
         """The table of BAP steps."""
         return self._models.bap_table
 
-    def begin_object(self, bap_table: str) -> None:
+    def begin_object(self, bap_table: BapTable) -> None:
         """Reset all state, including ranges. bap_table: of the BAP steps in this object."""
         self._models.bap_table = bap_table
         self._models.begin_object()

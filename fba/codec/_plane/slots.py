@@ -14,6 +14,7 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Bool, Float64, Int32, Int64
+from fba.encoder_options import EncoderOptions
 from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, bap_groups, baps, faps
 
 VISEME = slice(0, 3)
@@ -54,6 +55,11 @@ def body_order() -> Int64:
 def part_of(slot: int) -> int:
     """Return the bit of fba_object_mask for the part that a slot belongs to."""
     return FACE_BIT if slot < FLAGS.stop else BODY_BIT
+
+
+def quantiser_of(options: EncoderOptions, part: int) -> int:
+    """Return the quantiser of a part: `FACE_BIT` or `BODY_BIT`."""
+    return options.fap_quant if part == FACE_BIT else options.bap_quant
 
 
 def label(slot: int) -> str:

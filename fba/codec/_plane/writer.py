@@ -11,6 +11,7 @@ from fba.codec._plane.bits import BitWriter
 from fba.codec._plane.coder_state import Models
 from fba.codec._plane.loops import Layout
 from fba.codec.settings import PartSettings, PlaneSettings
+from fba.parameters import BapTable
 
 _SEGMENT_BITS = 20
 """Most bits that a segment takes besides its symbols."""
@@ -36,7 +37,7 @@ class PlaneWriter:
     plane begins, or the plane start code before it; 0 in the first, where the object begins.
     """
 
-    def __init__(self, bap_table: str = "iso") -> None:
+    def __init__(self, bap_table: BapTable = "iso") -> None:
         self.models = Models(bap_table)
         self.planes = 0
         self.taken = 0

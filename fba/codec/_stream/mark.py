@@ -20,7 +20,7 @@ from zlib import crc32
 from fba.codec._plane import syntax
 from fba.codec._stream.checksums import CHECK_BYTES, check_of
 from fba.errors import FbaWarning
-from fba.parameters import BAP_STEP_TABLES
+from fba.parameters import BAP_STEP_TABLES, BapTable
 
 USER_DATA = 0xB2
 """Last byte of user_data_start_code."""
@@ -49,7 +49,7 @@ MAX_MARK_BYTES = 64
 class Mark:
     """A mark. table: of the object before it, which begins at byte `begin`. end: byte behind its words."""
 
-    table: str
+    table: BapTable
     begin: int
     end: int
 
@@ -62,12 +62,12 @@ class MarkContent:
     reliable. problem: a fault of the mark, or "".
     """
 
-    table: str | None = None
+    table: BapTable | None = None
     checks: bytes | None = None
     problem: str = ""
 
 
-def write_mark(table: str | None, checks: bytes | None = None) -> bytes:
+def write_mark(table: BapTable | None, checks: bytes | None = None) -> bytes:
     """Return the mark to be put behind a stream.
 
     table: of BAP steps, or None. checks: of its I periods, four bytes each, or None.
@@ -82,7 +82,7 @@ def write_mark(table: str | None, checks: bytes | None = None) -> bytes:
     return START + _NAME + words if words else b""
 
 
-def write_opening(table: str) -> bytes:
+def write_opening(table: BapTable) -> bytes:
     """Return the bytes before an object that name its table to live readers: 35 or 32.
 
     The headers of a visual object sequence and of a visual object, with user data between them (ISO/IEC
@@ -169,7 +169,7 @@ def find_marks(data: bytes | bytearray | memoryview) -> tuple[Mark, ...]:
     return tuple(marks)
 
 
-def marked_table(data: bytes | bytearray | memoryview) -> str | None:
+def marked_table(data: bytes | bytearray | memoryview) -> BapTable | None:
     """Return the table that the marks in a stream name; None without a mark, or where they differ."""
     tables = {mark.table for mark in find_marks(data)}
     for opening in _BEFORE_OBJECT.finditer(bytes(data)):

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from fba.codec._plane import syntax
 from fba.codec._stream.mark import SEQUENCE, USER_DATA, Mark, read_mark
-from fba.parameters import BAP_STEP_TABLES
+from fba.parameters import BAP_STEP_TABLES, BapTable
 
-_DEFAULT_TABLE = BAP_STEP_TABLES[0]
+_DEFAULT_TABLE: BapTable = BAP_STEP_TABLES[0]
 
 
 class ObjectBorders:
@@ -24,18 +24,18 @@ class ObjectBorders:
     what the mark behind it lists, see `checksums`; None without a list.
     """
 
-    def __init__(self, bap_steps: str | None, marks: Sequence[Mark]) -> None:
+    def __init__(self, bap_steps: BapTable | None, marks: Sequence[Mark]) -> None:
         self._bap_steps = bap_steps
         self._marks = marks
         self._in_user_data = False  # whether user data stand at `end`, up to the next start code
         self._in_headers = False  # whether headers of a sequence have begun, and no object in it
-        self._before: str | None = None  # the table that user data in those headers name
+        self._before: BapTable | None = None  # the table that user data in those headers name
         self.count = 0
-        self.table = bap_steps or _DEFAULT_TABLE
+        self.table: BapTable = bap_steps or _DEFAULT_TABLE
         self.has_body = False
         self.end_code: int | None = None
         self.begin = self.end = 0
-        self.mark: str | None = None
+        self.mark: BapTable | None = None
         self.checks: bytes | None = None
 
     @property
@@ -50,8 +50,8 @@ class ObjectBorders:
 
     def begin_object(self, byte: int) -> None:
         """Begin another object, at this byte of the stream."""
-        marked = (mark.table for mark in self._marks if mark.begin <= byte < mark.end)
-        self.table = self._bap_steps or self._before or next(marked, _DEFAULT_TABLE)
+        marked = next((mark.table for mark in self._marks if mark.begin <= byte < mark.end), None)
+        self.table = self._bap_steps or self._before or marked or _DEFAULT_TABLE
         self.count += 1
         self.has_body = False
         self.end_code = None
@@ -97,7 +97,7 @@ class ObjectBorders:
         difference = self._difference("behind its end")
         return problems + ([difference] if difference else [])
 
-    def _read_before(self, table: str | None) -> list[str]:
+    def _read_before(self, table: BapTable | None) -> list[str]:
         """Take the table that user data before an object name; the first counts."""
         if self._before is None or table in (None, self._before):
             self._before = self._before or table

@@ -1,6 +1,6 @@
 """Fitting a face model to a person's feature points.
 
-model = fba.face.calibration.fit(FaceModel.default(), read_fdp("person.fdp"))
+model = fba.face.calibration.fit(FaceModel.default(), read_fdp_points("person.fdp"))
 """
 
 from fba.face.calibration._align import UNITS

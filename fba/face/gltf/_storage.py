@@ -29,7 +29,7 @@ def load(path: Path, limits: Limits = DEFAULT_LIMITS) -> FaceModel:
     return read_model(open_document(path, limits))
 
 
-def save(model: FaceModel, path: Path) -> None:
+def save(path: Path, model: FaceModel) -> None:
     """Write a face model as .glb, atomically; loading it gives an equal model.
 
     Any glTF viewer shows its neutral face, with a morph target for every FAP that has tables. Raises

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fba.choices import UpAxis
 from fba.errors import ModelError, OptionError
 from fba.face.importers._sniffing import KINDS, sniff
 from fba.face.model import FaceModel
@@ -24,7 +25,7 @@ def import_model(
     kind: str | None = None,
     points: object = None,
     unit: float | None = None,
-    up: str = "y",
+    up: UpAxis = "y",
     kinds: Mapping[str, str] | None = None,
     name: str | None = None,
     limits: Limits = DEFAULT_LIMITS,

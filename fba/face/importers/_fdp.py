@@ -13,7 +13,7 @@ from fba.face.importers._mesh import import_mesh
 from fba.face.importers.assembly._polygon_parts import make_piece
 from fba.face.importers.assembly.model import ImportOptions, finish_import
 from fba.face.importers.points._fdp_data import Fdp
-from fba.face.importers.points.fdp import load_fdp
+from fba.face.importers.points.fdp import read_fdp
 from fba.face.importers.points.points_file import GivenPoints
 from fba.face.importers.points.xface import NEUTRAL, xface_points
 from fba.face.model import FaceModel
@@ -36,7 +36,7 @@ def import_fdp(options: ImportOptions) -> FaceModel:
 
     Raises ModelError where the mesh is missing.
     """
-    fdp = load_fdp(options.path)
+    fdp = read_fdp(options.path)
     if fdp.format == "xface":
         return _import_xface(fdp, options)
     path = Path(options.path)

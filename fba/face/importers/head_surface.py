@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fba.arrays import Float64, Int32
+from fba.choices import UpAxis
 from fba.errors import ModelError, OptionError
 from fba.face.authoring.surface.binding import bind_points, face_size, separate_lips
 from fba.face.authoring.surface.landmarks import weld_skin
@@ -53,7 +54,7 @@ class HeadSurface:
     part_of: Int32
     given: GivenPoints = field(default_factory=lambda: GivenPoints(np.full((len(names()), 3), np.nan)))
     origin: str = ""
-    up: str = "y"
+    up: UpAxis = "y"
 
     @property
     def upright(self) -> Float64:
@@ -66,7 +67,7 @@ def read_head_surface(
     *,
     kind: str | None = None,
     points: object = None,
-    up: str = "y",
+    up: UpAxis = "y",
     kinds: Mapping[str, str] | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> HeadSurface:

@@ -6,7 +6,7 @@ degrees: no angle is computed anew, none flips, and they are rounded only to `DI
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32, Int64
 from fba.atomic import atomic
 from fba.capture.skeleton import MAX_FRAMES
+from fba.choices import Axes
 from fba.errors import FormatError, OptionError, Remedy
 from fba.parameters import BAP_COUNT
 from fba.source import Path
@@ -44,9 +45,9 @@ def write(
     path: Path,
     animation: Animation,
     *,
-    joints: str = "all",
+    joints: Literal["all", "moving"] = "all",
     skeleton: Skeleton | None = None,
-    axes: str = "iso",
+    axes: Axes = "iso",
     unit: float = CENTIMETRES,
 ) -> None:
     """Write the body track as BVH, at the animation's rate; skipped frames are filled in.

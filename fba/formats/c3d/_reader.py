@@ -36,11 +36,11 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
     """Return the markers of a C3D file, without what programs computed from them (angles, forces).
 
-    fps: the rate of a file that has none.
+    source_rate: the rate of a file that has none.
 
     Raises FormatError for a file that is damaged or holds no markers; LimitError. Warns (FbaWarning) of
     a file that is cut short.
@@ -87,7 +87,9 @@ def read_markers(
     if not kept:
         raise FormatError(f"holds no markers, only {points} computed values, such as {labels[0]}", path=path)
     unit, factors = _units(parameters, points)
-    rate = file_rate(float(numbers.floats(data, 1, 20)[0]) or parameters.number("POINT:RATE"), fps, path)
+    rate = file_rate(
+        float(numbers.floats(data, 1, 20)[0]) or parameters.number("POINT:RATE"), source_rate, path
+    )
     values *= factors[:, None]
     try:
         return MarkerMotion(

@@ -15,7 +15,8 @@ import numpy as np
 
 from fba.arrays import Bool, UInt8
 from fba.codec import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
-from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT
+from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
+from fba.encoder_options import QUANT_MAX
 from fba.errors import FbaWarning
 from fba.formats.epf._tags import BODY, FACE, PARTS, TAGS, Part
 from fba.formats.text._lines import Lines, content, decoded

@@ -58,38 +58,46 @@ def tracked_rows(table: Table, column: dict[str, int]) -> Bool:
 
 
 def row_times(
-    table: Table, rows: Int64, seconds: int | None, frame: int | None, fps: Fraction | int | str | None
+    table: Table,
+    rows: Int64,
+    seconds: int | None,
+    frame: int | None,
+    source_rate: Fraction | int | str | None,
 ) -> tuple[Float64, Fraction, list[str]]:
     """Return times (R,) of rows from the first on, the nominal rate, and what was odd about them.
 
-    seconds, frame: numbers of columns. fps: frames in a second, where no column has seconds, or where these
-    are those of pictures. Raises FormatError.
+    seconds, frame: numbers of columns. source_rate: frames in a second, where no column has seconds, or where
+    these are those of pictures. Raises FormatError.
     """
     if len(rows) == 1:
-        return np.zeros(1), Fraction(fps or USUAL), []
+        return np.zeros(1), Fraction(source_rate or USUAL), []
     findings = []
     if seconds is not None and ":" in table.rows[rows[0]][seconds]:
-        if fps is None and frame is not None:
-            fps = _film_rate(table, rows, seconds, frame)
-            if fps is not None:
-                findings.append(f"its whole seconds are those of a film of {float(fps):g} frames in a second")
+        if source_rate is None and frame is not None:
+            source_rate = _film_rate(table, rows, seconds, frame)
+            if source_rate is not None:
+                findings.append(
+                    f"its whole seconds are those of a film of {float(source_rate):g} frames in a second"
+                )
         seconds = None  # py-feat's "00:03" is too coarse to be the time of a frame
     counted = seconds is not None or frame is not None
     if seconds is not None and _are_pictures(table, seconds):
-        if fps is None:
-            fps = USUAL
+        if source_rate is None:
+            source_rate = USUAL
             findings.append(
                 f"the times are those of pictures whose rate nobody knew; taken as {USUAL} in a second"
             )
         seconds = None
     if seconds is not None:
         times = table.numbers([seconds])[rows, 0]
-    elif fps is not None:
+    elif source_rate is not None:
         frames = np.arange(len(table.rows), dtype=np.float64)
-        times = (frames if frame is None else table.numbers([frame])[:, 0])[rows] / float(Fraction(fps))
+        times = (frames if frame is None else table.numbers([frame])[:, 0])[rows] / float(
+            Fraction(source_rate)
+        )
     else:
         raise FormatError("has no column of times", path=table.path).with_remedies(
-            Remedy("fps", "give the frame rate of the film with {}", "30")
+            Remedy("source_rate", "give the frame rate of the film with {}", "30")
         )
     lines = [table.lines[row] for row in rows.tolist()]
     if np.isnan(times).any():
@@ -98,7 +106,7 @@ def row_times(
     times = times - times[0]
     check_order(times, lines, table.path)
     try:
-        return times, (find_rate(times) if counted else Fraction(fps or USUAL)), findings
+        return times, (find_rate(times) if counted else Fraction(source_rate or USUAL)), findings
     except ModelError as error:
         raise FormatError(error.finding, path=table.path) from error
 

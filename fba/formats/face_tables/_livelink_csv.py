@@ -19,6 +19,7 @@ from fba.arrays import Float64
 from fba.capture import ShapeMotion
 from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_rate
+from fba.choices import Swap
 from fba.errors import FormatError, ModelError, Remedy
 from fba.face.shape_names import arkit_names
 from fba.formats.face_tables._faces import angle_unit
@@ -59,23 +60,23 @@ def sniff(head: bytes, suffix: str) -> bool:
 def read_face(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
-    swap: str = "auto",
+    source_rate: Fraction | int | str | None = None,
+    swap: Swap = "auto",
     limits: Limits = DEFAULT_LIMITS,
 ) -> ShapeMotion:
     """Return weights, head and eyes as they are in a table.
 
-    fps: rows in a second, for a table without times. swap: whether MouthLeft and MouthRight, JawLeft and
-    JawRight change places, as Live Link Face writes them the wrong way round: "yes", "no", or "auto", which
-    looks at how they go with lop-sided smiles. `ShapeMotion.findings` say what was done. Raises FormatError,
-    LimitError, OptionError.
+    source_rate: rows in a second, for a table without times. swap: whether MouthLeft and MouthRight, JawLeft
+    and JawRight change places, as Live Link Face writes them the wrong way round: "yes", "no", or "auto",
+    which looks at how they go with lop-sided smiles. `ShapeMotion.findings` say what was done. Raises
+    FormatError, LimitError, OptionError.
     """
     table = read_table(path, limits)
     columns = _find_columns(table)
     shapes = list(columns.shapes)
     weights = table.numbers(list(columns.shapes.values()))
     check_weights(weights, shapes, path, table.lines)
-    times = _read_times(table, fps)
+    times = _read_times(table, source_rate)
     head = eyes = None
     still = []
     unit, odd = angle_unit(table.numbers(columns.head + columns.eyes))
@@ -152,7 +153,7 @@ def _find_columns(table: Table) -> _Columns:
     )
 
 
-def _read_times(table: Table, fps: Fraction | int | str | None) -> _Times:
+def _read_times(table: Table, source_rate: Fraction | int | str | None) -> _Times:
     keys = [key_of(name) for name in table.names]
 
     def column(names: tuple[str, ...]) -> int | None:
@@ -160,11 +161,12 @@ def _read_times(table: Table, fps: Fraction | int | str | None) -> _Times:
 
     coded, timed, counted = column(TIME_CODE), column(SECONDS), column(FRAMES)
     if coded is not None:
-        seconds, rate, start = read_time_codes(table.column(coded), table.lines, table.path)
+        codes = read_time_codes(table.column(coded), table.lines, table.path)
+        seconds, rate = codes.seconds, codes.rate
         check_order(seconds, table.lines, table.path)
         if len(seconds) > 1 and float(np.median(np.diff(seconds))) * rate > SPARSE:
             rate = find_rate(seconds)  # fewer frames than the time codes count
-        return _Times(seconds, rate, start, True)
+        return _Times(seconds, rate, codes.start, True)
     if timed is not None:
         read = table.numbers([timed])[:, 0]
         if np.isnan(read).any():
@@ -179,11 +181,11 @@ def _read_times(table: Table, fps: Fraction | int | str | None) -> _Times:
             return _Times(seconds, find_rate(seconds), None, False)
         except ModelError as error:
             raise FormatError(error.finding, path=table.path) from error
-    if fps is None:
+    if source_rate is None:
         raise FormatError(
             "has no column of times: none is called Timecode, time or timestamp", path=table.path
-        ).with_remedies(Remedy("fps", "give the rate of its rows with {}", "30"))
-    rate = Fraction(fps)
+        ).with_remedies(Remedy("source_rate", "give the rate of its rows with {}", "30"))
+    rate = Fraction(source_rate)
     rows = np.arange(len(table.rows), dtype=np.float64)
     if counted is not None:
         rows = table.numbers([counted])[:, 0]

@@ -48,14 +48,14 @@ def sniff(head: bytes, suffix: str) -> bool:
 def read_face(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> ActionUnitMotion:
     """Return action units, head and eyes as they are in a table.
 
-    fps: frames in a second, for tables without times. face: the `face_id` of the face to read, where there
-    are several. Raises FormatError, LimitError.
+    source_rate: frames in a second, for tables without times. face: the `face_id` of the face to read, where
+    there are several. Raises FormatError, LimitError.
     """
     table = read_table(path, limits)
     column = number_columns(table)
@@ -69,7 +69,7 @@ def read_face(
     if set(columns) == set(VERSION_3):
         columns = {VERSION_3[unit]: number for unit, number in columns.items()}
         findings.append("AU01_r to AU08_r are taken as OpenFace 3's: action units 1, 6, 12, 15, 17, 2, 9, 10")
-    rows = read_unit_rows(table, columns, LAYOUT, face, fps)
+    rows = read_unit_rows(table, columns, LAYOUT, face, source_rate)
     turns, odd = _turns(table, column)
     turns = None if turns is None else turns[rows.numbers]
     findings += odd

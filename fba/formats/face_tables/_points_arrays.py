@@ -46,7 +46,7 @@ def sniff(head: bytes, suffix: str) -> bool:
 def read_points(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> PointMotion:
@@ -54,7 +54,7 @@ def read_points(
     arrays = read_arrays(path, limits, single=SINGLE)
     positions, odd = _choose(arrays, path, face)
     limits.check_frames(len(positions), f"{path}: the recording")
-    times, rate = _times(arrays, len(positions), fps, path)
+    times, rate = _times(arrays, len(positions), source_rate, path)
     width, height = (_number(arrays, name) for name in ("width", "height"))
     return build_points(
         positions, times, rate, path=path, name=FilePath(path).stem,
@@ -109,7 +109,7 @@ def _as_points(array: Any) -> Float64 | None:
 
 
 def _times(
-    arrays: dict[str, Any], count: int, fps: Fraction | int | str | None, path: Path
+    arrays: dict[str, Any], count: int, source_rate: Fraction | int | str | None, path: Path
 ) -> tuple[Float64, Fraction]:
     """Return times (T,) in seconds from the first frame, and the nominal rate."""
     stored = next(
@@ -123,11 +123,13 @@ def _times(
         except ModelError as error:
             raise FormatError(error.finding, path=path) from error
     rate = next((found for name in RATES if (found := _number(arrays, name))), None)
-    if fps is None and rate is None and count > 1:
+    if source_rate is None and rate is None and count > 1:
         raise FormatError("has no times", path=path).with_remedies(
-            Remedy("fps", "give the frame rate of the film with {}", "30")
+            Remedy("source_rate", "give the frame rate of the film with {}", "30")
         )
-    chosen = Fraction(fps) if fps is not None else Fraction(rate or 30).limit_denominator(1001)
+    chosen = (
+        Fraction(source_rate) if source_rate is not None else Fraction(rate or 30).limit_denominator(1001)
+    )
     return np.arange(count) / float(chosen), chosen
 
 

@@ -71,14 +71,14 @@ def sniff(head: bytes, suffix: str) -> bool:
 def read_points(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> PointMotion:
     """Return the points as they are in a table.
 
-    fps: frames in a second, for tables without times. face: the name or number of the face to read, where
-    there are several. Raises FormatError, LimitError.
+    source_rate: frames in a second, for tables without times. face: the name or number of the face to read,
+    where there are several. Raises FormatError, LimitError.
     """
     table = _with_header(read_table(path, limits))
     column = {name: number for number, name in reversed(list(enumerate(table.names)))}
@@ -92,7 +92,7 @@ def read_points(
         positions, first = _read_wide(table, rows), rows
     seconds = next((by_word[name] for name in (*TIMES, *MILLISECONDS) if name in by_word), None)
     frame = next((by_word[name] for name in FRAMES if name in by_word), None)
-    times, rate, odd = row_times(table, first, seconds, frame, fps)
+    times, rate, odd = row_times(table, first, seconds, frame, source_rate)
     metric = long is None and _is_metric(table.names)
     positions[~tracked_rows(table, column)[first]] = np.nan
     return build_points(

@@ -53,7 +53,7 @@ def sniff(head: bytes, suffix: str) -> bool:
 def read_points(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> PointMotion:
@@ -76,11 +76,11 @@ def read_points(
             raise FormatError(f"frame {number} has {one.shape[0]} points, and others {shape[0]}", path=path)
         positions[number, :, : one.shape[1]] = one[:, : shape[1]]
     stated = document.get("fps") if isinstance(document, dict) else None
-    if fps is None and isinstance(stated, int | float) and 0 < stated < 10_000:
-        fps = Fraction(stated).limit_denominator(1001)
-    if fps is None and len(frames) == 1:
-        fps = 30
-    times, rate = frame_times([frame_time(frame) for frame in frames], len(frames), fps, path)
+    if source_rate is None and isinstance(stated, int | float) and 0 < stated < 10_000:
+        source_rate = Fraction(stated).limit_denominator(1001)
+    if source_rate is None and len(frames) == 1:
+        source_rate = 30
+    times, rate = frame_times([frame_time(frame) for frame in frames], len(frames), source_rate, path)
     return build_points(
         positions, times, rate, path=path, name=FilePath(path).stem, aspect=_aspect(document, frames)
     )

@@ -62,15 +62,15 @@ def sniff(head: bytes, suffix: str) -> bool:
 def read_face(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> ShapeMotion | ActionUnitMotion:
     """Return blendshapes as they are in a table; of a table without them, action units.
 
-    fps: frames in a second of the film; without it, the rate of films that fits the table's whole seconds.
-    face: the `Identity` of the face to read, where there are several; without identities, a number from 1 on,
-    in the order of their sizes. Raises FormatError, LimitError.
+    source_rate: frames in a second of the film; without it, the rate of films that fits the table's whole
+    seconds. face: the `Identity` of the face to read, where there are several; without identities, a number
+    from 1 on, in the order of their sizes. Raises FormatError, LimitError.
     """
     table = read_table(path, limits)
     column = number_columns(table)
@@ -78,8 +78,8 @@ def read_face(
     columns = {int(found[1]): column[name] for name in column if (found := UNIT.fullmatch(name))}
     ids = _identities(table, column)
     if len(shapes) >= MIN_UNITS:
-        return _read_shapes(table, column, shapes, ids, face, fps)
-    rows = read_unit_rows(table, columns, LAYOUT, face, fps, ids)
+        return _read_shapes(table, column, shapes, ids, face, source_rate)
+    rows = read_unit_rows(table, columns, LAYOUT, face, source_rate, ids)
     head, how = _find_head(table, rows.numbers, rows.times, rows.rate)
     findings = rows.findings + find_missing(rows.intensities, rows.times, rows.rate)
     findings.append(
@@ -101,11 +101,13 @@ def _read_shapes(
     shapes: dict[str, int],
     ids: Sequence[str],
     face: str | None,
-    fps: Fraction | int | str | None,
+    source_rate: Fraction | int | str | None,
 ) -> ShapeMotion:
     """Return the blendshapes of one face. shapes: ARKit's name -> number of its column."""
     rows = choose_rows(table, ids, face)
-    times, rate, findings = row_times(table, rows, column.get(LAYOUT.seconds), column.get("frame"), fps)
+    times, rate, findings = row_times(
+        table, rows, column.get(LAYOUT.seconds), column.get("frame"), source_rate
+    )
     weights = table.numbers(list(shapes.values()))[rows]
     check_weights(weights, list(shapes), table.path, [table.lines[row] for row in rows.tolist()])
     head, how = _find_head(table, rows, times, rate)

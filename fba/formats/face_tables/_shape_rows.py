@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from typing import get_args
 
 import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.capture import ShapeMotion
 from fba.capture.sampling import find_gaps
+from fba.choices import Swap
 from fba.errors import OptionError
 from fba.face.shape_names import arkit_names
 from fba.formats.face_tables._tables import named
@@ -18,7 +20,7 @@ from fba.formats.face_tables.shape_weights import check_weights, shape_of
 
 __all__ = ["check_weights", "find_lacks", "find_swap", "shape_of"]
 
-SWAPS = ("auto", "yes", "no")
+SWAPS: tuple[Swap, ...] = get_args(Swap)
 SWAPPED = (("mouthLeft", "mouthRight"), ("jawLeft", "jawRight"))
 """Labels that Live Link Face's tables have the wrong way round."""
 TELLING = 0.3
@@ -49,7 +51,7 @@ def find_lacks(names: Sequence[str], weights: Float64, times: Float64, rate: Fra
     return findings
 
 
-def find_swap(motion: ShapeMotion, swap: str, *, expected: bool) -> ShapeMotion:
+def find_swap(motion: ShapeMotion, swap: Swap, *, expected: bool) -> ShapeMotion:
     """Return a capture with the labels of `SWAPPED` the right way round; its findings say what was done.
 
     swap: "yes", "no", or "auto": they are changed where mouths go to the side on which nobody smiles. Where

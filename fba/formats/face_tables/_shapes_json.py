@@ -53,18 +53,18 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_face(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> ShapeMotion:
     """Return weights as they are in the file.
 
-    fps: frames in a second, for files without times. A frame without scores is one without a face. Raises
-    FormatError, LimitError.
+    source_rate: frames in a second, for files without times. A frame without scores is one without a face.
+    Raises FormatError, LimitError.
     """
     document = read_json(path, limits)
     names, weights, stamps, strange = _beat(document, path) or _frames(document, path)
     limits.check_frames(len(weights), f"{path}: the recording")
     check_weights(weights, names, path)
-    times, rate = frame_times(stamps, len(weights), fps, path)
+    times, rate = frame_times(stamps, len(weights), source_rate, path)
     odd = [f"names that mean nothing here are left out: {named(strange)}"] if strange else []
     return ShapeMotion(
         tuple(names), weights, times, rate, name=FilePath(path).stem,
@@ -213,15 +213,15 @@ def frame_time(frame: Any) -> Any:
 
 
 def frame_times(
-    stamps: list[Any], count: int, fps: Fraction | int | str | None, path: Path
+    stamps: list[Any], count: int, source_rate: Fraction | int | str | None, path: Path
 ) -> tuple[Float64, Fraction]:
     """Return times (T,) in seconds from the first frame, and the nominal rate."""
     if all(stamp is None for stamp in stamps):
-        if fps is None:
+        if source_rate is None:
             raise FormatError("its frames have no times", path=path).with_remedies(
-                Remedy("fps", "give their rate with {}", "30")
+                Remedy("source_rate", "give their rate with {}", "30")
             )
-        return np.arange(count) / float(Fraction(fps)), Fraction(fps)
+        return np.arange(count) / float(Fraction(source_rate)), Fraction(source_rate)
     times = np.array([_number(stamp, number, path) for number, stamp in enumerate(stamps)])
     if np.isnan(times).any():
         raise FormatError(f"frame {int(np.flatnonzero(np.isnan(times))[0])} has no time", path=path)

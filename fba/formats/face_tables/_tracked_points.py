@@ -22,18 +22,18 @@ def sniff(head: bytes, suffix: str) -> bool:
 def read_points(
     path: Path,
     *,
-    fps: Fraction | int | str | None = None,
+    source_rate: Fraction | int | str | None = None,
     face: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> PointMotion:
     """Return the points as they are in a file.
 
-    fps: frames in a second, for files without times. face: the name or number of the face to read, where
-    there are several. Raises FormatError, LimitError.
+    source_rate: frames in a second, for files without times. face: the name or number of the face to read,
+    where there are several. Raises FormatError, LimitError.
     """
     head = read_head(path)
     if points_arrays.sniff(head, ""):
-        return points_arrays.read_points(path, fps=fps, face=face, limits=limits)
+        return points_arrays.read_points(path, source_rate=source_rate, face=face, limits=limits)
     if points_json.sniff(head, ""):
-        return points_json.read_points(path, fps=fps, face=face, limits=limits)
-    return points_csv.read_points(path, fps=fps, face=face, limits=limits)
+        return points_json.read_points(path, source_rate=source_rate, face=face, limits=limits)
+    return points_csv.read_points(path, source_rate=source_rate, face=face, limits=limits)

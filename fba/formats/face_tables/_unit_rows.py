@@ -55,19 +55,21 @@ def read_unit_rows(
     columns: Mapping[int, int],
     layout: UnitLayout,
     face: str | None,
-    fps: Fraction | int | str | None,
+    source_rate: Fraction | int | str | None,
     ids: Sequence[str] | None = None,
 ) -> UnitRows:
     """Return action units of one face. columns: action unit -> number of its column.
 
-    face: which one, where there are several. fps: frames in a second, for tables without times. ids: whose
-    face each row is of; None for what the column of faces says. Raises FormatError.
+    face: which one, where there are several. source_rate: frames in a second, for tables without times. ids:
+    whose face each row is of; None for what the column of faces says. Raises FormatError.
     """
     column = number_columns(table)
     if ids is None:
         ids = table.column(column[layout.face]) if layout.face in column else [""] * len(table.rows)
     rows = choose_rows(table, ids, face)
-    times, rate, findings = row_times(table, rows, column.get(layout.seconds), column.get("frame"), fps)
+    times, rate, findings = row_times(
+        table, rows, column.get(layout.seconds), column.get("frame"), source_rate
+    )
     units = sorted(columns)
     strengths = table.numbers([columns[unit] for unit in units])[rows]
     if np.nanmax(np.abs(strengths), initial=0.0) > layout.largest:

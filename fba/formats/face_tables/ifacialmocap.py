@@ -44,11 +44,11 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_face(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> ShapeMotion:
     """Return weights, head and eyes as they are in the records.
 
-    fps: records in a second; without it the app's 60, which is said. Raises FormatError, LimitError.
+    source_rate: records in a second; without it the app's 60, which is said. Raises FormatError, LimitError.
     """
     data = read_whole(path)
     text = data.decode("utf-8-sig", errors="replace")
@@ -57,13 +57,13 @@ def read_face(
     limits.check_frames(len(records), f"{path}: the recording")
     shapes = find_shapes(records, path)
     weights, head, eyes = convert_records(records, shapes)
-    times = np.arange(len(records)) / float(Fraction(fps or RATE))
-    findings = [] if fps is not None else [f"the records have no times; taken as {RATE} in a second"]
+    times = np.arange(len(records)) / float(Fraction(source_rate or RATE))
+    findings = [] if source_rate is not None else [f"the records have no times; taken as {RATE} in a second"]
     if strange:
         findings.append(f"names that mean nothing here are left out: {named(sorted(strange))}")
-    findings += find_lacks(shapes, weights, times, Fraction(fps or RATE))
+    findings += find_lacks(shapes, weights, times, Fraction(source_rate or RATE))
     return ShapeMotion(
-        tuple(shapes), weights, times, Fraction(fps or RATE),
+        tuple(shapes), weights, times, Fraction(source_rate or RATE),
         head=head, eyes=eyes,
         name=FilePath(path).stem, findings=tuple(findings),
     )  # fmt: skip

@@ -17,6 +17,7 @@ import numpy as np
 from fba.arrays import Float64, Int64, to_float64
 from fba.capture import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
+from fba.choices import Swap
 from fba.errors import FormatError, Remedy, UnsupportedError
 from fba.formats.face_tables._shape_rows import check_weights, find_lacks, find_swap
 from fba.formats.face_tables._tables import named
@@ -52,7 +53,7 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_face(
-    path: Path, *, swap: str = "auto", face: str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, swap: Swap = "auto", face: str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> ShapeMotion:
     """Return weights, head and eyes as they were sent.
 

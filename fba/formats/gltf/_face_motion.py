@@ -20,8 +20,7 @@ from fba.errors import FbaWarning
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
 from fba.formats.gltf.clips import choose_clip
 from fba.formats.gltf.humanoid import find_humanoid
-from fba.gltf import Animation as Clip
-from fba.gltf import Gltf, Value, optional_member
+from fba.gltf import Clip, Gltf, Value, optional_member
 from fba.parameters import FAP_COUNT, fap_numbers
 
 NO_EYE = re.compile("brow|lid|lash|end|target|look|aim")

@@ -20,8 +20,7 @@ from fba.face import FaceModel, resolve
 from fba.formats.gltf._fap_joints import FapJoint
 from fba.formats.gltf._morph_targets import Targets
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
-from fba.gltf import Animation as Clip
-from fba.gltf import Builder, Gltf, Value
+from fba.gltf import Builder, Clip, Gltf, Value
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 MAX_ERROR = 0.25

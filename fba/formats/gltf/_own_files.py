@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import cast
 
 import numpy as np
 
@@ -14,14 +15,14 @@ from fba.animation import Animation, BodyTrack
 from fba.arrays import Float64
 from fba.body import BapSolver, Skeleton, convention_names
 from fba.body.solve.solver import solve_track
+from fba.choices import Axes
 from fba.errors import FormatError
 from fba.formats.gltf._fap_joints import MAX_COORDINATE
 from fba.formats.gltf._fap_tracks import read_face
 from fba.formats.gltf._pose import Sampler, key_times, nearest_rotation
 from fba.formats.gltf._writer import MARK, MOST_FRAMES
 from fba.formats.text.frame_rates import parse_rate
-from fba.gltf import Animation as Clip
-from fba.gltf import Channel, Gltf, Value, optional_member
+from fba.gltf import Channel, Clip, Gltf, Value, optional_member
 
 VERSION = 1
 MAX_INDEX = 1 << 62
@@ -80,7 +81,7 @@ def _body(
     gltf: Gltf, channels: Sequence[Channel], note: Value, nodes: dict[str, int], times: Float64
 ) -> BodyTrack:
     """Return the body track at times (T,). nodes: joint of the standard -> node."""
-    axes = note.member("axes").choice(*convention_names())
+    axes = cast("Axes", note.member("axes").choice(*convention_names()))
     centre = np.array(note.member("centre").numbers(3, -MAX_COORDINATE, MAX_COORDINATE))
     standard = Skeleton.default()
 

@@ -25,8 +25,7 @@ from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, key_times
 from fba.formats.gltf._skeletons import find_joints
 from fba.formats.gltf.clips import choose_clip
-from fba.gltf import Animation as Clip
-from fba.gltf import Gltf, read_gltf
+from fba.gltf import Clip, Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 

@@ -193,7 +193,7 @@ def _find_hips(motion: SkeletonMotion) -> int:
     another's for the back.
     """
     try:
-        mapped = find_bones(motion, None, Skeleton.default())[1]
+        mapped = find_bones(motion, None, Skeleton.default()).joints
     except ModelError:
         return 0
     hips = mapped.get(ROOT, 0)

@@ -15,6 +15,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
+from fba.choices import Axes
 from fba.errors import FbaWarning, FormatError
 from fba.formats.gltf._joints import Clip, move, nest, start_clip
 from fba.gltf import Builder
@@ -44,7 +45,7 @@ def write(
     mesh: bool = True,
     model: FaceModel | None = None,
     body: BodyModel | None = None,
-    axes: str = "iso",
+    axes: Axes = "iso",
 ) -> None:
     """Write an animation as .glb.
 
@@ -98,7 +99,7 @@ def _add_person(
     mesh: bool,
     model: FaceModel | None,
     body: BodyModel | None,
-    axes: str,
+    axes: Axes,
 ) -> list[int]:
     """Add a person or a skeleton with its animation, and complete the note; return the root nodes."""
     from fba.body import BapSolver, BodyModel, Skeleton
@@ -161,7 +162,7 @@ def _add_person(
 
 
 def _stand_on_ground(
-    builder: Builder, clip: Clip, skeleton: Skeleton, axes: str, baps: Int32, root: int
+    builder: Builder, clip: Clip, skeleton: Skeleton, axes: Axes, baps: Int32, root: int
 ) -> int:
     """Return the node at the top: one that raises the root to where feet stand, or the root itself.
 

@@ -31,8 +31,7 @@ from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
 from fba.formats.gltf._pose import bind_matrices
 from fba.formats.gltf._skeletons import Joints, find_joints
-from fba.gltf import Gltf, Node, Primitive, convert_material, read_gltf
-from fba.gltf import Material as GltfMaterial
+from fba.gltf import Gltf, GltfMaterial, Node, Primitive, convert_material, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh import Material, UniqueNames
 from fba.source import Path
@@ -62,7 +61,7 @@ KINDS = {"hair": "hair", "skin": "skin", "body": "skin", "head": "skin", "face":
 """Kinds of parts by words in the names of meshes and materials; others are cloth."""
 
 
-def read_body(
+def import_body(
     path: Path, *, joints: Mapping[str, str] | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> BodyModel:
     """Return the body in a glTF file: one that `BodyModel.save` wrote, or any skinned person.
@@ -82,7 +81,7 @@ def read_body(
             return BodyModel.load(path, limits=limits)
         return _import_person(gltf, path, joints)
     except ModelError as error:
-        call = f"{__name__}.read_body"
+        call = f"{__name__}.import_body"
         remedies = [replace(each, call=call) for each in error.remedies]
         finding = error.finding.removeprefix(f"{os.path.basename(path)}: ")
         raise FormatError(finding, path=path).with_remedies(*remedies) from error

@@ -7,8 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from fba.errors import FbaWarning, ModelError, Remedy, did_you_mean
-from fba.gltf import Animation as Clip
-from fba.gltf import Gltf, read_gltf
+from fba.gltf import Clip, Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 

@@ -38,12 +38,12 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
     """Return the markers of a CSV export of Motive; those without a label only if none has one.
 
-    fps: the rate of a file that has none. Raises FormatError, LimitError; warns (FbaWarning) of markers
-    that are left out.
+    source_rate: the rate of a file that has none. Raises FormatError, LimitError; warns (FbaWarning) of
+    markers that are left out.
     """
     lines = read_lines(path, "a CSV export of Motive")
     if not sniff(lines[0].encode(), ""):
@@ -71,7 +71,7 @@ def read_markers(
     second = next((n for n, cell in enumerate(columns) if cell.lower().startswith("time (")), None)
     times = rows[:, second] if second is not None else np.full(len(rows), np.nan)
     stored: str | float = settings.get("export frame rate", "") or settings.get("capture frame rate", "")
-    rate = file_rate(stored or rate_of_times(times[np.isfinite(times)].tolist()), fps, path)
+    rate = file_rate(stored or rate_of_times(times[np.isfinite(times)].tolist()), source_rate, path)
     places = np.array([start for _, start in chosen])[:, None] + np.arange(3)
     unit = UNITS.get(settings.get("length units", "meters").lower(), "")
     return build_motion(
@@ -101,7 +101,7 @@ def _find_start(
         if codes[0]:
             filled = [code or codes[0] for code in codes]
             with suppress(FormatError):  # codes of another kind
-                return read_time_codes(filled, numbers, path)[2]
+                return read_time_codes(filled, numbers, path).start
     begun = parse_time_of_day(settings.get("capture start time", ""))
     return None if begun is None else begun + float(np.nan_to_num(times[0]))
 

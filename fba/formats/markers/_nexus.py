@@ -33,9 +33,9 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
-    """Return the trajectories of a CSV export of Nexus. fps: the rate of a file that has none.
+    """Return the trajectories of a CSV export of Nexus. source_rate: the rate of a file that has none.
 
     Raises FormatError, LimitError.
     """
@@ -62,7 +62,7 @@ def read_markers(
     rows, numbers = parse_rows(lines, start + 5, delimiter, len(axes), path, limits, last=end)
     if not len(rows):
         raise FormatError("the section Trajectories holds no frames", path=path, line=start + 6)
-    rate = file_rate(lines[start + 1].strip(' \t,;"'), fps, path)
+    rate = file_rate(lines[start + 1].strip(' \t,;"'), source_rate, path)
     frames = rows[:, 0]
     if not np.isfinite(frames).all():
         raise FormatError(

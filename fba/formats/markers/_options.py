@@ -15,11 +15,11 @@ MIN_RATE = 0.001
 """Lowest rate, in frames per second; a lower one is damage."""
 MAX_RATE = 100_000
 """Highest rate, in frames per second; a higher one is damage."""
-GIVE_RATE = Remedy("fps", "give one with {}", "100")
+GIVE_RATE = Remedy("source_rate", "give one with {}", "100")
 
 
-def file_rate(stored: float | str, fps: Fraction | int | str | None, path: Path) -> Fraction:
-    """Return the frame rate of a file: what it says, or `fps` if it says 0 or nothing.
+def file_rate(stored: float | str, source_rate: Fraction | int | str | None, path: Path) -> Fraction:
+    """Return the frame rate of a file: what it says, or `source_rate` if it says 0 or nothing.
 
     Raises FormatError for anything but a positive number.
     """
@@ -28,9 +28,9 @@ def file_rate(stored: float | str, fps: Fraction | int | str | None, path: Path)
     except ValueError:
         number = float("nan")
     if number == 0:
-        if fps is None:
+        if source_rate is None:
             raise FormatError("has no frame rate", path=path).with_remedies(GIVE_RATE)
-        return Fraction(fps)
+        return Fraction(source_rate)
     if not MIN_RATE <= number <= MAX_RATE:
         raise FormatError(f"its frame rate must be {MIN_RATE} to {MAX_RATE}", path=path, token=str(stored))
     return parse_rate(f"{number:.6f}".rstrip("0").rstrip("."))

@@ -29,11 +29,12 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
-    """Return the markers of a TSV export of Qualisys Track Manager. fps: the rate of a file that has none.
+    """Return the markers of a TSV export of Qualisys Track Manager.
 
-    Raises FormatError, LimitError; warns (FbaWarning) of a wrong number of frames.
+    source_rate: the rate of a file that has none. Raises FormatError, LimitError; warns (FbaWarning) of a
+    wrong number of frames.
     """
     lines = read_lines(path, "a TSV export of Qualisys")
     if not sniff(lines[0].encode() + b"\t", ""):
@@ -64,7 +65,7 @@ def read_markers(
     if not len(rows):
         raise FormatError("holds no frames", path=path)
     warn_if_cut(path, _first_number(settings, "NO_OF_FRAMES"), len(rows))
-    rate = file_rate((settings.get("FREQUENCY") or [""])[0], fps, path)
+    rate = file_rate((settings.get("FREQUENCY") or [""])[0], source_rate, path)
     positions = rows[:, leading:].reshape(len(rows), -1, 3)
     positions[(positions == 0).all(axis=2)] = np.nan
     times = own_times(rows[:, 1], rate) if leading == 2 else regular_times(len(rows), rate)

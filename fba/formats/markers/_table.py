@@ -44,9 +44,9 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
-    """Return the markers of a table. fps: the rate of a file without times.
+    """Return the markers of a table. source_rate: the rate of a file without times.
 
     Raises FormatError, LimitError.
     """
@@ -74,10 +74,12 @@ def read_markers(
         raise FormatError("holds no frames", path=path)
     if np.isfinite(times).all():
         back = np.flatnonzero(np.diff(times) <= 0)
-        rate = file_rate(rate_of_times(times.tolist()) if not len(back) else 0, fps or Fraction(1), path)
+        rate = file_rate(
+            rate_of_times(times.tolist()) if not len(back) else 0, source_rate or Fraction(1), path
+        )
         times = own_times(times, rate)
     else:
-        rate = file_rate("", fps, path)
+        rate = file_rate("", source_rate, path)
         times = regular_times(len(positions), rate)
     return build_motion(
         labels, positions, times, rate, metres=METRES.get(unit, 1.0), unit=unit, up="", name=name, path=path,

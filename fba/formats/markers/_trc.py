@@ -37,9 +37,9 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
-    """Return the markers of a TRC file. fps: the rate of a file that has none.
+    """Return the markers of a TRC file. source_rate: the rate of a file that has none.
 
     Raises FormatError, LimitError; warns (FbaWarning) of a wrong number of frames.
     """
@@ -65,7 +65,7 @@ def read_markers(
     stored = header.get("datarate", "") or (
         rate_of_times(times.tolist()) if np.isfinite(times).all() else 0.0
     )
-    rate = file_rate(stored, fps, path)
+    rate = file_rate(stored, source_rate, path)
     unit = header.get("units", "").lower()
     return build_motion(
         without_subject(labels), rows[:, 2:].reshape(len(rows), -1, 3), own_times(times, rate), rate,

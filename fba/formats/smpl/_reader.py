@@ -66,17 +66,17 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_motion(
-    path: Path, *, fps: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> SkeletonMotion:
     """Return the joints as they turn in the file, y up, and jaw and eyes, where they move, as a face.
 
-    fps: of a file that has no rate. Raises FormatError, LimitError.
+    source_rate: of a file that has no rate. Raises FormatError, LimitError.
     """
     with naming_file(path):
-        return _skeleton(_read(path, fps, limits), path, limits)
+        return _skeleton(_read(path, source_rate, limits), path, limits)
 
 
-def _read(path: Path, fps: Fraction | int | str | None, limits: Limits) -> _Motion:
+def _read(path: Path, source_rate: Fraction | int | str | None, limits: Limits) -> _Motion:
     arrays = read_arrays(path, limits, single="poses", objects=True)
     poses, jaw, eyes = _poses(arrays, path)
     count = len(poses)
@@ -86,7 +86,7 @@ def _read(path: Path, fps: Fraction | int | str | None, limits: Limits) -> _Moti
         raise FormatError(f"trans has the shape {path_of_root.shape}, not ({count}, 3)", path=path)
     _check_sizes(path, MAX_TURN, "rad", {"poses": poses, "pose_jaw": jaw, "pose_eye": eyes})
     _check_sizes(path, MAX_COORDINATE, "m", {"trans": path_of_root})
-    rate = _rate(arrays, fps, path)
+    rate = _rate(arrays, source_rate, path)
     turns = poses.reshape(count, -1, 3)
     return _Motion(turns, path_of_root, jaw, None if eyes is None else eyes.reshape(count, 2, 3), rate)
 
@@ -102,15 +102,15 @@ def _check_sizes(path: Path, most: float, unit: str, arrays: Mapping[str, Float6
             )  # fmt: skip
 
 
-def _rate(arrays: dict[str, Any], fps: Fraction | int | str | None, path: Path) -> Fraction:
-    """Return the frame rate of a file, or `fps` if it has none."""
+def _rate(arrays: dict[str, Any], source_rate: Fraction | int | str | None, path: Path) -> Fraction:
+    """Return the frame rate of a file, or `source_rate` if it has none."""
     stored = next((arrays[name] for name in RATES if name in arrays and arrays[name].size == 1), None)
     if stored is None:
-        if fps is None:
+        if source_rate is None:
             raise FormatError("has no frame rate", path=path).with_remedies(
-                Remedy("fps", "give one with {}", "120")
+                Remedy("source_rate", "give one with {}", "120")
             )
-        return Fraction(fps)
+        return Fraction(source_rate)
     if not MIN_RATE <= (rate := float(stored.ravel()[0])) <= MAX_RATE:
         raise FormatError(f"its frame rate must be {MIN_RATE} to {MAX_RATE:g}", path=path, token=f"{rate:g}")
     return find_rate(np.array([0.0, 1.0 / rate]))

@@ -43,7 +43,7 @@ def read_frames(
     path: Path,
     layout: Layout,
     *,
-    fps: str | float | Fraction | None = None,
+    source_rate: str | float | Fraction | None = None,
     name: str | None = None,
     salvage: bool = False,
     angle_scale: Fraction | float = 1,
@@ -53,7 +53,7 @@ def read_frames(
 
     The options are those of `fba.formats.text.fap.read_fap`. Raises FormatError; warns with FbaWarning.
     """
-    rate = None if fps is None else parse_rate(fps)
+    rate = None if source_rate is None else parse_rate(source_rate)
     try:
         scale = float(angle_scale)
     except (TypeError, ValueError, OverflowError):

@@ -35,7 +35,7 @@ BODY_COLUMNS = 100
 _MASK_LIKE = 60
 """A line of at least this many 0s and 1s is a mask, not a header."""
 
-GIVE_RATE = Remedy("fps", "give one with {}", "25")
+GIVE_RATE = Remedy("source_rate", "give one with {}", "25")
 
 
 class Lines:

@@ -22,7 +22,7 @@ def sniff_bap(head: bytes, suffix: str) -> bool:
 def read_bap(
     path: Path,
     *,
-    fps: str | float | Fraction | None = None,
+    source_rate: str | float | Fraction | None = None,
     name: str | None = None,
     salvage: bool = False,
     angle_scale: Fraction | float = 1,
@@ -30,13 +30,19 @@ def read_bap(
 ) -> Animation:
     """Read a BAP file; its frame numbers become the animation's index.
 
-    fps, name: replace those of the header, or a missing header. salvage: keep the frames before damage
-    or a cut instead of raising. angle_scale: factor on all angles (BAPs 1..186 but the three
-    translations), for the old files whose unit is not 1e-5 rad. Raises FormatError with line and
-    token; FbaWarning as `fba.formats.text.fap.read_fap`.
+    source_rate, name: replace those of the header, or a missing header. salvage: keep the frames before
+    damage or a cut instead of raising. angle_scale: factor on all angles (BAPs 1..186 but the three
+    translations), for the old files whose unit is not 1e-5 rad. Raises FormatError with line and token;
+    FbaWarning as `fba.formats.text.fap.read_fap`.
     """
     frames = read_frames(
-        path, bap_layout(), fps=fps, name=name, salvage=salvage, angle_scale=angle_scale, limits=limits
+        path,
+        bap_layout(),
+        source_rate=source_rate,
+        name=name,
+        salvage=salvage,
+        angle_scale=angle_scale,
+        limits=limits,
     )
     body = BodyTrack(frames.slots, frames.mask)
     return Animation(frames.header.rate, frames.index, None, body, frames.header.name)

@@ -34,7 +34,7 @@ class Registered:
     alien: Bool
 
 
-def fit_similarity(points: Float64, targets: Float64, *, mirror: bool = True) -> geometry.FittedSimilarity:
+def fit_face_points(points: Float64, targets: Float64, *, mirror: bool = True) -> geometry.FittedSimilarity:
     """Return the similarity that brings points (..., N, Q) closest to targets (..., N, P), P >= Q.
 
     mirror: whether the rotation may be a reflection. Raises ModelError where all points coincide.
@@ -76,7 +76,7 @@ def register_points(points: Float64, yaw: Float64) -> tuple[Float64, Float64]:
     standard = standard_points()[:TRACKED] @ np.swapaxes(turn, 1, 2)  # (T, 64, 3)
     rows = [number - 1 for number in REGISTERED]
     upright = points * (1.0, -1.0)  # from a picture's axes, y down, to the mask's, y up
-    similarity = fit_similarity(upright[:, rows], standard[:, rows, :2], mirror=False)
+    similarity = fit_face_points(upright[:, rows], standard[:, rows, :2], mirror=False)
     laid = similarity.apply(upright)
     deep = standard[:, :, 2]
     # the first row of the inverse turn: x of the face seen from the front

@@ -4,6 +4,6 @@ May use: the points of a Persona, and readers of arrays.
 """
 
 from fba.persona.recognition._component import Component, Network, displacements
-from fba.persona.recognition._recogniser import Labels, Recogniser, decide
+from fba.persona.recognition._recogniser import ClassRecogniser, Labels, decide
 
-__all__ = ["Component", "Labels", "Network", "Recogniser", "decide", "displacements"]
+__all__ = ["ClassRecogniser", "Component", "Labels", "Network", "decide", "displacements"]

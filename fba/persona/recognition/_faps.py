@@ -109,7 +109,7 @@ def _standard_fapu() -> Fapu:
 def mask_faps(moved: Float64, fapu: Fapu, jaw: Float64) -> Float64:
     """Return FAPs (T, 68) for displacements (T, 86, 3) of masks from the neutral mask, millimetres.
 
-    fapu: of the neutral mask. jaw: (5,), `Recogniser.jaw`, from which FAP 3 follows the lips.
+    fapu: of the neutral mask. jaw: (5,), `ClassRecogniser.jaw`, from which FAP 3 follows the lips.
     """
     values = np.zeros((len(moved), FAP_COUNT))
     for fap in shown_faps():

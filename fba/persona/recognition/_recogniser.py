@@ -1,4 +1,4 @@
-"""`Recogniser`: knowledge of faces in general: five components, examples with their depth, the jaw."""
+"""`ClassRecogniser`: knowledge of faces in general: five components, examples with their depth, the jaw."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NONE = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Recogniser:
+class ClassRecogniser:
     """Recognition of expressions, and the depth and the jaw, which pictures do not show.
 
     components: by part. classes: names of the examples' classes. example_classes: int (N,), of each example.
@@ -54,12 +54,12 @@ class Recogniser:
     about: str
 
     @staticmethod
-    def default() -> Recogniser:
+    def default() -> ClassRecogniser:
         """Return the built-in recogniser, trained with synthetic faces (docs/persona.md)."""
         return _default()
 
     @staticmethod
-    def load(path: Path, limits: Limits = DEFAULT_LIMITS) -> Recogniser:
+    def load(path: Path, limits: Limits = DEFAULT_LIMITS) -> ClassRecogniser:
         """Return a recogniser from a file; FormatError, UnsupportedError for another version, LimitError."""
         header, arrays = read_archive(path, KIND, VERSION, limits)
         return _unpack(Fields(path, header, arrays), path)
@@ -97,12 +97,12 @@ class Recogniser:
 
 
 @cache
-def _default() -> Recogniser:
+def _default() -> ClassRecogniser:
     with as_file(files(__package__) / "default.recogniser") as path:
-        return Recogniser.load(path)
+        return ClassRecogniser.load(path)
 
 
-def _pack(recogniser: Recogniser) -> bytes:
+def _pack(recogniser: ClassRecogniser) -> bytes:
     arrays: dict[str, Array] = {
         "depth": recogniser.depth.astype(np.float16), "jaw": recogniser.jaw.astype(np.float32),
         "example_classes": recogniser.example_classes.astype(np.uint8),
@@ -124,7 +124,7 @@ def _pack(recogniser: Recogniser) -> bytes:
     return pack_archive(KIND, VERSION, header, arrays)
 
 
-def _unpack(fields: Fields, path: Path) -> Recogniser:
+def _unpack(fields: Fields, path: Path) -> ClassRecogniser:
     classes = fields.texts("classes")
     example_classes = fields.indices("example_classes", len(classes))
     count = len(example_classes)
@@ -153,7 +153,7 @@ def _unpack(fields: Fields, path: Path) -> Recogniser:
         labels[part] = fields.array(f"{part}.labels", count, len(names)) > 0
     depth = fields.array("depth", count, VERTICES)
     jaw = fields.array("jaw", len(JAW_FAPS))
-    return Recogniser(
+    return ClassRecogniser(
         components, classes, example_classes, labels, scores, depth, jaw, vertices, fields.text("about")
     )
 

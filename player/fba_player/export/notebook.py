@@ -112,7 +112,7 @@ class Preview:
         with tempfile.TemporaryDirectory(prefix="fba-") as folder:
             path = Path(folder) / "preview.mp4"
             record(
-                scene, path, fps=rate, size=self._size, camera=self._camera,
+                scene, path, rate=rate, size=self._size, camera=self._camera,
                 start=float(begin), end=float(last), audio=self._audio, audio_offset=self._audio_offset,
             )  # fmt: skip
             data = path.read_bytes()

@@ -18,6 +18,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
+from fba.choices import Axes
 from fba.errors import DisplayError
 from fba_player._mesh.primitives import sphere_mesh
 from fba_player.export.offscreen import follow_camera, looks_at_head
@@ -56,7 +57,7 @@ def to_pyrender(
     camera: Camera | str | None = None,
     aspect: float = 16 / 9,
     body: BodyModel | None = None,
-    axes: str = "iso",
+    axes: Axes = "iso",
 ) -> Any:
     """Return a `pyrender.Scene` of an animation at t seconds: its meshes, our camera and the studio's lights.
 

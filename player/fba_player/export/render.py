@@ -50,7 +50,7 @@ def render(
     path: PathLike,
     *,
     size: tuple[int, int] | None = None,
-    fps: Fraction | int | str | None = None,
+    rate: Fraction | int | str | None = None,
     camera: Camera | str | None = None,
     frame: int | None = None,
     time: float | None = None,
@@ -70,7 +70,7 @@ def render(
     size: width and height in pixels; by default 1280x720, of a GIF 480x270. camera: a `Camera`, "front",
     "three-quarter", "profile", "body", or None for the one that suits the content. For a picture: frame,
     its position in the animation (negative from the end), or time in seconds; by default the first frame.
-    For a film: fps (by default the rate of the animation), and start and end in seconds. audio: a sound file
+    For a film: rate (by default the rate of the animation), and start and end in seconds. audio: a sound file
     for an MP4; it begins with the first frame of the animation, or audio_offset seconds later (earlier if
     negative). transparent: PNG without a background. replace: numbered pictures that exist may be
     overwritten. progress: called with (done, total) frames.
@@ -89,13 +89,13 @@ def render(
                 "frame and time choose a single picture; write it to a .png, or give start and end"
             )
         return record(
-            scene, path, fps=fps, size=size, camera=camera, start=start, end=end, audio=audio,
+            scene, path, rate=rate, size=size, camera=camera, start=start, end=end, audio=audio,
             audio_offset=audio_offset, transparent=transparent, replace=replace, progress=progress,
         )  # fmt: skip
     transparent = transparent or _is_transparent(scene)
     check_picture(target, transparent=transparent)
-    if fps is not None or end is not None or (start is not None and time is not None):
-        raise ValueError("fps, start and end belong to a film; give frame or time for a .png")
+    if rate is not None or end is not None or (start is not None and time is not None):
+        raise ValueError("rate, start and end belong to a film; give frame or time for a .png")
     if audio is not None:
         raise ValueError("a picture has no sound; leave the audio out, or write an .mp4")
     if start is not None:
@@ -115,7 +115,7 @@ def record(
     scene: Showable | Animation,
     path: PathLike,
     *,
-    fps: Fraction | int | str | None = None,
+    rate: Fraction | int | str | None = None,
     size: tuple[int, int] | None = None,
     camera: Camera | str | None = None,
     start: float | None = None,
@@ -143,8 +143,8 @@ def record(
         )
     if numbered and audio is not None:
         raise ValueError("pictures have no sound; leave the audio out, or write an .mp4")
-    rate = exact_rate(film_rate(shown.timeline.rate, path) if fps is None else Fraction(fps))
-    first, count = _frame_range(shown, rate, start, end)
+    film = exact_rate(film_rate(shown.timeline.rate, path) if rate is None else Fraction(rate))
+    first, count = _frame_range(shown, film, start, end)
     width, height = picture_size(size, path)
     if size is not None and min(width, height) < 1:
         raise ValueError(f"a film must have at least 2x2 pixels, not {size[0]}x{size[1]}")
@@ -152,16 +152,16 @@ def record(
         # Opened before the first picture is drawn, so that a missing encoder or folder is reported at once.
         if numbered:
             sink = Sequence(Numbered(path), count, transparent=transparent, replace=replace)
-            recorder = Recorder.into(sink, path, (width, height), rate)
+            recorder = Recorder.into(sink, path, (width, height), film)
         else:
             into = first - shown.timeline.start - Fraction(audio_offset).limit_denominator(10**6)
-            recorder = Recorder(path, (width, height), rate=rate, audio=audio, audio_start=into)
+            recorder = Recorder(path, (width, height), rate=film, audio=audio, audio_start=into)
         stack.enter_context(recorder)
         stack.enter_context(_background(shown, clear=transparent))
         samples = PICTURE_SAMPLES if transparent else 0
         offscreen = stack.enter_context(Offscreen(shown, (width, height), camera, samples=samples))
         for number in range(count):
-            recorder.add(offscreen.draw(float(first + number / rate)))
+            recorder.add(offscreen.draw(float(first + number / film)))
             if progress is not None:
                 progress(number + 1, count)
         result = recorder.close()

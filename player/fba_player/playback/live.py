@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Int64
+from fba.choices import BapTableOrAuto
 from fba.codec import Block, Decoder, FrameBuffer, StreamInfo, marked_table
 from fba.errors import BitstreamError, FbaError, FbaWarning
 from fba.formats.step_choice import choose_steps
@@ -69,7 +70,7 @@ class LiveAnimation:
         *,
         head: bytes = b"",
         name: str = "",
-        bap_steps: str = "iso",
+        bap_steps: BapTableOrAuto = "iso",
         at_end: Callable[[], None] | None = None,
     ) -> None:
         self.name = name

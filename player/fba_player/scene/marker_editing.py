@@ -28,6 +28,7 @@ from fba.capture.virtual_markers.lids import lid_at
 from fba.capture.virtual_markers.performance import Neutral, SteadyMarkers, perform_steady, steady
 from fba.capture.virtual_markers.proposal import usual_radius
 from fba.capture.virtual_markers.weights import find_influences
+from fba.choices import Assignment, Overlap
 from fba.errors import FbaError, FbaWarning
 from fba_player.scene._hand_editing import HandEditing
 
@@ -137,11 +138,11 @@ class MarkerEditing(HandEditing[MarkerMapping]):
             marker = replace(old, fixed=fixed, lid=False)
         self._change(self.mapping.changed(self.current, marker))
 
-    def assign(self, assignment: str) -> None:
+    def assign(self, assignment: Assignment) -> None:
         """Set which markers a vertex belongs to: "shared" or "exclusive"."""
         self._change(replace(self.mapping, assignment=assignment))
 
-    def add_up(self, overlap: str) -> None:
+    def add_up(self, overlap: Overlap) -> None:
         """Set how displacements of shared vertices combine: "match" or "add"."""
         self._change(replace(self.mapping, overlap=overlap))
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
+from fba.choices import Axes
 from fba_player.playback.timeline import Timeline
 from fba_player.scene._framing import Extent, body_extent
 from fba_player.view._view import View
@@ -53,7 +54,7 @@ class Scene(Timed[Timeline]):
         model: FaceModel | None = None,
         *,
         body: BodyModel | None = None,
-        axes: str = "iso",
+        axes: Axes = "iso",
         view: str = "figure",
         timeline: Timeline | None = None,
     ) -> None:

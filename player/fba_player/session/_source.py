@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from fba.animation import Animation
 from fba.errors import FbaError
+from fba.parameters import BapTable
 from fba_player.playback.live import LiveAnimation
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
@@ -38,7 +39,7 @@ class Source:
         scene: Showable,
         path: str | os.PathLike[str] | None = None,
         *,
-        bap_steps: str = "iso",
+        bap_steps: BapTable = "iso",
         warnings: tuple[str, ...] = (),
     ) -> None:
         self.path = path

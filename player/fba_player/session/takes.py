@@ -11,7 +11,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba.errors import FormatError, RangeError
-from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP
+from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, BapTable
 from fba.tracks import BodyTrack, FaceTrack
 
 RATE = Fraction(25)
@@ -133,7 +133,7 @@ class Takes:
             free, number = f"{name}-{number}", number + 1
         return free
 
-    def save(self, name: str, *, bap_steps: str = "iso") -> tuple[Path, str]:
+    def save(self, name: str, *, bap_steps: BapTable = "iso") -> tuple[Path, str]:
         """Write the last take; return its path, and the table of BAP steps that readers need.
 
         If the steps of the standard ("iso") cannot code a turn of a joint, "visage" are used. Raises

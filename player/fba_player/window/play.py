@@ -15,6 +15,7 @@ from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba.atomic import PathLike
 from fba.face import Resolver
+from fba.parameters import BapTable
 from fba.tracks import BodyTrack, FaceTrack
 from fba_player.export.render import as_scene
 from fba_player.playback.live import LiveAnimation, LiveTimeline
@@ -48,7 +49,7 @@ def play(
     audio: PathLike | None = None,
     audio_offset: float = 0.0,
     file: PathLike | None = None,
-    bap_steps: str = "iso",
+    bap_steps: BapTable = "iso",
     warnings: tuple[str, ...] = (),
     panels: tuple[str, ...] = (),
     newest: Newest | None = None,

@@ -154,7 +154,7 @@ def test_real_walks_reduced(
     walk = fba.read(shared / "data" / name)
     reduced = gait.reduce(walk)
     assert reduced.factor > factor
-    errors = {kind: gait.compare(reduced.restore(kind), walk) for kind in ("linear", "smooth")}
+    errors = {kind: gait.compare_walks(reduced.restore(kind), walk) for kind in ("linear", "smooth")}
     assert errors["smooth"].mean_degrees < degrees
     assert errors["smooth"].mean_cm < centimetres
     assert errors["smooth"].mean_cm < errors["linear"].mean_cm
@@ -181,21 +181,21 @@ def test_compare_measures_angles_and_places() -> None:
     other[1, NUMBERS["l_elbow_flexion"] - 1] = round(1e5 * np.radians(40))
     other[1, NUMBERS["HumanoidRoot_tr_vertical"] - 1] = 20
     one, two = (Animation(30, np.arange(2), None, BodyTrack(v, v != 0)) for v in (bent, other))
-    errors = gait.compare(one, two)
+    errors = gait.compare_walks(one, two)
     assert errors.worst_joint == "l_elbow"
     assert errors.worst_degrees == pytest.approx(30, abs=1e-3)
     assert errors.mean_degrees == pytest.approx(15, abs=1e-3)
     assert errors.worst_cm == pytest.approx(2.0, abs=1e-6)  # the elbow itself only rises with the body
     assert errors.worst_cm_local == pytest.approx(0.0, abs=1e-6)
     with pytest.raises(ValueError, match="rates differ"):
-        gait.compare(one, Animation(25, np.arange(2), None, two.body))
+        gait.compare_walks(one, Animation(25, np.arange(2), None, two.body))
     with pytest.raises(ValueError, match="no frame in common"):
-        gait.compare(one, Animation(30, np.arange(5, 7), None, two.body))
+        gait.compare_walks(one, Animation(30, np.arange(5, 7), None, two.body))
 
 
 def test_turns_past_half_a_turn_are_reduced_without_spinning() -> None:
     walk = turned(gait.walk(cycles=6), 2.0)  # 386 degrees in all
     reduced = gait.reduce(fba.Animation(walk.rate, walk.index, None, BodyTrack(
         fba.body.wrapped(walk.body.values), walk.body.mask)))  # fmt: skip
-    errors = gait.compare(reduced.restore("linear"), walk)
+    errors = gait.compare_walks(reduced.restore("linear"), walk)
     assert errors.worst_degrees < 30

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fba.body import BapSolver, Limits, Skeleton
+from fba.body import BapSolver, JointLimits, Skeleton
 from fba.parameters import bap_numbers
 
 NUMBERS = bap_numbers()
@@ -19,7 +19,7 @@ def degrees(**angles: float) -> np.ndarray:
 
 
 def within(**angles: float) -> bool:
-    return not Limits.human().check(degrees(**angles))
+    return not JointLimits.human().check(degrees(**angles))
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_limits_open_the_way_people_move() -> None:
     solver, number = BapSolver(), Skeleton.default().number
     for side, outward in (("l", 1), ("r", -1)):
         far = {}
-        for limit in Limits.human().limits:
+        for limit in JointLimits.human().limits:
             if limit.segment.startswith("left" if side == "l" else "right"):
                 far[limit.segment.split(" ", 1)[1], limit.motion] = limit
         rest = solver.pose(np.zeros(296))
@@ -66,7 +66,7 @@ def test_limits_open_the_way_people_move() -> None:
         assert shifts["upper arm", "flexion"][1] > 0.5  # above the head
         assert shifts["upper arm", "abduction"][0] * outward > 0.2
         assert shifts["forearm", "flexion"][2] > 0.1
-    spine = {limit.name: limit for limit in Limits.human().limits}
+    spine = {limit.name: limit for limit in JointLimits.human().limits}
     tilt = spine["spine 1 tilt"]
     row = np.zeros(296)
     row[tilt.baps[0]] = np.radians(tilt.low) * 1e5  # 29 degrees, against 17 the other way: bowing
@@ -76,28 +76,28 @@ def test_limits_open_the_way_people_move() -> None:
 def test_vertebrae_share_a_limit() -> None:
     assert within(vl5_roll=6, vl4_roll=6, vl3_roll=5)
     bent = degrees(vl5_roll=12, vl4_roll=12, vl3_roll=12)
-    (found,) = Limits.human().check(bent)
+    (found,) = JointLimits.human().check(bent)
     assert (found.limit.name, found.frames, found.first) == ("spine 1 roll", 1, 0)
     assert found.worst == pytest.approx(18)
-    clamped = Limits.human().clamp(bent)
+    clamped = JointLimits.human().clamp(bent)
     assert clamped.shape == (296,)
     np.testing.assert_allclose(clamped, degrees(vl5_roll=6, vl4_roll=6, vl3_roll=6), atol=1)
 
 
 def test_clamp_changes_only_what_is_too_much() -> None:
     rows = np.stack([degrees(l_knee_flexion=a, l_hip_flexion=10) for a in (-200, -100, 0, 5)])
-    found = Limits.human().clamp(rows)
+    found = JointLimits.human().clamp(rows)
     np.testing.assert_allclose(found[:, NUMBERS["l_knee_flexion"] - 1],
                                np.radians([-113, -100, 0, 0]) * 1e5, atol=1)  # fmt: skip
     np.testing.assert_allclose(found[:, NUMBERS["l_hip_flexion"] - 1], np.radians(10) * 1e5, atol=1)
-    assert not Limits.human().check(found)
-    (excess,) = Limits.human().check(rows)
+    assert not JointLimits.human().check(found)
+    (excess,) = JointLimits.human().check(rows)
     assert (excess.frames, excess.first) == (2, 0)
     assert excess.worst == pytest.approx(87)
     assert "left shin flexion: beyond -113..0 degrees in 2 frames, by 87.0 at worst" in str(excess)
 
 
-@pytest.mark.parametrize("kind", [Limits.human, Limits.iso])
+@pytest.mark.parametrize("kind", [JointLimits.human, JointLimits.iso])
 def test_clamped_is_within(kind) -> None:  # type: ignore[no-untyped-def]
     rows = np.random.default_rng(3).integers(-300_000, 300_000, (50, 296))
     rows[:, 180:183] //= 1000
@@ -112,20 +112,20 @@ def test_clamped_is_within(kind) -> None:  # type: ignore[no-untyped-def]
 def test_whole_turns_do_not_count() -> None:
     assert within(l_elbow_flexion=90 + 360)
     assert within(l_shoulder_flexion=-175)  # 185 the other way round
-    assert not Limits.iso().check(degrees(l_elbow_flexion=-340))
+    assert not JointLimits.iso().check(degrees(l_elbow_flexion=-340))
 
 
 def test_standards_ranges() -> None:
-    (found,) = Limits.iso().check(degrees(l_shoulder_flexion=90))
+    (found,) = JointLimits.iso().check(degrees(l_shoulder_flexion=90))
     assert found.limit.high == pytest.approx(np.degrees(1860 * 64e-5))
-    assert not Limits.iso().check(degrees(l_shoulder_flexion=68))
+    assert not JointLimits.iso().check(degrees(l_shoulder_flexion=68))
 
 
 def test_wrong_input_to_limits() -> None:
     for bad in (np.zeros((2, 100)), np.full((1, 296), np.nan), np.zeros((1, 1, 296))):
-        with pytest.raises(ValueError, match="Limits"):
-            Limits.human().check(bad)
-        with pytest.raises(ValueError, match="Limits"):
-            Limits.human().clamp(bad)
-    assert Limits.human().check(np.zeros((0, 296))) == ()
-    assert Limits.human().clamp(np.zeros((0, 296))).shape == (0, 296)
+        with pytest.raises(ValueError, match="JointLimits"):
+            JointLimits.human().check(bad)
+        with pytest.raises(ValueError, match="JointLimits"):
+            JointLimits.human().clamp(bad)
+    assert JointLimits.human().check(np.zeros((0, 296))) == ()
+    assert JointLimits.human().clamp(np.zeros((0, 296))).shape == (0, 296)

@@ -241,7 +241,7 @@ def test_records_of_ifacialmocap(version: int, tmp_path: Path) -> None:
     path.write_text("\n".join(records))
     sent = at_rate([record.encode() for record in records])
     live, summary = captured("ifacialmocap", [*sent, (2.0, "10.0.0.2", b"StartStreaming")])
-    check_same(live, from_blendshapes(ifacialmocap.read_face(path, fps=60)), off=1)
+    check_same(live, from_blendshapes(ifacialmocap.read_face(path, source_rate=60)), off=1)
     assert summary.refused == {"not records of iFacialMocap": 1}
     lost = records[10].replace("jawOpen", "jawShut").encode()
     _, summary = captured("ifacialmocap", [*sent[:10], (10 / 60, "10.0.0.2", lost), *sent[11:]])

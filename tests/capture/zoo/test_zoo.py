@@ -165,16 +165,16 @@ def test_a_person_whose_left_is_called_right_is_refused(name: str) -> None:
 def test_toes_of_another_name_than_the_familys() -> None:
     """LaFAN1 calls the toes "LeftToe", where others of its family say "LeftToeBase"."""
     toes = replace(MAKERS[2], parts=(*MIXAMO[:-2], "{}Foot", "{}Toe"))
-    joints = find_bones(parse(write(toes)[0]), None, Skeleton.default())
-    assert joints[0] == "arm"
-    assert {"l_metatarsal", "r_metatarsal"} <= joints[1].keys()
+    found = find_bones(parse(write(toes)[0]), None, Skeleton.default())
+    assert found.family == "arm"
+    assert {"l_metatarsal", "r_metatarsal"} <= found.joints.keys()
 
 
 def test_vertebrae_up_to_the_atlas_carry_the_head() -> None:
     """Nothing is called neck or head."""
     parts = (*CLINIC[:2], "J_C7", "J_Atlas", *CLINIC[4:])
     text, _ = write(replace(next(maker for maker in MAKERS if maker.parts == CLINIC), parts=parts))
-    _, mapped, *_ = find_bones(parse(text), None, Skeleton.default())
+    mapped = find_bones(parse(text), None, Skeleton.default()).joints
     names = parse(text).names
     assert names[mapped["skullbase"]] == "J_Atlas"
     assert names[mapped["vc7"]] == "J_C7"

@@ -14,7 +14,7 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, FaceTrack
-from fba.body import Limits
+from fba.body import JointLimits
 from fba.capture import preparation
 from fba.capture.comparison import Comparison, Difference
 from fba.cli.capture_report import CaptureReport, poor_line
@@ -159,7 +159,7 @@ def test_limits_clamp(encode: Encode, tmp_path: Path) -> None:
         assert result.returncode == 0, result.stderr
         body = fba.decode(out.read_bytes(), bap_steps="visage").body
         assert body is not None
-        excess = {e.limit.name: e.worst for e in Limits.human().check(body.values)}
+        excess = {e.limit.name: e.worst for e in JointLimits.human().check(body.values)}
         assert (excess.get("left thigh flexion", 0) > 1) == beyond  # one step of the quantiser is 0.1 degrees
 
 

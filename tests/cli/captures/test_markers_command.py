@@ -14,7 +14,7 @@ import pytest
 
 from fba.capture.markers._targets import target_points
 from fba.capture.markers.motion import MarkerMotion
-from fba.capture.virtual_markers import perform, read_head, read_mapping
+from fba.capture.virtual_markers import move_head, read_head, read_mapping
 from fba.face.feature_points import names, row_of
 from fba.formats.gltf.moved_head import write_moved_head
 from mesh_files import write_obj
@@ -81,7 +81,7 @@ def test_a_head_with_its_animation(run: Run, files: tuple[Path, Path], tmp_path:
     code, out, err = run("markers", *files, "-o", moved, "--map-out", tmp_path / "m.toml")
     assert (code, err) == (0, "")
     assert f"{moved}: 20 frames, 16 virtual markers" in out
-    shown = perform(capture(), read_head(files[1]), read_mapping(tmp_path / "m.toml"))
+    shown = move_head(capture(), read_head(files[1]), read_mapping(tmp_path / "m.toml"))
     write_moved_head(tmp_path / "again.glb", shown, "lip")
     assert moved.stat().st_size == (tmp_path / "again.glb").stat().st_size  # numbers of the table are rounded
 

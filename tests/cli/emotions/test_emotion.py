@@ -19,7 +19,7 @@ Run = Callable[..., Any]
 def angry(tmp_path: Path) -> Path:
     path = tmp_path / "angry.fap"
     blend = fba.emotion.combine({"rage": 80})
-    fba.write(path, fba.emotion.perform(blend, seconds=2, ease=0.6))
+    fba.write(path, fba.emotion.animate(blend, seconds=2, ease=0.6))
     return path
 
 

@@ -362,11 +362,11 @@ def test_unusable_distances_are_refused(small: FaceModel, distances: dict[str, f
 
 def test_the_real_files(head: FaceModel, shared: Path) -> None:
     """Candide's points, with all their mistakes, make a face; each mistake is told."""
-    from fba.face.importers.points.fdp import read_fdp
+    from fba.face.importers.points.fdp import read_fdp_points
 
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        given = read_fdp(shared / "data/candide/candide3.fdp")
+        given = read_fdp_points(shared / "data/candide/candide3.fdp")
         fitted = fit(head, given, tables="carry")
     text = " ".join(str(one.message) for one in told)
     assert "2.5 and 8.4 coincide" in text
@@ -475,11 +475,11 @@ def test_every_faps_of_a_fitted_head_keeps_the_standard(
 ) -> None:
     """Of alice.fdp, and of people two standard deviations off the mean in face width or height."""
     from fba.face.checks import check_faps, check_neutral
-    from fba.face.importers.points.fdp import load_fdp
+    from fba.face.importers.points.fdp import read_fdp
 
     if who == "alice":
         alice = request.getfixturevalue("shared") / "data/xface/alice.fdp"
-        given = points_of_distances(head, load_fdp(alice).distances)
+        given = points_of_distances(head, read_fdp(alice).distances)
     else:
         # Norms of adults: width 137 mm, sd 4.3; nasion to chin 121 mm, sd 6.0 (means of men and women).
         width, height = {"broad": (2, 0), "narrow and long": (-2, 2)}[who]

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from fba.errors import FormatError, ModelError
 from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import neutral_points, row_of
-from fba.face.gltf._storage import load, save
+from fba.face.gltf._storage import load
 from fba.face.model import FaceModel, Material
 from fba.gltf import Gltf, Surface, read_gltf, surfaces
 from fba.parameters import fap_numbers, faps
@@ -36,10 +36,10 @@ def test_a_face_comes_back_as_it_was(tmp_path: Path) -> None:
 )
 @given(models())
 def test_any_face_comes_back_as_it_was(tmp_path: Path, model: FaceModel) -> None:
-    save(model, tmp_path / "a.glb")
+    model.save(tmp_path / "a.glb")
     again = load(tmp_path / "a.glb")
     assert_same(model, again)
-    save(again, tmp_path / "b.glb")
+    again.save(tmp_path / "b.glb")
     assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
 
 
@@ -47,7 +47,7 @@ def test_any_face_comes_back_as_it_was(tmp_path: Path, model: FaceModel) -> None
 
 
 def stored(model: FaceModel, tmp_path: Path) -> tuple[Gltf, dict[str, Surface]]:
-    save(model, tmp_path / "a.glb")
+    model.save(tmp_path / "a.glb")
     gltf = read_gltf(tmp_path / "a.glb")
     return gltf, {surface.name: surface for surface in surfaces(gltf)}
 
@@ -159,7 +159,7 @@ def test_a_large_face_stays_small(tmp_path: Path) -> None:
         vertices = np.sort(rng.choice(15_000, count, replace=False))
         tables.append(FaceDefTables(number, (FaceDefMesh("skin", borders, vertices, moves),)))
     model = face(parts=(skin,), bound=np.full(84, -1), tables=tuple(tables), lost={})
-    save(model, tmp_path / "a.glb")
+    model.save(tmp_path / "a.glb")
     assert (tmp_path / "a.glb").stat().st_size < 4_000_000
     for table, again in zip(model.tables, load(tmp_path / "a.glb").tables, strict=True):
         for mesh, same in zip(table.meshes, again.meshes, strict=True):
@@ -183,20 +183,20 @@ def test_what_a_file_cannot_hold(tmp_path: Path, change: dict[str, Any], message
     parts = tuple(replace(p, **change) if p.name == "left eye" else p for p in model.parts)
     (tmp_path / "a.glb").write_bytes(b"old")
     with pytest.raises(ModelError, match=message):
-        save(replace(model, parts=parts), tmp_path / "a.glb")
+        replace(model, parts=parts).save(tmp_path / "a.glb")
     assert (tmp_path / "a.glb").read_bytes() == b"old"
 
 
 def test_other_names_and_places(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"a\.gltf: .* name it \.glb"):
-        save(face(), tmp_path / "a.gltf")
+        face().save(tmp_path / "a.gltf")
     with pytest.raises(ModelError, match="note 'licence' must be a text"):
-        save(face(notes={"licence": "x" * 70_000}), tmp_path / "a.glb")
+        face(notes={"licence": "x" * 70_000}).save(tmp_path / "a.glb")
     with pytest.raises(FormatError, match="is a folder"):
-        save(face(), tmp_path)
+        face().save(tmp_path)
     huge = FaceDefMesh("skin", [0, 1], [0], [[(1e37, 0, 0)]])
     with pytest.raises(ModelError, match="FAP 3"):
-        save(face(tables=(FaceDefTables(3, (huge,)),)), tmp_path / "a.glb")
+        face(tables=(FaceDefTables(3, (huge,)),)).save(tmp_path / "a.glb")
     assert list(tmp_path.iterdir()) == []
 
 

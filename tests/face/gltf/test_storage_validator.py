@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fba.face.gltf._storage import save
 from fba.face.model import FaceModel, Material
 from stored_models import face
 
@@ -50,7 +49,7 @@ def plain(model: FaceModel) -> FaceModel:
 @pytest.mark.parametrize("which", ["small", "plain", "built-in"])
 def test_the_validator_finds_no_fault(modules: str, tmp_path: Path, which: str) -> None:
     model = {"small": face, "plain": lambda: plain(face()), "built-in": FaceModel.default}[which]()
-    save(model, tmp_path / "a.glb")
+    model.save(tmp_path / "a.glb")
     found = issues(modules, tmp_path / "a.glb")
     assert (found["numErrors"], found["numWarnings"]) == (0, 0), found["messages"][:5]
     assert {message["code"] for message in found["messages"]} <= KNOWN

@@ -11,7 +11,7 @@ import pytest
 from fba.errors import FbaWarning, ModelError
 from fba.face.fapu import Fapu
 from fba.face.feature_points import neutral_points, row_of
-from fba.face.importers.points.fdp import load_fdp, read_fdp
+from fba.face.importers.points.fdp import read_fdp, read_fdp_points
 from fba.face.importers.points.points_file import given_points, read_points
 
 XFACE = """<?xml version="1.0"?><xfdp><head><file version="0.2"/>
@@ -101,7 +101,7 @@ def text_fdp(points: np.ndarray, **changed: str) -> str:
 def test_text_fdp_gives_points_and_vertices(tmp_path: Path) -> None:
     file = tmp_path / "a.fdp"
     file.write_text(text_fdp(neutral_points()))
-    fdp = load_fdp(file)
+    fdp = read_fdp(file)
     np.testing.assert_allclose(fdp.points, neutral_points(), atol=1e-6)
     # "0.10" is vertex 10 of mesh 0, not a tenth
     assert fdp.vertices["2.12"] == ("0", row_of()["2.12"])
@@ -118,7 +118,7 @@ def test_wrong_sides_are_put_right_with_a_warning(tmp_path: Path) -> None:
     file = tmp_path / "a.fdp"
     file.write_text(text_fdp(points))
     with pytest.warns(FbaWarning, match=r"4\.1 and 4\.2 .*3\.8 and 3\.12 .*10\.10 is on the other side"):
-        found = read_fdp(file)
+        found = read_fdp_points(file)
     np.testing.assert_allclose(found, neutral_points(), atol=1e-6)
 
 
@@ -137,23 +137,23 @@ def test_bad_text_fdp(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "a.fdp"
     file.write_text(text)
     with pytest.raises(ModelError) as caught:
-        read_fdp(file)
+        read_fdp_points(file)
     assert words in str(caught.value)
 
 
 def test_xface_names_vertices_of_its_meshes(tmp_path: Path) -> None:
     file = tmp_path / "head.fdp"
     file.write_text(XFACE)
-    fdp = load_fdp(file)
+    fdp = read_fdp(file)
     assert fdp.distances == {"ENS0": 51, "ES0": 69, "IRISD0": 16, "MNS0": 30, "MW0": 50}
     assert fdp.vertices == {"9.3": ("head.wrl_0", 2), "3.5": ("head.wrl_1", 0)}
     # such files count FAPs from 0: 62 is FAP 63, raise_nose
     assert [(i.fap, i.weight, i.vertices) for i in fdp.influences] == [(63, 0.3, (0, 1, 2))]
     assert fdp.meshes[0].bind == {"head.wrl_1": "LeftEye"}
     with pytest.raises(ModelError, match=r"needs head\.wrl, whose vertices it names"):
-        read_fdp(file)
+        read_fdp_points(file)
     (tmp_path / "head.wrl").write_text(WORLD)
-    points = read_fdp(file)
+    points = read_fdp_points(file)
     np.testing.assert_array_equal(points[row_of()["9.3"]], [0, 10, 5])
     np.testing.assert_array_equal(points[row_of()["3.5"]], [3, 1, 2])
     assert np.isfinite(points).all(axis=1).sum() == 2
@@ -182,7 +182,7 @@ def test_bad_xface(tmp_path: Path, old: str, new: str, words: str) -> None:
     assert old in XFACE
     file.write_text(XFACE.replace(old, new))
     with pytest.raises(ModelError) as caught:
-        read_fdp(file)
+        read_fdp_points(file)
     assert words in str(caught.value)
 
 
@@ -203,25 +203,25 @@ def test_bad_vrml(tmp_path: Path, old: str, new: str, words: str) -> None:
     (tmp_path / "head.fdp").write_text(XFACE)
     (tmp_path / "head.wrl").write_text(WORLD.replace(old, new))
     with pytest.raises(ModelError) as caught:
-        read_fdp(tmp_path / "head.fdp")
+        read_fdp_points(tmp_path / "head.fdp")
     assert words in str(caught.value)
     assert "head.wrl" in str(caught.value)
 
 
 def test_the_real_xface_file_says_which_mesh_it_needs(shared: Path) -> None:
     file = shared / "data/xface/alice.fdp"
-    fdp = load_fdp(file)
+    fdp = read_fdp(file)
     assert fdp.distances == {"ENS0": 51, "ES0": 69, "IRISD0": 16, "MNS0": 30, "MW0": 50}
     assert (len(fdp.vertices), len(fdp.influences), len(fdp.meshes)) == (33, 43, 29)
     assert fdp.vertices["2.1"] == ("alice.wrl_3", 2395)
     if not (file.parent / "alice.wrl").exists():
         with pytest.raises(ModelError, match=r"needs alice\.wrl"):
-            read_fdp(file)
+            read_fdp_points(file)
 
 
 def test_the_real_text_file(shared: Path) -> None:
     with pytest.warns(FbaWarning) as seen:
-        points = read_fdp(shared / "data/candide/candide3.fdp")
+        points = read_fdp_points(shared / "data/candide/candide3.fdp")
     said = " ".join(str(warning.message) for warning in seen)
     for words in ("12.1", "3.5 is on the other side", "3.8 and 3.12 have changed places"):
         assert words in said

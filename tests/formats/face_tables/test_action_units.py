@@ -127,7 +127,7 @@ def test_times_vary_or_are_those_of_pictures(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.times, uneven - uneven[0], atol=1e-5)
     path = saved(tmp_path, openface_csv(OF_FIVE, STILL, AHEAD, rate=1000))
     assert "taken as 30 in a second" in openface.read_face(path).findings[0]
-    assert openface.read_face(path, fps=25).rate == 25
+    assert openface.read_face(path, source_rate=25).rate == 25
 
 
 @pytest.mark.filterwarnings("ignore:.*rows have no face")
@@ -149,9 +149,11 @@ def test_pyfeat(tmp_path: Path) -> None:
     text = pyfeat_csv({**STRENGTHS, 43: WAVE}, frames=np.arange(ROWS) * 2.0)
     path = saved(tmp_path, text)
     assert format_of(path).name == "pyfeat"
-    with pytest.raises(FormatError, match="no column of times; give the frame rate of the film with fps=30"):
+    with pytest.raises(
+        FormatError, match="no column of times; give the frame rate of the film with source_rate=30"
+    ):
         pyfeat.read_face(path)
-    motion = pyfeat.read_face(path, fps=50)
+    motion = pyfeat.read_face(path, source_rate=50)
     assert isinstance(motion, ActionUnitMotion)
     order = tuple(sorted((*UNITS, 43)))
     assert (motion.units, motion.rate) == (order, 25)
@@ -166,8 +168,8 @@ def test_pyfeat(tmp_path: Path) -> None:
     twice = np.repeat(np.arange(ROWS // 2), 2).astype(float)
     path = saved(tmp_path, pyfeat_csv(STRENGTHS, frames=twice, identity=people))
     with pytest.raises(FormatError, match="has several faces"):
-        pyfeat.read_face(path, fps=25)
-    assert len(pyfeat.read_face(path, fps=25, face="Bo")) == ROWS // 2
+        pyfeat.read_face(path, source_rate=25)
+    assert len(pyfeat.read_face(path, source_rate=25, face="Bo")) == ROWS // 2
 
 
 def test_the_samples(shared: Path) -> None:

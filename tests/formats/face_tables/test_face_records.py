@@ -154,7 +154,7 @@ def test_records_of_ifacialmocap(tmp_path: Path, version: int, between: str) -> 
     records = ifacialmocap_records(WEIGHTS, HEAD, EYES, version=version)
     path = saved(tmp_path, between.join(records), "a.txt")
     assert format_of(path).name == "ifacialmocap"
-    motion = ifacialmocap.read_face(path, fps=30)
+    motion = ifacialmocap.read_face(path, source_rate=30)
     check(motion, tolerance=0.0051)
     assert motion.rate == 30
     assert motion.head is not None
@@ -193,7 +193,7 @@ def test_signs_in_a_record_of_the_app(tmp_path: Path) -> None:
         "eyeLookDown_L-25|eyeLookIn_L-25|eyeLookOut_L-0|eyeLookDown_R-25|eyeLookIn_R-0|eyeLookOut_R-13|jawOpen-0"
         "|hapihapi-0|=head#-16.5,4.35,0.26,0.03,-0.08,-0.4|rightEye#8.97,-4.78,-0.75|leftEye#8.8,-9.08,-1.4|"
     )
-    motion = ifacialmocap.read_face(saved(tmp_path, "\n".join([record] * 2), "a.txt"), fps=60)
+    motion = ifacialmocap.read_face(saved(tmp_path, "\n".join([record] * 2), "a.txt"), source_rate=60)
     assert motion.eyes is not None
     yaw_left, yaw_right, pitch_left, pitch_right = motion.eyes[0]
     assert max(yaw_left, yaw_right) < 0 < min(pitch_left, pitch_right)
@@ -230,9 +230,9 @@ def test_json_that_is_refused(tmp_path: Path) -> None:
     for frame in untimed:
         del frame["timestampMs"]
     path = saved(tmp_path, json.dumps(untimed), "a.json")
-    with pytest.raises(FormatError, match="its frames have no times; give their rate with fps=30"):
+    with pytest.raises(FormatError, match="its frames have no times; give their rate with source_rate=30"):
         fba.read(path)
-    assert fba.read(path, fps=25).rate == 25
+    assert fba.read(path, source_rate=25).rate == 25
     short = beat(WEIGHTS)
     short["frames"][4]["weights"].pop()  # type: ignore[index]
     backwards = beat(WEIGHTS)

@@ -193,9 +193,11 @@ def test_tables_of_other_programs(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.weights[:, 0], 0.01 * (np.arange(40) + 1), atol=1e-9)
     bare = [",".join(names), *(",".join(row) for row in rows)]
     path = saved(tmp_path, "\n".join(bare))
-    with pytest.raises(FormatError, match=r"has no column of times.*give the rate of its rows with fps=30"):
+    with pytest.raises(
+        FormatError, match=r"has no column of times.*give the rate of its rows with source_rate=30"
+    ):
         fba.read(path)
-    assert fba.read(path, fps=50).rate == 50
+    assert fba.read(path, source_rate=50).rate == 50
 
 
 @pytest.mark.filterwarnings("ignore:eyes that turn further:fba.errors.FbaWarning")

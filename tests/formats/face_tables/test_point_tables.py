@@ -60,7 +60,7 @@ def test_every_layout(name: str, tmp_path: Path) -> None:
             continue
         path = saved(tmp_path, name, LAYOUTS[name](motion))
         assert format_of(path).name == "points"
-        found = read_points(path, fps=30)
+        found = read_points(path, source_rate=30)
         np.testing.assert_allclose(found.positions, motion.positions, rtol=1e-5)
         np.testing.assert_allclose(found.times, motion.times, atol=1e-5)
         assert (found.flat, found.share, found.rate) == (motion.flat, motion.share, 30)
@@ -68,10 +68,10 @@ def test_every_layout(name: str, tmp_path: Path) -> None:
 
 def test_openpose(tmp_path: Path) -> None:
     motion = flat(70)
-    found = read_points(saved(tmp_path, "film.jsonl", lines(openpose_frames(motion))), fps=30)
+    found = read_points(saved(tmp_path, "film.jsonl", lines(openpose_frames(motion))), source_rate=30)
     np.testing.assert_allclose(found.positions, motion.positions)
     lost = [*openpose_frames(motion)[:5], {"version": 1.3, "people": []}, *openpose_frames(motion, 0.0)[6:]]
-    found = read_points(saved(tmp_path, "film.jsonl", lines(lost)), fps=30)
+    found = read_points(saved(tmp_path, "film.jsonl", lines(lost)), source_rate=30)
     assert found.seen.tolist() == [True] * 5 + [False] * 7
 
 
@@ -96,7 +96,7 @@ def test_points_of_other_trackers_are_refused_by_name(count: int, tmp_path: Path
         saved(tmp_path, "a.json", json.dumps([{"landmarks": [[1.0, 2.0]] * count}])),
     ):
         with pytest.raises(FormatError, match=f"{count} points on a face, as those of {whose}"):
-            read_points(path, fps=30)
+            read_points(path, source_rate=30)
 
 
 def test_what_is_wrong_is_named(tmp_path: Path) -> None:
@@ -108,15 +108,15 @@ def test_what_is_wrong_is_named(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r":6: the row is 0\.033 s before the one before it"):
         read_points(saved(tmp_path, "a.csv", back))
     for data in (array(flat()), json.dumps(flat().positions.tolist()), wide(flat(), header=False)):
-        with pytest.raises(FormatError, match=r"fps"):
+        with pytest.raises(FormatError, match=r"source_rate"):
             read_points(saved(tmp_path, "none", data))
     twice = [{"faceLandmarks": 2 * frame["faceLandmarks"]} for frame in mediapipe_frames(deep())]
     path = saved(tmp_path, "two.json", json.dumps(twice))
     with pytest.raises(FormatError, match=r"frame 0 has 2 faces"):
-        read_points(path, fps=30)
-    assert len(read_points(path, fps=30, face="1")) == FRAMES
+        read_points(path, source_rate=30)
+    assert len(read_points(path, source_rate=30, face="1")) == FRAMES
     with pytest.raises(FormatError, match=r"no frame with points"):
-        read_points(saved(tmp_path, "a.json", json.dumps([{"faceLandmarks": []}] * 3)), fps=30)
+        read_points(saved(tmp_path, "a.json", json.dumps([{"faceLandmarks": []}] * 3)), source_rate=30)
     with pytest.raises(FormatError, match=r"no face is seen in any of the 12 frames"):
         fba.read(saved(tmp_path, "a.npz", arrays(replace(flat(), positions=0 * flat().positions), fps=30)))
     cut = long(flat()).decode().replace(",3,", ",x,", 1)
@@ -128,7 +128,7 @@ def test_numbers_that_are_no_face(tmp_path: Path) -> None:
     random = np.random.default_rng(1).uniform(0, 500, flat().positions.shape)
     path = saved(tmp_path, "a.npy", array(replace(flat(), positions=random)))
     with pytest.raises(FormatError, match=r"the points do not lie as those of a face"):
-        fba.read(path, fps=30)
+        fba.read(path, source_rate=30)
 
 
 def test_arrays_of_objects_are_not_run(tmp_path: Path) -> None:
@@ -203,7 +203,7 @@ def test_heads_of_py_feat_are_found_from_points(tmp_path: Path) -> None:
     rows = [",".join(map(str, points.T.ravel().tolist())) for points in take.motion.positions]
     lines = [f"{line},{more},approx_time" for line, more in zip(table[:1], [names], strict=True)]
     lines += [f"{line},{more},00:01" for line, more in zip(table[1:], rows, strict=True)]
-    found = pyfeat.read_face(saved(tmp_path, "face.csv", "\n".join(lines)), fps=30)
+    found = pyfeat.read_face(saved(tmp_path, "face.csv", "\n".join(lines)), source_rate=30)
     assert found.head is not None
     np.testing.assert_allclose(found.head[:, 0], take.faps[:, 47] * 1e-5, atol=0.06)
     np.testing.assert_allclose(found.head[:, 1], take.faps[:, 48] * 1e-5, atol=0.06)

@@ -115,7 +115,7 @@ def test_documents(content: Any, tmp_path: Path) -> None:
 
 def test_documents_by_numbers_of_frames(tmp_path: Path) -> None:
     frames = {str(n): {"landmarks": one} for n, one in enumerate(points().tolist())}
-    found = read_points(document(tmp_path, dict(reversed(frames.items()))), fps=30)
+    found = read_points(document(tmp_path, dict(reversed(frames.items()))), source_rate=30)
     np.testing.assert_allclose(found.positions, points())
 
 
@@ -138,14 +138,14 @@ def test_documents_that_say_the_size_of_the_picture(tmp_path: Path) -> None:
 def test_documents_without_a_face(change: Any, message: str, tmp_path: Path) -> None:
     frames = [{"landmarks": one} for one in points().tolist()]
     with pytest.raises(FormatError, match=message):
-        read_points(document(tmp_path, change(frames)), fps=30)
+        read_points(document(tmp_path, change(frames)), source_rate=30)
 
 
 def test_what_is_no_number_is_not_seen(tmp_path: Path) -> None:
     frames: list[Any] = points().tolist()
     frames[2] = [["?", None], *frames[2][1:]]
     frames[3][5] = [1e301, True]
-    found = read_points(document(tmp_path, frames), fps=30)
+    found = read_points(document(tmp_path, frames), source_rate=30)
     assert np.argwhere(np.isnan(found.positions[..., 0])).tolist()[-1] == [3, 5]
 
 
@@ -154,10 +154,10 @@ def test_lines_of_which_one_is_broken(tmp_path: Path) -> None:
     lines = [json.dumps({"landmarks": one}) for one in points().tolist()]
     path.write_text("\n".join([*lines[:2], lines[2][:-40], *lines[3:]]))
     with pytest.raises(FormatError, match=r"a\.jsonl:3: is no complete JSON"):
-        read_points(path, fps=30)
+        read_points(path, source_rate=30)
 
 
 def test_faces_of_documents_are_numbered(tmp_path: Path) -> None:
     frames = [{"landmarks": one} for one in points().tolist()]
     with pytest.raises(FormatError, match="has no face 'Anna'; faces are numbered from 0"):
-        read_points(document(tmp_path, frames), fps=30, face="Anna")
+        read_points(document(tmp_path, frames), source_rate=30, face="Anna")

@@ -12,7 +12,7 @@ import fba
 from fba.body import BapSolver, Skeleton
 from fba.body.model import BodyModel
 from fba.errors import FbaWarning, FormatError
-from fba.formats.gltf.bodies import read_body
+from fba.formats.gltf.bodies import import_body
 from fba.parameters import baps
 from gltf_edits import edit
 from small_bodies import rod
@@ -42,7 +42,7 @@ def standing(body: BodyModel) -> np.ndarray:
 def test_a_person_stands_in_the_default_posture(
     tmp_path: Path, extension: str | None, facing: int, scale: float
 ) -> None:
-    body = read_body(write_person(tmp_path / "p.glb", extension=extension, facing=facing, scale=scale))
+    body = import_body(write_person(tmp_path / "p.glb", extension=extension, facing=facing, scale=scale))
     assert body.skeleton.names == Skeleton.default().names
     posture = body.skin(standing(body))
     assert posture[:, 1].min() == pytest.approx(0, abs=1e-6)
@@ -79,7 +79,7 @@ def test_a_motion_moves_its_own_person_as_in_the_file(tmp_path: Path) -> None:
         "leftLowerLeg": turn("x", 80),
     }
     path = write_person(tmp_path / "p.glb", clips={"pose": clip})
-    body = read_body(path)
+    body = import_body(path)
     track = fba.read(path, ground="none").body
     assert track is not None
     shown = BapSolver(body.skeleton).pose(track.values)
@@ -111,7 +111,7 @@ def test_a_motion_moves_its_own_person_as_in_the_file(tmp_path: Path) -> None:
     ("joint", "bone"), [("sacroiliac", "hips"), ("l_subtalar", "leftFoot"), ("l_midtarsal", "leftFoot")]
 )
 def test_hips_and_feet_follow_all_joints_that_turn_them(tmp_path: Path, joint: str, bone: str) -> None:
-    body = read_body(write_person(tmp_path / "p.glb"))
+    body = import_body(write_person(tmp_path / "p.glb"))
     solver = BapSolver(body.skeleton)
     values = np.zeros(296)
     values[[bap.number - 1 for bap in baps() if bap.joint == joint]] = 30_000
@@ -133,7 +133,7 @@ def test_meshes_without_a_skin_hang_on_their_joint(tmp_path: Path) -> None:
 
     edit(path, add)
     with pytest.warns(FbaWarning, match="left out: chair"):
-        body = read_body(path)
+        body = import_body(path)
     hat = body.part("hat")
     assert {body.skeleton.names[joint] for joint in hat.joints[:, 0]} == {"skullbase"}
     assert len(body.parts) == 2
@@ -147,7 +147,7 @@ def test_joints_that_a_file_does_not_declare_go_with_those_above(tmp_path: Path)
         bones[:] = [entry for entry in bones if not entry["bone"].endswith(("Proximal", "Shoulder"))]
 
     edit(path, forget)
-    body = read_body(path)
+    body = import_body(path)
     carried = [body.skeleton.names[body.joints[8 * number, 0]] for number in range(len(BONES))]
     joints = dict(zip(BONES, carried, strict=True))
     assert joints["leftMiddleProximal"] == joints["leftHand"] == "l_wrist"
@@ -166,10 +166,10 @@ def test_files_that_show_no_person(tmp_path: Path, change: object, message: str)
     path = write_person(tmp_path / "p.glb")
     edit(path, change)  # type: ignore[arg-type]
     with pytest.raises(FormatError, match=message):
-        read_body(path)
+        import_body(path)
 
 
 def test_own_body_models_are_loaded(tmp_path: Path) -> None:
     path = tmp_path / "own.glb"
     rod().save(path)
-    assert read_body(path).skeleton.names == rod().skeleton.names
+    assert import_body(path).skeleton.names == rod().skeleton.names

@@ -12,7 +12,7 @@ import pytest
 
 from fba.capture.markers._targets import target_points
 from fba.capture.markers.motion import MarkerMotion
-from fba.capture.virtual_markers import MarkerMapping, VirtualMarker, head_of_model, perform
+from fba.capture.virtual_markers import MarkerMapping, VirtualMarker, head_of_model, move_head
 from fba.face.feature_points import row_of
 from fba.formats.gltf.moved_head import write_moved_head
 from small_head import small_head
@@ -41,7 +41,7 @@ def mapping() -> MarkerMapping:
 def test_shapes_weights_and_turns(tmp_path: Path) -> None:
     moved = tmp_path / "moved.glb"
     head = head_of_model(small_head())
-    shown = perform(capture(), head, mapping())
+    shown = move_head(capture(), head, mapping())
     write_moved_head(moved, shown)
     data = moved.read_bytes()
     size = struct.unpack("<I", data[12:16])[0]

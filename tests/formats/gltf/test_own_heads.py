@@ -9,7 +9,7 @@ import pytest
 
 from fba.body.own_head import HeadShape, OwnHead
 from fba.capture.blendshapes.shape_table import amounts_of
-from fba.formats.gltf.bodies import read_body
+from fba.formats.gltf.bodies import import_body
 from fba.parameters import FAP_COUNT, fap_numbers
 from gltf_edits import edit
 from small_people import BONES, write_person
@@ -28,7 +28,7 @@ def faps(**values: float) -> np.ndarray:
 
 def risen(path: Path, values: np.ndarray) -> np.ndarray:
     """By how much FAPs raise vertices, in metres of the file."""
-    body = read_body(path)
+    body = import_body(path)
     assert body.own_head is not None
     size = float(body.notes["size"].split()[0])
     moved: np.ndarray = body.own_head.move(body.vertices, values) - body.vertices
@@ -38,7 +38,7 @@ def risen(path: Path, values: np.ndarray) -> np.ndarray:
 def test_shapes_with_known_names_move_the_head(tmp_path: Path) -> None:
     morphs = {"jawOpen": [0.0], "eyeBlink_L": [0.0], "Wobble": [0.0]}
     path = write_person(tmp_path / "p.glb", morphs=morphs)
-    body = read_body(path)
+    body = import_body(path)
     assert body.own_head is not None
     assert [shape.name for shape in body.own_head.shapes] == ["jawOpen", "eyeBlinkLeft"]
     moved = risen(path, faps(close_t_l_eyelid=1024))
@@ -88,7 +88,7 @@ def test_eyes_turn_with_their_bones(tmp_path: Path) -> None:
         bones["leftEye"] = bones.pop("leftMiddleProximal")
 
     edit(path, rename)
-    body = read_body(path)
+    body = import_body(path)
     assert body.own_head is not None
     (eye,) = body.own_head.eyes
     box = 8 * list(BONES).index("leftMiddleProximal")

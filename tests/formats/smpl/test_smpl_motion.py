@@ -99,9 +99,9 @@ def test_rates(tmp_path: Path) -> None:
     slow = fba.read(path, rate=30)
     assert (slow.rate, len(slow)) == (30, 3)
     np.savez(tmp_path / "b.npz", poses=poses)
-    with pytest.raises(FormatError, match=r"b\.npz: has no frame rate; give one with fps=120"):
+    with pytest.raises(FormatError, match=r"b\.npz: has no frame rate; give one with source_rate=120"):
         fba.read(tmp_path / "b.npz")
-    assert fba.read(tmp_path / "b.npz", fps=60).rate == 60
+    assert fba.read(tmp_path / "b.npz", source_rate=60).rate == 60
 
 
 @pytest.mark.parametrize(

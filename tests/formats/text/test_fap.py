@@ -89,9 +89,9 @@ def test_numbers_that_start_again_go_on_instead(tmp_path: Path) -> None:
 
 def test_without_a_header_it_wants_a_rate(tmp_path: Path) -> None:
     path = file(tmp_path, "a.fap", mask(3), "0 1")
-    with pytest.raises(FormatError, match=r"no header.*; give one with fps=25$"):
+    with pytest.raises(FormatError, match=r"no header.*; give one with source_rate=25$"):
         read_fap(path)
-    animation = read_fap(path, fps="29.97", name="given")
+    animation = read_fap(path, source_rate="29.97", name="given")
     assert (animation.rate, animation.name) == (Fraction(30000, 1001), "given")
     assert len(animation) == 1
 
@@ -115,7 +115,7 @@ def test_without_a_header_it_wants_a_rate(tmp_path: Path) -> None:
         (["2.1 a 25 1", mask(3).replace("1", "2"), "0 1"], 2, "2", "mask line of 68 bits"),
         (["2.1 a 25 1", mask(width=67), "0", mask(), "0"], 2, None, "mask of 68 bits, found 67"),
         (["2.1 a 25 1", mask(3), "0 1", "2.1 b 25 1", mask(), "0"], 4, "2.1", "second header"),
-        (["2.1 a 0 1", mask(3), "0 1"], 1, "0", r"more than 0 \(found '0'\); give one with fps=25$"),
+        (["2.1 a 0 1", mask(3), "0 1"], 1, "0", r"more than 0 \(found '0'\); give one with source_rate=25$"),
         (["2.1 a nan 1", mask(3), "0 1"], 1, "nan", "frame rate is a positive number"),
         (["2.1 a 1e400000000 1", mask(3), "0 1"], 1, "1e400000000", "frame rate is a positive number"),
         (["2.1 a -25 1", mask(3), "0 1"], 1, "-25", "frame rate"),
@@ -220,7 +220,7 @@ def test_every_real_file_reads_and_writes_back(shared: Path, tmp_path: Path) -> 
     paths = [path for path in shared.rglob("*") if path.suffix.lower() == ".fap"]
     assert len(paths) >= 190
     for path in paths:
-        options = {"fps": 25} if path.parent.name == "semaine" else {}
+        options = {"source_rate": 25} if path.parent.name == "semaine" else {}
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # none of them has an oddity worth a warning
             animation = read_fap(path, **options)  # type: ignore[arg-type]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from hypothesis import strategies as st
 
 from fba import Animation, BodyTrack, Decoder, FaceTrack, FbaError, FbaWarning, Frame
-from fba.parameters import bap_steps, fap_steps
+from fba.parameters import BapTable, bap_steps, fap_steps
 from fba_conformance._textbook import FrequencyTable, encode_segment
 
 OBJECT, PLANE, END = b"\0\0\1\xba", b"\0\0\1\xbb", b"\0\0\1\xb1"
@@ -70,7 +70,7 @@ def jaw_predicted(difference: int, *, skip: str = "0") -> str:
 
 
 def decoded(
-    data: bytes, *, chunk: int | None = None, mode: str = "raise", bap_steps: str = "iso"
+    data: bytes, *, chunk: int | None = None, mode: str = "raise", bap_steps: BapTable = "iso"
 ) -> tuple[list[Frame], FbaError | None, Decoder]:
     """All frames that come out, what was raised, and the decoder."""
     decoder = Decoder(on_error=mode, bap_steps=bap_steps)  # type: ignore[arg-type]
@@ -97,7 +97,7 @@ def content(frame: Frame) -> tuple[object, ...]:
     return (frame.plane.settings.intra, *parts)
 
 
-def steps(part: str, quant: int, table: str = "iso") -> npt.NDArray[np.int64]:
+def steps(part: str, quant: int, table: BapTable = "iso") -> npt.NDArray[np.int64]:
     """Quantiser steps, by the standard's rule, of all FAPs or BAPs."""
     if part == "face":
         return fap_steps() * quant if quant else np.ones(68, dtype=np.int64)
@@ -116,7 +116,7 @@ RATES = st.one_of(
 
 
 @st.composite
-def animations(draw: st.DrawFn, fap_quant: int, bap_quant: int, table: str = "iso") -> Animation:
+def animations(draw: st.DrawFn, fap_quant: int, bap_quant: int, table: BapTable = "iso") -> Animation:
     """Any animation that these quantisers can carry: 1..30 frames, gaps, masks that change, absent parts."""
     count = draw(st.integers(1, 30))
     rate = draw(RATES)
@@ -142,7 +142,7 @@ def animations(draw: st.DrawFn, fap_quant: int, bap_quant: int, table: str = "is
 
 
 def _track(
-    random: np.random.Generator, count: int, part: str, quant: int, table: str, masking: str
+    random: np.random.Generator, count: int, part: str, quant: int, table: BapTable, masking: str
 ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_]]:
     step = steps(part, quant, table)
     largest = largest_level(part, quant) * step

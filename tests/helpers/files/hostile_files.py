@@ -536,7 +536,7 @@ def read_markers(path: Path) -> object:
 
     reader = format_of(path).read_face
     assert reader is not None
-    return reader(path, fps=Fraction(50))
+    return reader(path, source_rate=Fraction(50))
 
 
 def _markers() -> dict[str, HostileFile]:
@@ -705,9 +705,9 @@ def _sounds() -> dict[str, HostileFile]:
 
 
 def _personas() -> dict[str, HostileFile]:
-    from fba.persona import load_persona
+    from fba.persona import Persona
 
-    return {"persona members": HostileFile(load_persona, "a.persona", persona_members)}
+    return {"persona members": HostileFile(Persona.load, "a.persona", persona_members)}
 
 
 def persona_members(size: int) -> bytes:

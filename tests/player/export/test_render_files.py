@@ -48,7 +48,7 @@ class TestFiles:
     @pytest.mark.parametrize("rate", [Fraction(30000, 1001), Fraction(25, 2), Fraction(60)])
     def test_rates_are_exact(self, talking: Animation, tmp_path: Path, rate: Fraction) -> None:
         path = tmp_path / "rate.mp4"
-        render(talking, path, size=(64, 64), fps=rate)
+        render(talking, path, size=(64, 64), rate=rate)
         frames, found, _, _ = read_film(path)
         assert found == rate
         assert len(frames) == -(-Fraction(10, 25) * rate // 1)
@@ -108,7 +108,7 @@ def test_frames_and_stretches_outside_are_refused(talking: Animation, tmp_path: 
     with pytest.raises(ValueError, match=r"\.png"):
         render(talking, tmp_path / "a.mp4", frame=1)
     with pytest.raises(ValueError, match="frame rate"):
-        render(talking, tmp_path / "a.mp4", fps=0)
+        render(talking, tmp_path / "a.mp4", rate=0)
     with pytest.raises(ValueError, match="2x2"):
         render(talking, tmp_path / "a.mp4", size=(1, 1))
     assert not list(tmp_path.iterdir())

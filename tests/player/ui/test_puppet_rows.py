@@ -8,7 +8,7 @@ import pytest
 import fba
 from fba.animation import Animation, BodyTrack
 from fba.body import BapSolver, Skeleton
-from fba.body.solve.limits import Limits
+from fba.body.solve.limits import JointLimits
 from fba_player._ui.panels._puppet_rows import Group, Row, groups
 
 
@@ -68,7 +68,7 @@ def test_both_sides_are_mirror_images(group: Group, row: Row, other: Row) -> Non
 
 
 def test_the_body_stays_within_human_limits_and_fits_a_stream() -> None:
-    human = {limit.baps for limit in Limits.human().limits}
+    human = {limit.baps for limit in JointLimits.human().limits}
     for end in ("low", "high"):
         baps = np.zeros((2, 296), np.int32)
         limited = np.zeros((2, 296), np.int32)
@@ -80,7 +80,7 @@ def test_the_body_stays_within_human_limits_and_fits_a_stream() -> None:
                         baps[1, number - 1] = value
                         if tuple(number - 1 for number in row.numbers) in human:
                             limited[1, number - 1] = value
-        assert not Limits.human().check(limited[:, :186])
+        assert not JointLimits.human().check(limited[:, :186])
         assert np.count_nonzero(limited[1]) > 40
         take = Animation(25, np.arange(2), body=BodyTrack(baps, np.ones(baps.shape, bool)))  # type: ignore[arg-type]
         assert fba.encode(take, fba.EncoderOptions(bap_steps="visage"))

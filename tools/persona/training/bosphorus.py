@@ -27,7 +27,7 @@ from fba.arrays import Float64
 from fba.errors import FormatError
 from fba.formats.numpy_archives import read_arrays
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.persona.points import fit_similarity
+from fba.persona.points import fit_face_points
 from fba.persona.points.layout import (
     OUTLINE,
     REGISTERED,
@@ -151,7 +151,7 @@ def read_scan(path: Path, limits: Limits = DEFAULT_LIMITS) -> Float64:
     points = arrays.get("points")
     if points is None or points.shape != (TRACKED, 2) or not np.isfinite(points).all():
         raise FormatError(f"needs `points` ({TRACKED}, 2) of a tracker", path=path.with_suffix(".npz"))
-    to_cloud = fit_similarity(
+    to_cloud = fit_face_points(
         np.array([here[name] for name in both]), np.array([there[name][:2] for name in both])
     )
     across = to_cloud.apply(points)
@@ -209,6 +209,6 @@ def _register(points: Float64) -> tuple[Float64, Float64]:
     apart = np.linalg.norm(across[SAME:, None] - points[None, :, :2], axis=2)
     deep[SAME:] = points[apart.argmin(axis=1), 2]
     rows = [number - 1 for number in REGISTERED]
-    similarity = fit_similarity(points[rows], standard_points()[rows], mirror=False)
+    similarity = fit_face_points(points[rows], standard_points()[rows], mirror=False)
     mask = similarity.apply(np.column_stack([across, deep]))
     return similarity.apply(points[:TRACKED])[:, :2], mask

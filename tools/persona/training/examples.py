@@ -8,7 +8,7 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.parameters import FAP_COUNT
-from fba.persona.points import fit_similarity
+from fba.persona.points import fit_face_points
 from fba.persona.points._registration import register_points
 from fba.persona.points.layout import REGISTERED, mask_of_face, points_of_face, standard_points
 from tools.persona.training.camera import photograph
@@ -94,5 +94,5 @@ def _size_ratio(rest: Float64) -> float:
     """Return millimetres of the standard mask for each of a face's, by the six points of the registration."""
     rows = [number - 1 for number in REGISTERED]
     return float(
-        fit_similarity(points_of_face(rest)[rows, :2], standard_points()[rows, :2], mirror=False).scale
+        fit_face_points(points_of_face(rest)[rows, :2], standard_points()[rows, :2], mirror=False).scale
     )

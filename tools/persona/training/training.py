@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
-from fba.persona import Recogniser
+from fba.persona import ClassRecogniser
 from fba.persona.points.layout import PARTS, VERTICES, flat_mask, part_vertices
 from fba.persona.recognition import Component, displacements
 from fba.persona.recognition._faps import face_scale, mask_faps, measure_fapu
@@ -24,7 +24,9 @@ MAX_NEUTRALS = 3
 """Largest number of neutral examples of a part, relative to its largest other class."""
 
 
-def train_recogniser(examples: Examples, *, tries: int = 3, seed: int = 1, about: str = "") -> Recogniser:
+def train_recogniser(
+    examples: Examples, *, tries: int = 3, seed: int = 1, about: str = ""
+) -> ClassRecogniser:
     """Return a recogniser trained with examples; every fifth person is held back for validation."""
     check = examples.person % FOLDS == FOLDS - 1
     random = np.random.default_rng(seed)
@@ -37,7 +39,7 @@ def train_recogniser(examples: Examples, *, tries: int = 3, seed: int = 1, about
             part, part_classes(part), moved[part][used], targets[used], check[used], tries=tries, seed=seed
         )
     kept = _stored(examples)
-    return Recogniser(
+    return ClassRecogniser(
         components,
         tuple(each.name for each in face_classes()),
         examples.classes[kept],
@@ -90,5 +92,5 @@ def _fit_jaw(examples: Examples) -> Float64:
         fapu = measure_fapu(examples.neutral[rows[0]])
         values[rows] = mask_faps(moved[rows], fapu, np.zeros(len(JAW_FAPS)))[:, [fap - 1 for fap in JAW_FAPS]]
     if not examples.jaw.any():  # scans do not have it: that of the synthetic faces
-        return Recogniser.default().jaw
+        return ClassRecogniser.default().jaw
     return np.asarray(np.linalg.lstsq(values, examples.jaw, rcond=None)[0])

@@ -16,6 +16,7 @@ from fba.parameters import (
     FAP_COUNT,
     INTENSITY_MAX,
     VISEME_SELECT_MAX,
+    BapTable,
     baps,
     faps,
 )
@@ -92,7 +93,7 @@ def expression_fields(frame: int) -> tuple[int, ...]:
 
 
 def bodies(
-    count: int, numbers: Sequence[int] = STANDARD_BAPS, *, table: str = "iso", seed: int = 2
+    count: int, numbers: Sequence[int] = STANDARD_BAPS, *, table: BapTable = "iso", seed: int = 2
 ) -> list[dict[int, int | tuple[int, ...]]]:
     """Return BAPs that walk within the standard's limits, a dictionary for each plane."""
     result: list[dict[int, int | tuple[int, ...]]] = [{} for _ in range(count)]

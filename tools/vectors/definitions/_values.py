@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from fba.parameters import BAP_STEP_TABLES, EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX
+from fba.parameters import (
+    BAP_STEP_TABLES,
+    EXPRESSION_SELECT_MAX,
+    INTENSITY_MAX,
+    VISEME_SELECT_MAX,
+    BapTable,
+)
 from tools.vectors.definitions._targets import (
     EXTENSION_BAPS,
     FEW_BAPS,
@@ -103,7 +109,7 @@ def _fap_quantisers(first: int) -> bytes:
     )
 
 
-def _bap_quantisers(first: int, table: str) -> bytes:
+def _bap_quantisers(first: int, table: BapTable) -> bytes:
     values = bodies(16, FEW_BAPS, table=table, seed=first + 3)
     return write_stream(
         [

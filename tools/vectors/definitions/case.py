@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fba.parameters import BapTable
+
 
 @dataclass(frozen=True)
 class Case:
@@ -19,7 +21,7 @@ class Case:
     name: str
     tests: str
     make: Callable[[], bytes]
-    bap_steps: str = "iso"
+    bap_steps: BapTable = "iso"
     times: bool = True
     encodes: bool = True
     optional: str = ""

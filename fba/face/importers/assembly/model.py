@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32
+from fba.choices import UpAxis
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly._default_materials import apply_default_materials
@@ -41,12 +42,12 @@ class ImportOptions:
     path: str | os.PathLike[str]
     name: str
     unit: float | None = None
-    up: str = "y"
+    up: UpAxis = "y"
     kinds: Mapping[str, str] | None = None
     limits: Limits = DEFAULT_LIMITS
 
 
-def turn_upright(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piece], Float64]:
+def turn_upright(pieces: Sequence[Piece], points: Float64, up: UpAxis) -> tuple[list[Piece], Float64]:
     """Return the pieces and points of a file whose vertical axis is "y" or "z", with y up."""
     if up not in AXES:
         raise OptionError(f"up must be one of {', '.join(AXES)}, not {up!r}")

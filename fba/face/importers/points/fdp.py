@@ -15,29 +15,28 @@ from fba.arrays import Float64
 from fba.errors import FbaWarning, ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.points._fdp_data import Fdp, repair_sides_with_warning
-from fba.face.importers.points.xface import load_xface, xface_points
+from fba.face.importers.points.xface import read_xface, xface_points
 from fba.text_files import parse_integer, parse_number, read_bytes, read_words
 
 
-def read_fdp(path: str | os.PathLike[str]) -> Float64:
+def read_fdp_points(path: str | os.PathLike[str]) -> Float64:
     """Return the feature points of an FDP file: float64 (84, 3), in the file's unit, NaN for those not in it.
 
     A point on the wrong side of the face, or eye corners that are swapped, are corrected with an
     FbaWarning. An Xface file names vertices of mesh files; the points are looked up there. Raises
     ModelError where the file is damaged or its mesh files are missing.
     """
-    fdp = load_fdp(path)
+    fdp = read_fdp(path)
     if fdp.format == "xface":
         return xface_points(fdp)
     return fdp.points
 
 
-def load_fdp(path: str | os.PathLike[str]) -> Fdp:
-    """Return the content of an FDP file, points repaired as by `read_fdp`. Raises ModelError if it is
-    damaged."""
+def read_fdp(path: str | os.PathLike[str]) -> Fdp:
+    """Return the content of an FDP file, points repaired as by `read_fdp_points`. ModelError for damage."""
     name = os.fspath(path)
     if read_bytes(name)[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
-        return load_xface(name)
+        return read_xface(name)
     return _load_text(name)
 
 

@@ -16,7 +16,7 @@ from fba.arrays import Float64
 from fba.atomic import atomic
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.points.fdp import load_fdp
+from fba.face.importers.points.fdp import read_fdp
 from fba.face.importers.points.xface import xface_points
 from fba.text_files import parse_integer, parse_number, read_bytes, read_lines
 
@@ -176,7 +176,7 @@ def _short(value: object) -> str:
 
 
 def _from_fdp(path: str) -> GivenPoints:
-    fdp = load_fdp(path)
+    fdp = read_fdp(path)
     if fdp.format == "xface":
         return GivenPoints(xface_points(fdp))
     return GivenPoints(fdp.points, {name: vertex for name, (_, vertex) in fdp.vertices.items()})

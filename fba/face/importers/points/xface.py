@@ -20,9 +20,8 @@ NEUTRAL = "Rest"
 """Alias of the mesh file that shows the neutral face."""
 
 
-def load_xface(path: str) -> Fdp:
-    """Return an Xface file; positions are NaN until `xface_points` looks them up. ModelError where
-    damaged."""
+def read_xface(path: str) -> Fdp:
+    """Return an Xface file; positions are NaN until `xface_points` looks them up. ModelError for damage."""
     data = read_bytes(path)
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise ModelError(f"{path}: declares a DOCTYPE or entities, which Xface files do not need")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 from imgui_bundle import imgui
 
@@ -19,6 +20,8 @@ MAX_REACH = 2.0
 """Limits of the radius and the depth that can be set, in multiples of a new virtual marker's radius."""
 ASSIGNMENT_TEXTS = {"shared": "several markers", "exclusive": "the nearest alone"}
 OVERLAP_TEXTS = {"match": "meet their markers", "add": "are added"}
+
+Word = TypeVar("Word", bound=str)
 
 
 class MarkersPanel(EditingPanel[MarkerEditing]):
@@ -124,7 +127,7 @@ def _settings(editing: MarkerEditing) -> None:
         editing.beside = on
 
 
-def _choose(names: Sequence[str], texts: Mapping[str, str], current: str) -> str | None:
+def _choose(names: Sequence[Word], texts: Mapping[str, str], current: str) -> Word | None:
     """Draw radio buttons beside each other; return the name that was clicked, else None."""
     clicked = None
     for number, name in enumerate(names):

@@ -100,10 +100,10 @@ def _fap_rows(names: list[str]) -> tuple[Row, ...]:
 
 
 def _bap_rows(names: list[str]) -> tuple[Row, ...]:
-    from fba.body import Limits
+    from fba.body import JointLimits
     from fba.body.solve.limits import widest_limits
 
-    limits = {limit.name: limit for limit in Limits.human().limits}
+    limits = {limit.name: limit for limit in JointLimits.human().limits}
     rows: list[Row] = []
     words = [name.replace("~", " ") for name in names]
     for word in words:

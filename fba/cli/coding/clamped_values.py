@@ -12,7 +12,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.errors import FbaWarning
-from fba.parameters import bap_numbers, bap_steps, baps
+from fba.parameters import BapTable, bap_numbers, bap_steps, baps
 from fba.tracks import BodyTrack
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ MOST_STEPS = 1860
 """Quantiser steps that an I plane carries."""
 
 
-def bring_near(animation: Animation, table: str, quant: int) -> Animation:
+def bring_near(animation: Animation, table: BapTable, quant: int) -> Animation:
     """Return a capture, moved to begin at the default place if no first plane carries where it begins.
 
     Warns (FbaWarning) that it was moved. table, quant: of the BAPs.
