@@ -126,7 +126,7 @@ FACADES = {
     ("fba.face", "*"): "public names of the face",
     ("fba.body", "*"): "public names of the body",
     (
-        "fba.formats.registry",
+        "fba.formats._registry",
         "fba.formats.*",
     ): "the table of formats: readers and writers by name",
     ("fba.planning", "fba.planning._encoding"): "the function over all ways to encode, bit rates among them",

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from fba.errors import OptionError
-from fba.formats.merge import merge
-from fba.formats.registry import (
+from fba.formats._registry import (
     Format,
     format_of,
     formats,
@@ -15,6 +14,7 @@ from fba.formats.registry import (
     write,
     writer_for,
 )
+from fba.formats.merge import merge
 
 __all__ = [
     "Format",

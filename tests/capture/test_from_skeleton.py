@@ -18,8 +18,8 @@ from fba.body.footing import GroundedPoser, lowest_sole
 from fba.body.model import BodyModel
 from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
 from fba.capture.comparison._figure import find_up, result_figure, source_figure
+from fba.capture.comparison._measurement import sole_heights, source_scale
 from fba.capture.comparison._standing import find_floor, find_standing
-from fba.capture.comparison.measurement import sole_heights, source_scale
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.bvh import _reader as reader
 from fba.parameters import bap_numbers, baps

@@ -24,7 +24,7 @@ from fba.codec._plane.pricing import NextPlane
 from fba.errors import FbaError, OptionError
 from fba.face.importers import KINDS as HEADS
 from fba.face.importers import sniff
-from fba.formats.registry import format_of, formats
+from fba.formats._registry import format_of, formats
 from fba.live import KINDS
 from tools.fuzz import __main__ as program
 from tools.fuzz import _campaign as campaign

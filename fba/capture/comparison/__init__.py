@@ -7,9 +7,9 @@ May use: parameters, the body, and captured motion.
 """
 
 from fba.capture.comparison._figure import Figure, find_up, source_figure
+from fba.capture.comparison._measurement import compare, source_scale
 from fba.capture.comparison._stick import Stick, find_sticks
 from fba.capture.comparison._verdict import GRADES, Bounds, Comparison, Difference, bounds
-from fba.capture.comparison.measurement import compare, source_scale
 
 __all__ = [
     "GRADES",

@@ -12,9 +12,9 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.body import SIDES, BapSolver, BodyModel
 from fba.capture.comparison import _figure as figure
+from fba.capture.comparison import _measurement as measurement
 from fba.capture.comparison import _path_measures as path_measures
 from fba.capture.comparison import _pose_measures as pose_measures
-from fba.capture.comparison import measurement
 from fba.capture.comparison._standing import find_floor, find_standing
 from fba.capture.motion import SkeletonMotion
 from fba.parameters import BAP_COUNT
