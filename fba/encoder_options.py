@@ -32,8 +32,8 @@ class EncoderOptions:
     time_codes: with start codes, also the time at which decoding goes on after damage: I planes come at
         whole seconds where the intra period allows it, and carry a time code there. Takes 18 bits each.
     bap_steps: table of BAP steps: the standard's, or one vendor's, which is finer.
-    mark: name the table of BAP steps behind the end of the stream, where other decoders do not read; else a
-        decoder must be told, and the stream is the FBA object alone.
+    mark: write checksums, and of a body the table of BAP steps, behind the end of the stream, where other
+        decoders do not read; else the stream is the FBA object alone, and a decoder must be told the table.
     checksums: with the mark, a CRC-32 of each I period, 4 bytes each and about 20 more, by which a decoder
         notices flipped bits that leave the syntax whole.
     preset: what is sent: all that is given (reference); of streams, not what never moves (exact); of the

@@ -204,4 +204,4 @@ written_steps_option = option(
     help="Table of BAP steps of a stream, the standard's or one vendor's, which is finer; auto: the finer "
     "one for motion capture and walks, that of a stream for what comes from one, else the standard's.",
 )
-mark_option = option_like(EncoderOptions, "mark", default=None, by_default="yes, if it has a body")
+mark_option = option_like(EncoderOptions, "mark", default=None, by_default="yes")
