@@ -66,9 +66,10 @@ def group(*names: str, **changed: Any) -> Any:
 
 
 def documented(kind: type, name: str) -> str:
-    """Return what the docstring of a dataclass says of a field: the paragraph that begins "    name: "."""
-    pattern = rf"^    (?:\w+, )*{name}(?:, \w+)*: (.*(?:\n {{8}}.*)*)"
-    match = re.search(pattern, kind.__doc__ or "", re.MULTILINE)
+    """Return what the docstring of a dataclass says of a field: the paragraph that begins "name: "."""
+    pattern = rf"^(?:\w+, )*{name}(?:, \w+)*: (.*(?:\n {{4}}.*)*)"
+    # Python 3.13 takes the indentation off docstrings itself.
+    match = re.search(pattern, inspect.cleandoc(kind.__doc__ or ""), re.MULTILINE)
     text = " ".join(match[1].split()) if match else ""
     return text[:1].upper() + text[1:]
 
