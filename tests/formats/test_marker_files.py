@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 
 import fba
 from fba.capture.markers.motion import MarkerMotion
-from fba.errors import FbaWarning, FormatError, LimitError
+from fba.errors import FbaError, FbaWarning, FormatError, LimitError
 from fba.formats import format_of
 from fba.limits import Limits
 from tools.captures import marker_files
@@ -140,6 +141,23 @@ def test_what_is_wrong_is_named(
         return
     with pytest.raises(FormatError, match=message):
         reader(path)
+
+
+@pytest.mark.parametrize("name", marker_files.MAKERS)
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
+def test_damage_is_an_error_of_ours(tmp_path: Path, name: str) -> None:
+    path = marker_files.write(tmp_path, name, cloud(4, 5))
+    reader = format_of(path).read_face
+    assert reader is not None
+    data = bytearray(path.read_bytes())
+    random = np.random.default_rng(len(name))
+    for _ in range(60):
+        broken = bytearray(data)
+        for place in random.integers(0, min(len(data), 1500), 3):
+            broken[place] = random.integers(0, 256)
+        path.write_bytes(broken[: random.integers(1, len(data) + 1)])
+        with contextlib.suppress(FbaError):
+            assert len(reader(path).names) > 0
 
 
 def test_what_is_read_is_limited(tmp_path: Path) -> None:

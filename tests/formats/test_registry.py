@@ -17,7 +17,7 @@ import pytest
 import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.errors import BitstreamError, FbaWarning, FormatError, UnsupportedError
-from fba.formats import OptionError, format_of, formats, merge
+from fba.formats import OptionError, format_of, formats, merge, read_face, read_motion
 from fba.source import read_head
 from format_files import file, mask
 
@@ -144,6 +144,25 @@ def test_options(tmp_path: Path) -> None:
         fba.write(tmp_path / "b.fba", performance(), quant=3)
     with pytest.raises(OptionError, match="either options or fap_quant"):
         fba.write(tmp_path / "b.fba", performance(), options=fba.EncoderOptions(), fap_quant=3)
+
+
+SAMPLES = Path(fba.__file__).parent / "samples"
+
+
+def test_captures_are_read_as_the_file_has_them() -> None:
+    motion = read_motion(SAMPLES / "hello.bvh")
+    assert (motion.rate, len(motion), motion.names[0]) == (60, 576, "Hips")
+    markers = read_face(SAMPLES / "talk.c3d", format="c3d", limits=fba.Limits())
+    assert (markers.rate, markers.positions.shape) == (50, (300, 50, 3))
+
+
+def test_captures_of_the_other_kind_are_refused() -> None:
+    with pytest.raises(FormatError, match=r"hello\.bvh: is BVH, which holds .* captured face"):
+        read_face(SAMPLES / "hello.bvh")
+    with pytest.raises(FormatError, match=r"talk\.c3d: is C3D, which holds .* captured skeleton"):
+        read_motion(SAMPLES / "talk.c3d")
+    with pytest.raises(OptionError, match="reading bvh takes no option 'spine'"):
+        read_motion(SAMPLES / "hello.bvh", spine="full")
 
 
 def test_writing_chooses_by_suffix(tmp_path: Path) -> None:
