@@ -160,6 +160,18 @@ def test_damage_is_an_error_of_ours(tmp_path: Path, name: str) -> None:
             assert len(reader(path).names) > 0
 
 
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
+def test_motion_beyond_all_faps_is_an_error(tmp_path: Path) -> None:
+    path = tmp_path / "far.tsv"
+    path.write_bytes(
+        b"NO_OF_FRAMES\t\nMARKER_NAMES\t1\t2.1\t1\t8.2\t8.3\t8.4\t1\t2\t3\t9.12\t9.15\t11.1\t11.2\r"
+        b"\t\t\t\t\t\t\t\t\t0\t65000005\t0\n\t\t\t\t\t\t\t\t\t0\t0\t8\n\t\t\t\t\t\t\t\t\t0\t0\t1\t0\t-5\t0"
+        b"\t\t\t\t\t\t\t\t\t\t\t\t\t0\t0\t1000\t0\t0\t5\t0\t600\t5\t0\t0\t8"
+    )
+    with pytest.raises(FbaError, match="further than FAPs can say"):
+        fba.read(path, source_rate=30)
+
+
 def test_what_is_read_is_limited(tmp_path: Path) -> None:
     path = marker_files.write(tmp_path, "wide.csv", cloud())
     with pytest.raises(LimitError):

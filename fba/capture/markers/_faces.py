@@ -145,7 +145,11 @@ def from_markers(
         motion, markers=markers, neutral=neutral, gaze=gaze, model=model, traits=traits, limits=limits
     )
     at = motion.times[0] + np.arange(count) / float(rate)
-    columns = np.array(face.sent) - 1
+    columns = np.array(face.sent, dtype=np.intp) - 1
+    if not (np.abs(face.faps[:, columns]) < 2**31).all():
+        raise ModelError(
+            "the markers move further than FAPs can say: is their unit right, and are they a face's?"
+        )
     values = np.zeros((count, FAP_COUNT), dtype=np.int32)
     mask = np.zeros((count, FAP_COUNT), dtype=bool)
     mask[:, columns] = True

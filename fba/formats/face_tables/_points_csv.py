@@ -200,7 +200,7 @@ def _read_long(
     """Return points (T, N, 2 or 3) of a table with a row for each, and each frame's first row."""
     frame, point, *axes = (number for number in columns if number is not None)
     numbers = table.numbers([frame, point])[rows]
-    lost = np.isnan(numbers).any(axis=1)
+    lost = ~(np.abs(numbers) < 2**53).all(axis=1)  # beyond, float64 has no room for every whole number
     if lost.any():
         raise FormatError(
             "the row has no frame, or no number of a point",

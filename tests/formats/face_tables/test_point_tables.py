@@ -209,3 +209,11 @@ def test_heads_of_py_feat_are_found_from_points(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.head[:, 1], take.faps[:, 48] * 1e-5, atol=0.06)
     np.testing.assert_allclose(found.head[:, 2], take.faps[:, 49] * 1e-5, atol=0.02)
     assert "found from the face's points instead" in found.findings[-1]
+
+
+@pytest.mark.parametrize("number", ["1e19", "inf", "-1e300"])
+def test_numbers_of_points_that_no_table_has(tmp_path: Path, number: str) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("frame,landmark,x,y\n" + f"0,0,1,2\n0,{number},3,4\n", encoding="utf-8")
+    with pytest.raises(FormatError):
+        read_points(path, source_rate=30)
