@@ -232,7 +232,7 @@ def _part(entry: Value, gltf: Gltf, skin: Value, row: Int32, document: Document)
             normals=primitive.normals,
             texcoords=primitive.texcoords[0] if primitive.texcoords else None,
             colours=primitive.colours,
-            material=read_material(entry, gltf, primitive.material),
+            material=read_material(entry, gltf, primitive),
         )
 
 

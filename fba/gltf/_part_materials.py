@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from fba.arrays import Float32
 from fba.errors import ModelError
-from fba.gltf._scene import Gltf, GltfMaterial
+from fba.gltf._scene import Gltf, GltfMaterial, Primitive
 from fba.gltf._values import Value
 from fba.gltf._writer import Builder
 from fba.mesh import Material, Mesh
@@ -90,16 +90,18 @@ class PartWriter:
         return entry
 
 
-def read_material(entry: Value, gltf: Gltf, index: int | None) -> Material:
-    """Return the material of a part.
+def read_material(entry: Value, gltf: Gltf, primitive: Primitive) -> Material:
+    """Return the material of a part, which is this primitive. FormatError for a texture that has no place on it.
 
     entry: the part's entry in our extension, which has the material's colour where colours of vertices
-    replace it. index: of the document's material, or None.
+    replace it.
     """
     given = entry.get("colour")
-    if index is None:
+    if primitive.material is None:
         return Material()
-    material = gltf.materials[index]
+    material = gltf.materials[primitive.material]
+    if material.texture is not None and not primitive.texcoords:
+        raise entry.error("its material has a texture, but its mesh has no texture coordinates; leave one out")
     read = convert_material(material, material.texture)
     if given is not None:
         red, green, blue = given.numbers(3, 0.0, 1.0)

@@ -103,7 +103,7 @@ def _part(entry: Value, where: Value, gltf: Gltf, number: int, budget: Budget) -
             normals=primitive.normals,
             texcoords=primitive.texcoords[0] if primitive.texcoords else None,
             colours=primitive.colours,
-            material=read_material(entry, gltf, primitive.material),
+            material=read_material(entry, gltf, primitive),
         )
 
 

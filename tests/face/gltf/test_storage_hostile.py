@@ -107,6 +107,7 @@ CASES: list[tuple[str, Any, str]] = [
     (FACE + "/fit", {"links": 3}, "FBA_face.fit: the links of the FIT must be a list"),
     (FACE + "/fit/links", [LOOP], "FBA_face.fit: the links of the FIT form a circle"),
     (FACE + "/morphValues", {"open_jaw": "wide"}, "FBA_face.morphValues.open_jaw: expected a number"),
+    ("meshes/1/primitives/0/attributes/TEXCOORD_0", REMOVED, r"parts\[1\]: its material has a texture, but"),
     ("meshes/0/primitives/0/targets/0/POSITION", 0.5, r"targets\[0\].POSITION: expected a whole number"),
 ]  # fmt: skip
 
