@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from random import Random
 
 MOST_BYTES = 60_000
-"""Largest mutated file: more finds nothing else, and takes longer."""
+"""Length above which no mutation makes a file longer: more finds nothing else, and takes longer."""
 
 _NUMBER = re.compile(rb"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 _NUMBERS = (
@@ -49,7 +49,7 @@ def mutate(files: Sequence[bytes], random: Random, words: Sequence[bytes] = ()) 
     data = bytearray(original)
     for _ in range(random.choice((1, 1, 1, 2, 2, 3, 4))):
         random.choice(_MUTATIONS)(data, random, files, words)
-        del data[MOST_BYTES:]
+        del data[max(MOST_BYTES, len(original)) :]
     return bytes(data), original
 
 

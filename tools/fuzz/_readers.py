@@ -8,7 +8,8 @@ from __future__ import annotations
 import os
 import struct
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
@@ -166,15 +167,16 @@ def check_live(data: bytes, folder: Path) -> Outcome:
     recorder = StreamRecorder([StreamFile(file)])
     capture = Capture(kind, recorder.push)
     position, now = 1, 0.0
-    while position < len(data) and now < LONGEST_CAPTURE:
-        size = int.from_bytes(data[position + 1 : position + 3], "big")
-        now += 1 / 60
-        capture.receive(data[position + 3 : position + 3 + size], f"10.0.0.{data[position] % 4}", now)
-        capture.settle()
-        capture.newest()
-        position += 3 + size
-    summary = capture.finish()
-    recorder.finish()
+    with _strict_warnings():
+        while position < len(data) and now < LONGEST_CAPTURE:
+            size = int.from_bytes(data[position + 1 : position + 3], "big")
+            now += 1 / 60
+            capture.receive(data[position + 3 : position + 3 + size], f"10.0.0.{data[position] % 4}", now)
+            capture.settle()
+            capture.newest()
+            position += 3 + size
+        summary = capture.finish()
+        recorder.finish()
     if summary.frames and len(fba.read(file)) != summary.frames:
         raise ContractError(f"{summary.frames} frames were recorded, and the file has others")
     return Outcome(not summary.refused)
@@ -288,12 +290,19 @@ def _arrays() -> list[np.ndarray]:
     return [one.copy() for one in _CACHED]
 
 
-def _check_file(data: bytes, path: Path, read: Callable[[Path], object]) -> Outcome:
-    """Read a file with this content. Every warning of others is an error; an FbaError must name the file."""
-    path.write_bytes(data)
+@contextmanager
+def _strict_warnings() -> Iterator[None]:
+    """Make every warning of another library an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", FbaWarning)
+        yield
+
+
+def _check_file(data: bytes, path: Path, read: Callable[[Path], object]) -> Outcome:
+    """Read a file with this content; an FbaError must name the file."""
+    path.write_bytes(data)
+    with _strict_warnings():
         try:
             read(path)
         except FbaError as error:
