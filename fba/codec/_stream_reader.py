@@ -220,6 +220,7 @@ class StreamReader:
                 f"{missing} of {len(listed) // CHECK_BYTES} I periods of the object are missing",
                 range(self.planes, self.planes), self.objects.begin,
             )  # fmt: skip
+        self.damage.sort(key=lambda damage: damage.start)
         self._checks = PeriodChecks()
 
     def _report_wrong(self, text: str, planes: range, byte: int) -> None:
@@ -228,7 +229,6 @@ class StreamReader:
         if not self._salvage:
             raise error
         self._log.add(error, byte, doubtful=planes)
-        self.damage.sort(key=lambda damage: damage.start)
         self._check_memory_of_damage()
         if planes:
             self.wrong.append(planes)

@@ -419,7 +419,6 @@ def hostile_files() -> dict[str, HostileFile]:
         **_captures(),
         **_faces(),
         **_markers(),
-        **_markers(),
         **_gltf(),
         **_meshes(),
         **_points(),
