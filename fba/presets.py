@@ -1,4 +1,4 @@
-"""Presets: the parts of an animation that a stream has. docs/encode.md compares them."""
+"""Presets: which parameters of an animation a stream sends. docs/encode.md compares them."""
 
 from __future__ import annotations
 

@@ -10,12 +10,12 @@ from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
 from fba.codec import (
     Encoder,
     coarsest_quantisers,
-    code_lengths,
     count_rounded,
     exact_quantisers,
     quantise,
 )
 from fba.parameters import bap_steps, faps
+from fba.planning._code_lengths import code_lengths
 
 
 def test_estimated_lengths_are_those_of_the_coder() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import fba
 from fba import Animation
-from fba.codec import EncoderOptions, EncoderStatistics, encode_with_statistics
+from fba.codec import EncoderOptions, EncoderStatistics, encode_animation
 from fba.codec._ranges import _extremes
 from fba.parameters import bap_numbers, bap_steps
 from fba.tracks import BodyTrack
@@ -35,7 +35,7 @@ def motion(columns: dict[int, list[int] | np.ndarray]) -> Animation:
 def coded(animation: Animation, **options: object) -> tuple[np.ndarray, EncoderStatistics]:
     """The BAPs that a decoder returns, as int64, and what the encoder counted."""
     chosen = EncoderOptions(**options)  # type: ignore[arg-type]
-    data, statistics = encode_with_statistics(animation, chosen)
+    data, statistics = encode_animation(animation, chosen)
     track = fba.decode(data, bap_steps=chosen.bap_steps).body
     assert track is not None
     return track.values.astype(np.int64), statistics

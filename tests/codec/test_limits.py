@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from codec_streams import WIDEST, largest_level, steps
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack, FbaWarning, RangeError, decode, encode
-from fba.codec import encode_with_statistics
+from fba.codec import encode_animation
 from fba.parameters import baps, faps
 
 
@@ -98,7 +98,7 @@ def test_clamped_values_are_counted_and_the_nearest_there_are() -> None:
     animation = one_value("face", 48, [400_000, 400_000, 400_000, 0, -400_000, -400_000])
     with pytest.raises(RangeError, match="400000 cannot be carried"):
         encode(animation)
-    coded, statistics = encode_with_statistics(animation, EncoderOptions(clamp=True))
+    coded, statistics = encode_animation(animation, EncoderOptions(clamp=True))
     got = decode(coded).face
     assert got is not None
     values = got.values[:, 47].tolist()
@@ -110,7 +110,7 @@ def test_clamped_values_are_counted_and_the_nearest_there_are() -> None:
     assert statistics.clamped >= 1
     assert statistics.planes == 6
     inside = one_value("face", 48, [largest, -largest, 0])
-    _, statistics = encode_with_statistics(inside, EncoderOptions(clamp=True))
+    _, statistics = encode_animation(inside, EncoderOptions(clamp=True))
     assert statistics.clamped == 0
 
 
@@ -120,7 +120,7 @@ def test_clamping_leaves_other_parameters_alone() -> None:
     mask[:, [2, 47]] = True
     values[:, 2] = [4, 8, -12, 400]
     values[:, 47] = [1_000_000, 170, -1_000_000, 340]
-    coded, statistics = encode_with_statistics(
+    coded, statistics = encode_animation(
         Animation(Fraction(25), np.arange(4), FaceTrack(values, mask)), EncoderOptions(clamp=True)
     )
     got = decode(coded).face
@@ -156,7 +156,7 @@ def test_amounts_out_of_range(field: str, column: int, value: int) -> None:
         encode(animation())
     assert caught.value.frame == 1
     assert caught.value.limits == (0, 63)
-    coded, statistics = encode_with_statistics(animation(), EncoderOptions(clamp=True))
+    coded, statistics = encode_animation(animation(), EncoderOptions(clamp=True))
     track = decode(coded).face
     assert track is not None
     assert statistics.clamped == 1

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from codec_streams import END, OBJECT, RATES, decoded, jaw_intra, packed
 from fba import Animation, Decoder, EncoderOptions, FbaWarning, RangeError, decode, encode
 from fba.codec import Block, FrameBuffer, FrameRate, PlaneSettings, TimeCode, encode_planes
-from fba.codec._compact_buffer import CompactBuffer
+from fba.codec._frame_buffers import CompactBuffer
 from fba.limits import DEFAULT_LIMITS
 from tools import synthetic_motion as motion
 

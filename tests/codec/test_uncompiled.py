@@ -42,7 +42,8 @@ for stream in [*streams, long]:
         if frame.face is not None:
             values.update(frame.face.viseme.tobytes() + frame.face.expression.tobytes())
 result["values"] = values.hexdigest()
-from fba.codec import Encoder, EncoderOptions, code_lengths
+from fba.codec import Encoder, EncoderOptions
+from fba.planning._code_lengths import code_lengths
 import numpy as np
 moving = motion.animation(motion.face(30), motion.body(30))
 options = EncoderOptions()

@@ -12,7 +12,14 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
-from fba.codec import Encoder, coarsest_quantisers, count_rounded, encode, exact_quantisers, quantise
+from fba.codec import (
+    Encoder,
+    coarsest_quantisers,
+    count_rounded,
+    encode_animation,
+    exact_quantisers,
+    quantise,
+)
 from fba.errors import FbaWarning, OptionError
 from fba.face.resolve import resolve, shown_faps
 from fba.parameters import faps
@@ -208,7 +215,7 @@ def test_presets_of_options_are_those_of_plans() -> None:
         sizes.append(len(data))
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[2] < sizes[0]
-    assert fba.encode(animation) == encode(animation)
+    assert fba.encode(animation) == encode_animation(animation)[0]
     with pytest.raises(OptionError, match=r"the preset 'compact' needs all frames.*fba\.encode"):
         Encoder(EncoderOptions(preset="compact"))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -17,7 +18,8 @@ from fba.errors import OptionError, RangeError
 from fba.face.resolve import resolve
 from fba.parameters import bap_steps, fap_steps
 from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate, measure_errors
-from fba.planning.rate._visibility import slot_weights
+from fba.planning.rate._encoder import TUNING
+from fba.planning.rate._visibility import error_weights
 
 VISAGE = EncoderOptions(bap_steps="visage", clamp=True, mark=False)
 FACE = [3, 4, 5, 6, 7, 12, 13, 14, 19, 20, 23, 24, 31, 32, 48, 49, 50]
@@ -127,8 +129,8 @@ def test_every_plane_fits_the_buffer(kind: str, fps: Fraction | int, rate: float
 
 @pytest.mark.parametrize("kind", ["shock", "noise"])
 def test_planes_fit_however_little_is_given_up(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fba.planning.rate._encoder.COARSEST", 1e-9)
-    monkeypatch.setattr("fba.planning.rate._encoder.FULL", 10.0)
+    generous = replace(TUNING, max_error=1e-9, full_share=10.0)
+    monkeypatch.setattr("fba.planning.rate._encoder.TUNING", generous)
     animation = made(kind)
     encoder = RateEncoder(950, 1.0, VISAGE, finest=0)
     data = encoder.push_animation(animation) + encoder.finish()
@@ -345,10 +347,10 @@ def test_the_next_plane_at_no_price_and_at_any() -> None:
     encoder.settle(1)
     plane = encoder.next_plane(animation[1:2])
     assert plane is not None
-    still = plane.with_levels(plane.levels(slot_weights(), np.inf))
+    still = plane.with_levels(plane.levels(error_weights(), np.inf))
     assert still.face is not None
     assert np.array_equal(still.face.values[0], animation.face.values[0])
-    levels = plane.levels(slot_weights(), 0.0)
+    levels = plane.levels(error_weights(), 0.0)
     exact = plane.with_levels(levels)
     assert exact == animation[1:2]
     before, plane_bits = encoder.bits, plane.bits(levels)

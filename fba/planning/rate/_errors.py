@@ -1,4 +1,4 @@
-"""How far the parameters that a stream shows are off from those that were to be shown."""
+"""Errors of what a stream shows, compared with its source."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.body.displacement import displacements
 from fba.face import resolve
-from fba.parameters import bap_steps, baps, fap_steps, faps
+from fba.parameters import FAP_COUNT, bap_steps, baps, fap_steps, faps
 from fba.planning.rate._visibility import error_weights
 from fba.tracks import hold
 
-FACE_PARAMETERS = len(fap_steps())
-
 
 class ParameterErrors(NamedTuple):
-    """How far one parameter is off over all frames, in its unit.
+    """Errors of a parameter over all frames, in its unit.
 
-    label: the standard's name. largest, percentile: the largest error, and what 99 % of frames are within.
+    label: the standard's name. largest: the largest error. percentile: the error that 99 % of frames are
+    within.
     """
 
     label: str
@@ -30,10 +29,10 @@ class ParameterErrors(NamedTuple):
 
 
 class DistanceErrors(NamedTuple):
-    """How far points of a face or a body are off over all frames, in metres.
+    """Errors of the points of a face or a body over all frames, in metres.
 
-    largest, percentile: the largest distance, and what 99 % of them are within. head: degrees that the head's
-    angles are off at most. feet: metres that soles are off while they stand.
+    largest: the largest distance. percentile: the distance that 99 % are within. head: the largest error of
+    the head's angles, in degrees. feet: the largest error of soles while they stand, in metres.
     """
 
     largest: float
@@ -44,11 +43,11 @@ class DistanceErrors(NamedTuple):
 
 @dataclass(frozen=True)
 class ShownErrors:
-    """What a stream shows otherwise than its source.
+    """Differences between what a stream and its source show.
 
-    parameters: those that are off, first those that are off by most table steps. face: vertices of the
-    built-in head, in the head's own frame. body: points 3 cm off the built-in body's joints. None for what is
-    not shown.
+    parameters: those with errors, ordered by the largest error in table steps, the largest first. face:
+    vertices of the built-in head, in the frame of the head. body: points 3 cm off the built-in body's joints.
+    None for a part that is not shown.
     """
 
     parameters: list[ParameterErrors]
@@ -57,17 +56,17 @@ class ShownErrors:
 
 
 def measure_errors(wanted: Animation, shown: Animation) -> ShownErrors:
-    """Return what is shown otherwise, at every frame of `wanted`.
+    """Return the differences at every frame of `wanted`.
 
-    Between the frames of `shown`, values go on in straight lines, as players show them. FAPs as a face
-    without an interpolation table of its own shows them.
+    Between the frames of `shown`, values are interpolated linearly, as players do. FAPs are resolved as for a
+    face without an interpolation table.
     """
     there, here = _values(wanted), _at(_values(shown), wanted, shown)
     face = body = None
     if wanted.face is not None:
-        face = _face_distances(there[:, :FACE_PARAMETERS], here[:, :FACE_PARAMETERS])
+        face = _face_distances(there[:, :FAP_COUNT], here[:, :FAP_COUNT])
     if wanted.body is not None:
-        pair = there[:, FACE_PARAMETERS:], here[:, FACE_PARAMETERS:]
+        pair = there[:, FAP_COUNT:], here[:, FAP_COUNT:]
         moved = displacements(*pair, float(wanted.rate))
         percentile = float(np.percentile(moved.joints, 99))
         body = DistanceErrors(float(moved.joints.max()), percentile, feet=float(moved.feet.max(initial=0.0)))
@@ -75,9 +74,9 @@ def measure_errors(wanted: Animation, shown: Animation) -> ShownErrors:
 
 
 def mean_distance(wanted: Animation, shown: Animation) -> float:
-    """Return how far all parameters together are off, in weighed millimetres, on average over frames.
+    """Return the mean error over frames, in weighted millimetres.
 
-    The root of the sum of their squared errors, each with its weight (`error_weights`).
+    The error of a frame is the root of the weighted sum (`error_weights`) of all squared errors.
     """
     weights = error_weights()
     coded = np.isfinite(weights)
@@ -86,8 +85,8 @@ def mean_distance(wanted: Animation, shown: Animation) -> float:
 
 
 def _parameter_errors(errors: Float64) -> list[ParameterErrors]:
-    """Return the errors of parameters that are off. errors: (T, 364)."""
-    labels = [*(one.label for one in faps()), *(one.label for one in baps())]
+    """Return the errors of the parameters that have any. errors: (T, 364)."""
+    labels = [*(fap.label for fap in faps()), *(bap.label for bap in baps())]
     steps = np.concatenate([fap_steps(), bap_steps("iso")])
     largest = errors.max(axis=0)
     order = np.argsort(-largest / steps, kind="stable")
@@ -99,7 +98,7 @@ def _parameter_errors(errors: Float64) -> list[ParameterErrors]:
 
 
 def _face_distances(there: Float64, here: Float64) -> DistanceErrors:
-    """Return how far vertices of the built-in head are off, for FAPs (T, 68)."""
+    """Return the errors of vertices of the built-in head, for FAPs (T, 68)."""
     from fba.face import FaceModel
     from fba.face.deform.displacements import DisplacementMeter
 
@@ -109,22 +108,22 @@ def _face_distances(there: Float64, here: Float64) -> DistanceErrors:
 
 
 def _values(animation: Animation) -> Float64:
-    """Return what an animation shows: float64 (T, 364), FAPs, then BAPs; 0 for a track that it lacks."""
+    """Return the shown values: float64 (T, 364), FAPs, then BAPs; 0 for an absent track."""
     result = np.zeros((len(animation), len(error_weights())))
     if animation.face is not None:
-        result[:, :FACE_PARAMETERS] = resolve(animation.face)
+        result[:, :FAP_COUNT] = resolve(animation.face)
     if animation.body is not None:
         track = animation.body
-        result[:, FACE_PARAMETERS:] = hold(track.values, track.mask, np.zeros_like(track.values[0]))
+        result[:, FAP_COUNT:] = hold(track.values, track.mask, np.zeros_like(track.values[0]))
     return result
 
 
 def _at(values: Float64, wanted: Animation, shown: Animation) -> Float64:
     """Return the values (S, columns) of the frames of `shown` at those of `wanted`: (T, columns)."""
-    times, known = wanted.index - wanted.index[0], shown.index - shown.index[0]
-    after = np.clip(np.searchsorted(known, times), 0, len(known) - 1)
-    before = np.maximum(after - (known[after] > times), 0)
-    length = np.maximum(known[after] - known[before], 1)
-    share = np.clip((times - known[before]) / length, 0.0, 1.0)[:, None]
+    index, keys = wanted.index - wanted.index[0], shown.index - shown.index[0]
+    after = np.clip(np.searchsorted(keys, index), 0, len(keys) - 1)
+    before = np.maximum(after - (keys[after] > index), 0)
+    length = np.maximum(keys[after] - keys[before], 1)
+    share = np.clip((index - keys[before]) / length, 0.0, 1.0)[:, None]
     result: Float64 = values[before] * (1.0 - share) + values[after] * share
     return result
