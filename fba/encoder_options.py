@@ -5,14 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import get_args
+from typing import Final, Literal, get_args
 
 import numpy as np
 
 from fba.choices import Unsent
 from fba.parameters import BAP_STEP_TABLES, BapTable
-from fba.presets import PRESETS, REFERENCE, Preset
 
+PlannedPreset = Literal["exact", "compact"]
+"""Without parameters that never move, and FAPs that players derive from others. See `fba.planning`."""
+Preset = Literal["reference", PlannedPreset]
+"""Which parameters of an animation a stream sends; docs/encode.md compares them."""
+REFERENCE: Final = "reference"
+"""All parameters that the animation sends."""
+PLANNED: tuple[PlannedPreset, ...] = ("exact", "compact")
+PRESETS: tuple[Preset, ...] = (REFERENCE, *PLANNED)
 QUANT_MAX = 31
 """Largest quantiser."""
 

@@ -13,11 +13,11 @@ from bench.bitrate.errors import ROOT, TURN
 from bench.bitrate.subjects import BODY, FACE, Subject
 from fba.arrays import Float64, Int64
 from fba.codec import EncoderOptions, decode, encode_animation, probe_stream
+from fba.encoder_options import PlannedPreset
 from fba.face import resolve
 from fba.face.resolve import known_faps
 from fba.planning import LiveEncoder, Tolerance, encode_planned, encode_within_tolerance, plan_compact
 from fba.planning.rate import RateEncoder
-from fba.presets import PlannedPreset
 
 QUANTISERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 31)
 UNPLANNED = "FBA, nothing known"

@@ -19,10 +19,9 @@ from fba.codec._stream import clock
 from fba.codec._stream.checksums import PeriodChecks
 from fba.codec._stream.mark import write_mark
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
-from fba.encoder_options import EncoderOptions
+from fba.encoder_options import REFERENCE, EncoderOptions
 from fba.errors import OptionError, RangeError
 from fba.parameters import INTENSITY_MAX
-from fba.presets import REFERENCE
 
 _CODE_BYTES = 4
 _CHUNK_FRAMES = 4096

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.codec import EncoderOptions, EncoderStatistics, encode_animation
+from fba.encoder_options import PRESETS, REFERENCE, Preset
 from fba.errors import FbaWarning, OptionError, did_you_mean
 from fba.face import FaceModel
 from fba.planning._near_lossless import encode_within_tolerance
 from fba.planning._plan import encode_planned
 from fba.planning._tolerance import NearLossless, Tolerance
-from fba.presets import PRESETS, REFERENCE, Preset
 
 if TYPE_CHECKING:
     from fba.planning.fit_streams import FitStream

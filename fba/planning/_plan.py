@@ -20,6 +20,7 @@ from fba.codec import (
     encode_animation,
     quantise,
 )
+from fba.encoder_options import PLANNED, REFERENCE, PlannedPreset
 from fba.errors import FbaWarning
 from fba.face import resolve
 from fba.face.resolve import FaceSettings, known_faps
@@ -35,7 +36,6 @@ from fba.planning._derived_faps import (
     table_columns,
 )
 from fba.planning._segments import Cuts, cheapest_segments, find_cuts
-from fba.presets import PLANNED, REFERENCE, PlannedPreset
 from fba.tracks import BodyTrack, FaceTrack
 
 NO_LIMITS = Limits(frames=1 << 62, bytes=1 << 62)

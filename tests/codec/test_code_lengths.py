@@ -31,7 +31,7 @@ def test_estimated_lengths_are_those_of_the_coder() -> None:
     assert length == pytest.approx(estimated + planes, rel=0.01)
 
 
-def test_estimates_between_any_cuts_are_those_of_the_frames_alone() -> None:
+def test_estimates_between_cuts_equal_those_of_these_frames_alone() -> None:
     rng = np.random.default_rng(6)
     values = np.cumsum(rng.integers(-9, 10, (90, 296)), axis=0).astype(np.int32) * 128
     values[:, 20:] = 0
@@ -111,7 +111,7 @@ def test_values_between_steps_are_counted_and_kept_where_planes_can_carry_them()
     assert count_rounded(Animation(25, np.arange(4), FaceTrack.empty(4)), options) == {}
 
 
-def test_what_the_next_plane_may_bring() -> None:
+def test_prices_of_the_next_plane() -> None:
     values = np.zeros((12, 68), dtype=np.int32)
     values[:, 13] = [0] + [5] * 10 + [8]
     animation = Animation(25, np.arange(12), FaceTrack(values, np.tile(np.arange(68) == 13, (12, 1))))
@@ -137,7 +137,7 @@ def test_what_the_next_plane_may_bring() -> None:
     assert encoder.next_plane(Animation(25, np.arange(12), more)[11:12]) is None
 
 
-def test_a_segment_begins_with_an_i_plane_and_ranges_of_its_own() -> None:
+def test_a_segment_begins_with_an_i_plane_and_new_ranges() -> None:
     values = np.zeros((60, 68), dtype=np.int32)
     values[:, 13] = np.where(np.arange(60) < 30, np.arange(60) % 2 * 900, np.arange(60) % 2)
     animation = Animation(25, np.arange(60), FaceTrack(values, np.tile(np.arange(68) == 13, (60, 1))))
@@ -151,7 +151,7 @@ def test_a_segment_begins_with_an_i_plane_and_ranges_of_its_own() -> None:
 
 
 @pytest.mark.parametrize("cuts", [[0, 4], [-1, 3], [0, 2, 2], [3, 0]])
-def test_cuts_that_are_no_frames_are_refused(cuts: list[int]) -> None:
+def test_cuts_outside_the_frames_are_refused(cuts: list[int]) -> None:
     track = BodyTrack(np.ones((3, 296), dtype=np.int32), np.ones((3, 296), dtype=bool))
     with pytest.raises(ValueError, match="cuts must increase from 0 to 3 frames"):
         code_lengths(track, np.array(cuts), EncoderOptions())

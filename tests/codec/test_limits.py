@@ -63,7 +63,7 @@ def test_the_largest_value(table: str, part: str, numbers: tuple[int, ...], quan
     st.sampled_from(["iso", "visage"]),
 )
 @settings(max_examples=120, deadline=None)
-def test_the_quantiser_that_is_named_would_do(
+def test_the_recommended_quantiser_suffices(
     parameter: tuple[str, int], quant: int, value: int, table: str
 ) -> None:
     """... and every smaller one would not; where none is named, none would."""
@@ -92,7 +92,7 @@ def test_the_quantiser_that_is_named_would_do(
     assert not other or carried(int(other[2]), other[1])
 
 
-def test_clamped_values_are_counted_and_the_nearest_there_are() -> None:
+def test_clamped_values_are_counted_and_the_nearest_possible() -> None:
     """FAP 48 at fap_quant 1: 1860 steps of 170 in an I plane; the P planes after it catch up."""
     largest = WIDEST * 170
     animation = one_value("face", 48, [400_000, 400_000, 400_000, 0, -400_000, -400_000])
@@ -195,6 +195,6 @@ def test_a_value_at_the_end_of_int32_is_rounded_inwards(sign: int) -> None:
     assert error.max() < 512
 
 
-def test_what_is_clamped_is_named_in_a_warning() -> None:
+def test_a_warning_names_clamped_parameters() -> None:
     with pytest.warns(FbaWarning, match=r"FAP 3 open_jaw \(3; frame 0: 90000 sent as 7440\)"):
         encode(one_value("face", 3, [90_000] * 3), EncoderOptions(clamp=True))

@@ -99,7 +99,7 @@ def test_the_same_without_machine_code(way: str, usual: dict[str, object]) -> No
     assert {name: result[name] for name in same} == {name: usual[name] for name in same}
 
 
-def test_an_emptied_folder_of_numba_is_no_numba() -> None:
+def test_an_empty_folder_of_numba_counts_as_missing() -> None:
     """What an uninstalled numba may leave behind can be imported, and holds nothing."""
     script = (
         "import sys; sys.modules['numba'] = type(sys)('numba'); from fba import compiled; import fba.codec"

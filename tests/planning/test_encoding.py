@@ -101,7 +101,7 @@ def test_every_choice_makes_the_stream_of_its_function(
         ((FACE,), {"bit_rate": 1500, "bap_quant": 2, "intra_period": 2}, "leave bap_quant and intra_period"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_encoded_says_what_to_do(
+def test_errors_say_what_can_be_encoded(
     arguments: tuple[Any, ...], keywords: dict[str, Any], text: str
 ) -> None:
     with pytest.raises(fba.OptionError, match=re.escape(text)):

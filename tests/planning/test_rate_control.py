@@ -128,7 +128,7 @@ def test_every_plane_fits_the_buffer(kind: str, fps: Fraction | int, rate: float
 
 
 @pytest.mark.parametrize("kind", ["shock", "noise"])
-def test_planes_fit_however_little_is_given_up(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_planes_fit_even_if_hardly_any_error_is_allowed(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     generous = replace(TUNING, max_error=1e-9, full_share=10.0)
     monkeypatch.setattr("fba.planning.rate._encoder.TUNING", generous)
     animation = made(kind)
@@ -206,7 +206,7 @@ def test_what_players_derive_is_not_sent() -> None:
 
 
 @pytest.mark.parametrize("whole", [True, False])
-def test_a_buffer_that_no_i_plane_fits_says_which_does(whole: bool) -> None:
+def test_an_error_names_a_buffer_that_an_i_plane_fits(whole: bool) -> None:
     animation = made("speech", 30)
 
     def encode(rate: float, buffer: float) -> bytes:
@@ -259,7 +259,7 @@ def test_a_bit_rate_decides_where_i_planes_come() -> None:
         RateEncoder(900, 1.0, EncoderOptions(intra_period=1))
 
 
-def test_an_angle_that_goes_on_past_half_a_turn_takes_the_short_way() -> None:
+def test_an_angle_that_continues_past_half_a_turn_takes_the_short_way() -> None:
     animation = made("body", 60)
     assert animation.body is not None
     values = animation.body.values.copy()
@@ -274,7 +274,7 @@ def test_an_angle_that_goes_on_past_half_a_turn_takes_the_short_way() -> None:
     assert np.abs(off).max() < 2000
 
 
-def test_what_is_still_stays_still() -> None:
+def test_still_parameters_stay_still() -> None:
     animation = made("noise", 150)
     assert animation.face is not None
     values = animation.face.values.copy()
@@ -305,7 +305,7 @@ def test_a_live_blink_is_seen() -> None:
     assert np.abs(shown - values[:, 18]).max() < 100
 
 
-def test_what_begins_later_comes_as_soon_as_there_is_room() -> None:
+def test_parameters_that_come_later_are_sent_once_there_is_room() -> None:
     animation = made("speech", 120)
     assert animation.face is not None
     mask = animation.face.mask.copy()
@@ -321,7 +321,7 @@ def test_what_begins_later_comes_as_soon_as_there_is_room() -> None:
     assert decoded.face.mask[-1, 47:50].all()
 
 
-def test_what_begins_later_and_never_fits_is_not_sent() -> None:
+def test_parameters_that_come_later_and_never_fit_are_not_sent() -> None:
     animation = made("speech", 60)
     assert animation.face is not None
     mask = animation.face.mask.copy()
