@@ -58,8 +58,8 @@ class Frame:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Frame):
             return NotImplemented
-        mine, others = ((frame.index, frame.rate, frame.face, frame.body) for frame in (self, other))
-        return mine == others
+        same_time = self.index == other.index and self.rate == other.rate
+        return same_time and self.face == other.face and self.body == other.body
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +164,10 @@ class Animation:
                 self.name,
             )
         position = range(len(self))[frames]  # turns negative positions, raises IndexError outside
-        frame = self[position : position + 1]
-        return Frame(int(self.index[position]), self.rate, frame.face, frame.body)
+        frame = slice(position, position + 1)
+        face = self.face[frame] if self.face is not None else None
+        body = self.body[frame] if self.body is not None else None
+        return Frame(int(self.index[position]), self.rate, face, body)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Animation):

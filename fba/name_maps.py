@@ -61,7 +61,7 @@ def change_names(
     pairs: Mapping[str, str],
     check_name: Callable[[str], None],
     check_value: Callable[[str], None],
-    shared: str = "",
+    shared: str,
 ) -> dict[str, str]:
     """Return a map of names with changes.
 

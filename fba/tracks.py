@@ -287,15 +287,13 @@ def _fill_in(track: FaceTrack | BodyTrack, name: str) -> Array | None:
 
 
 @overload
-def batches(track: FaceTrack, count: int = _BATCH_FRAMES) -> Iterator[FaceTrack]: ...
+def batches(track: FaceTrack) -> Iterator[FaceTrack]: ...
 @overload
-def batches(track: BodyTrack, count: int = _BATCH_FRAMES) -> Iterator[BodyTrack]: ...
-def batches(
-    track: FaceTrack | BodyTrack, count: int = _BATCH_FRAMES
-) -> Iterator[FaceTrack] | Iterator[BodyTrack]:
-    """Yield a track in pieces of at most `count` frames, so that a compact one stays so."""
-    for start in range(0, len(track), count):
-        yield track[start : start + count]
+def batches(track: BodyTrack) -> Iterator[BodyTrack]: ...
+def batches(track: FaceTrack | BodyTrack) -> Iterator[FaceTrack] | Iterator[BodyTrack]:
+    """Yield a track in pieces, so that a compact track stays compact."""
+    for start in range(0, len(track), _BATCH_FRAMES):
+        yield track[start : start + _BATCH_FRAMES]
 
 
 def _equal(a: Track, b: Track, names: tuple[str, ...]) -> bool:

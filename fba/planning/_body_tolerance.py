@@ -92,7 +92,7 @@ def fit_bodies(
 
 
 def body_candidates(
-    animation: Animation, tolerance: Tolerance, options: EncoderOptions, *, gaps: bool = True
+    animation: Animation, tolerance: Tolerance, options: EncoderOptions, *, gaps: bool
 ) -> Iterator[tuple[Animation, EncoderOptions]]:
     """Yield animations to send that may keep a body within a tolerance, and the quantisers for them.
 

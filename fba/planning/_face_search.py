@@ -43,7 +43,7 @@ class Segment:
 
 
 def search_faps(
-    segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, effort: Effort, below: float = np.inf
+    segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, effort: Effort, below: float
 ) -> Found:
     """Return the cheapest FAPs that the search comes to for a segment, measured on all vertices.
 

@@ -42,12 +42,10 @@ class Tuning:
 
     rest_speed: float = 0.06  # m/s, below which the point of a foot that stands rests
     rest_seconds: float = 0.2  # s, over which that speed is measured
-    smoothing: float = (
-        0.25  # s, over which a resting sole is averaged: captured roots come in whole millimetres
-    )
+    smoothing: float = 0.25  # s, over which resting soles are averaged: captured roots have whole millimetres
     sweeps: int = 3  # rounds over the BAPs of legs; those of root and pelvis are searched once, before them
     max_root_step: int = (
-        10  # mm, above which legs cannot make up for a step of the root, as in the standard's table
+        10  # mm of the root for which legs can make up; the standard's table has a coarser one
     )
 
 

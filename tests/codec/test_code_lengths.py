@@ -121,10 +121,10 @@ def test_prices_of_the_next_plane() -> None:
     before = encoder.bits
     plane = encoder.next_plane(animation[11:12])
     assert plane is not None
-    assert plane.levels(np.ones(372), 0.0).tolist() == [3]
-    assert plane.levels(np.full(372, np.inf), np.inf).tolist() == [3]
-    assert plane.levels(np.ones(372), np.inf).tolist() == [0]
-    cheap, dear = (plane.levels(np.full(372, weight), 1.0) for weight in (100.0, 1e-3))
+    assert plane.levels(np.ones(364), 0.0).tolist() == [3]
+    assert plane.levels(np.full(364, np.inf), np.inf).tolist() == [3]
+    assert plane.levels(np.ones(364), np.inf).tolist() == [0]
+    cheap, dear = (plane.levels(np.full(364, weight), 1.0) for weight in (100.0, 1e-3))
     assert cheap.tolist() == [3]
     assert dear.tolist() == [0]  # what is still stays still
     assert plane.with_levels(np.array([2])).face.values[0, 13] == 7  # type: ignore[union-attr]

@@ -53,7 +53,7 @@ encoder = Encoder(options)
 encoder.push_animation(moving[:20])
 encoder.settle(20)
 plane = encoder.next_plane(moving[20:21])
-chosen = [plane.levels(np.full(372, 1e-4), price) for price in (0.0, 0.5, 4.0, float("inf"))]
+chosen = [plane.levels(np.full(364, 1e-4), price) for price in (0.0, 0.5, 4.0, float("inf"))]
 result["levels"] = [hashlib.sha256(one.tobytes()).hexdigest() for one in chosen]
 result["bits"] = [plane.bits(one) for one in chosen]
 report = fuzz.run(find_target("stream"), streams[:3], count=60, seed=3)

@@ -19,7 +19,7 @@ from fba.face.resolve import resolve
 from fba.parameters import bap_steps, fap_steps
 from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate, measure_errors
 from fba.planning.rate._encoder import TUNING
-from fba.planning.rate._visibility import error_weights
+from fba.planning.rate._errors import error_weights
 
 VISAGE = EncoderOptions(bap_steps="visage", clamp=True, mark=False)
 FACE = [3, 4, 5, 6, 7, 12, 13, 14, 19, 20, 23, 24, 31, 32, 48, 49, 50]

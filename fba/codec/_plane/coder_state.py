@@ -49,7 +49,7 @@ class Models:
     step, last = _row(loops.STEP), _row(loops.LAST)
     lowest, highest = _row(loops.LOWEST), _row(loops.HIGHEST)
 
-    def __init__(self, bap_table: BapTable = "iso") -> None:
+    def __init__(self, bap_table: BapTable) -> None:
         self.bap_table = bap_table
         self.limits = default_limits().copy()
         numbers = np.zeros((loops.NUMBERS, slots.SLOTS), dtype=np.int64)

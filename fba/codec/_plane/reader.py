@@ -97,7 +97,7 @@ class PlaneReader:
     Bits in errors count from the start of the data that was passed in.
     """
 
-    def __init__(self, bap_table: BapTable = "iso") -> None:
+    def __init__(self, bap_table: BapTable) -> None:
         self._models = Models(bap_table)
         self._settings: dict[int, PartSettings] = {}
         self._doubtful_ranges = 0  # parts, added up, whose ranges may have been replaced in a lost plane
@@ -106,11 +106,6 @@ class PlaneReader:
         self._parts = np.zeros(_MAX_RUN, dtype=np.uint8)
         self._skips = np.zeros(_MAX_RUN, dtype=np.int64)
         self._borders = np.zeros(_MAX_RUN + 1, dtype=np.int64)
-
-    @property
-    def bap_table(self) -> str:
-        """The table of BAP steps."""
-        return self._models.bap_table
 
     def begin_object(self, bap_table: BapTable) -> None:
         """Reset all state, including ranges. bap_table: of the BAP steps in this object."""

@@ -37,7 +37,7 @@ class PlaneWriter:
     the last I plane begins, or the plane start code before it; 0, where the object begins, for the first.
     """
 
-    def __init__(self, bap_table: BapTable = "iso") -> None:
+    def __init__(self, bap_table: BapTable) -> None:
         self.models = Models(bap_table)
         self.planes = 0
         self.taken = 0

@@ -13,8 +13,8 @@ from fba.animation import Animation, Frame, check_order
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, write_mark
 from fba.errors import FbaWarning, OptionError, RangeError, Remedy
 from fba.planning.rate._bucket import LeakyBucket
+from fba.planning.rate._errors import error_weights
 from fba.planning.rate._expectations import expected_motion, quantiser_for
-from fba.planning.rate._visibility import error_weights
 from fba.tracks import BodyTrack, FaceTrack
 
 
@@ -29,9 +29,7 @@ class Tuning:
     min_price: float = 1e-4
     max_price: float = 1e9
     full_share: float = 0.5  # of the buffer, above which frames are left out if still planes take too much
-    still_share: float = (
-        2.0  # share of the rate for a plane, in still planes, below which frames are left out
-    )
+    still_share: float = 2.0  # still planes for which the rate has bits before a plane comes, if so full
     max_gap: float = 0.2  # s between two planes, unless the buffer is full
     spare_bits: int = 96  # always free: for the end of the stream, and for start codes between planes
     growth_bits: int = 16  # by which a still plane may cost more after the next plane than now

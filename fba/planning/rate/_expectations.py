@@ -28,9 +28,7 @@ class Tuning:
     limb_seconds: float = 0.3  # of the other BAPs
     gap: float = 0.05  # s between two planes to be expected; frames may come faster
     unknown_limit: int = 60  # table steps that a parameter without limits in the standard reaches
-    bits_of_finest: float = (
-        8.0  # bits for a parameter in a frame from which quantiser 1 suits; at half, 2 suits
-    )
+    bits_of_finest: float = 8.0  # for a parameter in a frame, at which quantiser 1 suits; at half of it, 2
     max_quantiser: int = 6  # with a coarser quantiser, slow turns of the head visibly move in steps
 
 

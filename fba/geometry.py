@@ -1,4 +1,4 @@
-"""Rotations and similarities that fit points or matrices best, by least squares.
+"""Rotations and similarities that fit points or matrices best, by least squares: for faces and bodies.
 
 Arun, Huang and Blostein, "Least-squares fitting of two 3-D point sets", 1987; Umeyama, "Least-squares
 estimation of transformation parameters between two point patterns", 1991.
