@@ -44,32 +44,19 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_MODULE_OF = {
-    "Animation": "fba.animation",
-    "BodyTrack": "fba.animation",
-    "FaceTrack": "fba.animation",
-    "Frame": "fba.animation",
-    "BitstreamError": "fba.errors",
-    "DisplayError": "fba.errors",
-    "FbaError": "fba.errors",
-    "FbaWarning": "fba.errors",
-    "FormatError": "fba.errors",
-    "LimitError": "fba.errors",
-    "ModelError": "fba.errors",
-    "OptionError": "fba.errors",
-    "RangeError": "fba.errors",
-    "UnsupportedError": "fba.errors",
-    "Decoder": "fba.codec",
-    "Encoder": "fba.codec",
-    "EncoderOptions": "fba.encoder_options",
-    "StreamInfo": "fba.codec",
-    "decode": "fba.codec",
-    "encode": "fba.planning",
-    "Limits": "fba.limits",
-    "probe": "fba.formats",
-    "read": "fba.formats",
-    "write": "fba.formats",
-}
+_NAMES = {
+    "fba.animation": ("Animation", "BodyTrack", "FaceTrack", "Frame"),
+    "fba.codec": ("Decoder", "Encoder", "StreamInfo", "decode"),
+    "fba.encoder_options": ("EncoderOptions",),
+    "fba.errors": (
+        "BitstreamError", "DisplayError", "FbaError", "FbaWarning", "FormatError", "LimitError", "ModelError",
+        "OptionError", "RangeError", "UnsupportedError",
+    ),
+    "fba.formats": ("probe", "read", "write"),
+    "fba.limits": ("Limits",),
+    "fba.planning": ("encode",),
+}  # fmt: skip
+"""Public names by the module that they are imported from."""
 _MODULES = (
     "body", "capture", "codec", "emotion", "face", "formats", "live", "parameters", "persona", "planning",
     "player",
@@ -110,8 +97,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     from importlib import import_module
 
-    if name in _MODULE_OF:
-        value = getattr(import_module(_MODULE_OF[name]), name)
+    module = next((module for module, names in _NAMES.items() if name in names), None)
+    if module is not None:
+        value = getattr(import_module(module), name)
     elif name in _MODULES:
         value = import_module(f"fba.{name}")
     else:

@@ -1,9 +1,9 @@
 """Disk cache of compiled functions: numba's cache, but with files that are checked.
 
 Numba trusts its index and its files of machine code: a truncated file breaks the program, and a flipped bit
-may crash it. Here one file contains everything for one signature, and begins with a digest of its content and
-of everything that the content depends on. If the digest does not match, the function is compiled again and
-the file replaced. Failures to write are ignored.
+may crash it. Here a file contains everything for a signature, and begins with a digest of its content and of
+all that the content depends on. If the digest does not match, the function is compiled again and the file
+replaced. Failures to write are ignored.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from fba import __version__
 from fba.atomic import atomic
 from fba.errors import FormatError
 
-DIGEST = 32
+DIGEST_BYTES = 32
 """Bytes of the digest at the start of a file."""
 
 
 class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types here
     """Loads and saves the machine code of a function, in the folders that numba uses.
 
-    before_compiling: called where there is no such code, so that the function has to be compiled.
+    before_compiling: called if there is no such code, so that the function must be compiled.
     """
 
     def __init__(self, function: FunctionType, before_compiling: Callable[[], None]) -> None:
@@ -54,8 +54,8 @@ class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types here
         """Return the compiled function, or None."""
         loaded = None
         if self._numba is not None:
-            # A file with the right digest was made by the same versions of everything, and loads. If it does
-            # not, for whatever reason, the function is compiled.
+            # A file with the right digest was made by the same versions of everything, and should load. If it
+            # does not, for whatever reason, the function is compiled.
             with contextlib.suppress(Exception):
                 loaded = self._numba.load_overload(signature, target)
         if loaded is None:
@@ -80,9 +80,9 @@ class CodeFiles:
             content = self._path(key).read_bytes()
         except OSError:
             return None
-        if content[:DIGEST] != self._digest(content[DIGEST:]):
+        if content[:DIGEST_BYTES] != self._digest(content[DIGEST_BYTES:]):
             return None
-        saved_key, data = pickle.loads(content[DIGEST:])
+        saved_key, data = pickle.loads(content[DIGEST_BYTES:])
         return data if saved_key == key else None
 
     def save(self, key: Any, data: Any) -> None:
@@ -96,32 +96,33 @@ class CodeFiles:
         return self._folder / f"{self._name}.{digest.hexdigest()}.fbc"
 
     def _digest(self, content: bytes) -> bytes:
-        return hashlib.blake2b(content, digest_size=DIGEST, key=self._stamp).digest()
+        return hashlib.blake2b(content, digest_size=DIGEST_BYTES, key=self._stamp).digest()
 
     @cached_property
     def _stamp(self) -> bytes:
         """Digest of everything that the machine code depends on, apart from the key."""
         versions = f"{numba.__version__} {__version__} {_variant()}"
-        digest = hashlib.blake2b(versions.encode(), digest_size=DIGEST)
+        digest = hashlib.blake2b(versions.encode(), digest_size=DIGEST_BYTES)
         for function in _called_functions(self._function):
             digest.update(_source(function.__code__.co_filename))
             for name in function.__code__.co_names:
                 value = function.__globals__.get(name)
-                if isinstance(value, int | float | tuple):  # compiled into the code, wherever they come from
+                if isinstance(value, int | float | tuple):  # constants in the code, also imported ones
                     digest.update(f"{name}={value!r}".encode())
         return digest.digest()
 
 
 def _variant() -> str:
-    """Return the settings of numba that other machine code is made with, which its key leaves out.
+    """Return the settings of numba that change machine code but are not in numba's key.
 
-    With `NUMBA_BOUNDSCHECK=1`, code checks the bounds of every access; code that does not must not stand in.
+    With `NUMBA_BOUNDSCHECK=1`, code checks the bounds of every access; code without these checks must not be
+    loaded then.
     """
     return f"bounds={int(numba.config.BOUNDSCHECK or 0)} optimise={int(numba.config.OPT)}"
 
 
 def _called_functions(function: FunctionType) -> Iterator[FunctionType]:
-    """Yield a function and all compiled functions that it calls, directly or not."""
+    """Yield a function and all compiled functions that it calls, directly or through others."""
     functions = [function]
     for caller in functions:
         yield caller

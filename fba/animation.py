@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cache
 from importlib import import_module
 from typing import Any, overload
 
@@ -21,7 +20,7 @@ import numpy.typing as npt
 from fba.arrays import Array, Bool, Float64, Int64, Intp
 from fba.errors import OptionError
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import EXPRESSION_FIELDS, VISEME_FIELDS, bap_numbers, baps, fap_numbers
+from fba.parameters import EXPRESSION_FIELDS, VISEME_FIELDS, bap_angles, bap_numbers, fap_numbers
 from fba.tracks import BodyTrack, FaceTrack, freeze, integers
 
 __all__ = ["Animation", "BodyTrack", "FaceTrack", "Frame"]
@@ -30,19 +29,19 @@ _INDEX_MAX = 1 << 62
 """Bound of frame indices, so that sums of two fit 64 bits."""
 
 _RESAMPLED_BYTES = 10
-"""Memory of a resampled parameter in a frame: an int32, masks, and its share of all that comes in between."""
+"""Memory of a resampled parameter in a frame: an int32, masks, and its share of temporary arrays."""
 _HALF_TURN = 1e5 * math.pi
 """In the unit of angles, 1e-5 rad."""
-_CHUNK = 1 << 14
-"""Frames that are interpolated at once, which limits the memory for numbers of 64 bits."""
+_CHUNK_FRAMES = 1 << 14
+"""Frames that are interpolated at once, to limit the memory for numbers of 64 bits."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Frame:
     """One frame of an animation.
 
-    index: shown at index / rate seconds. face and body: tracks of length 1, or None if the frame carries
-    nothing of them. plane: its plane in the stream (`fba.codec.PlaneInfo`), if it was decoded from one.
+    index: shown at index / rate seconds. face, body: tracks of length 1; None if the frame lacks the part.
+    plane: of a decoded frame, its plane in the stream (`fba.codec.PlaneInfo`).
     """
 
     index: int
@@ -59,14 +58,8 @@ class Frame:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Frame):
             return NotImplemented
-        return (self.index, self.rate, self.face, self.body) == (
-            other.index,
-            other.rate,
-            other.face,
-            other.body,
-        )
-
-    __hash__ = None  # type: ignore[assignment]
+        same_time = self.index == other.index and self.rate == other.rate
+        return same_time and self.face == other.face and self.body == other.body
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,9 +164,9 @@ class Animation:
                 self.name,
             )
         position = range(len(self))[frames]  # turns negative positions, raises IndexError outside
-        one = slice(position, position + 1)
-        face = self.face[one] if self.face is not None else None
-        body = self.body[one] if self.body is not None else None
+        frame = slice(position, position + 1)
+        face = self.face[frame] if self.face is not None else None
+        body = self.body[frame] if self.body is not None else None
         return Frame(int(self.index[position]), self.rate, face, body)
 
     def __eq__(self, other: object) -> bool:
@@ -185,8 +178,6 @@ class Animation:
             and self.face == other.face
             and self.body == other.body
         )
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         """Return one line, without the arrays."""
@@ -296,9 +287,17 @@ class Animation:
         if self.body is not None:
             mask = self.body.mask[before]
             both = mask & self.body.mask[after]
-            between = _between(self.body.values, before, after, weight, both, angles=_body_angles())
+            between = _between(self.body.values, before, after, weight, both, angles=bap_angles())
             body = BodyTrack(between, mask)
         return Animation(rate, index, face, body, self.name)
+
+
+def check_order(before: Animation, after: Animation) -> None:
+    """Raise ValueError if `after` cannot follow in a stream: it has another rate, or does not come later."""
+    if after.rate != before.rate:
+        raise ValueError(f"the stream has {before.rate} frames/s, this frame {after.rate}; resample it first")
+    if after.index[0] <= before.index[0]:
+        raise ValueError(f"frame index {after.index[0]} comes after {before.index[0]}; they must increase")
 
 
 def _scale(index: Int64, factor: Fraction) -> tuple[Array, Float64]:
@@ -324,12 +323,12 @@ def _between(
 ) -> npt.NDArray[np.signedinteger]:
     """Return values (S, columns) between frames before (S,) and after (S,), by weight (S,) in 0..1.
 
-    both: bool (S, columns), True where both frames sent the value; elsewhere that of before holds.
+    both: bool (S, columns), True where both frames sent the value; elsewhere the value before remains.
     angles: bool (columns,), True for angles, which turn the shorter way and stay within +-pi if both are.
     """
     result = np.empty((len(before), values.shape[1]), dtype=values.dtype)
-    for first in range(0, len(before), _CHUNK):
-        chunk = slice(first, first + _CHUNK)
+    for first in range(0, len(before), _CHUNK_FRAMES):
+        chunk = slice(first, first + _CHUNK_FRAMES)
         start = values[before[chunk]]
         change = np.where(both[chunk], values[after[chunk]].astype(np.float64) - start, 0.0)
         between = start + change * weight[chunk, None]
@@ -350,14 +349,8 @@ def _within_half_turn(angles: Float64) -> Float64:
     return result
 
 
-@cache
-def _body_angles() -> Bool:
-    """Return bool (296,): True for BAPs that are angles."""
-    return np.array([bap.unit == "1e-5 rad" for bap in baps()])
-
-
 def _resample_face(face: FaceTrack, before: Intp, after: Intp, weight: Float64, is_first: Bool) -> FaceTrack:
-    """Return a face track resampled as by `_between`. is_first: (S,), whether an old frame begins."""
+    """Return a face track resampled by `_between`. is_first: (S,), whether an old frame begins."""
     mask = face.mask[before]
     both = mask & face.mask[after]
     fields = []

@@ -28,6 +28,6 @@ UInt32 = npt.NDArray[np.uint32]
 
 
 def to_float64(numbers: npt.ArrayLike) -> Float64:
-    """Return the numbers of a file as float64, without a warning of NaNs that signal, as in damaged files."""
+    """Return the numbers of a file as float64, without a warning of signalling NaNs, as in damaged files."""
     with np.errstate(invalid="ignore"):
         return np.asarray(numbers, dtype=np.float64)

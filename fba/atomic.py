@@ -28,10 +28,10 @@ _unfinished: set[str] = set()
 def atomic(path: PathLike) -> Iterator[BinaryIO]:
     """Open a binary file to write; the target appears, or changes, only if the block ends without an error.
 
-    If an exception or Ctrl-C leaves the block, the temporary file is removed and an old target stays as it
-    was. An existing target keeps its permissions, and of a link, the file that it points to is written. A
+    If an exception or Ctrl-C ends the block, the temporary file is removed and an old target stays as it was.
+    An existing target keeps its permissions. If it is a link, the file that it points to is written. A
     device, a pipe with a reader and an open file by its number (`/dev/null`, `>(program)`, `/dev/stdout`) are
-    written to directly. Raises FormatError where the target cannot be written.
+    written directly. Raises FormatError if the target cannot be written.
     """
     name = os.fspath(path)
     target, mode, direct = check_target(name)
@@ -56,9 +56,8 @@ def atomic(path: PathLike) -> Iterator[BinaryIO]:
 def atomic_path(path: PathLike) -> Iterator[Path]:
     """Yield the path of a temporary file, for encoders that need a name instead of an open file.
 
-    It lies in the folder of the target, is renamed to the target if the block ends without an error, and
-    removed otherwise. Raises FormatError
-    where the target cannot be written, or is a device or a pipe.
+    It lies in the folder of the target. It is renamed to the target if the block ends without an error, and
+    removed otherwise. Raises FormatError if the target cannot be written, or is a device or a pipe.
     """
     name, mode, direct = check_target(path)
     if direct:
@@ -90,7 +89,7 @@ class Target(NamedTuple):
     """A file to write.
 
     path: its name with links followed. mode: st_mode; None if it does not exist yet. direct: whether it is
-    written in place because no other file can replace it: a device, a pipe, an open file.
+    written in place, because no other file can replace it: a device, a pipe, an open file.
     """
 
     path: str
@@ -151,15 +150,15 @@ def _descriptor(name: str) -> int | None:
 
 @contextlib.contextmanager
 def temporary_beside(target: str, suffix: str, name: PathLike) -> Iterator[tuple[str, int]]:
-    """Make a new file in the target's folder; yields its name and open handle, and removes it at the end.
+    """Make a new file in the target's folder; yield its name and open handle, and remove it at the end.
 
-    If Ctrl-C comes while the block is being entered, it is removed when the program ends. Raises FormatError,
-    with the name as the user wrote it, if it cannot be made.
+    If Ctrl-C comes while the block is being entered, the file is removed when the program ends. Raises
+    FormatError, with the name as the user wrote it, if the file cannot be made.
     """
     temporary = os.path.join(os.path.dirname(target), f".fba-{secrets.token_hex(6)}{suffix}")
     _unfinished.add(temporary)
     try:
-        # with the permissions that open() gives, which follow the umask
+        # with the permissions that open() gives, by the umask
         handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     except (OSError, ValueError) as error:
         _unfinished.discard(temporary)

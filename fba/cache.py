@@ -18,9 +18,9 @@ from fba.arrays import Array
 
 Cached = TypeVar("Cached", bound=Array)
 
-MOST_FILES = 96
-"""Most files in the cache; those that were not used for longest are deleted first."""
-DIGEST = 32
+MAX_FILES = 96
+"""Most files in the cache; those unused for the longest time are deleted first."""
+DIGEST_BYTES = 32
 """Bytes of the digest at the start of a file, which shows whether the rest is undamaged."""
 
 
@@ -40,11 +40,11 @@ def load_or_make(
     """Return the arrays that `make` returned for this key, from the disk if they are there.
 
     key: of letters and digits, different for different input, see `make_key`. shapes: of the arrays. kind:
-    the dtype of all, or a list with that of each. If the cache cannot be used (no home folder, full disk,
-    damaged file) the arrays are made anew, silently. Loaded arrays have the right shapes and finite numbers,
-    but a file may have been tampered with: check indices before using them.
+    the dtype of all, or a list with the dtype of each. If the cache cannot be used (no home folder, full
+    disk, damaged file) the arrays are made again, silently. Loaded arrays have the right shapes and finite
+    numbers, but a file may have been tampered with: check indices before using them.
     """
-    kinds = [np.dtype(one) for one in (kind if isinstance(kind, list) else [kind] * len(shapes))]
+    kinds = [np.dtype(each) for each in (kind if isinstance(kind, list) else [kind] * len(shapes))]
     folder = _folder()
     path = None if folder is None else folder / f"{key}.fbk"
     if path is not None:
@@ -78,7 +78,9 @@ def _read(
     path: Path, shapes: tuple[tuple[int, ...], ...], kinds: Sequence[np.dtype[Any]]
 ) -> list[Any] | None:
     """Return the arrays of a file, or None if it is missing or damaged."""
-    size = DIGEST + sum(kind.itemsize * math.prod(shape) for shape, kind in zip(shapes, kinds, strict=True))
+    size = DIGEST_BYTES + sum(
+        kind.itemsize * math.prod(shape) for shape, kind in zip(shapes, kinds, strict=True)
+    )
     try:
         if path.stat().st_size != size:
             return None
@@ -87,9 +89,9 @@ def _read(
             os.utime(path)
     except OSError:
         return None
-    if content[:DIGEST] != _digest(content[DIGEST:], path.stem, kinds, shapes):
+    if content[:DIGEST_BYTES] != _digest(content[DIGEST_BYTES:], path.stem, kinds, shapes):
         return None
-    arrays, offset = [], DIGEST
+    arrays, offset = [], DIGEST_BYTES
     for shape, kind in zip(shapes, kinds, strict=True):
         count = math.prod(shape)
         arrays.append(np.frombuffer(content, kind, count, offset).reshape(shape).copy())
@@ -104,11 +106,11 @@ def _digest(
 ) -> bytes:
     """Return a digest of the content of a file: numbers, key, dtypes and shapes."""
     about = f"{key} {[kind.str for kind in kinds]} {list(shapes)} "
-    return hashlib.blake2b(about.encode() + content, digest_size=DIGEST).digest()
+    return hashlib.blake2b(about.encode() + content, digest_size=DIGEST_BYTES).digest()
 
 
 def _write(path: Path, arrays: list[Cached]) -> None:
-    """Write arrays to a file, and delete the files that were not used for longest; ignore failures."""
+    """Write arrays to a file, and delete the files unused for the longest time; ignore failures."""
     from fba.atomic import atomic
     from fba.errors import FormatError
 
@@ -118,5 +120,5 @@ def _write(path: Path, arrays: list[Cached]) -> None:
             content = b"".join(array.tobytes() for array in arrays)
             kinds, shapes = [array.dtype for array in arrays], [array.shape for array in arrays]
             file.write(_digest(content, path.stem, kinds, shapes) + content)
-        for old in sorted(path.parent.glob("*.fbk"), key=lambda one: one.stat().st_mtime)[:-MOST_FILES]:
+        for old in sorted(path.parent.glob("*.fbk"), key=lambda file: file.stat().st_mtime)[:-MAX_FILES]:
             old.unlink(missing_ok=True)

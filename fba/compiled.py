@@ -20,13 +20,13 @@ _listeners: list[Callable[[], None]] = []
 
 @cache
 def _numba() -> Any:
-    """Return the package numba, imported for the first function; None if it is missing.
+    """Return the package numba, imported for the first compiled function; None if it is missing.
 
-    `fba --help` imports this module and compiles nothing: numba would double its time.
+    `fba --help` imports this module and compiles nothing: importing numba would double its time.
     """
     try:
         import numba
-    except ImportError:  # the codec runs anywhere Python and NumPy run
+    except ImportError:  # the codec runs wherever Python and NumPy run
         return None
     return numba if hasattr(numba, "njit") else None  # the folder of an uninstalled numba may still be there
 
@@ -45,7 +45,7 @@ def _compiled(function: Function, **options: bool) -> Function:
     numba = _numba()
     if numba is None:
         return function
-    # Nobody calls these through C: numba's wrapper for that took a quarter of the time to compile.
+    # No C code calls these functions: numba's wrapper for C took a quarter of the time to compile.
     dispatcher: Any = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
     if not numba.config.DISABLE_JIT:
         from fba._numba_cache import MachineCode
@@ -57,20 +57,19 @@ def _compiled(function: Function, **options: bool) -> Function:
 
 
 def _call_by_type(dispatcher: Any, arguments: Any, named: Any) -> Any:
-    """Return the template by which another compiled function calls this one, chosen by argument types alone.
+    """Return the template by which compiled functions call this function, chosen by argument types alone.
 
-    Numba would compile it once more for each constant that is passed to it.
+    Otherwise numba would compile it again for each constant that is passed to it.
     """
     from numba.types import unliteral
 
-    plain = [unliteral(one) for one in arguments]
-    return type(dispatcher).get_call_template(
-        dispatcher, plain, {key: unliteral(one) for key, one in named.items()}
-    )
+    plain = [unliteral(argument) for argument in arguments]
+    named = {key: unliteral(argument) for key, argument in named.items()}
+    return type(dispatcher).get_call_template(dispatcher, plain, named)
 
 
 def is_compiled() -> bool:
-    """Whether the hot loops run as machine code in this process."""
+    """Return whether the hot loops run as machine code in this process."""
     numba = _numba()
     return numba is not None and not numba.config.DISABLE_JIT
 

@@ -10,7 +10,7 @@ from fba.compiled import inlined
 
 
 def smoothstep(value: npt.ArrayLike) -> Float64:
-    """Return float64 array of value's shape: 0 up to 0, 1 from 1 on, 3 t^2 - 2 t^3 between."""
+    """Return a float64 array of value's shape: 0 up to 0, 1 from 1 on, 3 t^2 - 2 t^3 between."""
     t = np.clip(np.asarray(value, dtype=np.float64), 0.0, 1.0)
     result: Float64 = t * t * (3.0 - 2.0 * t)
     return result

@@ -5,14 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import get_args
+from typing import Final, Literal, get_args
 
 import numpy as np
 
 from fba.choices import Unsent
 from fba.parameters import BAP_STEP_TABLES, BapTable
-from fba.presets import PRESETS, REFERENCE, Preset
 
+PlannedPreset = Literal["exact", "compact"]
+"""Without parameters that never move, and FAPs that players derive from others. See `fba.planning`."""
+Preset = Literal["reference", PlannedPreset]
+"""Which parameters of an animation a stream sends; docs/encode.md compares them."""
+REFERENCE: Final = "reference"
+"""All parameters that the animation sends."""
+PLANNED: tuple[PlannedPreset, ...] = ("exact", "compact")
+PRESETS: tuple[Preset, ...] = (REFERENCE, *PLANNED)
 QUANT_MAX = 31
 """Largest quantiser."""
 
@@ -27,24 +34,24 @@ class EncoderOptions:
         stream; 0: unquantised.
     intra_period: most seconds from one I plane to the next; without it, I planes come only where one is
         needed. An I plane that cannot carry the values of its frame is put off.
-    start_codes: write a plane start code before every I plane after the first, and all ranges with each, so
-        that a decoder can start there or resume after damage.
-    time_codes: with start codes, also the time at which decoding goes on after damage: I planes come at
-        whole seconds where the intra period allows it, and carry a time code there. Takes 18 bits each.
+    start_codes: write a plane start code before every I plane after the first, and all ranges in it, so that
+        a decoder can start there or resume after damage.
+    time_codes: with start codes, also write time codes, by which a decoder knows the time after damage: I
+        planes come at whole seconds if the intra period allows it, with a time code of 18 bits.
     bap_steps: table of BAP steps: the standard's, or one vendor's, which is finer.
     mark: write checksums, and of a body the table of BAP steps, behind the end of the stream, where other
         decoders do not read; else the stream is the FBA object alone, and a decoder must be told the table.
     checksums: with the mark, a CRC-32 of each I period, 4 bytes each and about 20 more, by which a decoder
         notices flipped bits that leave the syntax whole.
-    preset: what is sent: all that is given (reference); of streams, not what never moves (exact); of the
-        FAPs, only those that players do not derive from others (compact).
-    unsent: what a decoder does with a FAP that is not sent, unless the animation itself says so: keep its
-        last value (mask type 1), or interpolate it from others (mask type 2).
+    preset: what is sent: all that the animation sends (reference); without parameters that never move
+        (exact); also without FAPs that players derive from others (compact).
+    unsent: what a decoder does with a FAP that is not sent, unless the animation says so: keep its last value
+        (mask type 1), or interpolate it from others (mask type 2).
     gender: suggested_gender, 1 male.
-    clamp: limit values to the codable range instead of failing: I planes stop at the end of the
-        widest range, and P planes after them catch up.
+    clamp: limit values to the codable range instead of failing: I planes stop at the end of the widest range,
+        and P planes after them catch up.
 
-    `fba.encode` and `fba.write` know all presets, `fba.codec.encode` knows "reference" alone.
+    `fba.encode` and `fba.write` take all presets, `fba.codec.encode_animation` takes "reference" alone.
 
     Raises ValueError for any other value.
     """

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 
 from fba.errors import LimitError, Remedy
 
-GROWTH = 20
-"""Bytes of memory that each byte of the input may take in addition to `Limits.bytes`."""
+BYTES_PER_BYTE = 20
+"""Bytes of memory that each byte of the input may take, in addition to `Limits.bytes`."""
 
 
 @dataclass(frozen=True)
@@ -19,9 +19,9 @@ class Limits:
     frames: of an animation, also after resampling.
     bytes: of memory for decoded content, in addition to 20 for each byte of the input.
     pixels: of a picture, width times height.
-    seconds: from the first frame of an animation to the last, where every moment between them needs a frame.
+    seconds: from the first frame of an animation to the last, if every moment between them needs a frame.
 
-    Raises ValueError for a limit that is no positive integer.
+    Raises ValueError for a limit that is not a positive integer.
     """
 
     frames: int = 6_000_000
@@ -42,10 +42,10 @@ class Limits:
 
     def check_bytes(self, count: int, what: str, *, source: int = 0) -> None:
         """Raise LimitError if `what` takes more memory than allowed. source: bytes of the input."""
-        allowed = self.bytes + GROWTH * source
+        allowed = self.bytes + BYTES_PER_BYTE * source
         if count > allowed:
             text = f"{what} takes {count} bytes of memory, made from {source} bytes of input"
-            raise _excess("bytes", text, count, allowed, needed=count - GROWTH * source)
+            raise _excess("bytes", text, count, allowed, needed=count - BYTES_PER_BYTE * source)
 
     def check_pixels(self, width: int, height: int, what: str) -> None:
         """Raise LimitError if `what` has more pixels than allowed."""
@@ -79,6 +79,6 @@ def _excess(limit: str, finding: str, found: int, allowed: int, *, needed: int =
 
 
 def _round_up(number: int) -> int:
-    """Return a number with two digits that are not 0, that is no smaller."""
+    """Return a number rounded up to two significant digits."""
     unit = int(10 ** max(len(str(number)) - 2, 0))
     return -(-number // unit) * unit

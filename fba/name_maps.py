@@ -16,17 +16,17 @@ from fba.errors import SAVE_AS_UTF8, FormatError, OptionError
 from fba.limits import Limits
 from fba.source import Path, read_whole
 
-MOST_BYTES = 1 << 20
-"""Longest file of a map."""
-NAMED = 12
+MAX_BYTES = 1 << 20
+"""Size of the longest file of a map."""
+MAX_LISTED = 12
 """Most names in a message."""
 
 
 def read_names(path: Path, table: str, example: str, limits: Limits) -> dict[str, Any]:
-    """Return a table of a TOML file, as it is there: name -> value.
+    """Return a table of a TOML file: name -> value.
 
-    example: a line of such a table, for messages. Raises FormatError for a file without it, with the line,
-    LimitError.
+    example: a line of such a table, for messages. Raises FormatError for a file without the table, and as
+    `read_toml`.
     """
     names = read_toml(path, f"{example} below [{table}]", limits).get(table)
     if not isinstance(names, dict) or not names:
@@ -41,8 +41,8 @@ def read_toml(path: Path, expected: str, limits: Limits) -> dict[str, Any]:
     LimitError.
     """
     data = read_whole(path)
-    if len(data) > MOST_BYTES:
-        raise FormatError(f"has {len(data)} bytes, more than the {MOST_BYTES} that a map may have", path=path)
+    if len(data) > MAX_BYTES:
+        raise FormatError(f"has {len(data)} bytes, more than the {MAX_BYTES} that a map may have", path=path)
     limits.check_bytes(40 * len(data), f"{os.fspath(path)}: the map", source=len(data))
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
@@ -61,12 +61,12 @@ def change_names(
     pairs: Mapping[str, str],
     check_name: Callable[[str], None],
     check_value: Callable[[str], None],
-    shared: str = "",
+    shared: str,
 ) -> dict[str, str]:
-    """Return a map of names changed by hand.
+    """Return a map of names with changes.
 
     pairs: name -> value, or "" to leave the name out. Another name that had the same value loses it, unless
-    that is the one that several may share. The checks raise OptionError for what does not exist.
+    it is the shared value. The checks raise OptionError for names and values that do not exist.
     """
     result = dict(base)
     for name, value in pairs.items():
@@ -91,9 +91,9 @@ def change_known_names(
     check_value: Callable[[str], None],
     shared: str = "",
 ) -> dict[str, str]:
-    """Return the names in the order of `known`, the names of the source.
+    """Return a map as `change_names` does, in the order of `known`, the names of the source.
 
-    what: begins the message of a name that it lacks, "the capture has no marker".
+    what: begins the message about an absent name, "the capture has no marker".
     """
 
     def check_name(name: str) -> None:
@@ -106,12 +106,14 @@ def change_known_names(
 
 
 def list_names(names: Sequence[str]) -> str:
-    """Return names as text, the first of many."""
-    return ", ".join(names[:NAMED]) + (f", and {len(names) - NAMED} more" if len(names) > NAMED else "")
+    """Return names as text, at most `MAX_LISTED` of them."""
+    return ", ".join(names[:MAX_LISTED]) + (
+        f", and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+    )
 
 
 def _like(name: str, known: Sequence[str]) -> str:
-    """Return " (did you mean 'LCL'?)", whatever is written in capitals, or ""."""
+    """Return " (did you mean 'LCL'?)", or ""; upper and lower case count as equal."""
     by_lower = {each.lower(): each for each in known}
     near = get_close_matches(name.lower(), by_lower, n=1)
     return f" (did you mean {by_lower[near[0]]!r}?)" if near else ""
@@ -126,7 +128,7 @@ def write_names(
 ) -> None:
     """Write a table as TOML.
 
-    heading: lines of comment before it. left: what is said behind it of other names -> these names.
+    heading: lines of comment before it. left: texts of comments behind it -> names that they list.
     """
     lines = [*(f"# {line}" for line in heading), "", f"[{table}]"]
     for name, value in names.items():

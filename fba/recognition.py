@@ -46,11 +46,13 @@ HEAD_BYTES = 4096
 """Bytes of a file that are enough for recognition."""
 EPF_TAGS = ("FBM", "FFR", "BFR", "ISI", "GDR", "CDM")
 """Tags with which EPF files begin."""
-MASK_BITS, BODY_BITS = 60, 100
-"""Bits at which a line is a mask, and a mask of BAPs."""
+MIN_MASK_BITS = 60
+"""Least number of bits in a line that counts as a mask."""
+MIN_BODY_BITS = 100
+"""Least number of bits in a mask of BAPs; a mask of FAPs has fewer."""
 OBJ_WORDS = ("v", "vt", "vn", "f", "g", "o", "mtllib", "usemtl", "s")
-CSV_LINES = 3
-"""Lines that a table has at least."""
+MIN_CSV_LINES = 3
+"""Least number of lines in a table."""
 
 
 def recognise(head: bytes) -> str:
@@ -85,7 +87,7 @@ def recognition_hint(head: bytes) -> str:
 
 
 def _is_program_stream(head: bytes) -> bool:
-    """Whether this is video of MPEG-1 or 2, which begins like an FBA stream; the next bits differ."""
+    """Return whether this is video of MPEG-1 or 2, which begins like an FBA stream; the next bits differ."""
     return head.startswith(b"\0\0\1\xba") and len(head) > 4 and (head[4] >> 6 == 1 or head[4] >> 4 == 2)
 
 
@@ -113,8 +115,8 @@ def _recognise_lines(lines: list[str]) -> str:
         return "an EPF file (encoder parameters)"
     for line in lines[:2]:
         words = line.split()
-        if len(words) >= MASK_BITS and set(words) <= {"0", "1"}:
-            return "a BAP file" if len(words) >= BODY_BITS else "a FAP file"
+        if len(words) >= MIN_MASK_BITS and set(words) <= {"0", "1"}:
+            return "a BAP file" if len(words) >= MIN_BODY_BITS else "a FAP file"
     obj_lines = sum(line.split()[0] in OBJ_WORDS for line in lines)
     return "an OBJ mesh" if obj_lines > max(len(lines) // 2, 2) else ""
 
@@ -122,7 +124,7 @@ def _recognise_lines(lines: list[str]) -> str:
 def _recognise_table(lines: list[str]) -> str:
     """Recognise a table by a separator that occurs equally often in each of the first lines."""
     rows = lines[:10]
-    if len(rows) < CSV_LINES:
+    if len(rows) < MIN_CSV_LINES:
         return ""
     for separator in (",", ";", "\t"):
         counts = {row.count(separator) for row in rows}

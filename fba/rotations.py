@@ -1,4 +1,4 @@
-"""Rotations over arrays: quaternions (w, x, y, z) and 3 x 3 matrices, leading axes free."""
+"""Rotations over arrays: quaternions (w, x, y, z) and 3 x 3 matrices, with any leading axes."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def cross(a: Float64, b: Float64) -> Float64:
 
 
 def dot(a: Float64, b: Float64) -> Float64:
-    """Return the products (...) of vectors (..., 3); sums along so short an axis take three times as long."""
+    """Return the scalar products (...) of vectors (..., 3); three times as fast as sums over an axis."""
     result: Float64 = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
     return result
 

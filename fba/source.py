@@ -1,4 +1,4 @@
-"""Files to be read: opened, with a clear error where there is nothing to be read, and named in errors."""
+"""Files to be read: opened, with a clear error if they cannot be read, and named in errors."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _read(file: BinaryIO, count: int, path: Path) -> bytes:
 
 @contextmanager
 def naming_file(path: Path) -> Iterator[None]:
-    """Put a file's name in front of errors that concern its content and do not have it.
+    """Put a file's name before errors about its content that do not have it.
 
     A ModelError becomes a FormatError; all others keep their type and attributes.
     """

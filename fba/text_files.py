@@ -25,8 +25,8 @@ MAX_TEXT = 1 << 26
 def read_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
     """Yield line numbers from 1 and lines of a text file, without their ends, read one by one.
 
-    UTF-8, else Latin-1; UTF-16 as its byte order mark says is refused, as are zero bytes: such a file is
-    no text. Raises ModelError as `open_source` raises FormatError, and for a line beyond `MAX_LINE`.
+    UTF-8, else Latin-1. Raises ModelError as `open_source` raises FormatError, for a line beyond `MAX_LINE`,
+    for UTF-16 with a byte order mark, and for zero bytes, which no text has.
     """
     name = os.fspath(path)
     file, size = _opened(name)
@@ -115,5 +115,5 @@ def find_beside(path: str | os.PathLike[str], name: str) -> Path | None:
     candidate = Path(path).parent / plain
     try:
         return candidate if candidate.is_file() else None
-    except (OSError, ValueError):  # too long a name, or half of a character
+    except (OSError, ValueError):  # too long a name, or a lone surrogate
         return None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +23,9 @@ from fba.parameters import (
     fap_numbers,
 )
 
-_CHUNK = 4096
-"""Frames of a batch."""
+_BATCH_FRAMES = 4096
+_ZEROS: Any = None
+"""Default of fields that are zeros if they are not given."""
 
 
 class CompactFrames(Protocol):
@@ -59,15 +60,15 @@ class FaceTrack:
 
     values: Int32
     mask: Bool
-    viseme: Int16 = None  # type: ignore[assignment]
-    expression: Int16 = None  # type: ignore[assignment]
+    viseme: Int16 = _ZEROS
+    expression: Int16 = _ZEROS
     interpolated: Bool | None = None
     _compact: tuple[CompactFrames, range] | None = field(default=None, init=False, repr=False)
 
     if not TYPE_CHECKING:  # or it would accept any attribute
 
         def __getattr__(self, name: str) -> Array | None:
-            """Return a field that is asked for the first time."""
+            """Return a field of a compact track that is not made yet."""
             return _fill_in(self, name)
 
     def __post_init__(self) -> None:
@@ -145,20 +146,14 @@ class FaceTrack:
             return self.values[:, number - 1]
         if self._compact is not None:
             return compact_track(FaceTrack, self._compact[0], self._compact[1][frames])
-        names = ("values", "mask", "viseme", "expression")
-        arrays = {name: getattr(self, name)[frames] for name in names}
-        return trusted(
-            FaceTrack,
-            **arrays,
-            interpolated=self.interpolated[frames] if self.interpolated is not None else None,
-        )
+        names = ("values", "mask", "viseme", "expression", "interpolated")
+        fields = {name: getattr(self, name) for name in names}
+        return trusted(FaceTrack, **{name: f if f is None else f[frames] for name, f in fields.items()})
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FaceTrack):
             return NotImplemented
         return _equal(self, other, ("mask", "values", "viseme", "expression"))
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         """Return one line, without the arrays."""
@@ -182,7 +177,7 @@ class BodyTrack:
     if not TYPE_CHECKING:  # or it would accept any attribute
 
         def __getattr__(self, name: str) -> Array | None:
-            """Return a field that is asked for the first time."""
+            """Return a field of a compact track that is not made yet."""
             return _fill_in(self, name)
 
     def __post_init__(self) -> None:
@@ -231,8 +226,6 @@ class BodyTrack:
             return NotImplemented
         return _equal(self, other, ("mask", "values"))
 
-    __hash__ = None  # type: ignore[assignment]
-
     def __repr__(self) -> str:
         """Return one line, without the arrays."""
         return _summary(self, "BAP")
@@ -242,14 +235,14 @@ Track = TypeVar("Track", FaceTrack, BodyTrack)
 
 
 def trusted(kind: type[Track], **arrays: Array | None) -> Track:
-    """Return a track without checking its arrays, for arrays that are known to be valid."""
+    """Return a track of valid arrays, without checking them."""
     track: Track = object.__new__(kind)
     freeze(track, _compact=None, **arrays)
     return track
 
 
 def compact_track(kind: type[Track], source: CompactFrames, frames: range) -> Track:
-    """Return a track of these frames of the source, whose arrays are made when they are asked for."""
+    """Return a track of these frames of the source, whose arrays are made on first use."""
     track: Track = object.__new__(kind)
     object.__setattr__(track, "_compact", (source, frames))
     return track
@@ -257,9 +250,9 @@ def compact_track(kind: type[Track], source: CompactFrames, frames: range) -> Tr
 
 @dataclass(frozen=True, eq=False)
 class BodyColumns:
-    """BAPs of frames that all send the same ones, as `CompactFrames`.
+    """BAPs of frames that all send the same parameters, as `CompactFrames`.
 
-    rows: int32 (T, K), the values that are sent. sent: bool (296,), K of them.
+    rows: int32 (T, K), the values that are sent. sent: bool (296,), the K BAPs that are sent.
     """
 
     rows: Int32
@@ -283,7 +276,7 @@ class BodyColumns:
 
 
 def _fill_in(track: FaceTrack | BodyTrack, name: str) -> Array | None:
-    """Return a field that a compact track does not hold yet, and store it."""
+    """Make a field of a compact track, store and return it."""
     if name.startswith("_") or name not in track.__slots__:
         raise AttributeError(f"{type(track).__name__!r} object has no attribute {name!r}")
     assert track._compact is not None
@@ -294,26 +287,26 @@ def _fill_in(track: FaceTrack | BodyTrack, name: str) -> Array | None:
 
 
 @overload
-def batches(track: FaceTrack, count: int = _CHUNK) -> Iterator[FaceTrack]: ...
+def batches(track: FaceTrack) -> Iterator[FaceTrack]: ...
 @overload
-def batches(track: BodyTrack, count: int = _CHUNK) -> Iterator[BodyTrack]: ...
-def batches(track: FaceTrack | BodyTrack, count: int = _CHUNK) -> Iterator[FaceTrack] | Iterator[BodyTrack]:
-    """Yield a track in pieces of at most `count` frames, so that a compact one stays so."""
-    for start in range(0, len(track), count):
-        yield track[start : start + count]
+def batches(track: BodyTrack) -> Iterator[BodyTrack]: ...
+def batches(track: FaceTrack | BodyTrack) -> Iterator[FaceTrack] | Iterator[BodyTrack]:
+    """Yield a track in pieces, so that a compact track stays compact."""
+    for start in range(0, len(track), _BATCH_FRAMES):
+        yield track[start : start + _BATCH_FRAMES]
 
 
-def _equal(one: Track, other: Track, names: tuple[str, ...]) -> bool:
-    """Whether tracks have equal fields of these names; compact tracks stay compact."""
-    return len(one) == len(other) and all(
-        np.array_equal(getattr(mine, name), getattr(theirs, name))
-        for mine, theirs in zip(batches(one), batches(other), strict=True)
+def _equal(a: Track, b: Track, names: tuple[str, ...]) -> bool:
+    """Return whether tracks have equal fields of these names; compact tracks stay compact."""
+    return len(a) == len(b) and all(
+        np.array_equal(getattr(part, name), getattr(other_part, name))
+        for part, other_part in zip(batches(a), batches(b), strict=True)
         for name in names
     )
 
 
 def _number(key: object, numbers: dict[str, int], kind: str) -> int:
-    """Return the number of a parameter, which may be given by its name. OptionError for another key."""
+    """Return the number of a parameter, given by its name or number. OptionError for another key."""
     if isinstance(key, str):
         if key in numbers:
             return numbers[key]
@@ -334,7 +327,7 @@ def _number(key: object, numbers: dict[str, int], kind: str) -> int:
 
 
 def _summary(track: FaceTrack | BodyTrack, kind: str) -> str:
-    """Return a line on a track of this kind of parameters."""
+    """Return a line about a track of this kind of parameters."""
     sent = (
         sum(np.bitwise_or.reduce([part.mask.any(axis=0) for part in batches(track)], axis=0))
         if len(track)
@@ -345,7 +338,7 @@ def _summary(track: FaceTrack | BodyTrack, kind: str) -> str:
 
 
 def _check_values(values: object, mask: object, columns: int, what: str) -> tuple[Int32, Bool]:
-    """Return values, 0 where not sent, and mask, both as a track holds them. ValueError if they are wrong."""
+    """Return values, 0 where not sent, and mask, as fields of a track. ValueError if they are wrong."""
     array = integers(values, np.int32, f"{what}: values")
     sent = np.asarray(mask)
     if array.ndim != 2 or array.shape[1] != columns:
@@ -420,7 +413,7 @@ def _stack(arrays: list[Array]) -> Array:
 
 
 def hold(values: Array, mask: Bool, before: Array) -> Array:
-    """Return values (T, N) in force at each frame: where the mask is False, the last one where it is True.
+    """Return values (T, N) in force at each frame: where the mask is False, the last value before it.
 
     mask: (T, N), or (T, 1) for all columns together. before: (N,), in force before the first frame.
     """

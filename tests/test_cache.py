@@ -14,7 +14,7 @@ import pytest
 
 from fba.body.model import BodyModel
 from fba.body.skin._moving_normals import normal_rings
-from fba.cache import MOST_FILES, load_or_make, make_key
+from fba.cache import MAX_FILES, load_or_make, make_key
 
 
 def numbers(value: float) -> list[npt.NDArray[np.float16]]:
@@ -98,9 +98,9 @@ print(load_or_make("one", ((3, 2),), lambda: [np.ones((3, 2), np.float16)])[0].s
 
 def test_not_more_is_kept_than_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FBA_CACHE", str(tmp_path))
-    for number in range(MOST_FILES + 5):
+    for number in range(MAX_FILES + 5):
         load_or_make(f"file{number}", ((3, 2),), lambda: numbers(1))
-    assert len(list((tmp_path / "fba").iterdir())) == MOST_FILES
+    assert len(list((tmp_path / "fba").iterdir())) == MAX_FILES
 
 
 def test_where_nothing_can_be_kept_it_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,12 +12,12 @@ import numpy as np
 from bench.bitrate.errors import ROOT, TURN
 from bench.bitrate.subjects import BODY, FACE, Subject
 from fba.arrays import Float64, Int64
-from fba.codec import EncoderOptions, decode, encode_with_statistics, probe_stream
+from fba.codec import EncoderOptions, decode, encode_animation, probe_stream
+from fba.encoder_options import PlannedPreset
 from fba.face import resolve
 from fba.face.resolve import known_faps
 from fba.planning import LiveEncoder, Tolerance, encode_planned, encode_within_tolerance, plan_compact
 from fba.planning.rate import RateEncoder
-from fba.presets import PlannedPreset
 
 QUANTISERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 31)
 UNPLANNED = "FBA, nothing known"
@@ -112,7 +112,7 @@ def encode_with_known_ranges(subject: Subject) -> bytes:
     options = options_for(subject, 1)
     if subject.kind == FACE:
         return plan_compact(subject.animation, options, intra_bits=NO_SPARE_INTRA).encode()[0]
-    return encode_with_statistics(subject.animation, options)[0]
+    return encode_animation(subject.animation, options)[0]
 
 
 def encode_live(subject: Subject) -> bytes:

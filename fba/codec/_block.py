@@ -20,14 +20,13 @@ from fba.codec.settings import PlaneInfo, PlaneSettings
 class Block:
     """Consecutive planes with the same settings: an I plane, or P planes after it.
 
-    index: int64 (T,); frame t is shown at start + (index[t] - index[0]) / rate seconds. number: that of the
-    first plane. borders: int64 (T + 1,), absolute bit positions of the planes, and the end of the last.
-    skips: int64 (T,). doubtful: see `fba.codec.PlaneInfo`.
+    index: int64 (T,); frame t is shown at start + (index[t] - index[0]) / rate seconds. number: of the first
+    plane, counted from 0. borders: int64 (T + 1,), the bit of the stream at which each plane begins, and the
+    end of the last. skips: int64 (T,). doubtful: see `fba.codec.PlaneInfo`.
 
-    parts: uint8 (T,), fba_object_mask of each plane. settings: those of a plane with all parts that planes
-    of the block carry. rows: int32 (T, K), the values of columns (K,), which are numbers of slots; 0 where a
-    plane lacks the part. `face` and `body` are made from them when they are asked for; a frame without the
-    part sends nothing.
+    parts: uint8 (T,), fba_object_mask of each plane. settings: of a plane with all parts that planes of the
+    block carry. rows: int32 (T, K), values; 0 where a plane lacks the part. columns: (K,), their slots.
+    `face` and `body` are made from them on first use; a frame without the part sends nothing.
     """
 
     index: Int64
@@ -112,7 +111,7 @@ class Block:
 
 @lru_cache(maxsize=64)
 def _places(columns: bytes) -> Int64:
-    """Return int64 (slots,): the place of each slot among columns, the bytes of int64; -1 if it has none."""
+    """Return int64 (slots,): the place of each slot in columns, given as bytes of int64; -1 if absent."""
     numbers = np.frombuffer(columns, dtype=np.int64)
     places = np.full(slots.SLOTS, -1, dtype=np.int64)
     places[numbers] = np.arange(len(numbers))

@@ -12,7 +12,7 @@ from fba.codec._plane import slots
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 from fba.tracks import BodyTrack, FaceTrack, compact_track
 
-_CHUNK = 1 << 14
+_CHUNK_FRAMES = 1 << 14
 """Number of frames that are expanded at once, to limit the memory."""
 
 
@@ -49,9 +49,9 @@ _FIELDS = {
 
 @dataclass(frozen=True, eq=False)
 class Masks:
-    """Masks of frames, most of which are equal.
+    """Masks of frames; most frames have equal masks.
 
-    rows: bool (M, columns), the different ones. kinds: integers (T,), the row of each frame; None if all
+    rows: bool (M, columns), the distinct masks. kinds: integers (T,), the row of each frame; None if all
     frames have row 0.
     """
 
@@ -99,8 +99,9 @@ class CodedFrames:
         columns, places = self._columns[name]
         result = np.zeros((len(rows), wanted.width), dtype=wanted.dtype)
         if len(columns):
-            for start in range(0, len(rows), _CHUNK):
-                result[start : start + _CHUNK, columns] = rows[start : start + _CHUNK, places]
+            for start in range(0, len(rows), _CHUNK_FRAMES):
+                chunk = slice(start, start + _CHUNK_FRAMES)
+                result[chunk, columns] = rows[chunk, places]
         return result
 
     def face(self) -> FaceTrack:

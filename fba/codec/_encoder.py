@@ -1,41 +1,39 @@
-"""Encode animations: the incremental `Encoder`, and `encode` for a complete animation."""
+"""Encode animations: the incremental `Encoder`, and `encode_animation` for a complete animation."""
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
 
-from fba.animation import Animation, Frame
+from fba.animation import Animation, Frame, check_order
 from fba.arrays import Int32, Int64
-from fba.codec import _headers as headers
 from fba.codec._plane import full_turns, quantiser, slots
 from fba.codec._plane.loops import SKIP_MAX
 from fba.codec._plane.pricing import NextPlane
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec._ranges import CLAMP, Ranges, fitting_ranges
 from fba.codec._runs import Run, find_runs
+from fba.codec._stream import clock
 from fba.codec._stream.checksums import PeriodChecks
 from fba.codec._stream.mark import write_mark
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
-from fba.encoder_options import EncoderOptions
-from fba.errors import FbaWarning, OptionError, RangeError
+from fba.encoder_options import REFERENCE, EncoderOptions
+from fba.errors import OptionError, RangeError
 from fba.parameters import INTENSITY_MAX
-from fba.presets import REFERENCE
 
 _CODE_BYTES = 4
-_CHUNK = 4096
-"""Number of frames that `encode` passes to the encoder at once, to limit its memory."""
+_CHUNK_FRAMES = 4096
+"""Number of frames that `encode_animation` passes to the encoder at once, to limit its memory."""
 
 
 @dataclass
 class ClampedParameter:
-    """Values of a parameter that no plane can carry, clamped to the nearest that can.
+    """Values of a parameter that no plane can carry, and that were clamped to the nearest that a plane can.
 
-    count: number of them. first: frame of the first. frame, value, sent: frame, original and sent value of
-    the worst. Frames are counted from 0 in the order in which they were encoded.
+    count: of such values. first: frame of the first. frame, value, sent: of the worst, its frame, its value
+    and the value sent instead. Frames are counted from 0 in the order in which they were encoded.
     """
 
     count: int
@@ -52,7 +50,7 @@ class ClampedParameter:
 
 @dataclass
 class EncoderStatistics:
-    """Counts of an encoder: planes and I planes written, and values clamped, by the parameter's label."""
+    """Counts of an encoder: planes and I planes written, and clamped values by the parameter's label."""
 
     planes: int = 0
     intra_planes: int = 0
@@ -64,7 +62,7 @@ class EncoderStatistics:
         return sum(clamped.count for clamped in self.clamped_parameters.values())
 
     def count_clamped(self, label: str, frame: int, value: int, sent: int) -> None:
-        """Count a value of a parameter that was sent as another."""
+        """Count a value of a parameter in whose place another was sent."""
         clamped = self.clamped_parameters.setdefault(label, ClampedParameter(0, frame, frame, value, sent))
         clamped.count += 1
         if abs(value - sent) > clamped.off:
@@ -75,9 +73,9 @@ class Encoder:
     """Encodes frames as they come; `push` and `finish` return the bytes that are complete.
 
     A frame is encoded when the next one comes, because its plane states how many frames are skipped after it.
-    Ranges start from the standard's tables (or from `ranges`, as `encode` fits them) and grow: a frame
-    outside them becomes an I plane with wider ranges. Masks may change from frame to frame; a change needs
-    an I plane, unless it only leaves a part out.
+    Ranges start from the standard's tables (or from `ranges`, as `encode_animation` fits them) and grow: a
+    frame outside them becomes an I plane with wider ranges. Masks may change from frame to frame; a change
+    needs an I plane, unless it only leaves a part out.
 
     Raises RangeError for a value that no range can carry (unless options.clamp) and for a frame rate that
     cannot be coded, ValueError for frames of another rate or with an index that does not increase.
@@ -126,15 +124,9 @@ class Encoder:
             return b""
         pending = self._pending
         if pending is None:
-            self._frame_rate = headers.frame_rate(animation.rate)
-        elif animation.rate != pending.rate:
-            raise ValueError(
-                f"the stream has {pending.rate} frames/s, this frame {animation.rate}; resample it first"
-            )
-        elif animation.index[0] <= pending.index[0]:
-            raise ValueError(
-                f"frame index {animation.index[0]} comes after {pending.index[0]}; they must increase"
-            )
+            self._frame_rate = clock.frame_rate_fields(animation.rate)
+        else:
+            check_order(pending, animation)
         self._pending = animation if len(animation) == 1 else animation[-1:]
         if pending is not None:
             self._encode(pending, int(animation.index[0]))
@@ -153,9 +145,9 @@ class Encoder:
         return first + self._push_all(animation[1:])
 
     def begin_segment(self, expected: Animation, options: EncoderOptions | None = None) -> None:
-        """Make the next frame an I plane with ranges for the expected frames, or also with other quantisers.
+        """Make the next frame an I plane with ranges for the expected frames, and with options if given.
 
-        options: from now on; they may differ in fap_quant and bap_quant only. Call it after `settle`, or
+        options: they may differ from those before in fap_quant and bap_quant only. Call it after `settle`, or
         before the first frame.
         """
         self.options = options or self.options
@@ -171,7 +163,7 @@ class Encoder:
         parts = {"face": (slots.FACE_BIT, slots.FAPS.start, 2), "body": (slots.BODY_BIT, slots.BAPS.start, 0)}
         self._ranges, self._resumable = {}, set()
         for name, changes in limits.items():
-            part, first, skipped = parts[name]  # visemes and expressions have ranges of their own
+            part, first, skipped = parts[name]  # visemes and expressions have fixed ranges
             both = np.stack([changes[skipped:]] * 2)
             self._ranges[part] = Ranges(part, self.options)
             self._ranges[part].widen(
@@ -202,8 +194,8 @@ class Encoder:
 
     def _push_all(self, animation: Animation) -> bytes:
         """Add consecutive frames in pieces, to limit the memory; return the complete bytes."""
-        starts = range(0, len(animation), _CHUNK)
-        return b"".join(self.push_animation(animation[start : start + _CHUNK]) for start in starts)
+        starts = range(0, len(animation), _CHUNK_FRAMES)
+        return b"".join(self.push_animation(animation[start : start + _CHUNK_FRAMES]) for start in starts)
 
     def finish(self) -> bytes:
         """End the stream; return the last bytes: alignment, end code, mark. ValueError without a frame."""
@@ -247,7 +239,7 @@ class Encoder:
         """Encode frames. following: index of the frame after them, which determines the last skip."""
         if not self._writer.planes:
             first = int(frames.index[0])
-            self._time_code = headers.first_time_code(first, frames.rate)
+            self._time_code = clock.first_time_code(first, frames.rate)
             self._origin = 0 if self._time_code is not None else first
         for run in find_runs(frames, following, self.options.unsent):
             self._check_skips(run.skips)
@@ -268,8 +260,8 @@ class Encoder:
     def _clip_amounts(self, rows: Int32) -> None:
         """Limit blends and intensities of rows (T, columns) to 0..63, in place.
 
-        A coarse quantiser makes a decoder round beyond that; RangeError for what none explains, unless
-        options.clamp.
+        A coarse quantiser makes a decoder round beyond that. RangeError for values that no quantiser
+        explains, unless options.clamp.
         """
         amounts = rows[:, slots.AMOUNTS]
         if amounts.min() >= 0 and amounts.max() <= INTENSITY_MAX:
@@ -314,7 +306,7 @@ class Encoder:
                 due = self._next_intra(run, position, rate)
 
     def _in_force(self, run: Run, part: int) -> bool:
-        """Whether a decoder has the run's masks of a part from an I plane before."""
+        """Return whether a decoder has the run's masks of a part from an earlier I plane."""
         settings = self._writer.settings_in_force(part)
         return (
             settings is not None
@@ -324,7 +316,7 @@ class Encoder:
         )
 
     def _next_intra(self, run: Run, position: int, rate: Fraction) -> int:
-        """Return the position, from this position on, of the next frame that is due as an I plane."""
+        """Return the position of the next frame, from this position on, that is due as an I plane."""
         due = position + self._frames_before_intra(run.index[position:], rate)
         while due < len(run.rows) and not self._can_be_intra(run, run.rows[due]):
             due += 1  # put off: P planes reach values that I planes do not
@@ -334,14 +326,14 @@ class Encoder:
     def _frames_before_intra(self, index: Int64, rate: Fraction) -> int:
         """Return how many of the next frames, with index (T,), come before the next I plane is due.
 
-        It is due when the intra period is over, or before that at the last frame that a time code names.
+        It is due when the intra period is over, or at the last frame before that which a time code names.
         """
         if self.options.intra_period is None:
             return len(index)
         due = self._last_intra + float(self.options.intra_period * rate)
         before = int(np.searchsorted(index, due - 1e-9))
         if self._times_restarts:
-            named = headers.last_named_frame(due + 1e-9 - self._origin, rate) + self._origin
+            named = clock.last_named_frame(due + 1e-9 - self._origin, rate) + self._origin
             position = int(np.searchsorted(index, named))
             if named > self._last_intra and position < before and index[position] == named:
                 return position
@@ -353,11 +345,11 @@ class Encoder:
         return self.options.start_codes and self.options.time_codes
 
     def _can_be_intra(self, run: Run, row: Int32) -> bool:
-        """Whether an I plane can carry the values of row (columns,), with the widest ranges."""
+        """Return whether an I plane can carry the values of row (columns,), with the widest ranges."""
         return not self._lacking(run, self._intra_row(run, row))
 
     def _lacking(self, run: Run, row: Int32) -> int:
-        """Return by how many levels, of all parameters, an I plane misses the values of row (columns,)."""
+        """Return the sum of the levels by which an I plane misses the values of row (columns,)."""
         return sum(int(self._ranges_of(part).lacking(run.masks[part], row).sum()) for part in run.parts)
 
     def _intra_row(self, run: Run, row: Int32) -> Int32:
@@ -370,11 +362,11 @@ class Encoder:
         return full_turns.within_half_turn(row, misfits)
 
     def _fit_difference(self, run: Run, position: int, error: DoesNotFitError) -> bool:
-        """Change the value that does not fit so that a P plane carries it, with options.clamp.
+        """With options.clamp, change the value that does not fit; return whether a P plane now carries it.
 
-        An angle goes on the short way, in the frames after this, too. Where that does not help and no I plane
-        carries the frame either, the plane that misses by less is taken: in a P plane, the value comes as
-        near as it can. Return False for an I plane. The next one has a wider range of differences.
+        An angle turns the shorter way round, in the later frames, too. If that does not help, and no I plane
+        carries the frame either, the plane that misses by less is taken: a P plane then sends the nearest
+        value that it can. False: an I plane must come, with a wider range of differences.
         """
         slot, row, ranges = error.slot, run.rows[position], self._ranges[slots.part_of(error.slot)]
         if self.options.clamp:
@@ -401,7 +393,7 @@ class Encoder:
         settings = {part: self._part_settings(run, part, row) for part in parts}
         time_code = self._time_code if first else None
         if not first and self._times_restarts:
-            time_code = headers.time_code(int(run.index[position]) - self._origin, rate)
+            time_code = clock.time_code(int(run.index[position]) - self._origin, rate)
         plane = PlaneSettings(
             intra=True,
             face=settings.get(slots.FACE_BIT),
@@ -444,37 +436,14 @@ class Encoder:
         )
 
 
-def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes:
-    """Return an animation encoded as one FBA object, with ranges fitted to all of it.
-
-    Raises RangeError for values that the syntax cannot carry (see `EncoderOptions.clamp`), ValueError for an
-    animation without frames. Gives an FbaWarning that names clamped parameters.
-    """
-    data, statistics = encode_with_statistics(animation, options)
-    warn_of_clamped(statistics)
-    return data
-
-
-def warn_of_clamped(statistics: EncoderStatistics) -> None:
-    """Warn of clamped values, if there are any, with an FbaWarning to the caller's caller."""
-    if statistics.clamped:
-        most = sorted(statistics.clamped_parameters.items(), key=lambda pair: -pair[1].count)[:3]
-        names = [
-            f"{name} ({one.count}; frame {one.frame}: {one.value} sent as {one.sent})" for name, one in most
-        ]
-        more = len(statistics.clamped_parameters) - len(names)
-        warnings.warn(
-            f"values limited to what their ranges carry: {statistics.clamped}, of {', '.join(names)}"
-            f"{f' and {more} parameters more' if more else ''}; a larger quantiser may carry them",
-            FbaWarning,
-            stacklevel=3,
-        )
-
-
-def encode_with_statistics(
+def encode_animation(
     animation: Animation, options: EncoderOptions | None = None
 ) -> tuple[bytes, EncoderStatistics]:
-    """Return the result of `encode`, and the encoder's statistics."""
+    """Return an animation encoded as one FBA object, with ranges fitted to all of it; and the statistics.
+
+    Raises RangeError for values that the syntax cannot carry (see `EncoderOptions.clamp`), ValueError for an
+    animation without frames.
+    """
     options = options or EncoderOptions()
     encoder = Encoder(options, ranges=fitting_ranges(animation, options))
     return encoder._push_all(animation) + encoder.finish(), encoder.statistics

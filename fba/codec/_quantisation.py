@@ -1,9 +1,10 @@
-"""Quantised values: those that a decoder returns, and the coarsest quantisers that keep them."""
+"""Quantised values, as a decoder returns them, and the coarsest quantisers that keep them."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +12,26 @@ from fba.animation import Animation
 from fba.arrays import Bool, Int32, Int64
 from fba.codec._plane import quantiser, slots
 from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
+from fba.compiled import compiled
 from fba.encoder_options import QUANT_MAX, EncoderOptions
 from fba.parameters import INTENSITY_MAX
 from fba.tracks import BodyTrack, FaceTrack
+
+
+def step_scale(options: EncoderOptions, *, body: bool) -> int:
+    """Return how many table steps the quantiser of BAPs, or of FAPs, takes: the divisor of range limits."""
+    part = slots.BODY_BIT if body else slots.FACE_BIT
+    return quantiser.scale(part, slots.quantiser_of(options, part))
+
+
+@compiled
+def range_limit(level: int, scale: int) -> int:
+    """Return the limit of the tightest range that contains a level from 0 up, in levels.
+
+    Of a level beyond all ranges, the limit of the widest. scale: `step_scale` of the part.
+    """
+    code = min(-(-level * scale // RANGE_UNIT), RANGE_CODE_MAX)
+    return RANGE_UNIT * code // scale
 
 
 def levels(track: FaceTrack | BodyTrack, options: EncoderOptions) -> Int64:
@@ -29,61 +47,60 @@ def quantise(animation: Animation, options: EncoderOptions) -> Animation:
 
     Each value is rounded by itself, as in an I plane, so that equal values stay equal. Masks do not change.
     """
-    return replace(
-        animation,
-        face=None if animation.face is None else _quantised_face(animation.face, options),
-        body=None
-        if animation.body is None
-        else BodyTrack(_quantised(animation.body, options), animation.body.mask),
-    )
+    face, body = animation.face, animation.body
+    if face is not None:
+        face = _quantised_face(face, options)
+    if body is not None:
+        body = BodyTrack(_quantised(body, options), body.mask)
+    return replace(animation, face=face, body=body)
 
 
 def coarsest_quantisers(animation: Animation, options: EncoderOptions) -> EncoderOptions:
     """Return options with the coarsest quantisers that keep every value of a quantised animation.
 
-    Ranges come in steps of 60 table steps, whatever the quantiser: the coarser it is, the fewer symbols
-    they have that never occur. Unquantised parts (fap_quant or bap_quant 0) stay so.
+    Limits of ranges are multiples of 60 table steps, whatever the quantiser: the coarser it is, the fewer
+    symbols a range has that never occur. Parts without quantisation (fap_quant or bap_quant 0) stay so.
     """
-    chosen: dict[str, int] = {}
+    chosen: dict[str, Any] = {}
     for part, name, track in (
         (slots.FACE_BIT, "fap_quant", animation.face),
         (slots.BODY_BIT, "bap_quant", animation.body),
     ):
-        own = slots.quantiser_of(options, part)
-        if track is None or not own:
+        given = slots.quantiser_of(options, part)
+        if track is None or not given:
             continue
-        scale, coded = quantiser.scale(part, own), levels(track, options)
+        scale, coded = quantiser.scale(part, given), levels(track, options)
         divisor = int(np.gcd.reduce(coded, axis=None)) * scale
-        if part == slots.FACE_BIT:
-            assert animation.face is not None
-            divisor = int(np.gcd.reduce(_amounts(animation.face), initial=divisor))
+        if isinstance(track, FaceTrack):
+            divisor = int(np.gcd.reduce(_amounts(track), initial=divisor))
         largest = int(np.abs(coded).max(initial=0)) * scale
         chosen[name] = max(
             quant
-            for quant in range(own, QUANT_MAX + 1)
-            if quant == own or _keeps(divisor, largest, quantiser.scale(part, quant))
+            for quant in range(given, QUANT_MAX + 1)
+            if quant == given or _keeps(divisor, largest, quantiser.scale(part, quant))
         )
-    return replace(options, **chosen)  # type: ignore[arg-type]
+    return replace(options, **chosen)
 
 
 def exact_quantisers(
     animation: Animation, options: EncoderOptions, parts: Collection[str] = ("face", "body")
 ) -> EncoderOptions:
-    """Return options that leave parts, "face" and "body", unquantised where that alone keeps their values.
+    """Return options without the quantisers of those parts, "face" and "body", that they would round.
 
-    That is where some lie between the quantiser's steps, and planes carry all of them as they are.
+    A part stays quantised if all its values are multiples of its steps, or if planes cannot carry all of them
+    without a quantiser.
     """
     rounded = count_rounded(animation, options)
     tracks = {"face": animation.face, "body": animation.body}
     sent = [track.mask for track in tracks.values() if track is not None]
-    intra = np.append(True, np.logical_or.reduce([(one[1:] != one[:-1]).any(axis=1) for one in sent]))
+    intra = np.append(True, np.logical_or.reduce([(mask[1:] != mask[:-1]).any(axis=1) for mask in sent]))
     names = {"face": "fap_quant", "body": "bap_quant"}
-    chosen = {
+    chosen: dict[str, Any] = {
         names[part]: 0
         for part, track in tracks.items()
         if part in parts and part in rounded and track is not None and _fits_unquantised(track, intra)
     }
-    return replace(options, **chosen)  # type: ignore[arg-type]
+    return replace(options, **chosen)
 
 
 def _fits_unquantised(track: FaceTrack | BodyTrack, intra: Bool) -> bool:
@@ -94,9 +111,9 @@ def _fits_unquantised(track: FaceTrack | BodyTrack, intra: Bool) -> bool:
 
 
 def count_rounded(animation: Animation, options: EncoderOptions) -> dict[str, int]:
-    """Return how many values that are sent lie between the quantiser's steps, by "face" and "body".
+    """Return how many sent values lie between the quantiser's steps, by "face" and "body".
 
-    A part without any is missing. Blends and intensities count, too.
+    Parts without such values are absent. Blends and intensities count, too.
     """
     after, result = quantise(animation, options), {}
     if animation.face is not None and after.face is not None:
@@ -117,9 +134,9 @@ def _keeps(divisor: int, largest: int, scale: int) -> bool:
 
 
 def _amounts(face: FaceTrack) -> Int64:
-    """Return the blends and intensities that are sent, which a FAP's quantiser rounds, too."""
+    """Return the blends and intensities that are sent; the quantiser of FAPs rounds them, too."""
     fields = [face.viseme[face.mask[:, 0], 2:3], face.expression[face.mask[:, 1]][:, [1, 3]]]
-    amounts: Int64 = np.concatenate([one.ravel() for one in fields]).astype(np.int64)
+    amounts: Int64 = np.concatenate([values.ravel() for values in fields]).astype(np.int64)
     return amounts
 
 

@@ -1,4 +1,4 @@
-"""Ranges of values in planes: fit them to an animation, widen them, report values beyond them."""
+"""Ranges of values in planes: fitted to an animation, widened, and reported where a value is beyond them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT, RangeLists
 from fba.compiled import compiled
 from fba.encoder_options import QUANT_MAX, EncoderOptions
 from fba.errors import RangeError, Remedy
-from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, Bap, Fap, baps, faps
+from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, FULL_TURN, Bap, Fap, baps, faps
 from fba.tracks import batches
 
 
@@ -34,28 +34,29 @@ class Ranges:
     def start_from_tables(self) -> None:
         """Set the standard's limits, for data that is not known in advance."""
         table: tuple[Fap | Bap, ...] = faps() if self._part == slots.FACE_BIT else baps()
-        for column, one in enumerate(table):
-            if one.i_limits is not None and one.p_limits is not None:
-                limits = (one.i_limits[1], -one.i_limits[0], one.p_limits[1], -one.p_limits[0])
+        for column, parameter in enumerate(table):
+            i_limits, p_limits = parameter.i_limits, parameter.p_limits
+            if i_limits is not None and p_limits is not None:
+                limits = (i_limits[1], -i_limits[0], p_limits[1], -p_limits[0])
                 self.codes[:, column] = [-(-limit // RANGE_UNIT) for limit in limits]
 
     def widen(self, slots_: Int64, levels: Int64) -> None:
-        """Widen the ranges of slots (K,) to hold these levels as far as possible.
+        """Widen the ranges of slots (K,) to contain these levels as far as possible.
 
         levels: (4, K): I max, I min, P max, P min, the minima negated.
         """
         columns = slots_ - self._first
         wanted = np.minimum(self._codes(np.maximum(levels, 0)), RANGE_CODE_MAX)
-        held = self.codes[:, columns]
-        if (wanted > held).any():
-            self.codes[:, columns] = np.maximum(held, wanted)
+        present = self.codes[:, columns]
+        if (wanted > present).any():
+            self.codes[:, columns] = np.maximum(present, wanted)
             self.changed = True
 
     def widen_for_intra(self, mask: Bool, row: Int32, position: int) -> None:
-        """Widen the ranges to hold the values of row (columns,) that are sent, in an I plane.
+        """Widen the ranges to contain the sent values of row (columns,) in an I plane.
 
-        With options.clamp, P planes get room to catch up with a value that no I plane can carry; without,
-        RangeError for it. position: the frame that the error names.
+        With options.clamp, P planes get room to catch up with a value that no I plane can carry; without it,
+        such a value is a RangeError. position: the frame that the error names.
         """
         coded, levels = self._levels(mask, row)
         beyond = ~self._fit(levels)
@@ -96,7 +97,7 @@ class Ranges:
         return coded, quantiser.levels(row[coded], self._step[coded - (0 if face else self._first)])
 
     def _fit(self, levels: Int64) -> Bool:
-        """Return bool (K,): whether the widest range holds each level."""
+        """Return bool (K,): whether the widest range contains each level."""
         fitting: Bool = self._codes(np.abs(levels)) <= RANGE_CODE_MAX
         return fitting
 
@@ -107,13 +108,13 @@ class Ranges:
 
 
 def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, Ranges]:
-    """Return by part the ranges that hold all values of an animation, as far as any can."""
+    """Return by part the ranges that contain all values of an animation, as far as ranges can."""
     result = {}
     for part, track in ((slots.FACE_BIT, animation.face), (slots.BODY_BIT, animation.body)):
         if track is None:
             continue
         step = quantiser.steps(part, slots.quantiser_of(options, part), options.bap_steps)
-        turn = np.where(full_turns.angle_slots() & options.clamp, full_turns.FULL_TURN, 0)
+        turn = np.where(full_turns.angle_slots() & options.clamp, FULL_TURN, 0)
         # The viseme and expression, the first two columns of a face, have fixed ranges.
         skipped, first = 2 * (part == slots.FACE_BIT), slots.BAPS.start
         if part == slots.FACE_BIT:
@@ -136,13 +137,13 @@ def _extremes(
     """Raise extremes (4, columns): largest and negated smallest levels of frames as I and as P planes.
 
     turn: int64 (columns,), the full turn by which P planes may change a value, or 0.
-    last_values: int64 (columns,), as a decoder has them before the first frame, if that before it was `sent`,
-    bool (columns,). Both are set to those of the last frame.
+    last_values: int64 (columns,), the decoder's values before the first frame. sent: bool (columns,), whether
+    the frame before it sent them. Both are updated to the last frame.
 
-    Bounds: all are as wide as values, since `fitting_ranges` makes them for the columns of one part.
+    Bounds: all arrays are as wide as values, since `fitting_ranges` makes them for the columns of one part.
     """
     for column in range(values.shape[1]):
-        one_step, one_turn = int(step[column]), int(turn[column])
+        own_step, own_turn = int(step[column]), int(turn[column])
         last = int(last_values[column])
         following = bool(sent[column])
         for frame in range(values.shape[0]):
@@ -150,24 +151,24 @@ def _extremes(
                 following = False
                 continue
             value = int(values[frame, column])
-            level = quantise(value, one_step)
+            level = quantise(value, own_step)
             extremes[0, column] = max(int(extremes[0, column]), level)
             extremes[1, column] = max(int(extremes[1, column]), -level)
             if following:
-                if one_turn and abs(value - last) > one_turn // 2:  # as `full_turns.follow` does
-                    value += (last - value + one_turn // 2) // one_turn * one_turn
-                change = quantise_change(value, last, one_step)
+                if own_turn and abs(value - last) > own_turn // 2:  # as `full_turns.follow` does
+                    value += (last - value + own_turn // 2) // own_turn * own_turn
+                change = quantise_change(value, last, own_step)
                 extremes[2, column] = max(int(extremes[2, column]), change)
                 extremes[3, column] = max(int(extremes[3, column]), -change)
-                last += change * one_step
+                last += change * own_step
             else:
-                last = level * one_step
+                last = level * own_step
             following = True
         last_values[column] = last
         sent[column] = following
 
 
-CLAMP = Remedy("clamp", "or bring what does not fit as near as can be with {}", "True", "EncoderOptions")
+CLAMP = Remedy("clamp", "or send the nearest value that fits with {}", "True", "EncoderOptions")
 
 
 def does_not_fit(slot: int, value: int, position: int, options: EncoderOptions) -> RangeError:

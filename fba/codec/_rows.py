@@ -10,8 +10,8 @@ from fba.arrays import Array, Bool, Int64
 class Rows:
     """An array (T, *shape) that grows by an eighth at a time.
 
-    count: rows at the start, all zeros. in_place: resize the memory itself, which needs half as much of it,
-    but invalidates older views; otherwise these do not change.
+    count: rows at the start, all zeros. in_place: resize the memory itself, which takes half as much memory,
+    but invalidates older views; otherwise older views do not change.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Rows:
 
 
 class GrowingMasks:
-    """Growing masks, bool (T, columns), stored as one row until a different one comes, which is rare."""
+    """Growing masks, bool (T, columns), stored as a single row until a different row comes, which is rare."""
 
     def __init__(self, columns: int, count: int) -> None:
         self.any = False

@@ -32,7 +32,7 @@ class Run:
 
     @property
     def parts(self) -> list[int]:
-        """Parts that P planes of the run carry: those with sent parameters, or else the first."""
+        """Parts that P planes of the run carry: those with sent parameters; the first without any."""
         return [part for part, types in self.mask_types.items() if any(types)] or [min(self.masks)]
 
 
@@ -68,9 +68,9 @@ def _changes(arrays: list[Bool]) -> list[int]:
 def mask_types(part: int, mask: Bool, interpolated: Bool | None, unsent: str) -> tuple[int, ...]:
     """Return the mask type of every group: none, all, or masked.
 
-    mask: bool (68,) or (296,), sent parameters. interpolated: bool (68,), the FAPs that the animation wants
-    interpolated, or None. unsent: "keep" or "interpolate", for groups in which the animation does not want
-    all unsent FAPs interpolated. Unsent BAPs always keep their values.
+    mask: bool (68,) or (296,), sent parameters. interpolated: bool (68,), FAPs that the animation asks to be
+    interpolated, or None. unsent: "keep" or "interpolate", for groups of which the animation does not ask for
+    all unsent FAPs. Unsent BAPs always keep their values.
     """
     return _mask_types(
         part, mask.tobytes(), interpolated.tobytes() if interpolated is not None else b"", unsent
@@ -79,7 +79,7 @@ def mask_types(part: int, mask: Bool, interpolated: Bool | None, unsent: str) ->
 
 @lru_cache(maxsize=64)
 def _mask_types(part: int, mask: bytes, interpolated: bytes, unsent: str) -> tuple[int, ...]:
-    """Do the same with bytes, so that results can be cached: a live encoder asks for every frame."""
+    """Return the same from bytes, which can be keys of the cache: a live encoder asks for every frame."""
     masked = MASK_INTERPOLATE if unsent == "interpolate" and part == slots.FACE_BIT else MASK_KEEP
     types = []
     for group in syntax.groups(part):

@@ -1,4 +1,4 @@
-"""Encode planes with given `PlaneSettings`, such as those of an EPF file; no decisions are made here."""
+"""Encode planes with given `PlaneSettings`, such as those of an EPF file, without any decisions."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def encode_planes(
                 writer.intra(settings, rows[position])
             else:
                 count = _run_length(planes, position)
-                skips = np.array([one.skip for one in planes[position : position + count]], dtype=np.int64)
+                skips = np.array([p.skip for p in planes[position : position + count]], dtype=np.int64)
                 for part in (slots.FACE_BIT, slots.BODY_BIT):
                     if _object_mask(settings) & part and writer.settings_in_force(part) is None:
                         raise ValueError(
@@ -69,13 +69,13 @@ def encode_planes(
 def _rows(animation: Animation, planes: Sequence[PlaneSettings]) -> Int32:
     """Return the values of the planes, int32 (planes, columns), see `slots`."""
     rows = np.zeros((len(planes), slots.SLOTS), dtype=np.int32)
-    if any(one.face is not None for one in planes):
+    if any(p.face is not None for p in planes):
         track = animation.face
         if track is None:
             raise RangeError("the planes to be coded carry FAPs, but the animation has no face track")
         coding, positions = _frames(animation, [p.face_frame if p.face is not None else None for p in planes])
         rows[coding, : slots.FLAGS.stop] = slots.track_rows(track, None)[positions]
-    if any(one.body is not None for one in planes):
+    if any(p.body is not None for p in planes):
         if animation.body is None:
             raise RangeError("the planes to be coded carry BAPs, but the animation has no body track")
         coding, positions = _frames(animation, [p.body_frame if p.body is not None else None for p in planes])

@@ -1,4 +1,4 @@
-"""Describe a stream without storing its values: `probe_stream`, which returns `StreamInfo`."""
+"""Descriptions of streams: `StreamInfo`, and `probe_stream`, which stores no values."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Bool, Int64
 from fba.codec._block import Block
+from fba.codec._decoder import read_blocks, reader_for
 from fba.codec._plane import header_loops
 from fba.codec._stream.damage import Damage
-from fba.codec._whole_stream import read_blocks, reader_for
 from fba.codec.settings import PartSettings
 from fba.errors import BitstreamError
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -51,9 +51,9 @@ class StreamInfo:
     of frames (planes). duration, start: seconds, exact; duration runs from the first frame to one period
     after the last. skipped: frames left out between frames. bits_per_second: size over duration.
 
-    For FBA streams: intra_planes, start_codes (number of planes after a start code), plane_bits int64 (T,)
-    and plane_intra bool (T,), frame_index int64 (T,), and damage that was skipped; bap_steps, the table that
-    the mark behind the stream names, None without a mark.
+    For FBA streams also intra_planes and start_codes (numbers of I planes, and of planes after a start code),
+    plane_bits int64 (T,), plane_intra bool (T,), frame_index int64 (T,), damage that was skipped, and
+    bap_steps, the table that the mark behind the stream names (None without a mark).
     """
 
     format: str

@@ -1,4 +1,4 @@
-"""A reader of streams with three states: outside of an object, plane by plane, and past damage."""
+"""A reader of streams. It has three states: outside an object, between planes, and behind damage."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _FRAME_BYTES = 500
 """Memory of a `fba.Frame` without its arrays."""
 _DAMAGE_BYTES = 1000
 """Memory of a `Damage` with its error."""
-_LARGE_PLANE = 4096
-"""Bytes beyond which an incomplete plane is not tried again with every byte that comes."""
+_LARGE_PLANE_BYTES = 4096
+"""Bytes above which an incomplete plane is not tried again with every byte that comes."""
 
 
 class StreamReader:
@@ -37,8 +37,8 @@ class StreamReader:
     marks: of the whole stream, if known in advance.
 
     error: the error that ended the reading. planes: number of planes read. damage: in the skipped parts.
-    times: of the planes. objects: their borders. wrong: the planes of I periods
-    that do not match their checks, when salvaging.
+    times: of the planes. objects: their borders. wrong: when salvaging, the planes of I periods that do not
+    match their checks.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class StreamReader:
         self._bit = 0  # next bit to decode, in the buffer
         self._scanned = 0  # byte up to which no start code was found, while looking for one
         self._retry_at = 0  # length of the buffer at which an incomplete plane is tried again
-        # Plain functions: a bound method would hold the reader, which then waits for the garbage collector.
+        # Plain functions: with a bound method, the reader would refer to itself until a garbage collection.
         self._state: Callable[[StreamReader, bool], list[Block] | None] = StreamReader._find_object
         self._kind = ""  # apparent kind of data without an object start code
         self._start_error: BitstreamError | None = None  # why the stream does not begin with an object
@@ -89,7 +89,7 @@ class StreamReader:
         return self._advance(final=True)
 
     def _drop_bytes(self) -> None:
-        """Drop the bytes that neither the next plane needs, nor a look for start codes after damage."""
+        """Drop the bytes that neither the next plane nor a search for start codes after damage needs."""
         doubtful = self._log.first_doubtful_bit
         needed = (doubtful >> 3) - self._buffer.offset if doubtful is not None else self._bit >> 3
         if self._code_bit is not None:
@@ -103,7 +103,7 @@ class StreamReader:
         self._retry_at = max(self._retry_at - dropped, 0)
 
     def _stop(self, error: BitstreamError | LimitError | UnsupportedError) -> None:
-        """End the reading with an error, which may live long: it must not keep bytes and models in memory."""
+        """End the reading with an error. It may live long and must not keep bytes and models in memory."""
         _forget_frames(error)
         self.error = error
         del self._buffer, self._reader  # nothing is read any more
@@ -129,9 +129,12 @@ class StreamReader:
             except (BitstreamError, UnsupportedError) as error:
                 if not self._salvage:
                     self._stop(error)
-                else:
-                    self._skip_damage(error)
-                    self._check_damage()
+                    break
+                self._skip_damage(error)
+                try:
+                    self._check_memory_of_damage()
+                except LimitError as excess:
+                    self._stop(excess)
         return blocks
 
     def _find_object(self, final: bool) -> list[Block] | None:
@@ -194,28 +197,28 @@ class StreamReader:
         return None
 
     def _user_data_needed(self, code: int, position: int) -> int:
-        """Return how many bytes must be there behind a start code, at a byte of the buffer, for a mark."""
+        """Return how many bytes behind a start code, at a byte of the buffer, are needed to read a mark."""
         if code != USER_DATA:
             return 0
         words = self._buffer.data[position + 4 : min(position + 4 + MAX_MARK_BYTES, self._buffer.length)]
         return bytes_needed(words.tobytes(), self.objects.size)
 
     def _compare_checks(self) -> None:
-        """Compare the I periods of an object with the checks after it, if any; list those that are wrong."""
+        """Compare the I periods of an object with the checks behind it, if any; report mismatches."""
         listed, self.objects.checks = self.objects.checks, None
         if listed is None:
             return
-        own = self._checks
-        wrong = find_wrong(bytes(own.checks), listed)
+        computed = self._checks
+        wrong = find_wrong(bytes(computed.checks), listed)
         for number in wrong:
-            planes = range(own.planes[2 * number], own.planes[2 * number + 1])
+            planes = range(computed.planes[2 * number], computed.planes[2 * number + 1])
             self._report_wrong(
                 f"the I period of planes {planes.start}..{planes.stop - 1} does not match its CRC-32: "
                 "a part of it is wrong",
-                planes, own.starts[number],
+                planes, computed.starts[number],
             )  # fmt: skip
-        missing = len(listed) // CHECK_BYTES - len(own)
-        if missing > 0 and not (own.full or own.left_out or wrong):
+        missing = len(listed) // CHECK_BYTES - len(computed)
+        if missing > 0 and not (computed.full or computed.left_out or wrong):
             self._report_wrong(
                 f"{missing} of {len(listed) // CHECK_BYTES} I periods of the object are missing",
                 range(self.planes, self.planes), self.objects.begin,
@@ -224,7 +227,7 @@ class StreamReader:
         self._checks = PeriodChecks()
 
     def _report_wrong(self, text: str, planes: range, byte: int) -> None:
-        """Raise, or list as damage, that the planes of an I period, which begins at a byte, are wrong."""
+        """Raise, or list, the error that planes of an I period are wrong. byte: where the period begins."""
         error = BitstreamError(text, plane=planes.start, bit=8 * byte)
         if not self._salvage:
             raise error
@@ -300,10 +303,10 @@ class StreamReader:
         """Do not try the next plane again before more bytes of it come."""
         length = self._buffer.length
         waiting = length - (self._bit >> 3)
-        self._retry_at = length + (waiting // 4 if waiting > _LARGE_PLANE else 1)
+        self._retry_at = length + (waiting // 4 if waiting > _LARGE_PLANE_BYTES else 1)
 
     def _resynchronise(self, final: bool) -> list[Block] | None:
-        """Look, after damage, for the next start code of an object, or of a plane that is an I plane."""
+        """Look, after damage, for the next start code of an object or of an I plane."""
         buffer = self._buffer
         while (start_code := buffer.find_start_code(self._scanned)) is not None:
             position, code = start_code
@@ -431,15 +434,8 @@ class StreamReader:
             self._scanned = max((self._lost_from >> 3) + 1, 0) if self.objects.count else self._bit >> 3
         self._state = StreamReader._resynchronise
 
-    def _check_damage(self) -> None:
-        """Stop with a LimitError where the list of damage takes more memory than allowed."""
-        try:
-            self._check_memory_of_damage()
-        except LimitError as error:
-            self._stop(error)
-
     def _check_memory_of_damage(self) -> None:
-        """Raise a LimitError where the list of damage takes more memory than allowed."""
+        """Raise a LimitError if the list of damage takes more memory than allowed."""
         memory, read = len(self.damage) * _DAMAGE_BYTES, self._buffer.offset + self._buffer.length
         self._limits.check_bytes(memory, f"a list of {len(self.damage)} damages", source=read)
 
@@ -468,7 +464,7 @@ class StreamReader:
 
 
 def _forget_frames(error: Exception) -> None:
-    """Remove from an error, and from its cause, the frames that raised it: they hold large arrays."""
-    for one in (error, error.__cause__):
-        if one is not None:
-            one.__traceback__ = one.__context__ = None
+    """Remove from an error, and from its cause, the frames that raised it: they refer to large arrays."""
+    for raised in (error, error.__cause__):
+        if raised is not None:
+            raised.__traceback__ = raised.__context__ = None

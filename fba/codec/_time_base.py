@@ -1,4 +1,4 @@
-"""One frame rate and its frame indices for a stream that may change its rate and set its clock."""
+"""A common frame rate, and frame indices at it, for a stream that may change its rate and set its clock."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class TimeBase:
         self._in_place = in_place
         self._runs: list[_Run] = []
         self._rates: set[Fraction] = set()
-        self._exact: Fraction | None = Fraction(1)  # lowest at which all times are exact; None beyond a limit
+        self._exact: Fraction | None = Fraction(1)  # lowest rate with exact times; None beyond a limit
         self._clock_index = Rows((), np.int64, in_place=in_place)
         self._index = self._clock_index
         self._index_rate = DEFAULT_RATE  # the rate of `_index`
@@ -93,7 +93,7 @@ class TimeBase:
     def _update_index(self, rate: Fraction) -> None:
         """Append the indices of new frames to `_index`; compute all of it anew if the rate has changed."""
         if self._index is self._clock_index or rate != self._index_rate:
-            # A new one, because arrays that were returned must not change.
+            # a new array, because arrays that were returned must not change
             self._index = Rows((), np.int64, in_place=self._in_place)
             self._index_rate, self._runs_placed = rate, 0
         clock, placed = self._clock_index.view(), self._index

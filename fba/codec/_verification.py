@@ -1,4 +1,4 @@
-"""Check a stream for an archive: is it complete, is it damaged, and has it still the same values?"""
+"""Check a stream in an archive: is it complete, is it undamaged, does it still have the same values?"""
 
 from __future__ import annotations
 
@@ -11,24 +11,25 @@ from typing import Any
 import numpy as np
 
 from fba.animation import Animation
-from fba.codec._compact_buffer import CompactBuffer
+from fba.codec._decoder import read_blocks, reader_for
+from fba.codec._frame_buffers import CompactBuffer
 from fba.codec._stream.damage import Damage
-from fba.codec._whole_stream import read_blocks, reader_for
 from fba.errors import BitstreamError, FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, BapTable
 
-_FRAMES = 4096
-"""Frames of which the digest is computed at once."""
+_CHUNK_FRAMES = 4096
+"""Frames of which the digest is computed at once, to limit the memory."""
 
 
 @dataclass(frozen=True)
 class Verification:
     """The result of a check of a stream.
 
-    size: bytes. frames: those decoded. duration: seconds. ended: an end code closes the stream. damage: what
-    was lost. doubtful: number of planes that may be wrong, because damage came soon after them, or because
-    they depend on what was lost. warnings: what was odd. digest: SHA-256 of the decoded values, see `digest`.
+    size: bytes. frames: number of decoded frames. duration: seconds. ended: an end code closes the stream.
+    damage: what was lost. doubtful: number of planes that may be wrong, because damage came soon after them,
+    or because they depend on what was lost. warnings: their texts. digest: SHA-256 of the decoded values, see
+    `digest`.
     """
 
     size: int
@@ -43,14 +44,14 @@ class Verification:
 
     @property
     def intact(self) -> bool:
-        """Whether nothing is missing and nothing in doubt, as far as the syntax shows."""
+        """Whether nothing is missing and nothing is in doubt, as far as the syntax shows."""
         return self.ended and not self.damage and not self.doubtful
 
     @property
     def frames_lost(self) -> int | None:
         """Total of lost frames, partly estimated; None if it is unknown for any damage."""
-        known = [damage.frames_lost for damage in self.damage if damage.frames_lost is not None]
-        return sum(known) if len(known) == len(self.damage) else None
+        counts = [damage.frames_lost for damage in self.damage if damage.frames_lost is not None]
+        return sum(counts) if len(counts) == len(self.damage) else None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain numbers and strings, for JSON."""
@@ -99,7 +100,7 @@ def verify_stream(
     animation = frames.animation(reader.wrong)
     return Verification(
         len(view), len(animation), animation.rate, animation.duration, reader.objects.ended,
-        tuple(reader.damage), len(doubtful), tuple(str(one.message) for one in odd), digest(animation),
+        tuple(reader.damage), len(doubtful), tuple(str(given.message) for given in odd), digest(animation),
     )  # fmt: skip
 
 
@@ -120,8 +121,8 @@ def digest(animation: Animation) -> str:
         fields += [("viseme", "<i2", (len(VISEME_FIELDS),)), ("expression", "<i2", (len(EXPRESSION_FIELDS),))]
     if animation.body is not None:
         fields += [("body_mask", "u1", (BAP_COUNT,)), ("body_values", "<i4", (BAP_COUNT,))]
-    for start in range(0, len(animation), _FRAMES):
-        part = animation[start : start + _FRAMES]
+    for start in range(0, len(animation), _CHUNK_FRAMES):
+        part = animation[start : start + _CHUNK_FRAMES]
         records = np.zeros(len(part), dtype=fields)
         records["index"] = part.index
         if part.face is not None:

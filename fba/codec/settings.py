@@ -6,6 +6,7 @@ until the next I plane that carries the part.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -72,9 +73,9 @@ class RangeLists:
     p_max: UInt8 | None = None
     p_min: UInt8 | None = None
 
-    def __iter__(self):  # type: ignore[no-untyped-def]
-        """The four lists in coding order."""
-        return iter((self.i_max, self.i_min, self.p_max, self.p_min))
+    def __iter__(self) -> Iterator[UInt8 | None]:
+        """Yield the four lists in coding order."""
+        yield from (self.i_max, self.i_min, self.p_max, self.p_min)
 
     def __bool__(self) -> bool:
         return any(codes is not None for codes in self)
@@ -125,8 +126,8 @@ class PlaneInfo:
     """Position and settings of one plane in a stream.
 
     number: 0-based, in stream order. bit: where it starts, from the start of the stream. bits: its length.
-    Both include the alignment and start code before it. doubtful: it was decoded after damage, with ranges
-    that a lost plane may have replaced, so that its values may be wrong. For planes before damage, see
+    Both include the alignment and start code before it. doubtful: whether its values may be wrong, because it
+    was decoded after damage with ranges that a lost plane may have replaced. For planes before damage, see
     `Damage.doubtful`.
     """
 

@@ -15,7 +15,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from fba.arrays import Int64
+from fba.arrays import Bool, Int64
 
 FAP_COUNT = 68
 BAP_COUNT = 296
@@ -44,6 +44,8 @@ EXPRESSION_FIELDS = (
 )
 VISEME_SELECT_MAX = 14
 EXPRESSION_SELECT_MAX = 6
+FULL_TURN = 628319
+"""2 pi in 1e-5 rad, rounded: a full turn of a BAP changes the pose by less than 1e-5 rad."""
 INTENSITY_MAX = 63
 """Largest viseme blend and expression intensity (6 bits)."""
 
@@ -237,6 +239,14 @@ def bap_steps(table: BapTable = "iso") -> Int64:
     if table not in BAP_STEP_TABLES:
         raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {table!r}")
     return _frozen([b.step_iso if table == "iso" else b.step_visage for b in baps()])
+
+
+@cache
+def bap_angles() -> Bool:
+    """Return bool (296,): whether each BAP is an angle; read-only."""
+    angles = np.array([bap.unit == "1e-5 rad" for bap in baps()])
+    angles.flags.writeable = False
+    return angles
 
 
 def _frozen(values: list[int]) -> Int64:

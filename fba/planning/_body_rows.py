@@ -1,12 +1,12 @@
-"""Points of a body at which its errors are kept: 3 cm off joints, and under the soles.
+"""Points of a body at which its errors are measured: 3 cm off joints, and under the soles.
 
-An error of a BAP moves the points below its joint along a slope: about an axis, or along one. Errors of all
-BAPs add up at every point. Points that always move as one body are as far apart as their outermost ones, so
-that some dozens stand for all.
+An error of a BAP moves the points below its joint along a slope: about an axis, or along an axis. Errors of
+all BAPs add up at every point. Points that move as a rigid body are off by no more than their outermost
+points, so that some dozens of points represent all.
 
 Bounds of the compiled loops: joints and rows of points come from `BodyRows`, of the skeleton whose matrices
-and points are given; `BodyRows.points` and `BodyTarget` make the results, with a frame for each of theirs.
-What a loop makes itself is as long as the rows that it goes through.
+and points are given; `BodyRows.points` and `BodyTarget` make the results, with a frame for each of their
+frames. Arrays that a loop makes itself are as long as the rows that it goes through.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from fba.compiled import compiled
 from fba.planning._tolerance import Tolerance
 
 BLOCK_FRAMES = 1024
-"""Number of frames that are posed at once."""
+"""Number of frames that are posed at once, to limit the memory."""
 DIRECTIONS = 48
-"""Directions in which the outermost points of a rigid part count."""
+"""Number of directions; the outermost points of a rigid part in each represent the part."""
 
 
 class BodyRows:
-    """Points of a skeleton that stand for all that move with some of its joints.
+    """Points of a skeleton that represent all points which move with some of its joints.
 
     joints: int64 (R,), the joint that each point moves with. offsets: float64 (R, 3), from its centre, in
     its frame. soles: int64 (R,), 0 or 1 for a point under the left or the right sole, else -1.
@@ -49,7 +49,7 @@ class BodyRows:
         rows: list[tuple[int, Float64, int]] = []
         for points in parts.values():
             at = np.array([skeleton.centres[joint] + offset for joint, offset in points])
-            rows += [(*points[one], -1) for one in np.unique((at @ directions.T).argmax(axis=0))]
+            rows += [(*points[outermost], -1) for outermost in np.unique((at @ directions.T).argmax(axis=0))]
         for foot, side in enumerate(SIDES):
             for name, point in (sole_points(skeleton, side) or {}).items():
                 number = skeleton.number(name)
@@ -70,14 +70,14 @@ class BodyRows:
 
 
 class BodyTarget:
-    """Where a body is to be, and how near.
+    """Where a body must be, and within which tolerances.
 
     values: float64 (T, 296), BAPs, without jumps of full turns. tolerances: float32 (T, 3), metres: at
     joints, and at the soles of the left and the right foot.
     """
 
     def __init__(self, values: Float64, rate: float, tolerance: Tolerance) -> None:
-        """rate: frames a second, by which feet stand."""
+        """rate: frames a second, from which speeds of feet are computed."""
         self.values = values
         self.solver = BapSolver()
         self.tolerances = np.full((len(values), 3), tolerance.joint, dtype=np.float32)
@@ -86,7 +86,7 @@ class BodyTarget:
             self.tolerances[block, 1:][stands.T] = tolerance.foot
 
     def weights(self, rows: BodyRows) -> Float32:
-        """Return by what errors at the points are multiplied to be shares of the tolerance: (T, R)."""
+        """Return the factors that turn errors at the points into shares of the tolerance: (T, R)."""
         return np.reciprocal(self.tolerances)[:, rows.soles + 1]
 
     def longest(self, shown: Float64, rows: BodyRows, frames: slice = slice(None)) -> Float64:
@@ -116,13 +116,13 @@ def _place_points(matrices: Float64, joints: Int64, offsets: Float64, result: Fl
     """Set result (T, R, 3) to where points are that move with joints (R,), offsets (R, 3) from them."""
     for frame in range(len(result)):
         for row in range(len(joints)):
-            own = matrices[frame, joints[row]]
+            matrix = matrices[frame, joints[row]]
             for axis in range(3):
                 result[frame, row, axis] = (
-                    own[axis, 3]
-                    + own[axis, 0] * offsets[row, 0]
-                    + own[axis, 1] * offsets[row, 1]
-                    + own[axis, 2] * offsets[row, 2]
+                    matrix[axis, 3]
+                    + matrix[axis, 0] * offsets[row, 0]
+                    + matrix[axis, 1] * offsets[row, 1]
+                    + matrix[axis, 2] * offsets[row, 2]
                 )
 
 
@@ -130,7 +130,7 @@ class MovedPoints(NamedTuple):
     """The points that a BAP moves.
 
     points: (T, R, 3). weights: (T, R), see `BodyTarget.weights`. rows: (K,), the points below its joint.
-    centre, axis: (T, 3), see `BapMotion`; the centre does not matter unless it turns.
+    centre, axis: (T, 3), and turns: see `BapMotion`; only turns have a centre.
     """
 
     points: Float32
@@ -171,8 +171,8 @@ def add_error(errors: Float32, moved: MovedPoints, change: Float64) -> None:
 def free_room(errors: Float32, moved: MovedPoints, limit: Float64) -> Float64:
     """Return how far a BAP may move down and up at each frame, and its longest slope: float64 (3, T).
 
-    So far no error (T, R, 3) below its joint becomes longer than limit (T,). Where there is no such way, both
-    are the one that makes the longest error shortest.
+    Within these changes no error (T, R, 3) below its joint becomes longer than limit (T,). If there is no
+    such change, down and up both are the change that makes the longest error shortest.
     """
     points, weights, rows, centre, axis, turns = moved
     count = len(rows)
@@ -203,15 +203,15 @@ def free_room(errors: Float32, moved: MovedPoints, limit: Float64) -> Float64:
 
 
 MIN_SLOPE_SQUARE = 1e-16
-"""Square of a slope, in shares of the tolerance for a step of 1, below which a BAP does not move a point."""
+"""Square of the slope, shares of the tolerance for a step of 1, below which a BAP does not move a point."""
 
 
 @compiled
 def _interval(steep: Float64, along: Float64, length: Float64, allowed: float) -> tuple[float, float, float]:
-    """Return the change down and up that keeps all squares of errors to what is allowed, and the steepest.
+    """Return the changes down and up within which squares of errors stay allowed, and the steepest square.
 
-    The square of error k after a change c is length[k] + 2 along[k] c + steep[k] c c. Down is above up where
-    there is no such change.
+    The square of error k after a change c is length[k] + 2 along[k] c + steep[k] c c. Down is above up if no
+    change keeps all errors within.
     """
     low, high, steepest = -1e9, 1e9, 0.0
     for k in range(len(steep)):
@@ -231,23 +231,23 @@ def _interval(steep: Float64, along: Float64, length: Float64, allowed: float) -
 
 @compiled
 def _shortest_longest(steep: Float64, along: Float64, length: Float64) -> float:
-    """Return the change with the shortest longest error: the longest is convex, so halves are left out."""
+    """Return the change that makes the longest error shortest, by ternary search: that length is convex."""
     low, high = 0.0, 0.0
     for k in range(len(steep)):
         if steep[k] >= MIN_SLOPE_SQUARE:
-            own = -float(along[k]) / float(steep[k])
-            low, high = min(low, own), max(high, own)
+            best = -float(along[k]) / float(steep[k])
+            low, high = min(low, best), max(high, best)
     for _ in range(40):
-        one, other = low + (high - low) / 3, high - (high - low) / 3
-        longest_one, longest_other = 0.0, 0.0
+        lower, upper = low + (high - low) / 3, high - (high - low) / 3
+        longest_lower, longest_upper = 0.0, 0.0
         for k in range(len(steep)):
             if steep[k] < MIN_SLOPE_SQUARE:
                 continue
             base, rise, curve = float(length[k]), 2 * float(along[k]), float(steep[k])
-            longest_one = max(longest_one, base + one * (rise + curve * one))
-            longest_other = max(longest_other, base + other * (rise + curve * other))
-        if longest_one < longest_other:
-            high = other
+            longest_lower = max(longest_lower, base + lower * (rise + curve * lower))
+            longest_upper = max(longest_upper, base + upper * (rise + curve * upper))
+        if longest_lower < longest_upper:
+            high = upper
         else:
-            low = one
+            low = lower
     return (low + high) / 2

@@ -1,6 +1,6 @@
 """The cheapest BAPs that keep a body within a tolerance, measured at the points of `BodyRows`.
 
-They choose from the root to fingers and toes: what is off above, a joint below may make up for.
+They are chosen from the root to fingers and toes: a joint may compensate for errors of those above it.
 """
 
 from __future__ import annotations
@@ -10,22 +10,23 @@ from dataclasses import replace
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int64
+from fba.body import BapSolver
 from fba.body.solve.conventions import NO_BAP
 from fba.body.solve.motions import BapMotion, bap_motions
 from fba.planning._body_rows import BodyRows, BodyTarget, MovedPoints, add_error, all_rows, blocks, free_room
 from fba.planning._search import SWEEPS, Effort, Found, PathSearch, Room, interpolated
 
-CHECKS = 6
-"""Times that less is allowed, or frames left out are taken back, where a body is too far off."""
-HOPELESS = 1.6
-"""Shares of the tolerance beyond which the quantiser is too coarse: less would not help."""
+MAX_TIGHTENINGS = 6
+"""How often the limits are lowered, and frames sent that were left out, where a body is too far off."""
+HOPELESS_ERROR = 1.6
+"""Shares of the tolerance above which the quantiser is too coarse: lower limits would not help."""
 
 
 def search_baps(target: BodyTarget, base: Float64, gaps: Bool, effort: Effort) -> Found:
-    """Return the cheapest BAPs found.
+    """Return the cheapest BAPs that the search comes to.
 
     base: float64 (T, 296), BAPs to start from, within the tolerance. gaps: bool (T,), frames that may be left
-    out. effort: its gap_share counts what `base` has taken up.
+    out. effort: its gap_share includes the share that `base` has taken.
     """
     keys = choose_keys(target, base, gaps, effort)
     rows = _MovingRows(target, interpolated(base, keys), effort)
@@ -34,19 +35,19 @@ def search_baps(target: BodyTarget, base: Float64, gaps: Bool, effort: Effort) -
         search.sweep(first=number == 0)
     longest = rows.longest(search.shown)
     best = search.result(float(longest.max(initial=0.0)))
-    for _ in range(CHECKS):
-        if best.within or best.longest > HOPELESS:
+    for _ in range(MAX_TIGHTENINGS):
+        if best.within or best.longest > HOPELESS_ERROR:
             break
         _tighten(search, longest)
         search.sweep()
         longest = rows.longest(search.shown)
         found = search.result(float(longest.max(initial=0.0)))
-        best = min(best, found, key=lambda one: (max(one.longest, 1.0), one.bits))
+        best = min(best, found, key=lambda result: (max(result.longest, 1.0), result.bits))
     return best
 
 
 def _tighten(search: PathSearch, longest: Float64) -> None:
-    """Allow less in frames that are too far off, and send frames beside them that were left out.
+    """Lower the limits of frames that are too far off, and send those of them that were left out.
 
     longest: float64 (T,), the largest error at each frame, in shares of the tolerance.
     """
@@ -58,8 +59,18 @@ def _tighten(search: PathSearch, longest: Float64) -> None:
             search.paths[column] = np.rint(np.interp(search.keys, before, path)).astype(np.int64)
 
 
+def turning_joints(solver: BapSolver, moved: Bool) -> list[str]:
+    """Return the joints of the skeleton that have BAPs which move, bool (296,)."""
+    rules = solver.convention
+    return [
+        joint
+        for joint, columns in zip(rules.joints, rules.bap, strict=True)
+        if joint in solver.skeleton and moved[columns[columns != NO_BAP]].any()
+    ]
+
+
 def choose_keys(target: BodyTarget, base: Float64, gaps: Bool, effort: Effort) -> Int64:
-    """Return frames, (K,), between which BAPs that are interpolated keep within a share of the tolerance."""
+    """Return frames (K,) between which interpolated BAPs stay within a share of the tolerance."""
     count = len(base)
     if effort.gap_share <= 0 or not gaps.any():
         return np.arange(count)
@@ -87,13 +98,8 @@ class _MovingRows:
         self.target, self.wanted, self.steps = target, wanted, effort.steps
         self.moved = np.asarray(wanted.any(axis=0))
         self.motions: dict[int, BapMotion] = {}
-        skeleton, rules = target.solver.skeleton, target.solver.convention
-        turned = [
-            joint
-            for joint, columns in zip(rules.joints, rules.bap, strict=True)
-            if joint in skeleton and self.moved[columns[columns != NO_BAP]].any()
-        ]
-        joints = {0, *(skeleton.number(joint) for joint in turned)}
+        skeleton = target.solver.skeleton
+        joints = {0, *(skeleton.number(joint) for joint in turning_joints(target.solver, self.moved))}
         self.points_of = BodyRows(skeleton, joints)
         self.all_rows = all_rows(skeleton)
         self.weights = target.weights(self.points_of)
@@ -103,7 +109,7 @@ class _MovingRows:
         self.centres = {joint: np.zeros((len(wanted), 3), dtype=np.float32) for joint in joints}
 
     def begin_sweep(self, shown: Float64) -> list[int]:
-        """Take points, errors and axes of the body's present pose; return its BAPs from the root outwards."""
+        """Measure the body's present pose; return the BAPs from the root outwards."""
         solver = self.target.solver
         parts: list[list[BapMotion]] = []
         for block in blocks(len(shown)):
@@ -115,11 +121,14 @@ class _MovingRows:
             for joint, centres in self.centres.items():
                 centres[block] = matrices[:, joint, :3, 3]
             parts.append(bap_motions(solver, shown[block], matrices, self.moved))
-        self.motions = {one[0].column: _joined(one) for one in zip(*parts, strict=True)}
+        self.motions = {}
+        for pieces in zip(*parts, strict=True):
+            axis = np.concatenate([piece.axis for piece in pieces])
+            self.motions[pieces[0].column] = replace(pieces[0], axis=axis)
         return list(self.motions)
 
     def room(self, column: int, shown: Float64, limit: Float64, share: float | None) -> Room:
-        """Return where a BAP may be so that no point gets further off than limit (T,); see `Rows`."""
+        """Return where a BAP may be so that no error becomes longer than limit (T,); see `Rows`."""
         low, high, steepest = free_room(self.errors, self._moved_points(column), limit)
         lower, upper = shown + low, shown + high
         if share is not None:
@@ -137,15 +146,10 @@ class _MovingRows:
 
     def _moved_points(self, column: int) -> MovedPoints:
         """Return the points that a BAP moves."""
-        one = self.motions[column]
-        below, centre = self.below[one.joint], self.centres[one.joint]
-        return MovedPoints(self.points, self.weights, below, centre, one.axis, one.turns)
+        motion = self.motions[column]
+        below, centre = self.below[motion.joint], self.centres[motion.joint]
+        return MovedPoints(self.points, self.weights, below, centre, motion.axis, motion.turns)
 
     def longest(self, shown: Float64) -> Float64:
         """Return the largest error at each frame, as a body shows it, in shares of the tolerance: (T,)."""
         return self.target.longest(shown, self.all_rows)
-
-
-def _joined(parts: tuple[BapMotion, ...]) -> BapMotion:
-    """Return what a BAP moves at all frames, from what it moves in blocks of them."""
-    return replace(parts[0], axis=np.concatenate([one.axis for one in parts]))

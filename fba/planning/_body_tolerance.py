@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,57 +11,54 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32, Int64
 from fba.body import Skeleton
 from fba.body.displacement import displacements
-from fba.body.solve.conventions import NO_BAP
-from fba.codec import EncoderOptions, decode, encode_with_statistics, step_scale
+from fba.codec import EncoderOptions, decode, encode_animation, step_scale
 from fba.encoder_options import QUANT_MAX
 from fba.errors import RangeError
-from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_steps, baps
+from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, FULL_TURN, bap_angles, bap_steps
 from fba.planning._body_rows import BodyTarget, all_rows, blocks
-from fba.planning._body_search import HOPELESS, search_baps
+from fba.planning._body_search import HOPELESS_ERROR, search_baps, turning_joints
 from fba.planning._plan import encode_planned
 from fba.planning._search import Effort
 from fba.planning._tolerance import BodyErrors, NearLossless, Tolerance
 from fba.tracks import BodyTrack, hold
 
-FULL_TURN = 628319
-"""2 pi in 1e-5 rad, as the codec turns angles."""
-ARM = 0.9
-"""Metres from the hips to the fingers of arms that hang: how far half a step of an angle moves something."""
-REDUCED = (0.5, 0.3)
-"""Shares of the tolerance that joints which are no longer turned may take."""
-EFFORTS = ((0.5, 0.8), (0.7, 0.7), (0.5, 0.6))
-"""Share of a BAP and share of gaps, see `Effort`, of the searches that are tried for each of those."""
-MOST_LEFT_OUT = 16
-"""Most frames left out in a row."""
-MARGINS = (0.99, 0.93, 0.86, 0.78)
-"""Shares of the tolerance that searches fill: the next where the one before left frames beyond it."""
-GIVEN_UP = 2
-"""Searches far beyond the tolerance after which a quantiser is too coarse."""
-STANDING = 0.9
-"""Share of the tolerance of feet that half a step of the root may take: legs must make up for it."""
-SPARE = 0.15
-"""Share of the tolerance that is left for quantisers where frames are left out."""
-FRAMES_SEARCHED = 1600
-"""Frames, times searches: longer streams are searched less often."""
-REDUCTION_FRAMES = 160
-"""Number of frames by which the joints to turn are chosen; the choice is then checked at all frames."""
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the search. Shares are of the tolerance."""
+
+    arm: float = 0.9  # m, from the hips to the fingers of hanging arms, which half a step of an angle moves
+    reductions: tuple[float, ...] = (0.5, 0.3)  # shares that joints which are no longer turned may take
+    efforts: tuple[tuple[float, float], ...] = ((0.5, 0.8), (0.7, 0.7), (0.5, 0.6))
+    """Shares of a BAP and of gaps (see `Effort`) of the searches that are tried for each reduction."""
+    max_left_out: int = 16  # frames left out in a row
+    margins: tuple[float, ...] = (0.99, 0.93, 0.86, 0.78)
+    """Shares that searches fill: the next if a search left frames beyond the tolerance."""
+    max_hopeless: int = 2  # searches far beyond the tolerance after which a quantiser is too coarse
+    standing: float = 0.9  # share of the feet's tolerance for half a step of the root; legs compensate
+    spare: float = 0.15  # share that is left for quantisers where frames are left out
+    frames_searched: int = 1600  # frames, times searches: longer streams are searched less often
+    reduction_frames: int = 160  # frames by which the joints to turn are chosen; all frames check the choice
+
+
+TUNING = Tuning()
 
 
 def encode_body_within_tolerance(
     animation: Animation, tolerance: Tolerance, options: EncoderOptions, *, every_frame: bool
 ) -> tuple[bytes, NearLossless]:
-    """Return a stream of a body without a face that stays within a tolerance, and what it came to.
+    """Return a stream of a body without a face that stays within a tolerance, and its errors.
 
-    Errors are measured where the source has frames, on the decoded stream: a frame that was left out is
-    interpolated, as `fba.player` does it. Angles beyond half a turn are sent as they go on. RangeError where
-    not even the finest quantiser keeps within the tolerance.
+    Errors are measured on the decoded stream, where the source has frames; frames that were left out are
+    interpolated, as `fba.player` does. Angles continue beyond half a turn. RangeError if not even the finest
+    quantiser stays within the tolerance.
     """
     options = replace(options, clamp=True)
     smallest: tuple[bytes, NearLossless] | None = None
     nearest: BodyErrors | None = None
     for sent, chosen in body_candidates(animation, tolerance, options, gaps=not every_frame):
-        streams = [encode_with_statistics(sent, chosen), encode_planned(sent, chosen)]
-        for data, statistics in sorted(streams, key=lambda one: len(one[0])):
+        streams = [encode_animation(sent, chosen), encode_planned(sent, chosen)]
+        for data, statistics in sorted(streams, key=lambda stream: len(stream[0])):
             if smallest is not None and len(data) >= len(smallest[0]):
                 break
             errors = body_errors(animation, decode(data, bap_steps=options.bap_steps), tolerance)
@@ -83,24 +80,24 @@ def fit_bodies(
 ) -> list[tuple[BodyTrack, int]]:
     """Return bodies within a tolerance of an animation's, and their quantisers, the cheapest first.
 
-    For streams with a face, too: all frames are sent.
+    All frames are sent, as streams with a face need.
     """
-    own = Animation(animation.rate, animation.index, None, animation.body)
+    body_only = replace(animation, face=None)
     fitted = []
-    for sent, chosen in body_candidates(own, tolerance, replace(options, clamp=True), gaps=False):
+    for sent, chosen in body_candidates(body_only, tolerance, replace(options, clamp=True), gaps=False):
         assert sent.body is not None
-        size = len(encode_with_statistics(sent, chosen)[0])
+        size = len(encode_animation(sent, chosen)[0])
         fitted.append((size, sent.body, chosen.bap_quant))
-    return [(body, quant) for _, body, quant in sorted(fitted, key=lambda one: one[0])]
+    return [(body, quant) for _, body, quant in sorted(fitted, key=lambda fit: fit[0])]
 
 
 def body_candidates(
-    animation: Animation, tolerance: Tolerance, options: EncoderOptions, *, gaps: bool = True
+    animation: Animation, tolerance: Tolerance, options: EncoderOptions, *, gaps: bool
 ) -> Iterator[tuple[Animation, EncoderOptions]]:
     """Yield animations to send that may keep a body within a tolerance, and the quantisers for them.
 
-    The last ones are the source's own values, with finer and finer quantisers. gaps: whether frames may be
-    left out.
+    The last of them has the source's values, with the coarsest quantiser that suffices. gaps: whether frames
+    may be left out.
     """
     assert animation.body is not None
     count = len(animation)
@@ -127,43 +124,46 @@ def body_candidates(
 def _searched(
     animation: Animation, values: Float64, gaps: Bool, tolerance: Tolerance, options: EncoderOptions
 ) -> Iterator[tuple[Animation, EncoderOptions]]:
-    """Yield what searches find within the tolerance; with the finest quantiser, also the first beyond it."""
+    """Yield results of searches within the tolerance; of the finest quantiser, also the first beyond it."""
     target = BodyTarget(values, float(animation.rate), tolerance)
-    searches = max(FRAMES_SEARCHED // len(animation), 1)
-    bases = [_unwrapped(reduce_joints(target, share)) for share in REDUCED[:searches]]
-    efforts = [(*effort, base) for effort in EFFORTS for base in bases][: max(searches, 2)]
+    searches = max(TUNING.frames_searched // len(animation), 1)
+    bases = [_unwrapped(reduce_joints(target, share)) for share in TUNING.reductions[:searches]]
+    efforts = [(*effort, base) for effort in TUNING.efforts for base in bases][: max(searches, 2)]
     for quant in _quantisers(target, tolerance, options):
         chosen = replace(options, bap_quant=quant)
         scale = step_scale(chosen, body=True)
         steps = bap_steps(options.bap_steps) * scale
         within, hopeless = False, 0
         for share, gap_share, base in efforts:
-            for margin in MARGINS:
-                effort = Effort(steps, scale, share, min(gap_share, margin - SPARE), margin, MOST_LEFT_OUT)
+            for margin in TUNING.margins:
+                effort = Effort(
+                    steps, scale, share, min(gap_share, margin - TUNING.spare), margin, TUNING.max_left_out
+                )
                 found = search_baps(target, base, gaps, effort)
-                if found.within or found.longest > HOPELESS:
+                if found.within or found.longest > HOPELESS_ERROR:
                     break
             if found.within or (quant == 1 and not hopeless):
                 within |= found.within
                 yield _to_send(animation, found.keys, found.values), chosen
-            hopeless += not found.within and (quant == 1 or found.longest > HOPELESS)
-            if (within and searches == 1) or hopeless == GIVEN_UP:
+            hopeless += not found.within and (quant == 1 or found.longest > HOPELESS_ERROR)
+            if (within and searches == 1) or hopeless == TUNING.max_hopeless:
                 break
-        if within:  # finer ones take more
+        if within:  # finer quantisers take more bits
             return
 
 
 def _quantisers(target: BodyTarget, tolerance: Tolerance, options: EncoderOptions) -> list[int]:
-    """Return quantisers, coarsest first, of which half a step moves nothing beyond the tolerance."""
+    """Return the quantisers, coarsest first, whose half step moves nothing beyond the tolerance."""
     steps = bap_steps(options.bap_steps)
     moving = np.flatnonzero(target.values[:, :BAP_STANDARD_COUNT].any(axis=0)).tolist()
     stands = bool((target.tolerances[:, 1:] < tolerance.joint).any())
-    way = tolerance.joint / (STANDING * tolerance.foot) if stands else 1.0  # feet have only this to go
-    reach = [steps[one] * (ARM * 1e-5 if is_angle(one) else max(way, 1.0) * 1e-3) / 2 for one in moving]
+    # Feet that stand may move less, so that the root counts more.
+    root = max(tolerance.joint / (TUNING.standing * tolerance.foot), 1.0) if stands else 1.0
+    metres = np.where(bap_angles(), TUNING.arm * 1e-5, root * 1e-3) * steps / 2
     fitting = [
         quant
         for quant in range(QUANT_MAX, 0, -1)
-        if max(reach) * step_scale(replace(options, bap_quant=quant), body=True) <= tolerance.joint
+        if metres[moving].max() * step_scale(replace(options, bap_quant=quant), body=True) <= tolerance.joint
     ]
     return fitting or [1]
 
@@ -191,19 +191,14 @@ def body_errors(source: Animation, decoded: Animation, tolerance: Tolerance) -> 
 
 
 def held_angles(body: BodyTrack) -> Float64:
-    """Return the BAPs in force at every frame, float64 (T, 296); angles go on without full turns."""
+    """Return the BAPs in force at every frame, float64 (T, 296), without jumps of full turns."""
     values: Int32 = hold(body.values, body.mask, np.zeros(BAP_COUNT, dtype=np.int32))
     return _unwrapped(values.astype(np.float64))
 
 
-def is_angle(column: int) -> bool:
-    """Whether the BAP of a column is an angle."""
-    return baps()[column].unit == "1e-5 rad"
-
-
 def _unwrapped(values: Float64) -> Float64:
-    """Return values (T, 296) whose angles take the short way from frame to frame."""
-    angles = [column for column in np.flatnonzero(values.any(axis=0)).tolist() if is_angle(column)]
+    """Return values (T, 296) whose angles turn the shorter way round from frame to frame."""
+    angles = np.flatnonzero(values.any(axis=0) & bap_angles())
     result = values.copy()
     turns = np.cumsum(-np.rint(np.diff(values[:, angles], axis=0) / FULL_TURN), axis=0)
     result[1:, angles] += turns * FULL_TURN
@@ -217,7 +212,7 @@ def _to_send(animation: Animation, keys: Int64, values: Int32) -> Animation:
 
 
 def beyond_body(nearest: BodyErrors, tolerance: Tolerance) -> RangeError:
-    """Return the error for a body beyond a tolerance. nearest: what the best stream came to."""
+    """Return the error for a body beyond a tolerance. nearest: errors of the best stream."""
     return RangeError(
         f"no quantiser keeps the body within {tolerance.joint * 1000:g} mm, and feet that stand within "
         f"{tolerance.foot * 1000:g} mm: with the finest, a point 3 cm off {nearest.joint} is "
@@ -227,31 +222,24 @@ def beyond_body(nearest: BodyErrors, tolerance: Tolerance) -> RangeError:
 
 
 def reduce_joints(target: BodyTarget, share: float) -> Float64:
-    """Return BAPs (T, 296) that turn as few joints as can be, within a share of the tolerance at every frame.
+    """Return BAPs (T, 296) that turn as few joints as possible within a share of the tolerance.
 
-    What is left out is made up for by the joints below: a spine bends at a few vertebrae instead of all.
+    Joints below make up for those left out: a spine bends at a few vertebrae instead of all.
     """
     solver = target.solver
     rows = all_rows(solver.skeleton)
-    rules = solver.convention
-    moved = np.asarray(target.values.any(axis=0))
-    used = [
-        joint
-        for joint, columns in zip(rules.joints, rules.bap, strict=True)
-        if joint in solver.skeleton and moved[columns[columns != NO_BAP]].any()
-    ]
-    frames = np.unique(np.linspace(0, len(target.values) - 1, REDUCTION_FRAMES).astype(int))
+    kept, dropped = turning_joints(solver, np.asarray(target.values.any(axis=0))), list[str]()
+    frames = np.unique(np.linspace(0, len(target.values) - 1, TUNING.reduction_frames).astype(int))
     matrices = solver.pose(target.values[frames])
     wanted, weights = rows.points(matrices), target.weights(rows)[frames]
 
     def off_without(joint: str) -> float:
-        solved = solver.solve(matrices, [one for one in kept if one != joint], target.values[0])
+        solved = solver.solve(matrices, [other for other in kept if other != joint], target.values[0])
         apart = rows.points(solver.pose(solved)) - wanted
         return float((np.linalg.norm(apart, axis=2) * weights).max())
 
     root = solver.skeleton.names[0]
-    kept, dropped = list(used), []
-    candidates = [joint for joint in used if joint != root]
+    candidates = [joint for joint in kept if joint != root]
     while candidates:
         off = {joint: off_without(joint) for joint in candidates}
         candidates = [joint for joint in candidates if off[joint] <= share]

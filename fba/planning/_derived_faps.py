@@ -1,4 +1,4 @@
-"""FAPs that a player derives from others, and which to send so that it derives them right.
+"""FAPs that a player derives from others, and the FAPs to send so that it derives all values correctly.
 
 ISO/IEC 14496-2 leaves it to the decoder how unsent FAPs are interpolated; these are the rules that the
 standard suggests and `fba.face.resolve` follows (see `fba.face.mates`).
@@ -36,11 +36,11 @@ class Choice(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FitChoice:
-    """What an interpolation table (FIT) gives from one cut to another, if only that FAP is not sent.
+    """What an interpolation table (FIT) makes of each FAP between two cuts, if only that FAP is not sent.
 
-    gives: bool (68, C, C), the value that is shown, at every frame. leaves: bool (68, C, C), nothing at any
-    frame, and it computes nothing from this one, which may copy its mate. unsendable: bool (68, C, C), those
-    that cannot be sent.
+    gives: bool (68, C, C), it gives the shown value at every frame. leaves: bool (68, C, C), it gives nothing
+    at any frame, and computes nothing from the FAP, which may copy its mate. unsendable: bool (68, C, C), the
+    FAP cannot be sent.
     """
 
     gives: Bool
@@ -51,18 +51,18 @@ class FitChoice:
 @cache
 def related_faps() -> tuple[tuple[int, ...], ...]:
     """Return the columns of low-level FAPs in sets of 1, 2 or 4 that can be derived from one another."""
-    sets = {frozenset([column, *(int(one[column]) for one in donors())]) for column in range(2, FAP_COUNT)}
-    return tuple(sorted(tuple(sorted(one)) for one in sets))
+    sets = {frozenset([column, *(int(by[column]) for by in donors())]) for column in range(2, FAP_COUNT)}
+    return tuple(sorted(tuple(sorted(related)) for related in sets))
 
 
 def choose_faps(
     values: Int32, known: Bool, bits: Float64, cuts: Cuts, fit: FitChoice | None = None
 ) -> Choice:
-    """Return the FAPs to send, from one cut to another, that take the fewest bits and give all others.
+    """Return the FAPs to send between any two cuts that take the fewest bits and give all others.
 
-    values: int32 (T, 68), shown. known: bool (T, 68), those to be shown, the same from one needed cut to
-    the next, and either all FAPs of a related set or none. bits: float64 (68, C, C), of each FAP by itself.
-    fit: what an interpolation table gives.
+    values: int32 (T, 68), shown. known: bool (T, 68), FAPs to be shown; they change only at needed cuts, and
+    include all FAPs of a related set or none of them. bits: float64 (68, C, C), of each FAP by itself. fit:
+    what an interpolation table gives.
     """
     if fit is not None:
         bits = np.where(fit.unsendable, np.inf, bits)
@@ -77,9 +77,9 @@ def choose_faps(
         least = np.full(bits.shape[1:], np.inf)
         equal = _equal_pairs(values, related, cuts)
         for few in subsets(related, smallest):
-            own = np.where(derive_others(related, few, equal, fit), bits[list(few)].sum(axis=0), np.inf)
-            better = shown & (own < least)
-            least[better] = own[better]
+            cost = np.where(derive_others(related, few, equal, fit), bits[list(few)].sum(axis=0), np.inf)
+            better = shown & (cost < least)
+            least[better] = cost[better]
             for column in related:
                 sent[column][better] = column in few
         total += np.where(shown, least, 0.0)
@@ -88,13 +88,14 @@ def choose_faps(
 
 def subsets(related: tuple[int, ...], smallest: int) -> list[tuple[int, ...]]:
     """Return the subsets of at least `smallest` members, the smallest first."""
-    return [one for size in range(smallest, len(related) + 1) for one in combinations(related, size)]
+    return [subset for size in range(smallest, len(related) + 1) for subset in combinations(related, size)]
 
 
 def interpolated_faps(sent: Bool, known: Bool) -> Bool:
-    """Return bool (T, 68): unsent FAPs of every group in which a known one is left to the player.
+    """Return bool (T, 68): FAPs to ask players to interpolate: all unsent FAPs of groups that need it.
 
-    sent, known: bool (T, 68). A group's mask type says the same of all its unsent FAPs.
+    A group needs it if it has an unsent FAP that is `known`, because its mask type is the same for all its
+    unsent FAPs. sent, known: bool (T, 68).
     """
     result = np.zeros_like(sent)
     for group in fap_groups()[1:]:
@@ -105,7 +106,7 @@ def interpolated_faps(sent: Bool, known: Bool) -> Bool:
 
 
 def _equal_pairs(values: Int32, related: tuple[int, ...], cuts: Cuts) -> dict[tuple[int, int], Bool]:
-    """Return for each pair of related FAPs whether they are equal from one cut to another: bool (C, C)."""
+    """Return for each pair of related FAPs whether they are equal between any two cuts: bool (C, C)."""
     result = {}
     for one, other in combinations(related, 2):
         differences = np.append(0, np.cumsum(values[:, one] != values[:, other]))[cuts.frames]
@@ -119,14 +120,14 @@ def derive_others(
     equal: Mapping[tuple[int, int], Bool | np.bool_],
     fit: FitChoice | None,
 ) -> Bool | np.bool_:
-    """Return bool (C, C): whether the sent FAPs and a FIT give all related ones, from one cut to another."""
+    """Return bool (C, C): whether the sent FAPs and a FIT give all related FAPs between any two cuts."""
     result: Bool | np.bool_ = np.True_
     for column in related:
         if column in sent:
             continue
         copied: Bool | np.bool_ = np.False_
-        known: Bool | np.bool_ = np.False_  # whether a better donor is, so that this one is not asked
-        for donor in (int(one[column]) for one in donors()):
+        known: Bool | np.bool_ = np.False_  # whether a better donor gives it
+        for donor in (int(by[column]) for by in donors()):
             if donor == column:
                 continue
             gives = np.bool_(donor in sent) if fit is None or donor in sent else fit.gives[donor]
@@ -138,15 +139,14 @@ def derive_others(
 
 @dataclass(frozen=True, eq=False)
 class FitFaps:
-    """What a FIT has to do with the FAPs of a face.
+    """The FAPs of a face as a FIT computes them, and computes others from them.
 
-    values: int32 (T, 68), those in force, rounded. known: bool (T, 68), which those are. exact: bool (T, 68),
-    those to which the FIT gives the value that is shown. given: bool (T, 68), those to which it gives any.
-    unsendable: bool (T, 68), those that cannot be sent in place of others. needed: bool (T, 68), those from
-    which it computes others.
+    values: int32 (T, 68), FAPs in force, rounded. The others are bool (T, 68): known: FAPs in force. exact:
+    the FIT gives the shown value. given: the FIT gives any value. unsendable: the FAP cannot be sent in place
+    of others. needed: the FIT computes others from it.
 
-    What the FIT computes from is known to it only if it is sent or computed, never from a mate. So the same
-    FAPs must be, as without a plan: then every link applies as it did.
+    A FIT computes only from FAPs that are sent or computed, never from copies of mates. So a plan must leave
+    these FAPs as they are; then every link applies as without a plan.
     """
 
     values: Int32
@@ -157,7 +157,7 @@ class FitFaps:
     needed: Bool
 
     def choice(self, cuts: Cuts) -> FitChoice:
-        """Return what the FIT gives from one cut to another."""
+        """Return what the FIT gives between any two cuts."""
         return FitChoice(
             gives=~_any(~self.exact, cuts),
             leaves=~_any(self.given | self.needed, cuts),
@@ -166,7 +166,7 @@ class FitFaps:
 
 
 def find_fit_faps(face: FaceTrack, table: InterpolationTable, step: Int64) -> FitFaps:
-    """Return what a FIT has to do with the FAPs of a face. step: int64 (68,), of the quantiser."""
+    """Return the FAPs of a face as a FIT computes them. step: int64 (68,), of the quantiser."""
     fit = fit_values(face, table)
     filled, known = fill(fit.values, fit.known)
     values = np.rint(filled).astype(np.int32)
@@ -186,7 +186,7 @@ def table_columns(table: InterpolationTable) -> list[int]:
 
 
 def _any(events: Bool, cuts: Cuts) -> Bool:
-    """Return bool (68, C, C): whether something happens from one cut to another. events: bool (T, 68)."""
+    """Return bool (68, C, C): whether any event happens between two cuts. events: bool (T, 68)."""
     before = np.zeros((1, FAP_COUNT), dtype=np.int64)
     counts = np.concatenate([before, np.cumsum(events, axis=0)])[cuts.frames].T
     result: Bool = counts[:, :, None] != counts[:, None, :]

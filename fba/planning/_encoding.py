@@ -1,20 +1,21 @@
-"""`encode` and `encode_stream`: an animation as a stream, whatever decides how small that is to be."""
+"""`encode` and `encode_stream`: the functions that encode an animation towards any goal."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal
 
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba.codec import EncoderOptions, EncoderStatistics, encode_with_statistics, warn_of_clamped
-from fba.errors import OptionError, did_you_mean
+from fba.codec import EncoderOptions, EncoderStatistics, encode_animation
+from fba.encoder_options import PRESETS, REFERENCE, Preset
+from fba.errors import FbaWarning, OptionError, did_you_mean
 from fba.face import FaceModel
 from fba.planning._near_lossless import encode_within_tolerance
 from fba.planning._plan import encode_planned
 from fba.planning._tolerance import NearLossless, Tolerance
-from fba.presets import PRESETS, REFERENCE, Preset
 
 if TYPE_CHECKING:
     from fba.planning.fit_streams import FitStream
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 class BitRate:
     """A mean rate that a stream keeps.
 
-    bits_per_second: the rate. buffer: seconds of it by which the stream may be ahead at any time.
+    bits_per_second: the rate. buffer: seconds of that rate by which the stream may be ahead at any time.
     """
 
     bits_per_second: float
@@ -33,7 +34,7 @@ class BitRate:
 
 
 Goal = Preset | Literal["fit"] | Tolerance | BitRate
-"""What decides how much of an animation is sent, and how finely; see `encode_stream`."""
+"""How much of an animation is sent, and how finely; see `encode_stream`."""
 
 _DECIDED: dict[type | str, tuple[tuple[str, ...], str]] = {
     Tolerance: (("fap_quant", "bap_quant", "unsent"), "a tolerance decides what is sent, and how finely"),
@@ -48,13 +49,13 @@ _DECIDED: dict[type | str, tuple[tuple[str, ...], str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Encoded:
-    """A stream, and what encoding it came to.
+    """A stream, and what encoding it resulted in.
 
     data: the stream. statistics: counts of the encoder: planes, I planes, clamped values; at a bit rate, a
     `fba.planning.rate.RateStatistics`. options: how it was coded, with the quantisers that were chosen.
     left_out: number of frames that are not sent, since players fill them in.
 
-    errors: how far what a player shows is off. Within a tolerance a `NearLossless`, at a bit rate a
+    errors: of what a player shows. Within a tolerance a `NearLossless`, at a bit rate a
     `fba.planning.rate.ShownErrors`: both have `face` and `body`, whose `largest` is in metres. For the FIT of
     a head a `fba.planning.fit_streams.FitStream`. None for presets, which change values by rounding only.
     """
@@ -94,7 +95,7 @@ def encode(
     goal = _goal(animation, preset, tolerance, bit_rate)
     encoded = encode_stream(animation, _options(options, fields), goal)
     if not isinstance(goal, Tolerance):  # what a tolerance clamps stays within it
-        warn_of_clamped(encoded.statistics)
+        _warn_of_clamped(encoded.statistics)
     return encoded.data
 
 
@@ -107,17 +108,17 @@ def encode_stream(
     keep_masks: Collection[str] = (),
     every_frame: bool = False,
 ) -> Encoded:
-    """Encode an animation as one FBA object; return it with what that came to.
+    """Encode an animation as one FBA object; return it with statistics and errors.
 
-    goal: what decides how much is sent; default: the preset of the options.
-        "reference": all that the animation sends (`fba.codec.encode`).
+    goal: how much is sent, and how finely; default: the preset of the options.
+        "reference": all that the animation sends.
         "exact", "compact": not what never moves; of FAPs, not what players derive (`encode_planned`).
         "fit": not what `model` computes by its FIT (`fba.planning.fit_streams.encode_with_fit`).
-        a `Tolerance`: as little as stays within it (`encode_within_tolerance`).
-        a `BitRate`: what loses least at that rate (`fba.planning.rate.encode_at_rate`).
+        a `Tolerance`: the smallest stream within it (`encode_within_tolerance`).
+        a `BitRate`: the stream with the least errors at that rate (`fba.planning.rate.encode_at_rate`).
     model: for "compact" and "fit", the head that all receivers have; for a tolerance, the head that is
         measured, by default the built-in head.
-    keep_masks: for presets: parts, "face" and "body", of which nothing is left out.
+    keep_masks: for presets: parts, "face" and "body", of which all parameters are sent.
     every_frame: for a tolerance: send all frames, for players that hold a frame until the next comes.
 
     Raises OptionError for what is no animation, and where goal and options contradict each other; else as the
@@ -137,7 +138,7 @@ def encode_stream(
     if goal == "fit":
         return _encode_with_fit(animation, options, model)
     if goal == REFERENCE:
-        return Encoded(*encode_with_statistics(animation, options), options)
+        return Encoded(*encode_animation(animation, options), options)
     return Encoded(
         *encode_planned(animation, options, preset=goal, keep_masks=keep_masks, model=model), options
     )
@@ -145,7 +146,7 @@ def encode_stream(
 
 def _encode_at_rate(animation: Animation, options: EncoderOptions, goal: BitRate) -> Encoded:
     """Return the stream at a bit rate."""
-    from fba.planning.rate import encode_at_rate, measure_errors  # which other goals need not load
+    from fba.planning.rate import encode_at_rate, measure_errors  # imported only for this goal
 
     rated = encode_at_rate(animation, goal.bits_per_second, goal.buffer, options)
     errors = measure_errors(animation, rated.shown)
@@ -154,16 +155,32 @@ def _encode_at_rate(animation: Animation, options: EncoderOptions, goal: BitRate
 
 def _encode_with_fit(animation: Animation, options: EncoderOptions, model: FaceModel | None) -> Encoded:
     """Return the stream for a head with a FIT. OptionError without a head."""
-    from fba.planning.fit_streams import encode_with_fit  # which other goals need not load
+    from fba.planning.fit_streams import encode_with_fit  # imported only for this goal
 
     if model is None:
         raise OptionError('the goal "fit" needs the head that all receivers have: give model=')
-    made = encode_with_fit(animation, model, options)
-    return Encoded(made.data, made.statistics, options, errors=made)
+    fitted = encode_with_fit(animation, model, options)
+    return Encoded(fitted.data, fitted.statistics, options, errors=fitted)
+
+
+def _warn_of_clamped(statistics: EncoderStatistics) -> None:
+    """Give the caller of `encode` an FbaWarning of clamped values, if there are any."""
+    if statistics.clamped:
+        most = sorted(statistics.clamped_parameters.items(), key=lambda pair: -pair[1].count)[:3]
+        names = [
+            f"{name} ({one.count}; frame {one.frame}: {one.value} sent as {one.sent})" for name, one in most
+        ]
+        more = len(statistics.clamped_parameters) - len(names)
+        warnings.warn(
+            f"values limited to what their ranges carry: {statistics.clamped}, of {', '.join(names)}"
+            f"{f' and {more} parameters more' if more else ''}; a larger quantiser may carry them",
+            FbaWarning,
+            stacklevel=3,
+        )
 
 
 def _check_animation(animation: object) -> None:
-    """Raise OptionError for what is no animation; it says how to come by an animation."""
+    """Raise OptionError for anything but an animation; it says how to get an animation."""
     if isinstance(animation, Animation):
         return
     if isinstance(animation, str) or hasattr(animation, "__fspath__"):
@@ -209,7 +226,7 @@ def _goal(
     tolerance: float | Tolerance | None,
     bit_rate: float | None,
 ) -> Goal | None:
-    """Return the goal that keywords of `encode` say; None for the preset of the options."""
+    """Return the goal that keywords of `encode` name; None for the preset of the options."""
     choices = {"preset": preset, "tolerance": tolerance, "bit_rate": bit_rate}
     given = [name for name, value in choices.items() if value is not None]
     if len(given) > 1:
@@ -239,7 +256,7 @@ def _check_goal(
     keep_masks: Collection[str],
     every_frame: bool,
 ) -> None:
-    """Raise OptionError for an unknown goal, and for what it decides itself or has no use for."""
+    """Raise OptionError for an unknown goal, and for options that it decides itself or does not use."""
     preset = goal if isinstance(goal, str) else None
     if preset not in (None, "fit", *PRESETS):
         raise OptionError(

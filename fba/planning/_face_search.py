@@ -12,16 +12,19 @@ from fba.face.deform.displacements import DisplacementMeter
 from fba.planning._mesh_error import ErrorBasis
 from fba.planning._search import SWEEPS, Effort, Found, PathSearch, Room
 
-JERK = 1.0
-"""Share of the tolerance by which a FAP's change from frame to frame may differ from the source's unseen."""
-ROUNDING = 1e-4
-"""Share of the tolerance that rounding in 32 bits may take."""
-AROUND = 12
-"""Frames on either side of one beyond the tolerance in which paths are searched again."""
-HOPELESS = 0.2
-"""Share of frames beyond the tolerance above which a quantiser is given up."""
-REPAIRS = 8
-"""Times that paths are searched again around frames beyond the tolerance."""
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the search. Shares are of the tolerance."""
+
+    jerk: float = 1.0  # share by which a FAP's change between frames may differ from the source's, unseen
+    rounding: float = 1e-4  # share that rounding in 32 bits may take
+    repaired_frames: int = 12  # frames on either side of a frame beyond the tolerance that are searched again
+    hopeless_share: float = 0.2  # share of frames beyond the tolerance above which a quantiser is given up
+    max_repairs: int = 8  # searches around frames beyond the tolerance
+
+
+TUNING = Tuning()
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +32,8 @@ class Segment:
     """Frames that begin with an I plane, and what is sent of them.
 
     shown: float64 (T, 68), what the source shows. values: float64 (T, 68), of the FAPs in force, without what
-    visemes and expressions add. groups: for each FAP that is sent, the columns that a player shows with its
-    values, its own first. gaps: bool (T,), frames that may be left out.
+    visemes and expressions add. groups: for each FAP that is sent, its column and after it the others that a
+    player shows with its values. gaps: bool (T,), frames that may be left out.
     """
 
     shown: Float64
@@ -40,11 +43,11 @@ class Segment:
 
 
 def search_faps(
-    segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, effort: Effort, below: float = np.inf
+    segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, effort: Effort, below: float
 ) -> Found:
-    """Return the cheapest FAPs found for a segment, measured on all vertices.
+    """Return the cheapest FAPs that the search comes to for a segment, measured on all vertices.
 
-    below: bits; what takes more is given up.
+    below: bits; the search gives up results that do not take fewer.
     """
     rows = _FaceRows(segment, basis, effort)
     search = _FaceSearch(rows, rows.choose_keys(effort), effort)
@@ -55,19 +58,19 @@ def search_faps(
     for _ in range(SWEEPS - 1):
         search.sweep()
     beyond = rows.find_beyond()
-    for attempt in range(REPAIRS):
-        if not beyond.any() or beyond.mean() > HOPELESS:
+    for attempt in range(TUNING.max_repairs):
+        if not beyond.any() or beyond.mean() > TUNING.hopeless_share:
             break
-        search.repair(beyond, round_off=attempt >= REPAIRS // 2)
+        search.repair(beyond, round_off=attempt >= TUNING.max_repairs // 2)
         beyond = rows.find_beyond()
     search.drop_repeated(segment.gaps)
     if beyond.any() or search.bits() >= below:  # too coarse a quantiser, or no better
         return search.result(np.inf)
     beyond = search.measure(meter)
-    for attempt in range(REPAIRS):
+    for attempt in range(TUNING.max_repairs):
         if not beyond.any():
             break
-        search.repair(beyond, round_off=attempt >= REPAIRS // 2)
+        search.repair(beyond, round_off=attempt >= TUNING.max_repairs // 2)
         beyond = search.measure(meter)
     search.drop_repeated(segment.gaps)
     return search.result(np.inf if beyond.any() else float(search.longest.max(initial=0.0)))
@@ -80,8 +83,8 @@ class _FaceRows:
         self.segment, self.wanted, self.tolerance = segment, segment.values, basis.tolerance
         slopes = {column: basis.slopes(columns, segment.shown) for column, columns in segment.groups.items()}
         self.slopes = slopes
-        # What is coarsest chooses first: later ones have finer levels to fit in.
-        self.columns = sorted(slopes, key=lambda one: -slopes[one].largest * effort.steps[one])
+        # FAPs with the coarsest levels choose first: the finer levels of later FAPs can adapt.
+        self.columns = sorted(slopes, key=lambda column: -slopes[column].largest * effort.steps[column])
         self.errors = np.zeros((len(segment.shown), basis.count, 3), dtype=np.float32)
         _add_differences(self.errors, segment, basis)
 
@@ -90,12 +93,13 @@ class _FaceRows:
         if effort.gap_share <= 0 or not self.segment.gaps.any() or not self.columns:
             return np.arange(len(self.wanted))
         scaled = [
-            self.wanted[:, one] / (self._reach(one, effort.share) * effort.gap_share) for one in self.columns
+            self.wanted[:, column] / (self._reach(column, effort.share) * effort.gap_share)
+            for column in self.columns
         ]
         return _choose_keys(np.stack(scaled, axis=1), self.segment.gaps, effort.most)
 
     def _reach(self, column: int, share: float) -> float:
-        """Return how far a FAP goes within a share of the tolerance."""
+        """Return how far a FAP may move within a share of the tolerance."""
         return share / max(self.slopes[column].largest, 1e-12)
 
     def begin_sweep(self, shown: Float64) -> list[int]:
@@ -104,16 +108,16 @@ class _FaceRows:
 
     def room(self, column: int, shown: Float64, limit: Float64, share: float | None) -> Room:
         """Return where a FAP may be so that no row becomes longer than limit (T,); see `Rows`."""
-        own = self.slopes[column]
-        down, up = _free_room(self.errors, *own[:3], limit)
+        slopes = self.slopes[column]
+        down, up = _free_room(self.errors, *slopes[:3], limit)
         added = self.segment.shown[:, column] - self.wanted[:, column]
-        lower = np.maximum(shown + down, np.minimum(own.lowest - added, shown))
-        upper = np.minimum(shown + up, np.maximum(own.highest - added, shown))
+        lower = np.maximum(shown + down, np.minimum(slopes.lowest - added, shown))
+        upper = np.minimum(shown + up, np.maximum(slopes.highest - added, shown))
         if share is not None:
             wanted, reach = self.wanted[:, column], self._reach(column, share)
             lower = np.maximum(lower, np.minimum(wanted - reach, shown))
             upper = np.minimum(upper, np.maximum(wanted + reach, shown))
-        return Room(lower, upper, self._reach(column, JERK))
+        return Room(lower, upper, self._reach(column, TUNING.jerk))
 
     def add(self, column: int, change: Float64) -> None:
         """Add to the errors what a change (T,) of a FAP moves."""
@@ -127,7 +131,7 @@ class _FaceRows:
 
 
 class _FaceSearch(PathSearch):
-    """Paths of FAPs. longest: float64 (T,), the largest error measured, in shares of the tolerance."""
+    """Paths of FAPs. longest: float64 (T,), the largest measured error, in shares of the tolerance."""
 
     def __init__(self, rows: _FaceRows, keys: Int64, effort: Effort) -> None:
         super().__init__(rows, keys, effort)
@@ -135,7 +139,7 @@ class _FaceSearch(PathSearch):
         self.measured, self.longest = rows.segment.shown, np.zeros(len(rows.wanted))
 
     def repair(self, beyond: Bool, *, round_off: bool) -> None:
-        """Search paths again around frames beyond the tolerance, bool (T,), after all frames there are sent.
+        """Send all frames around those beyond the tolerance, bool (T,), and search their paths again.
 
         round_off: begin with the levels nearest to the source there.
         """
@@ -150,43 +154,42 @@ class _FaceSearch(PathSearch):
         elif len(self.keys) > len(before):
             self.paths = {}
         for _ in range(2):
-            self.sweep(around=_widen(beyond, AROUND))
+            self.sweep(around=_widen(beyond, TUNING.repaired_frames))
 
     def measure(self, meter: DisplacementMeter) -> Bool:
-        """Return where the mesh is beyond the tolerance, bool (T,); less is allowed there from now on."""
+        """Return where the mesh is beyond the tolerance, bool (T,), and lower the limits there."""
         segment = self.face.segment
         new = segment.shown.copy()
         for column, columns in segment.groups.items():
-            for one in columns:
-                new[:, one] += self.shown[:, column] - segment.values[:, one]
+            for follower in columns:
+                new[:, follower] += self.shown[:, column] - segment.values[:, follower]
         changed = np.flatnonzero((new != self.measured).any(axis=1))
         moved = meter.measure(segment.shown[changed], new[changed]).largest
         self.longest[changed], self.measured = moved / self.face.tolerance.face, new
-        beyond = self.longest > 1 - ROUNDING
+        beyond = self.longest > 1 - TUNING.rounding
         self.limit[beyond] *= np.maximum(0.98 / self.longest[beyond], 0.5)
         return beyond | self.face.find_beyond()
 
 
 def _widen(frames: Bool, by: int) -> Bool:
-    """Return bool (T,): the frames and those so near to one of them."""
+    """Return bool (T,): these frames, and those up to `by` frames before or after them."""
     ends = np.cumsum(np.concatenate([np.zeros(by + 1), frames, np.zeros(by)]))
     widened: Bool = ends[2 * by + 1 :] > ends[: len(frames)]
     return widened
 
 
 def _add_differences(errors: Float32, segment: Segment, basis: ErrorBasis) -> None:
-    """Add by how much FAPs that are shown alike differ in the source."""
+    """Add the errors that come from showing FAPs alike which differ in the source."""
     for column, columns in segment.groups.items():
         for other in columns[1:]:
             difference = segment.values[:, column] - segment.values[:, other]
             if difference.any():
-                own = basis.slopes((other,), segment.shown)
-                _add_error(errors, *own[:3], difference)
+                _add_error(errors, *basis.slopes((other,), segment.shown)[:3], difference)
 
 
 @compiled
 def _choose_keys(values: Float64, gaps: Bool, most: int) -> Int64:
-    """Return frames between which values (T, F) are straight lines, but for less than 1: int64 (K,).
+    """Return frames between which values (T, F) differ by at most 1 from straight lines: int64 (K,).
 
     gaps: bool (T,), frames that may be left out, at most `most` in a row.
 
@@ -202,9 +205,9 @@ def _choose_keys(values: Float64, gaps: Bool, most: int) -> Int64:
             for between in range(frame + 1, end):
                 straight = straight and gaps[between]
                 share = (between - frame) / (end - frame)
-                for one in range(values.shape[1]):
-                    line = values[frame, one] + share * (values[end, one] - values[frame, one])
-                    if abs(line - values[between, one]) > 1.0:
+                for column in range(values.shape[1]):
+                    line = values[frame, column] + share * (values[end, column] - values[frame, column])
+                    if abs(line - values[between, column]) > 1.0:
                         straight = False
                         break
                 if not straight:
@@ -239,10 +242,11 @@ def _add_error(errors: Float32, rows: Int64, table: Float32, which: Int64, chang
 
 @compiled
 def _free_room(errors: Float32, rows: Int64, table: Float32, which: Int64, limit: Float64) -> Float64:
-    """Return how far a FAP may move down and up at each frame: float64 (2, T), the first one 0 or less.
+    """Return how far a FAP may move down and up at each frame: float64 (2, T), the first row 0 or less.
 
-    So far no row of errors (T, R, 3) becomes longer than limit (T,). One that is longer already must become
-    nearly as short as this FAP alone can make it. Bounds: as in `_add_error`; room is made for len(which).
+    Within these changes no row of errors (T, R, 3) becomes longer than limit (T,). A row that is longer
+    already must become nearly as short as this FAP alone can make it. Bounds: as in `_add_error`; room is
+    made for len(which).
     """
     room = np.zeros((2, len(which)))
     for frame in range(len(which)):

@@ -1,50 +1,49 @@
-"""`LiveEncoder`: encodes frames as they come, keeps what they show, and learns what to send."""
+"""`LiveEncoder`: encodes frames as they come, keeps what they show, and learns what must be sent."""
 
 from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
 from itertools import permutations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fba.animation import Animation, Frame
+from fba.animation import Animation, Frame, check_order
 from fba.arrays import Bool, Int64
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, levels, quantise, range_limit, step_scale
 from fba.errors import FbaWarning
 from fba.face import Resolver
 from fba.face.mates import fill
-from fba.parameters import BAP_COUNT, FAP_COUNT, baps
+from fba.parameters import BAP_COUNT, FAP_COUNT, bap_angles
+from fba.planning._code_lengths import BEYOND_RANGES
 from fba.planning._derived_faps import derive_others, interpolated_faps, related_faps, subsets
 from fba.tracks import BodyTrack, FaceTrack
 
-FACE, BODY = "face", "body"
-WIDER = 2
-"""How much further ranges reach than the largest change so far, up or down."""
+WIDENING = 2
+"""Factor between the largest change so far, up or down, and the reach of ranges."""
 MAX_INTRA_SHARE = 0.9
-"""Share of what an I plane can carry above which no more I planes are planned: later ones might not fit."""
-FAR_STEPS = 240
-"""Quantiser steps that ranges then reach at least."""
-MAX_STEPS = 1 << 20
-"""Number of steps that exceeds every range."""
+"""Share of the range of I planes above which a body is far away: later I planes might not carry it."""
+FAR_AWAY_STEPS = 240
+"""Least reach of ranges, in quantiser steps, for a body that is far away."""
 
 
 class LiveEncoder:
-    """Encodes frames of which nothing is known before; `push` and `finish` return the complete bytes.
+    """Encodes frames one by one, without knowing later frames; `push` and `finish` return complete bytes.
 
-    What is shown is kept exactly, with the quantisers in `options`: `fba.face.resolve` gives the same for the
-    decoded stream as for the quantised frames, and a body has the same values. A frame is encoded when the
-    next one comes, as by `Encoder`, and both decide what its plane carries.
+    The stream keeps exactly what is shown, with the quantisers in `options`: `fba.face.resolve` gives the
+    same for the decoded stream as for the quantised frames, and a body has the same values. A frame is
+    encoded when the next frame comes, as by `Encoder`; both decide what its plane carries.
 
-    It supposes that what is 0 stays 0 (and is not sent), that FAPs which equal their left/right mates or
-    their counterparts on the other contour of the lips stay so (and are left to the player, mask type 2), and
-    that changes stay within narrow ranges. A frame that shows otherwise becomes an I plane, which sends more
-    and has wider ranges. Before a body is further away than I planes reach, one sends all of it and has wide
-    ranges. As soon as a viseme or an expression shows, faces are sent as they come.
+    The encoder assumes that parameters which are 0 stay 0 (it does not send them), that FAPs which equal
+    their left/right mates or their counterparts on the other contour of the lips stay equal (it leaves them
+    to the player, mask type 2), and that changes stay within narrow ranges. A frame against an assumption
+    becomes an I plane, which sends more and has wider ranges. Before a body is further away than I planes
+    reach, an I plane sends all of it with wide ranges. From the first viseme or expression on, faces are sent
+    as they come.
 
-    Gives an FbaWarning where the first viseme or expression redefines itself, since all FAPs in force come
-    with it, or where FAPs that were sent are interpolated then. Raises as `Encoder` does.
+    Gives an FbaWarning if the first viseme or expression redefines itself, since all FAPs in force come with
+    it, or if FAPs that were sent are interpolated then. Raises as `Encoder` does.
     """
 
     def __init__(self, options: EncoderOptions | None = None) -> None:
@@ -98,7 +97,7 @@ class LiveEncoder:
         return data
 
     def _encode(self, shown: _Shown, following: _Shown | None) -> bytes:
-        """Encode a frame, of which the one after it is known; return the bytes that are complete."""
+        """Encode a frame, given the frame after it; return the bytes that are complete."""
         frame, parts = shown.animation, shown.parts
         begins = False
         for name, part in parts.items():
@@ -108,27 +107,19 @@ class LiveEncoder:
             for name, part in parts.items():
                 after = {} if following is None else following.parts
                 self._learnt[name].extend(part, after.get(name))
-            self._encoder.begin_learning({name: one.limits for name, one in self._learnt.items()})
-        sent = {name: self._learnt[name].track_to_send(part) for name, part in parts.items()}
-        data = self._encoder.push_animation(replace(frame, **sent))  # type: ignore[arg-type]
+            self._encoder.begin_learning({name: learnt.limits for name, learnt in self._learnt.items()})
+        sent: dict[str, Any] = {name: self._learnt[name].track_to_send(part) for name, part in parts.items()}
+        data = self._encoder.push_animation(replace(frame, **sent))
         if following is not None:
             data += self._encoder.settle(int(following.animation.index[0]))
         return data
 
 
-def check_order(before: Animation, frame: Animation) -> None:
-    """Raise ValueError for a frame that cannot come after another: of another rate, or no later."""
-    if frame.rate != before.rate:
-        raise ValueError(f"the stream has {before.rate} frames/s, this frame {frame.rate}; resample it first")
-    if frame.index[0] <= before.index[0]:
-        raise ValueError(f"frame index {frame.index[0]} comes after {before.index[0]}; they must increase")
-
-
 class _Part(NamedTuple):
     """The face or the body of a frame.
 
-    source_sent: bool (N,), what was sent so far. as_it_comes: the mask says what is sent; else that is to be
-    chosen, of a face among what the source sent where that suffices.
+    source_sent: bool (N,), what the source sent so far. as_it_comes: whether the mask says what is sent. Else
+    that is chosen; for a face, from what the source sent if that suffices.
     """
 
     track: FaceTrack | BodyTrack
@@ -138,7 +129,7 @@ class _Part(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """A frame with the values that it shows. The others: see `_Part`."""
+    """A frame with the values that it shows. For the other fields see `_Part`."""
 
     animation: Animation
     face_as_it_comes: bool
@@ -148,16 +139,16 @@ class _Shown:
     @property
     def parts(self) -> dict[str, _Part]:
         """The parts of the frame, by name."""
-        found = {}
+        parts = {}
         if self.animation.face is not None:
-            found[FACE] = _Part(self.animation.face, self.face_sent, self.face_as_it_comes)
+            parts["face"] = _Part(self.animation.face, self.face_sent, self.face_as_it_comes)
         if self.animation.body is not None:
-            found[BODY] = _Part(self.animation.body, self.body_sent)
-        return found
+            parts["body"] = _Part(self.animation.body, self.body_sent)
+        return parts
 
 
 class _FaceSource:
-    """What faces show that come one by one."""
+    """Faces that come one by one, and what they show."""
 
     def __init__(self) -> None:
         self._resolver = Resolver()
@@ -172,9 +163,9 @@ class _FaceSource:
         return sent
 
     def push(self, face: FaceTrack) -> FaceTrack:
-        """Return a face (1 frame) with the values that it shows, or else to be sent as it is.
+        """Return a face (1 frame) with the values that it shows; after a viseme or an expression, as it is.
 
-        The latter once there are visemes or expressions; the first of these sends all FAPs in force.
+        The first frame with a viseme or an expression sends all FAPs in force.
         """
         if self.as_it_comes:
             return face
@@ -187,7 +178,7 @@ class _FaceSource:
         return FaceTrack(shown, np.arange(FAP_COUNT)[None] >= 2)
 
     def _all_in_force(self, face: FaceTrack) -> FaceTrack:
-        """Return a frame with all that was sent so far, not only what it sends itself."""
+        """Return a frame with all FAPs that were sent so far, not only its own."""
         none = np.zeros_like(face.mask)
         interpolated = none if face.interpolated is None else face.interpolated
         added = self._sent & ~face.mask
@@ -204,7 +195,7 @@ class _FaceSource:
 
 
 class _BodySource:
-    """What bodies hold that come one by one. sent: bool (296,), BAPs that were sent so far."""
+    """Bodies that come one by one. sent: bool (296,), BAPs that were sent so far."""
 
     def __init__(self) -> None:
         self.sent: Bool = np.zeros(BAP_COUNT, dtype=np.bool_)
@@ -227,54 +218,57 @@ class _Learnt:
         count = track.values.shape[1]
         self.limits: Int64 = np.zeros(count, dtype=np.int64)
         self._sent: Bool = np.zeros(count, dtype=np.bool_)
-        self._used: Bool = np.zeros(count, dtype=np.bool_)  # FAPs that moved, and all that may copy them
+        self._used: Bool = np.zeros(
+            count, dtype=np.bool_
+        )  # parameters that moved, and FAPs that may copy them
         self._source_sent: Bool = np.zeros(count, dtype=np.bool_)
         self._apart: Bool = np.zeros((count, count), dtype=np.bool_)  # pairs of FAPs that were not equal
-        self._seen: Int64 = np.ones(count, dtype=np.int64)  # largest changes, up or down
+        self._largest: Int64 = np.ones(count, dtype=np.int64)  # largest changes, up or down
         self._last: Int64 = np.zeros(count, dtype=np.int64)
         self._begun = False
         self._options = options
         self._scale = step_scale(options, body=isinstance(track, BodyTrack))
-        self._widest = range_limit(MAX_STEPS, self._scale)
+        self._widest = range_limit(BEYOND_RANGES, self._scale)
         self._far = False
-        self._away = np.zeros(count, dtype=np.bool_)  # what goes away for good: bodies, but not their angles
-        if isinstance(track, BodyTrack):
-            self._away[:] = [one.unit != "1e-5 rad" for one in baps()]
+        # Bodies may walk away for good; angles and faces return.
+        self._walks: Bool = ~bap_angles() if isinstance(track, BodyTrack) else np.zeros(count, dtype=np.bool_)
 
     def push(self, part: _Part) -> bool:
-        """Take the next frame; return whether a P plane carries it, as far as it is not beyond all ranges."""
+        """Add the next frame; return whether a P plane carries it, apart from values beyond all ranges."""
         now = self._levels(part)
         if self._begun:
-            self._see(now - self._last)
+            self._note_changes(now - self._last)
         self._last = now
         begun, self._begun = self._begun, True
         reach = np.abs(now) / self._widest
-        if not self._far and (reach[self._away] > MAX_INTRA_SHARE).any():
+        if not self._far and (reach[self._walks] > MAX_INTRA_SHARE).any():
             self._far = True
             return False
-        beyond = self._far or bool((reach > 1)[self._sent].any())  # the encoder knows which plane is nearer
-        fits = beyond or not (self._sent & (self._seen > self.limits)).any()
+        beyond = self._far or bool(
+            (reach > 1)[self._sent].any()
+        )  # the encoder chooses the plane that misses by less
+        fits = beyond or not (self._sent & (self._largest > self.limits)).any()
         return begun and fits and self._shows(part)
 
     def extend(self, part: _Part, following: _Part | None) -> None:
-        """Send what the last frame and the one after it show, and widen the ranges for what changes more."""
+        """Send what the last frame and the frame after it show, and widen the ranges to their changes."""
         if following is not None:
-            self._see(self._levels(following) - self._last)
+            self._note_changes(self._levels(following) - self._last)
         if part.as_it_comes:
             self._sent = part.track.mask[0]
         else:
-            for one in (part, following):
-                if one is not None and not one.as_it_comes:
-                    self._use(one)
+            for shown in (part, following):
+                if shown is not None and not shown.as_it_comes:
+                    self._use(shown)
             self._sent = self._chosen_faps() if isinstance(part.track, FaceTrack) else self._used.copy()
-        wanted = WIDER * self._seen
+        wanted = WIDENING * self._largest
         if self._far:
-            wanted = np.maximum(WIDER * wanted, FAR_STEPS)
+            wanted = np.maximum(WIDENING * wanted, FAR_AWAY_STEPS)
             self._sent = self._sent if part.as_it_comes else self._sent | part.source_sent
-        self.limits = np.array([range_limit(one, self._scale) for one in wanted.tolist()])
+        self.limits = np.array([range_limit(reach, self._scale) for reach in wanted.tolist()])
 
     def track_to_send(self, part: _Part) -> FaceTrack | BodyTrack:
-        """Return the track of a frame with what is sent of it."""
+        """Return the track that is sent of a frame."""
         track, mask = part.track, self._sent[None]
         if part.as_it_comes:
             return track
@@ -283,23 +277,23 @@ class _Learnt:
         return FaceTrack(track.values, mask, interpolated=interpolated_faps(mask, self._used[None]))
 
     def _levels(self, part: _Part) -> Int64:
-        """Return the quantiser steps of a frame's values, int64 (N,); the last ones where none are sent."""
+        """Return a frame's values in quantiser steps, int64 (N,); the last values where none are sent."""
         now = levels(part.track, self._options)[0]
         return np.where(part.track.mask[0], now, self._last) if part.as_it_comes else now
 
-    def _see(self, changes: Int64) -> None:
-        """Remember the largest changes, but those that no P plane carries."""
+    def _note_changes(self, changes: Int64) -> None:
+        """Remember the largest changes, without those that no P plane carries."""
         sizes = np.abs(changes)
-        self._seen = np.maximum(self._seen, np.where(sizes > self._widest, 0, sizes))
+        self._largest = np.maximum(self._largest, np.where(sizes > self._widest, 0, sizes))
 
     def _shows(self, part: _Part) -> bool:
-        """Whether what is sent suffices to show a frame."""
+        """Return whether what is sent suffices to show a frame."""
         track, sent = part.track, self._sent
         if part.as_it_comes:
             return bool((track.mask[0] == sent).all())
         values = track.values[0]
-        held = np.where(sent, values, 0)
-        return bool(((fill(held, sent)[0] if isinstance(track, FaceTrack) else held) == values).all())
+        shown = np.where(sent, values, 0)
+        return bool(((fill(shown, sent)[0] if isinstance(track, FaceTrack) else shown) == values).all())
 
     def _use(self, part: _Part) -> None:
         """Remember which values are not 0, which FAPs are not equal, and which the source sends."""
@@ -315,12 +309,12 @@ class _Learnt:
     def _chosen_faps(self) -> Bool:
         """Return bool (68,): the fewest FAPs that give all others, and those that were sent before.
 
-        FAPs that the source never sent follow their mates when it is sent as it comes; they must not have
-        been sent by then.
+        Once faces are sent as they come, FAPs that the source never sent must follow their mates; so they
+        must not be sent before.
         """
         sent = self._sent.copy()
         sent[:2] = False
-        own = sent | self._source_sent
+        preferred = sent | self._source_sent
         for related in related_faps():
             if not self._used[related[0]]:
                 continue
@@ -328,6 +322,6 @@ class _Learnt:
             before = {column for column in related if sent[column]}
             choices = [few for few in subsets(related, 1) if before.issubset(few)]
             giving = [few for few in choices if derive_others(related, few, equal, None)]
-            few = next((few for few in giving if own[list(few)].all()), giving[0])
+            few = next((few for few in giving if preferred[list(few)].all()), giving[0])
             sent[list(few)] = True
         return sent

@@ -1,12 +1,13 @@
-"""How FAPs move the vertices of a head that are worst off, in shares of what a tolerance allows.
+"""How FAPs move the vertices of a head that are worst off, in shares of a tolerance.
 
-The displacement of a vertex is the sum of what each FAP's error moves it, along slopes from the model's
-tables. A few hundred vertices stand for all: those that come out worst for thousands of drawn errors. What
-transforms move (eyes) and the turn of the head are rows of their own, in which each FAP has its own axis.
+Each FAP's error moves a vertex along a slope from the model's tables; its displacement is their sum. A few
+hundred vertices represent all: those that are worst off for random errors. Parts that transforms move (eyes)
+and turns of the head have separate rows, in which each FAP has a separate axis.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -20,15 +21,18 @@ from fba.face.mates import donors
 from fba.parameters import FAP_COUNT
 from fba.planning._tolerance import Tolerance
 
-DRAWN = 1500
-"""Errors that are drawn to find the worst vertices."""
-MOST_AT_ONCE = 8
-"""FAPs that are off in one of them."""
 
-NEAR_BORDER = 0.5
-"""Share of the tolerance within which a border of intervals counts as near."""
-MAX_SLOPE_DIFFERENCE = 0.05
-"""Largest difference of equal slopes, as a share of the steepest."""
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the measurement."""
+
+    random_errors: int = 1500  # by which the worst vertices are determined
+    max_faps_off: int = 8  # in a random error
+    near_border: float = 0.5  # share of the tolerance within which a border of intervals counts as near
+    max_slope_difference: float = 0.05  # between slopes that count as equal, as a share of the steepest
+
+
+TUNING = Tuning()
 
 TRANSLATION, ROTATION = (KIND_ORDER.index(kind) for kind in ("translation", "rotation"))
 
@@ -37,7 +41,7 @@ _worst_vertices: WeakKeyDictionary[FaceModel, Int64] = WeakKeyDictionary()
 
 
 class Slopes(NamedTuple):
-    """What an error of FAPs that are shown alike moves.
+    """How an error of FAPs that are shown alike moves vertices.
 
     rows: int64 (N,), of the errors. table: float32 (K, N, 3), for a step of 1, in shares of the tolerance.
     which: int64 (T,), the entry of the table at each frame. lowest, highest: float64 (T,), values between
@@ -53,7 +57,7 @@ class Slopes(NamedTuple):
 
 
 class _Turn(NamedTuple):
-    """What a step of a FAP moves in a row along an axis, in shares of the tolerance."""
+    """How far a step of a FAP moves a row along an axis, in shares of the tolerance."""
 
     column: int
     row: int
@@ -64,7 +68,7 @@ class _Turn(NamedTuple):
 class ErrorBasis:
     """Rows in which errors of FAPs add up: vertices and turns.
 
-    count: number of rows. A row is a vector in shares of the tolerance: its length is to stay below 1.
+    count: number of rows. A row is a vector in shares of the tolerance: its length must stay below 1.
     """
 
     def __init__(self, meter: DisplacementMeter, tolerance: Tolerance) -> None:
@@ -82,7 +86,7 @@ class ErrorBasis:
     def slopes(self, columns: tuple[int, ...], values: Float64) -> Slopes:
         """Return slopes of FAPs that are shown alike around values (T, 68).
 
-        Where a border of a FAP's intervals is so near that the tolerance may reach beyond, the steeper side
+        If a border of a FAP's intervals is so near that the tolerance may extend beyond it, the steeper side
         counts.
         """
         tracks = [
@@ -91,10 +95,10 @@ class ErrorBasis:
         intervals = np.zeros((len(values), len(tracks)), dtype=np.int64)
         lowest, highest = np.full(len(values), -np.inf), np.full(len(values), np.inf)
         for place, track in enumerate(tracks):
-            own = values[:, self._shifts.column[track]]
-            margin = NEAR_BORDER / max(self._lengths[self._range(track)].max(), 1e-9)
-            near = np.stack([self._intervals(track, own + off) for off in (-margin, 0.0, margin)])
-            intervals[:, place] = near[self._lengths[near].argmax(axis=0), np.arange(len(own))]
+            track_values = values[:, self._shifts.column[track]]
+            margin = TUNING.near_border / max(self._lengths[self._range(track)].max(), 1e-9)
+            near = np.stack([self._intervals(track, track_values + off) for off in (-margin, 0.0, margin)])
+            intervals[:, place] = near[self._lengths[near].argmax(axis=0), np.arange(len(values))]
             lowest = np.maximum(lowest, self._lowest[near[0]])
             highest = np.minimum(highest, self._highest[near[2]])
         distinct, which = np.unique(intervals, axis=0, return_inverse=True)
@@ -113,34 +117,32 @@ class ErrorBasis:
 
     def _intervals(self, track: int, values: Float64) -> Int64:
         """Return the interval that each value (T,) is in."""
-        own = self._range(track)
-        uppers = self._shifts.upper[own.start : own.stop - 1]
-        result: Int64 = own.start + np.searchsorted(uppers, values, side="left").astype(np.int64)
+        span = self._range(track)
+        uppers = self._shifts.upper[span.start : span.stop - 1]
+        result: Int64 = span.start + np.searchsorted(uppers, values, side="left").astype(np.int64)
         return result
 
     def _find_ends(self) -> tuple[Float64, Float64]:
-        """Return where the slopes of each interval cease to hold, below and above: float64 (S,), (S,).
+        """Return the lowest and the highest value for which each interval's slopes are valid: float64 (S,).
 
-        Intervals with nearly the same slopes count as one.
+        Neighbouring intervals with nearly the same slopes are joined.
         """
         lowest, highest = np.zeros(len(self._slopes)), np.zeros(len(self._slopes))
         for track in range(len(self._shifts.column)):
-            own = self._range(track)
-            change = np.linalg.norm(np.diff(self._slopes[own], axis=0), axis=2).max(axis=1, initial=0.0)
-            borders = self._shifts.upper[own.start : own.stop - 1][
-                change > MAX_SLOPE_DIFFERENCE * self._lengths[own].max()
-            ]
+            span = self._range(track)
+            uppers = self._shifts.upper[span.start : span.stop - 1]
+            change = np.linalg.norm(np.diff(self._slopes[span], axis=0), axis=2).max(axis=1, initial=0.0)
+            borders = uppers[change > TUNING.max_slope_difference * self._lengths[span].max()]
             ends = np.concatenate([[-np.inf], borders, [np.inf]])
-            inside = np.append(self._shifts.upper[own.start : own.stop - 1], np.inf)
-            at = np.searchsorted(borders, inside, side="left")
-            lowest[own], highest[own] = ends[at], ends[at + 1]
+            at = np.searchsorted(borders, np.append(uppers, np.inf), side="left")
+            lowest[span], highest[span] = ends[at], ends[at + 1]
         return lowest, highest
 
 
 def _find_worst_vertices(meter: DisplacementMeter) -> Int64:
-    """Return the vertices of a model that are worst off for any of the errors drawn."""
-    found = _worst_vertices.get(meter.model)
-    if found is None:
+    """Return the vertices of a model that are worst off for any of the random errors."""
+    worst = _worst_vertices.get(meter.model)
+    if worst is None:
         rng = np.random.default_rng(0)
         shifts = meter.shifts
         steepest = np.zeros(FAP_COUNT)
@@ -150,17 +152,19 @@ def _find_worst_vertices(meter: DisplacementMeter) -> Int64:
             column = shifts.column[track]
             steepest[column] = max(steepest[column], float(lengths.max(initial=0.0)))
         moving = np.flatnonzero(steepest)
-        source = rng.normal(0, 0.004, (DRAWN, FAP_COUNT)) / np.where(steepest > 0, steepest, np.inf)
+        source = rng.normal(0, 0.004, (TUNING.random_errors, FAP_COUNT)) / np.where(
+            steepest > 0, steepest, np.inf
+        )
         errors = np.zeros_like(source)
         for row in errors if len(moving) else ():
-            chosen = rng.choice(moving, rng.integers(1, MOST_AT_ONCE + 1))
+            chosen = rng.choice(moving, rng.integers(1, TUNING.max_faps_off + 1))
             row[chosen] = rng.uniform(-0.0005, 0.0005, len(chosen)) / steepest[chosen]
             if rng.random() < 0.7:  # both sides alike
                 row[donors()[0][chosen]] = row[chosen]
         measured = meter.measure(source, source + errors)
-        found = np.unique(measured.worst[measured.largest > 0])
-        _worst_vertices[meter.model] = found
-    return found
+        worst = np.unique(measured.worst[measured.largest > 0])
+        _worst_vertices[meter.model] = worst
+    return worst
 
 
 def _slopes_at(shifts: Shifts, vertices: Int64, rows: int) -> Float32:
@@ -169,33 +173,32 @@ def _slopes_at(shifts: Shifts, vertices: Int64, rows: int) -> Float32:
     place[vertices] = np.arange(len(vertices))
     result = np.zeros((len(shifts.upper), rows, 3), dtype=np.float32)
     for interval in range(len(shifts.upper)):
-        own = slice(int(shifts.start[interval]), int(shifts.start[interval + 1]))
-        at = place[shifts.rows[own]]
-        result[interval, at[at >= 0]] = shifts.slopes[own][at >= 0]
+        entries = slice(int(shifts.start[interval]), int(shifts.start[interval + 1]))
+        at = place[shifts.rows[entries]]
+        result[interval, at[at >= 0]] = shifts.slopes[entries][at >= 0]
     return result
 
 
 def _turn_rows(model: FaceModel, transforms: Transforms, tolerance: Tolerance) -> list[_Turn]:
-    """Return what steps of FAPs with transforms of a part, or of the head, move.
+    """Return how far steps of FAPs that turn or shift a part, or turn the head, move rows.
 
-    Up to three FAPs of a part have an axis each: turns about crossing axes add up like that. Each angle, of
-    the head or of a part, has also a row of its own.
+    Up to three FAPs of a part have an axis of its row each, as turns about crossing axes add up. Each angle,
+    of the head or of a part, also has a separate row.
     """
     result: list[_Turn] = []
     row = 0
     for part in range(len(transforms.start) - 1):
         first, last = int(transforms.start[part]), int(transforms.start[part + 1])
         head = part == len(transforms.start) - 2
-        for place, one in enumerate(range(first, last)):
-            column, kind = int(transforms.column[one]), int(transforms.kind[one])
-            amount = float(np.linalg.norm(transforms.amount[one]))
+        for place, number in enumerate(range(first, last)):
+            column, kind = int(transforms.column[number]), int(transforms.kind[number])
+            amount = float(np.linalg.norm(transforms.amount[number]))
             if not head:
-                points = model.parts[part].vertices.astype(np.float64) - transforms.centre[one]
+                points = model.parts[part].vertices.astype(np.float64) - transforms.centre[number]
                 reach = 1.0 if kind == TRANSLATION else float(np.linalg.norm(points, axis=1).max(initial=0.0))
                 result.append(_Turn(column, row, place % 3, amount * reach / tolerance.face))
             if kind == ROTATION:
-                own = row + 1 + place
                 angle = tolerance.head if head else tolerance.gaze
-                result.append(_Turn(column, own, 0, float(np.degrees(amount)) / angle))
+                result.append(_Turn(column, row + 1 + place, 0, float(np.degrees(amount)) / angle))
         row += 1 + last - first
     return result

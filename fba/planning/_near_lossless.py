@@ -1,10 +1,11 @@
-"""`encode_within_tolerance`: a stream that shows nearly what its source does, measured after decoding."""
+"""`encode_within_tolerance`: a stream that shows nearly the same as its source, measured after decoding."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -26,24 +27,26 @@ from fba.planning._search import Effort, Found
 from fba.planning._tolerance import BodyErrors, FaceErrors, NearLossless, Tolerance
 from fba.tracks import FaceTrack
 
-QUANTS = (1, 2, 3, 4, 5, 6, 8, 10, 12)
-"""Quantisers of FAPs that are tried."""
-TRIED = 3
-"""Number of them that are tried: the coarsest that each FAP by itself could take, and the next finer ones."""
-EFFORTS = ((0.9, 1.1, 4), (1.1, 0.9, 4), (0.7, 1.1, 4), (0.9, 0.9, 10), (0.9, 1.1, 10), (1.1, 0.7, 4))
-"""Share, share of gaps, and most frames left out, of the searches that are tried; the best of all first."""
-MARGIN = 0.998
-"""Share of the tolerance that searches fill: slopes are not quite what the mesh does."""
-FAILURES = 3
-"""Searches without a result after which a quantiser is given up."""
-WORSE = 1.1
-"""How much more a finer quantiser takes than a coarser one, for still finer ones not to be tried."""
-FRAMES_SEARCHED = 18_000
-"""Frames, times searches: longer streams are searched less often."""
-INTRA_BITS = 2000
-"""What an I plane counts: differences take less than half of what they do if all is kept."""
-MAX_SEGMENT_FRAMES = 3000
-"""Frames of the longest segment, which bounds the memory of a search."""
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the search."""
+
+    quantisers: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 8, 10, 12)  # of FAPs, that may be tried
+    max_quantisers: int = 3  # tried: the coarsest that each FAP by itself could take, and the next finer
+    efforts: tuple[tuple[float, float, int], ...] = (
+        (0.9, 1.1, 4), (1.1, 0.9, 4), (0.7, 1.1, 4), (0.9, 0.9, 10), (0.9, 1.1, 10), (1.1, 0.7, 4),
+    )  # fmt: skip
+    """Share, share of gaps, and most frames left out (see `Effort`) of the searches; the best first."""
+    margin: float = 0.998  # share of the tolerance that searches fill: slopes only approximate the mesh
+    max_failures: int = 3  # searches without a result after which a quantiser is given up
+    worse: float = 1.1  # growth of bits at a finer quantiser above which still finer ones are not tried
+    frames_searched: int = 18_000  # frames, times searches: longer streams are searched less often
+    intra_bits: int = 2000  # weight of an I plane: differences take less than half of those of an exact plan
+    max_segment_frames: int = 3000  # frames of the longest segment, which bounds the memory of a search
+
+
+TUNING = Tuning()
 
 
 def encode_within_tolerance(
@@ -54,18 +57,18 @@ def encode_within_tolerance(
     *,
     every_frame: bool = False,
 ) -> tuple[bytes, NearLossless]:
-    """Return a stream that stays within a tolerance of what an animation shows, and what it came to.
+    """Return a stream that stays within a tolerance of what an animation shows, and its errors.
 
-    Both are measured where the source has frames, on the decoded stream: a frame that was left out is
-    interpolated linearly, as `fba.player` and `Animation.resample` do. Visemes and expressions are kept as
-    they are. Never larger than with the preset "compact", which is taken where nothing else is smaller.
+    Errors are measured on the decoded stream, where the source has frames; frames that were left out are
+    interpolated linearly, as `fba.player` and `Animation.resample` do. Visemes and expressions stay as they
+    are. The stream is never larger than that of the preset "compact", which is taken if no other is smaller.
 
-    A body that moves is kept within the tolerance of joints and feet; where there is a face, too, all frames
-    are sent.
+    A body that moves stays within the tolerance of joints and feet; if there is a face, too, all frames are
+    sent.
 
-    options: quantisers are ignored. model: the head to measure on; default: the built-in one. every_frame:
-    send all frames, for players that hold a frame until the next comes. RangeError where not even the finest
-    quantiser keeps within the tolerance, ValueError without frames.
+    options: quantisers are ignored. model: the head to measure on; default: the built-in head. every_frame:
+    send all frames, for players that hold a frame until the next comes. RangeError if not even the finest
+    quantiser stays within the tolerance, ValueError without frames.
     """
     tolerance, options = tolerance or Tolerance(), replace(options or EncoderOptions(), fap_quant=1)
     if not len(animation):
@@ -95,7 +98,7 @@ def _encode_face(
     model: FaceModel,
     every_frame: bool,
 ) -> tuple[bytes, NearLossless]:
-    """Return a stream whose face stays within a tolerance, and what it came to; a body is sent as it is."""
+    """Return a stream whose face stays within a tolerance, and its errors; a body is sent as it is."""
     source = _Source(animation, model, options, every_frame)
     data, statistics = encode_planned(animation, options, preset="compact")
     smallest = _measured(data, statistics, source, options, compact=True)
@@ -108,9 +111,9 @@ def _encode_face(
                 except RangeError:  # between frames left out, values change by more than a plane carries
                     continue
                 if len(found_data) < len(data) or not _is_within(smallest, tolerance):
-                    found = _measured(found_data, statistics, source, plan.options)
-                    if _is_within(found, tolerance):
-                        data, smallest = found_data, found
+                    result = _measured(found_data, statistics, source, plan.options)
+                    if _is_within(result, tolerance):
+                        data, smallest = found_data, result
     _check(smallest, tolerance)
     return data, smallest
 
@@ -130,37 +133,37 @@ class _Source:
             self.meter = DisplacementMeter(model)
 
     def plan(self) -> Plan:
-        """Return what is sent, and where I planes come, if all that is shown is kept."""
+        """Return the plan that keeps all that is shown."""
         face_only = replace(self.animation, body=None)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FbaWarning)
             if self.fit is not None:
                 return plan_exact(face_only, self.options)
-            return plan_compact(face_only, self.options, intra_bits=INTRA_BITS)
+            return plan_compact(face_only, self.options, intra_bits=TUNING.intra_bits)
 
 
 def _is_plain(face: FaceTrack) -> bool:
-    """Whether no frame defines a viseme or an expression by the FAPs that it sends."""
+    """Return whether no frame defines a viseme or an expression by the FAPs that it sends."""
     defines = face.mask[:, 0] & (face.viseme[:, 3] == 1) | face.mask[:, 1] & (face.expression[:, 5] == 1)
     return not defines.any()
 
 
 def _search(source: _Source, tolerance: Tolerance) -> Iterator[Plan]:
-    """Yield plans that keep within the tolerance, with different quantisers of FAPs."""
+    """Yield plans that stay within the tolerance, with different quantisers of FAPs."""
     plan = source.plan()
     face = source.animation.face
     assert face is not None
     assert plan.animation.face is not None
     basis = ErrorBasis(source.meter, tolerance)
     segments = _segments(source, plan)
-    if not any(one.groups for _, one in segments):
+    if not any(segment.groups for _, segment in segments):
         return
-    efforts = min(max(FRAMES_SEARCHED // len(source.animation), 1), len(EFFORTS))
-    tried, least = TRIED if efforts > 1 else 1, np.inf
-    for quant in reversed(QUANTS):
+    efforts = min(max(TUNING.frames_searched // len(source.animation), 1), len(TUNING.efforts))
+    tried, least = TUNING.max_quantisers if efforts > 1 else 1, np.inf
+    for quant in reversed(TUNING.quantisers):
         if not tried:
             break
-        if not all(_may_take(quant, one, basis) for _, one in segments):
+        if not all(_may_take(quant, segment, basis) for _, segment in segments):
             continue
         found = []
         for frames, segment in segments:
@@ -171,8 +174,8 @@ def _search(source: _Source, tolerance: Tolerance) -> Iterator[Plan]:
         else:
             tried -= 1
             yield _assemble(source, plan, segments, found, quant)
-            bits = sum(one.bits for _, one in found)
-            if bits > WORSE * least:  # still finer ones take still more
+            bits = sum(result.bits for _, result in found)
+            if bits > TUNING.worse * least:  # still finer ones take still more
                 return
             least = min(least, bits)
 
@@ -180,20 +183,20 @@ def _search(source: _Source, tolerance: Tolerance) -> Iterator[Plan]:
 def _best(
     segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, quant: int, efforts: int
 ) -> Found | None:
-    """Return the cheapest of several searches; None where the quantiser is too coarse."""
+    """Return the cheapest of several searches; None if the quantiser is too coarse."""
     best = None
-    for number, (share, gap_share, most) in enumerate(EFFORTS[:efforts]):
-        if best is None and number >= FAILURES:
+    for number, (share, gap_share, most) in enumerate(TUNING.efforts[:efforts]):
+        if best is None and number >= TUNING.max_failures:
             break
         below = best.bits if best is not None else np.inf
-        effort = Effort(fap_steps() * quant, quant, share, gap_share, MARGIN, most)
+        effort = Effort(fap_steps() * quant, quant, share, gap_share, TUNING.margin, most)
         found = search_faps(segment, basis, meter, effort, below)
         best = found if found.within else best
     return best
 
 
 def _segments(source: _Source, plan: Plan) -> list[tuple[slice, Segment]]:
-    """Return the segments of a plan, none too long, and what is sent of each."""
+    """Return the frames of a plan's segments, none of them too long, and what is sent of each."""
     track = plan.animation.face
     assert track is not None
     assert source.animation.face is not None
@@ -205,13 +208,13 @@ def _segments(source: _Source, plan: Plan) -> list[tuple[slice, Segment]]:
     consecutive &= ~track.mask[:, :2].any(axis=1) & source.may_skip
     result = []
     for whole in plan.segments:
-        for start in range(whole.start, whole.stop, MAX_SEGMENT_FRAMES):
-            frames = slice(start, min(start + MAX_SEGMENT_FRAMES, whole.stop))
+        for start in range(whole.start, whole.stop, TUNING.max_segment_frames):
+            frames = slice(start, min(start + TUNING.max_segment_frames, whole.stop))
             groups = _groups(track.mask[start], known[start] & shown_by_sent[start])
             gaps = consecutive[frames].copy()
             gaps[[0, -1]] = False
-            own = Segment(source.shown[frames], values[frames].astype(np.float64), groups, gaps)
-            result.append((frames, own))
+            segment = Segment(source.shown[frames], values[frames].astype(np.float64), groups, gaps)
+            result.append((frames, segment))
     return result
 
 
@@ -219,19 +222,19 @@ def _groups(sent: Bool, known: Bool) -> dict[int, tuple[int, ...]]:
     """Return for each low-level FAP that is sent the columns that a player shows with its values."""
     groups = {int(column): [int(column)] for column in np.flatnonzero(sent) if column > 1}
     for column in np.flatnonzero(known & ~sent):
-        donor = next((int(one[column]) for one in donors() if sent[one[column]]), None)
+        donor = next((int(by[column]) for by in donors() if sent[by[column]]), None)
         if donor in groups:
             groups[donor].append(int(column))
     return {column: tuple(columns) for column, columns in groups.items()}
 
 
 def _may_take(quant: int, segment: Segment, basis: ErrorBasis) -> bool:
-    """Whether each FAP by itself has a level within the tolerance at every frame that must be sent."""
+    """Return whether each FAP alone has a level within the tolerance at every frame that must be sent."""
     needed = ~segment.gaps
     for column, columns in segment.groups.items():
         step = int(fap_steps()[column]) * quant
-        own = segment.values[needed, column]
-        off = np.abs(own - np.rint(own / step) * step).max(initial=0.0)
+        values = segment.values[needed, column]
+        off = np.abs(values - np.rint(values / step) * step).max(initial=0.0)
         if off * basis.slopes(columns, segment.shown[needed]).largest > 1:
             return False
     return True
@@ -244,30 +247,29 @@ def _assemble(
     found: list[tuple[slice, Found]],
     quant: int,
 ) -> Plan:
-    """Return the plan that sends what was found."""
+    """Return the plan that sends the results of the searches."""
     animation, track, body = source.animation, plan.animation.face, source.animation.body
     assert track is not None
     moving = np.zeros(track.mask.shape[1], dtype=np.bool_)
-    for _, one in found:
-        moving |= one.values.any(axis=0)
-    if track.mask[:, :2].any():  # a FAP that is sent as 0 holds against a viseme
+    for _, result in found:
+        moving |= result.values.any(axis=0)
+    if track.mask[:, :2].any():  # a FAP that is sent as 0 overrides a viseme
         moving[:] = True
-    for related in related_faps():  # and against a mate that moves
+    for related in related_faps():  # and a mate that moves
         moving[list(related)] = moving[list(related)].any()
-    keys = np.concatenate([frames.start + one.keys for frames, one in found])
+    keys = np.concatenate([frames.start + result.keys for frames, result in found])
     mask = track.mask[keys] & moving
     mask[:, :2] = track.mask[keys, :2]
-    values = np.where(mask, np.concatenate([one.values for _, one in found]), 0).astype(np.int32)
+    values = np.where(mask, np.concatenate([result.values for _, result in found]), 0).astype(np.int32)
     asked = interpolated_faps(mask, known_faps(track)[1][keys] & moving)
     face = FaceTrack(values, mask, track.viseme[keys], track.expression[keys], asked)
     if body is not None:
         body = replace(body, values=body.values[keys], mask=body.mask[keys])
     sent = Animation(animation.rate, animation.index[keys], face, body, animation.name)
-    ends = np.cumsum([len(one.keys) for _, one in found])
-    slices = tuple(
-        slice(int(end - len(one.keys)), int(end)) for end, (_, one) in zip(ends, found, strict=True)
+    borders = np.cumsum([0, *(len(result.keys) for _, result in found)]).tolist()
+    return Plan(
+        sent, tuple(slice(*pair) for pair in pairwise(borders)), replace(source.options, fap_quant=quant)
     )
-    return Plan(sent, slices, replace(source.options, fap_quant=quant))
 
 
 def _measured(
@@ -278,7 +280,7 @@ def _measured(
     *,
     compact: bool = False,
 ) -> NearLossless:
-    """Return what a stream came to: decoded, and compared with its source."""
+    """Return the errors of a stream: decoded, and compared with its source."""
     decoded = decode(data, bap_steps=options.bap_steps)
     errors = None
     if source.animation.face is not None and decoded.face is not None:
@@ -300,12 +302,12 @@ def _measured(
 
 
 def _is_within(result: NearLossless, tolerance: Tolerance) -> bool:
-    """Whether a stream keeps within a tolerance."""
+    """Return whether a stream stays within a tolerance."""
     return result.face is None or result.face.is_within(tolerance)
 
 
 def _check(result: NearLossless, tolerance: Tolerance) -> None:
-    """Raise RangeError for a stream that is not within the tolerance: no quantiser is fine enough."""
+    """Raise RangeError if a stream is not within the tolerance: no quantiser is fine enough."""
     if _is_within(result, tolerance):
         return
     assert result.face is not None

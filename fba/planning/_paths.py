@@ -1,10 +1,10 @@
 """Paths: the levels of one parameter, from frame to frame, that take the fewest bits within bounds.
 
-A parameter has a lower and an upper bound at every frame, and a stream may leave frames out, which a player
-fills in linearly. `find_path` searches the levels of the frames that are sent, the keys. It starts from a
-path that changes as rarely as can be (a dead zone). Then, a few times over, it takes the shortest way
-through all levels within the bounds (Viterbi), where each change costs what the adaptive coder would take
-for it after the path found before.
+A parameter has a lower and an upper bound at every frame, and a stream may leave out frames, which a player
+interpolates linearly. `find_path` searches the levels of the frames that are sent, the keys. It starts from a
+path that changes as rarely as possible (a dead zone). Then it repeats a Viterbi search for the cheapest path
+through all levels within the bounds, in which a change costs the bits that the adaptive coder would take for
+it after the previous path.
 """
 
 from __future__ import annotations
@@ -14,28 +14,29 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float64, Int32, Int64
-from fba.codec import level_bits, range_limit
+from fba.codec import range_limit
 from fba.compiled import compiled
+from fba.planning._code_lengths import level_bits
 
-ROUNDS = 6
-"""Most searches for one path; each starts from what the one before tells of the coder."""
-WIDEST = 24
-"""Levels that are tried at a frame; more of them lie within the bounds of parameters that move little."""
-OUTSIDE = 1e6
-"""Bits that count for a frame outside its bounds, and for a change that no P plane carries."""
+MAX_ROUNDS = 6
+"""Most searches for a path; each starts from the statistics of the path before."""
+MAX_LEVELS = 24
+"""Most levels that are tried at a frame; bounds of parameters that move little contain more levels."""
+OUTSIDE_BITS = 1e6
+"""Bits counted for a frame outside its bounds, and for a change that no P plane carries."""
 JERK_BITS = 12.0
-"""Bits that count for a change by which a viewer would see a jerk."""
+"""Bits counted for a change that a viewer would see as a jerk."""
 ROUNDING = 1e-6
-"""Share of a step by which a level may lie outside."""
+"""Share of a step by which a level may lie outside its bounds."""
 
 
 class Bounds(NamedTuple):
-    """Where one parameter may be, from one I plane up to the next.
+    """Bounds of a parameter from one I plane up to the next.
 
     lower, upper: float64 (T,), values. keys: int64 (K,), ascending, the frames that are sent, with the first
     and the last. step: of the quantiser, in the parameter's unit. scale: table steps in it, which divide the
-    limits of ranges (`fba.codec.step_scale`). source: float64 (T,), values that the path stands for; jump: by
-    how much a change from one key to the next may differ from theirs without being seen as a jerk.
+    limits of ranges (`fba.codec.step_scale`). source: float64 (T,), values that the path represents; jump: by
+    how much a change from key to key may differ from the source's before it is seen as a jerk.
     """
 
     lower: Float64
@@ -47,15 +48,15 @@ class Bounds(NamedTuple):
     jump: float = np.inf
 
 
-def find_path(bounds: Bounds, start: Int64 | None = None, *, rounds: int = ROUNDS) -> Int64:
-    """Return the cheapest levels found at the keys: int64 (K,).
+def find_path(bounds: Bounds, start: Int64 | None = None, *, rounds: int = MAX_ROUNDS) -> Int64:
+    """Return the cheapest levels at the keys that the search comes to: int64 (K,).
 
-    Within the bounds at every frame, those between keys included, wherever `start` is, or a path that holds
-    its level as long as it may; and never costlier than that. Where no level is within the bounds of a key,
-    the one nearest to their middle is taken: the caller checks what must hold.
+    They never cost more than `start` or the path that holds each level as long as it may, and stay within the
+    bounds, also between keys, if one of these does. If no level is within the bounds of a key, the nearest to
+    their middle is taken: the caller checks what must be true.
 
-    start: int64 (K,), a path to better. rounds: most searches, with ranges as they are and with
-    narrower ones.
+    start: int64 (K,), a path to improve. rounds: most searches for each width of ranges: that of the path,
+    and narrower.
     """
     band = _band(bounds, start)
     candidates = [hold_level(bounds)] if start is None else [start, hold_level(bounds)]
@@ -72,9 +73,8 @@ def find_path(bounds: Bounds, start: Int64 | None = None, *, rounds: int = ROUND
 
 
 def hold_level(bounds: Bounds) -> Int64:
-    """Return levels at the keys, int64 (K,), each held until bounds force another, then the nearest."""
-    lowest, highest = _levels_within(bounds)
-    return _hold(lowest, highest)
+    """Return levels at the keys, int64 (K,), each kept until the bounds force another, then the nearest."""
+    return _hold(*_levels_within(bounds))
 
 
 def _levels_within(bounds: Bounds) -> tuple[Int64, Int64]:
@@ -83,51 +83,51 @@ def _levels_within(bounds: Bounds) -> tuple[Int64, Int64]:
     lowest = np.ceil(lower - ROUNDING).astype(np.int64)
     highest = np.floor(upper + ROUNDING).astype(np.int64)
     nearest = np.rint((lower + upper) / 2).astype(np.int64)
-    none = lowest > highest
-    return np.where(none, nearest, lowest), np.where(none, nearest, highest)
+    empty = lowest > highest
+    return np.where(empty, nearest, lowest), np.where(empty, nearest, highest)
 
 
 def _band(bounds: Bounds, start: Int64 | None) -> tuple[Int64, Int64]:
-    """Return the levels that are tried at each key, from first to last: at most `WIDEST`."""
+    """Return the first and the last level that are tried at each key, about `MAX_LEVELS` of them."""
     lowest, highest = _levels_within(bounds)
     middle = _hold(lowest, highest) if start is None else start
     lowest, highest = np.minimum(lowest, middle), np.maximum(highest, middle)
-    return np.maximum(lowest, middle - WIDEST // 2), np.minimum(highest, middle + WIDEST // 2)
+    return np.maximum(lowest, middle - MAX_LEVELS // 2), np.minimum(highest, middle + MAX_LEVELS // 2)
 
 
 def _cost(bounds: Bounds, path: Int64) -> float:
-    """Return the bits of a path, and `OUTSIDE` for every frame at which it is outside its bounds."""
+    """Return the bits of a path, with those counted for frames outside the bounds and for jerks."""
     shown = np.interp(np.arange(len(bounds.lower)), bounds.keys, path) * bounds.step
     slack = bounds.step * ROUNDING
     outside = int(((shown < bounds.lower - slack) | (shown > bounds.upper + slack)).sum())
     lowest, highest = _calm_changes(bounds)
     changes = np.diff(path)
     jerks = int(((changes < lowest) | (changes > highest)).sum())
-    return level_bits(path, bounds.scale) + OUTSIDE * outside + JERK_BITS * jerks
+    return level_bits(path, bounds.scale) + OUTSIDE_BITS * outside + JERK_BITS * jerks
 
 
 def _calm_changes(bounds: Bounds) -> tuple[Float64, Float64]:
-    """Return the least and the largest change to each key but the first that is no jerk: float64 (K - 1,)."""
+    """Return the least and the largest change from key to key that is not a jerk: float64 (K - 1,) each."""
     if bounds.source is None:
-        none = np.full(len(bounds.keys) - 1, np.inf)
-        return -none, none
+        unlimited = np.full(len(bounds.keys) - 1, np.inf)
+        return -unlimited, unlimited
     moved = np.diff(bounds.source[bounds.keys]) / bounds.step
     room = max(bounds.jump / bounds.step, 1.0)
     return np.minimum(moved - room, -ROUNDING), np.maximum(moved + room, ROUNDING)
 
 
 def _search(bounds: Bounds, band: tuple[Int64, Int64], before: Int64, narrower: int) -> Int64:
-    """Return the cheapest way through a band: int64 (K,).
+    """Return the cheapest path through a band: int64 (K,).
 
-    A change costs what the path before tells, and more where it is beyond the tightest ranges of that, made
-    narrower by this number of units.
+    A change costs its bits by the statistics of the path before, or `OUTSIDE_BITS` beyond the tightest ranges
+    of that path, made narrower by this number of units.
     """
     if len(before) < 2:
         return before
     changes = np.diff(before)
     high, low = int(max(changes.max(), 0)), int(max(-changes.min(), 0))
     unit = max(range_limit(1, bounds.scale), 1)
-    high, low = (max(range_limit(one, bounds.scale) - narrower * unit, unit) for one in (high, low))
+    high, low = (max(range_limit(limit, bounds.scale) - narrower * unit, unit) for limit in (high, low))
     counts = np.bincount(np.clip(changes + low, 0, high + low), minlength=high + low + 1)
     cost = np.log2((len(changes) + high + low + 1) / (counts + 1.0))
     first, last = band
@@ -146,11 +146,11 @@ def _search(bounds: Bounds, band: tuple[Int64, Int64], before: Int64, narrower: 
 
 @compiled
 def _hold(lowest: Int64, highest: Int64) -> Int64:
-    """Return levels (K,) that change as late as can be. Bounds: all arrays have the length of lowest."""
+    """Return levels (K,) that change as late as possible. Bounds: all arrays have the length of lowest."""
     result = np.zeros(len(lowest), dtype=np.int64)
     level = 0
     if len(lowest):
-        # The first one is held longest where later bounds agree with it, too.
+        # The first level lasts longest if it is within later bounds, too.
         low, high = int(lowest[0]), int(highest[0])
         for key in range(1, len(lowest)):
             if max(low, int(lowest[key])) > min(high, int(highest[key])):
@@ -173,15 +173,15 @@ def _shortest(
     low: int,
     choices: Int32,
 ) -> Int64:
-    """Return the levels (K,) whose changes cost least together.
+    """Return the levels (K,) whose changes cost least in total.
 
-    within: lower and upper bounds (T,), in levels, for the frames between keys, too, where values are
-    interpolated. band: lowest and highest levels (K,). calm: least and largest changes (K - 1,) that are no
-    jerk. cost: of changes from -low on. choices: int32 (K, most levels), working array.
+    within: lower and upper bounds (T,), in levels, also for the frames between keys, where values are
+    interpolated. band: lowest and highest levels (K,). calm: least and largest changes (K - 1,) that are not
+    jerks. cost: of changes from -low on. choices: int32 (K, most levels), working array.
 
-    Bounds: j and i are levels within the band, of which choices has a column each (`_search` makes it for the
-    widest). j_first and j_last keep changes within -low..len(cost) - 1 - low. Keys are places in both
-    bounds, those between two keys as well.
+    Bounds: i and j are levels within the band, and choices has a column for each (`_search` makes it for the
+    widest). j_first and j_last keep changes within -low..len(cost) - 1 - low. Keys, and the frames between
+    two keys, are places in both bounds.
     """
     lower, upper = within
     first, last = band
@@ -199,9 +199,9 @@ def _shortest(
             lowest, highest = -1e18, 1e18  # levels at this key that keep the frames between within bounds
             for frame in range(begin + 1, end):
                 share = (frame - begin) / (end - begin)
-                held = level * (1.0 - share)
-                lowest = max(lowest, (lower[frame] - held) / share - ROUNDING)
-                highest = min(highest, (upper[frame] - held) / share + ROUNDING)
+                before_part = level * (1.0 - share)
+                lowest = max(lowest, (lower[frame] - before_part) / share - ROUNDING)
+                highest = min(highest, (upper[frame] - before_part) / share + ROUNDING)
             j_first = max(0, level - low - base, int(np.ceil(max(lowest, -1e9))) - base)
             j_last = min(
                 count - 1, level - low + len(cost) - 1 - base, int(np.floor(min(highest, 1e9))) - base
@@ -217,9 +217,9 @@ def _shortest(
             least = min(least, sums[i])
             if sums[i] == least:
                 cheapest = i
-        for j in range(count):  # what no level before leads to
-            if new_sums[j] > least + OUTSIDE:
-                new_sums[j] = least + OUTSIDE
+        for j in range(count):  # levels that no level before leads to
+            if new_sums[j] > least + OUTSIDE_BITS:
+                new_sums[j] = least + OUTSIDE_BITS
                 choices[key, j] = cheapest
         sums, new_sums = new_sums, sums
     result = np.zeros(len(keys), dtype=np.int64)

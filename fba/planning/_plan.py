@@ -1,4 +1,4 @@
-"""`Plan`: what of an animation is sent, and where I planes come; `plan_exact` and `plan_compact` make one."""
+"""Plans, made by `plan_exact` and `plan_compact`: what of an animation is sent, and where I planes come."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32, Int64
 from fba.codec import (
-    INTRA_BITS,
     Encoder,
     EncoderOptions,
     EncoderStatistics,
     coarsest_quantisers,
-    code_lengths,
     count_rounded,
     decode,
-    encode_with_statistics,
+    encode_animation,
     quantise,
 )
+from fba.encoder_options import PLANNED, REFERENCE, PlannedPreset
 from fba.errors import FbaWarning
 from fba.face import resolve
 from fba.face.resolve import FaceSettings, known_faps
 from fba.limits import Limits
 from fba.parameters import FAP_COUNT, fap_steps
+from fba.planning._code_lengths import INTRA_BITS, code_lengths
 from fba.planning._derived_faps import (
     Choice,
     choose_faps,
@@ -36,11 +36,10 @@ from fba.planning._derived_faps import (
     table_columns,
 )
 from fba.planning._segments import Cuts, cheapest_segments, find_cuts
-from fba.presets import PLANNED, REFERENCE, PlannedPreset
 from fba.tracks import BodyTrack, FaceTrack
 
 NO_LIMITS = Limits(frames=1 << 62, bytes=1 << 62)
-"""For streams that were made here."""
+"""For streams that this program made itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ class Plan:
     options: EncoderOptions
 
     def encode(self) -> tuple[bytes, EncoderStatistics]:
-        """Return the stream, and what the encoder counted. Raises as `fba.codec.encode` does."""
+        """Return the stream, and the encoder's statistics. Raises as `fba.encode` does."""
         encoder = Encoder(self.options)
         chunks = [encoder.push_segment(self.animation[frames]) for frames in self.segments]
         chunks.append(encoder.finish())
@@ -71,17 +70,18 @@ def encode_planned(
     keep_masks: Collection[str] = (),
     model: FaceSettings | None = None,
 ) -> tuple[bytes, EncoderStatistics]:
-    """Return the shortest of the streams of plans and that of `fba.encode`, and what the encoder counted.
+    """Return the shortest of the planned streams and the unplanned stream, and the encoder's statistics.
 
-    preset: "exact" or "compact", the plans. Exact ones have the values of the stream of `fba.encode`. Where
-    those depend on what came before, compact ones may also have the values that each frame has by itself.
-    keep_masks, model: see `plan_exact` and `plan_compact`. Raises as `fba.codec.encode` does, ValueError for
-    another preset.
+    preset: "exact" or "compact", the plans. Exact plans have the values of the unplanned stream. Compact
+    plans may instead have the values that each frame has by itself, if rounding depends on earlier frames.
+    keep_masks: parts, "face" and "body", of which nothing is left out, so that a decoder returns their masks,
+    too; compact plans leave out FAPs all the same. model: see `plan_compact`. Raises as `fba.encode` does,
+    ValueError for another preset.
     """
     if preset not in PLANNED:
         raise ValueError(f"preset must be one of {', '.join(PLANNED)}, not {preset!r}")
     options = replace(options or EncoderOptions(), preset=REFERENCE)
-    unplanned = encode_with_statistics(animation, options)
+    unplanned = encode_animation(animation, options)
     given = _as_coded(animation, options, *unplanned)
     if preset == "exact":
         plans = [_plan_exact(given, options, keep_masks)]
@@ -90,8 +90,8 @@ def encode_planned(
         by_itself = quantise(animation, options)
         if by_itself != given:
             plans.append(_plan_compact(by_itself, options, keep_masks, model))
-    planned = [one for one in (plan.encode() for plan in plans) if not one[1].clamped]
-    best, statistics = min([unplanned, *planned], key=lambda one: len(one[0]))
+    planned = [stream for stream in (plan.encode() for plan in plans) if not stream[1].clamped]
+    best, statistics = min([unplanned, *planned], key=lambda stream: len(stream[0]))
     statistics.clamped_parameters = unplanned[1].clamped_parameters
     return best, statistics
 
@@ -107,45 +107,41 @@ def _as_coded(
         coded = decode(data, bap_steps=options.bap_steps, limits=NO_LIMITS)
     face, body = animation.face, animation.body
     if face is not None and coded.face is not None:
-        one = coded.face
-        face = FaceTrack(one.values, face.mask, one.viseme, one.expression, face.interpolated)
+        new = coded.face
+        face = FaceTrack(new.values, face.mask, new.viseme, new.expression, face.interpolated)
     if body is not None and coded.body is not None:
         body = BodyTrack(coded.body.values, body.mask)
     return replace(animation, face=face, body=body)
 
 
-def plan_exact(
-    animation: Animation, options: EncoderOptions | None = None, *, keep_masks: Collection[str] = ()
-) -> Plan:
+def plan_exact(animation: Animation, options: EncoderOptions | None = None) -> Plan:
     """Return a plan that keeps every value that is sent, with the quantisers in `options`.
 
-    What stays at 0 throughout is left out where a player shows the same without it. keep_masks: parts,
-    "face" and "body", of which nothing is left out, so that a decoder returns their masks, too.
-    ValueError for an animation without frames.
+    Parameters that are always 0 are left out if a player shows the same without them. ValueError for an
+    animation without frames.
     """
     options = options or EncoderOptions()
-    return _plan_exact(quantise(animation, options), options, keep_masks)
+    return _plan_exact(quantise(animation, options), options, ())
 
 
 def plan_compact(
     animation: Animation,
     options: EncoderOptions | None = None,
     *,
-    keep_masks: Collection[str] = (),
     model: FaceSettings | None = None,
     intra_bits: float = INTRA_BITS,
 ) -> Plan:
     """Return a plan that keeps every value that is shown, with the quantisers in `options`.
 
-    Left out is what a player fills in by the standard's rules: a FAP that equals its left/right mate or its
-    counterpart on the other contour of the lips. Which ones is decided anew at every I plane. On a face
-    without an interpolation table of its own, `fba.face.resolve` gives the same for the decoded stream
-    as for the animation. keep_masks: as for `plan_exact`; only "body" has an effect. model: the face that
-    every receiver has; what its table gives exactly is left out, too. intra_bits: what an I plane counts,
-    besides what its FAPs take: the more, the fewer segments. ValueError for an animation without frames.
+    It leaves out FAPs that a player interpolates by the standard's rules, because they equal their left/right
+    mate or their counterpart on the other contour of the lips; each segment has its own choice of them. On a
+    face without an interpolation table, `fba.face.resolve` gives the same for the decoded stream as for the
+    animation. model: the face that every receiver has; FAPs that its table gives exactly are left out, too.
+    intra_bits: bits counted for an I plane besides those of its FAPs: the more, the fewer segments.
+    ValueError for an animation without frames.
     """
     options = options or EncoderOptions()
-    return _plan_compact(quantise(animation, options), options, keep_masks, model, intra_bits)
+    return _plan_compact(quantise(animation, options), options, (), model, intra_bits)
 
 
 def _plan_exact(given: Animation, options: EncoderOptions, keep_masks: Collection[str]) -> Plan:
@@ -180,7 +176,7 @@ def _plan_compact(
     face = _face_to_send(sent.face, values, known, choice, borders, cuts)
     if not np.array_equal(resolve(face, model), resolve(sent.face, model)):
         return _plan_as_sent(sent, options)  # definitions of visemes or expressions depend on what is sent
-    return Plan(replace(sent, face=face), tuple(cuts.segment(*one) for one in borders), options)
+    return Plan(replace(sent, face=face), tuple(cuts.segment(*pair) for pair in borders), options)
 
 
 def _fap_steps(options: EncoderOptions) -> Int64:
@@ -193,8 +189,8 @@ def _without_unmoved(
 ) -> Animation:
     """Return an animation that does not send what never moves. ValueError if it has no frames.
 
-    keep_masks: parts of which all is sent. linked: columns of FAPs that are sent, too, since a FIT gives
-    something else for them, or others from them.
+    keep_masks: parts of which all is sent. linked: columns of FAPs that are sent, too, since a FIT would give
+    other values for them, or computes others from them.
     """
     if not len(animation):
         raise ValueError("there is no frame to encode")
@@ -202,7 +198,7 @@ def _without_unmoved(
     if face is not None and "face" not in keep_masks:
         face = _without_unmoved_faps(face, linked)
     if body is not None and "body" not in keep_masks:
-        body = BodyTrack(body.values, body.mask & body.values.any(axis=0))  # one never sent is 0, too
+        body = BodyTrack(body.values, body.mask & body.values.any(axis=0))  # unsent BAPs are 0, too
     return replace(animation, face=face, body=body)
 
 
@@ -214,14 +210,14 @@ def _plan_as_sent(sent: Animation, options: EncoderOptions) -> Plan:
         return Plan(sent, (slice(0, count),), options)
     bits = _code_lengths(sent.face, cuts, options) + _code_lengths(sent.body, cuts, options)
     borders = cheapest_segments(bits + INTRA_BITS, cuts)
-    return Plan(sent, tuple(cuts.segment(*one) for one in borders), options)
+    return Plan(sent, tuple(cuts.segment(*pair) for pair in borders), options)
 
 
 def _without_unmoved_faps(face: FaceTrack, linked: Collection[int]) -> FaceTrack:
-    """Return a face that does not send what is 0 throughout, as far as a player shows the same.
+    """Return a face that does not send FAPs that are always 0, if a player then shows the same.
 
-    With a viseme or an expression in force, a FAP that is sent as 0 holds against it. And 0 must be sent
-    beside a mate that moves, which a player would copy.
+    A FAP that is sent as 0 overrides visemes and expressions in force. And 0 must be sent if a mate moves,
+    which a player would copy.
     """
     mask = face.mask.copy()
     used = face.viseme.any(), face.expression.any()
@@ -231,7 +227,7 @@ def _without_unmoved_faps(face: FaceTrack, linked: Collection[int]) -> FaceTrack
         for related in related_faps():
             mask[:, related] &= moves[list(related)].any() or not set(linked).isdisjoint(related)
     interpolated = face.interpolated
-    if interpolated is not None:  # what is left out must not end the interpolation of its group
+    if interpolated is not None:  # FAPs left out must not end the interpolation of their group
         interpolated = interpolated_faps(mask, mask | interpolated)
     return FaceTrack(face.values, mask, face.viseme, face.expression, interpolated)
 
@@ -249,7 +245,7 @@ def _changes(mask: Bool) -> Bool:
 
 
 def _code_lengths(track: FaceTrack | BodyTrack | None, cuts: Cuts, options: EncoderOptions) -> Float64:
-    """Return the bits of a track from one cut to another: float64 (C, C)."""
+    """Return the bits of a track between any two cuts: float64 (C, C)."""
     count = len(cuts.frames)
     if track is None:
         return np.zeros((count, count))
@@ -260,7 +256,7 @@ def _code_lengths(track: FaceTrack | BodyTrack | None, cuts: Cuts, options: Enco
 def _face_to_send(
     face: FaceTrack, values: Int32, known: Bool, choice: Choice, borders: list[tuple[int, int]], cuts: Cuts
 ) -> FaceTrack:
-    """Return a face that sends the FAPs chosen for each segment, and asks for the others."""
+    """Return a face that sends the FAPs chosen for each segment; players interpolate the others."""
     mask = face.mask.copy()
     for first, last in borders:
         mask[cuts.segment(first, last), 2:] = choice.sent[2:, first, last]

@@ -1,9 +1,9 @@
-"""Search for the cheapest parameters within a tolerance: path by path, each within what the others leave.
+"""Search for the cheapest parameters within a tolerance: path by path, each within the tolerance left over.
 
 Errors of all parameters add up in rows at every frame: vertices of a face, points of a body. For each
-parameter in turn the rows say how far it may move either way without any of them getting too long;
-`find_path` takes the cheapest levels there. Later rounds give what the first has left over to those that
-came early. `Rows` is what faces and bodies do differently.
+parameter in turn, the rows determine how far it may move up and down before any of them gets too long;
+`find_path` takes the cheapest levels there. Later rounds distribute the tolerance that the first left over.
+`Rows` has what differs between faces and bodies.
 """
 
 from __future__ import annotations
@@ -15,23 +15,24 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32, Int64
-from fba.codec import level_bits
-from fba.planning._paths import ROUNDS, Bounds, find_path
+from fba.planning._code_lengths import level_bits
+from fba.planning._paths import MAX_ROUNDS, Bounds, find_path
 
 SWEEPS = 3
 """Rounds over all parameters."""
-PLANE_BITS, SKIP_BITS = 6, 4
-"""Bits of a P plane that no parameter pays for, and more where frames are left out behind it."""
+PLANE_BITS = 6
+"""Bits of a P plane apart from its parameters."""
+SKIP_BITS = 4
+"""Further bits of a P plane if frames are left out behind it."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How a search goes about it.
+    """Settings of a search. Shares are of the tolerance.
 
-    steps: int64 (N,), of the quantiser, one for each parameter. scale: table steps in each. share: of the
-    tolerance that each parameter may take at first. gap_share: of the tolerance, what leaving frames out may
-    take; 0 leaves out none that move. margin: share of the tolerance that the search fills. most: frames
-    left out in a row.
+    steps: int64 (N,), the quantiser's step of each parameter. scale: table steps in each. share: what each
+    parameter may take at first. gap_share: what frames that are left out may take; with 0, no frames that
+    move are left out. margin: share that the search fills. most: frames left out in a row.
     """
 
     steps: Int64
@@ -46,8 +47,8 @@ class Effort:
 class Found:
     """Result of a search. keys: int64 (K,), frames sent. values: int32 (K, N).
 
-    bits: what they take, about. longest: the largest error at any frame, in shares of the tolerance; infinite
-    where the search was given up before it was measured.
+    bits: approximate size. longest: the largest error at any frame, in shares of the tolerance; infinite if
+    the search was given up before it was measured.
     """
 
     keys: Int64
@@ -57,7 +58,7 @@ class Found:
 
     @property
     def within(self) -> bool:
-        """Whether all frames keep within the tolerance."""
+        """Whether all frames stay within the tolerance."""
         return self.longest <= 1
 
 
@@ -105,10 +106,10 @@ class PathSearch:
         self.limit = np.full(len(rows.wanted), effort.margin)
 
     def sweep(self, *, first: bool = False, around: Bool | None = None) -> None:
-        """Give each parameter the cheapest path within what the others leave.
+        """Give each parameter the cheapest path within the tolerance that the others leave.
 
-        first: none may take more than its share. around: bool (T,), frames at which paths may change; default
-        all.
+        first: no parameter may take more than its share. around: bool (T,), frames at which paths may change;
+        default: all.
         """
         for column in self.rows.begin_sweep(self.shown):
             shown = self.shown[:, column]
@@ -118,7 +119,7 @@ class PathSearch:
                 lower, upper = np.where(around, lower, shown), np.where(around, upper, shown)
             step, wanted = int(self.effort.steps[column]), self.rows.wanted[:, column]
             bounds = Bounds(lower, upper, self.keys, step, self.effort.scale, wanted, room.jump)
-            rounds = ROUNDS if around is None else 1
+            rounds = MAX_ROUNDS if around is None else 1
             self.take(column, find_path(bounds, self.paths.get(column), rounds=rounds))
 
     def take(self, column: int, path: Int64) -> None:
@@ -128,7 +129,7 @@ class PathSearch:
         self.paths[column], self.shown[:, column] = path, now
 
     def drop_repeated(self, gaps: Bool) -> None:
-        """Leave out frames that a player shows the same without: those between two that are the same.
+        """Leave out frames between two equal frames, which a player shows the same without them.
 
         gaps: bool (T,), frames that may be left out.
         """
@@ -142,12 +143,12 @@ class PathSearch:
         self.paths = {column: path[kept] for column, path in self.paths.items()}
 
     def bits(self) -> float:
-        """Return the bits of all that is sent, about."""
+        """Return the approximate bits of all that is sent."""
         planes = PLANE_BITS * (len(self.keys) - 1) + SKIP_BITS * int((np.diff(self.keys) > 1).sum())
         return planes + sum(level_bits(path, self.effort.scale) for path in self.paths.values())
 
     def result(self, longest: float) -> Found:
-        """Return what was found, whose largest error is this."""
+        """Return the result of the search. longest: its largest error."""
         values = np.zeros((len(self.keys), self.shown.shape[1]), dtype=np.int32)
         for column, path in self.paths.items():
             values[:, column] = path * self.effort.steps[column]

@@ -9,10 +9,9 @@ import numpy as np
 from fba.arrays import Bool, Float64, Int64
 
 MAX_CUTS = 48
-"""Largest number of places where a segment may begin, with the end: the time to weigh them grows with its
-square."""
+"""Most places where a segment may begin, with the end: the time to weigh them grows with the square."""
 MIN_SEGMENT_FRAMES = 5
-"""Frames between two places where a segment may begin. An I plane costs as much as a few P planes."""
+"""Least number of frames between two such places. An I plane costs as much as a few P planes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,7 @@ class Cuts:
 def find_cuts(needed: Bool) -> Cuts | None:
     """Return cuts where they are needed, bool (T,), and evenly between; None if too many are needed.
 
-    What is sent changes there so often that no two segments could be weighed against each other.
+    In that case the sent parameters change so often that weighing segments would take too long.
     """
     count = len(needed)
     forced = np.union1d(np.flatnonzero(needed), [0])

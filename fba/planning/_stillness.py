@@ -1,14 +1,14 @@
-"""`hold_still`: the levels of a captured body with which what rests in the source rests after decoding, too.
+"""`hold_still`: levels for a captured body with which parts that rest in the source rest after decoding, too.
 
-Rounded by itself, a joint that rests between two levels goes to and fro between them, and a root that sways
-by 2 mm takes the feet along. So the path of each BAP through its levels is searched (Viterbi), where a
-change costs something. Those of root, pelvis and legs are searched one after the other, those of legs a few
-times over: what one leaves at a sole, the next ones make up for.
+With plain rounding, a joint that rests between two levels alternates between them, and a root that sways by
+2 mm moves the feet. So a Viterbi search takes the cheapest path of each BAP through its levels, in which each
+change has a cost. BAPs of root, pelvis and legs are searched one after the other, those of legs several
+times: each makes up for the errors that the others leave at a sole.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,37 +25,42 @@ from fba.planning._body_rows import blocks
 from fba.planning._body_tolerance import held_angles
 from fba.tracks import BodyTrack, hold
 
-CHANGE = 1.0
-"""What a change of level costs: as much as a BAP that is off by a step in one frame."""
+# Weights in the cost of a path, relative to a BAP that is off by a step in a frame, which costs 1.
+CHANGE_COST = 1.0
+"""Cost of a change of level."""
 STANDING_WEIGHT = 5e5
-"""Weight of the square of a resting sole's error, per square metre; that of a BAP counts 1 per
-square step."""
+"""Weight of the squared error of a sole that rests, per square metre."""
 SWINGING_WEIGHT = 5e4
-"""The same for soles that do not rest."""
+"""Weight of the squared error of a sole that does not rest, per square metre."""
 STIR_WEIGHT = 6e6
 """Weight of the squared change of a resting sole's error from one frame to the next, per square metre."""
-REST_SPEED = 0.06
-"""Speed, in metres per second, below which the point of a foot that stands rests."""
-REST_SECONDS = 0.2
-"""Seconds over which that speed is measured."""
-SMOOTHED = 0.25
-"""Seconds over which the place of a sole that rests is averaged: captured roots come in whole millimetres."""
-SWEEPS = 3
-"""Rounds over the BAPs of legs; those of root and pelvis are searched once, before them."""
-COARSE = 10
-"""Millimetres in a step of the root for which legs cannot make up: with the standard's table."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the search."""
+
+    rest_speed: float = 0.06  # m/s, below which the point of a foot that stands rests
+    rest_seconds: float = 0.2  # s, over which that speed is measured
+    smoothing: float = 0.25  # s, over which resting soles are averaged: captured roots have whole millimetres
+    sweeps: int = 3  # rounds over the BAPs of legs; those of root and pelvis are searched once, before them
+    max_root_step: int = (
+        10  # mm of the root for which legs can make up; the standard's table has a coarser one
+    )
+
+
+TUNING = Tuning()
 
 
 def hold_still(animation: Animation, options: EncoderOptions | None = None) -> Animation:
     """Return an animation whose BAPs are multiples of their steps, and rest where the source's rest.
 
-    Each differs from the source's by less than a step, where rounding differs by at most half a step. Feet
-    that stand stay nearer to the source's than with rounding, and there are fewer changes to code. For
-    motion capture: BAPs that are given as such should be sent as they are.
+    Each value differs from the source's by less than a step; with rounding, it would be at most half a step.
+    But feet that stand stay nearer to the source's, and there are fewer changes to code. This is for motion
+    capture; BAPs that an author wrote should be sent as they are.
 
-    options: with the steps; with options.clamp, angles go on past half a turn, as they are coded then.
-    Nothing changes in a face, in a body whose BAPs are sent unquantised (bap_quant 0), and in what is not
-    sent.
+    options: for the steps; with options.clamp, angles continue past half a turn, as they are coded then.
+    Faces, bodies whose BAPs are not quantised (bap_quant 0), and unsent parameters do not change.
     """
     options = options or EncoderOptions()
     body = animation.body
@@ -73,7 +78,7 @@ def hold_still(animation: Animation, options: EncoderOptions | None = None) -> A
 
 
 class _Block:
-    """Some frames of a body, and where its soles are to be."""
+    """A block of frames of a body, and where its soles should be."""
 
     def __init__(self, wanted: Float64, first: Float64 | None, steps: Float64, animation: Animation) -> None:
         """wanted: (T, 296). first: levels of the first frame (296,), if they are given."""
@@ -82,20 +87,23 @@ class _Block:
         self.result = np.zeros_like(wanted)
         self.moved = np.asarray(wanted.any(axis=0))
         self.slopes: dict[int, Float64] = {}
-        self.trunk: set[int] = set()  # of them, those that move both feet, and what is above
+        self.trunk: set[int] = set()  # BAPs with slopes that move both feet
         self.rests, self.errors = _no_soles(len(wanted))
 
     def levels(self) -> Float64:
         """Return the levels of all BAPs: (T, 296)."""
         solver = BapSolver()
-        if self.steps[[column for column in solver.convention.translation if column >= 0]].max() <= COARSE:
+        if (
+            self.steps[[column for column in solver.convention.translation if column >= 0]].max()
+            <= TUNING.max_root_step
+        ):
             self._place_soles(solver)
         rests, errors = _no_soles(len(self.wanted))
         for column in np.flatnonzero(self.moved).tolist():
             if column not in self.slopes:
                 self._search(column, errors, errors, rests)
         off = {column: np.zeros(len(self.wanted)) for column in self.slopes}
-        for number in range(SWEEPS):
+        for number in range(TUNING.sweeps):
             for column, slopes in self.slopes.items():
                 if number and column in self.trunk:
                     continue
@@ -119,7 +127,7 @@ class _Block:
         soles = np.stack([end for foot in ends for end in foot or ()], axis=1)
         stands = np.repeat(find_stance(skeleton, matrices, self.rate).T, 2, axis=1)
         self.rests = stands & _find_rest(soles, self.rate)
-        self.errors = soles - _smoothed(soles, self.rests, round(SMOOTHED * self.rate / 2))
+        self.errors = soles - _smoothed(soles, self.rests, round(TUNING.smoothing * self.rate / 2))
         for motion in bap_motions(solver, self.wanted, matrices, self.moved):
             moves = np.isin(joints, skeleton.descendants(motion.joint)) | (not motion.turns)
             if moves.any():
@@ -130,12 +138,12 @@ class _Block:
 
 
 def _no_soles(count: int) -> tuple[Bool, Float64]:
-    """Return rests (T, 0) and errors (T, 0, 3) of no points, for `count` frames."""
+    """Return empty rests (T, 0) and errors (T, 0, 3), for `count` frames."""
     return np.zeros((count, 0), dtype=np.bool_), np.zeros((count, 0, 3))
 
 
 def _slopes(motion: BapMotion, arms: Float64) -> Float64:
-    """Return where a BAP moves points, in metres for an increase by 1: (T, P, 3).
+    """Return how a BAP moves points, in metres for an increase by 1: (T, P, 3).
 
     arms: (T, P, 3), the points from its joint.
     """
@@ -144,11 +152,11 @@ def _slopes(motion: BapMotion, arms: Float64) -> Float64:
 
 
 def _find_rest(points: Float64, rate: float) -> Bool:
-    """Return bool (T, P): when points (T, P, 3) go slowly, from before a frame to after it."""
-    half = max(round(REST_SECONDS * rate / 2), 1)
+    """Return bool (T, P): when points (T, P, 3) are slow from before a frame to after it."""
+    half = max(round(TUNING.rest_seconds * rate / 2), 1)
     around = np.pad(points, ((half, half), (0, 0), (0, 0)), mode="edge")
-    ways = np.linalg.norm(around[2 * half :] - around[: -2 * half], axis=2)
-    rests: Bool = ways * rate < REST_SPEED * 2 * half
+    distances = np.linalg.norm(around[2 * half :] - around[: -2 * half], axis=2)
+    rests: Bool = distances * rate < TUNING.rest_speed * 2 * half
     return rests
 
 
@@ -169,10 +177,10 @@ def _smoothed(points: Float64, rests: Bool, half: int) -> Float64:
 
 @compiled
 def _find_path(wanted: Float64, first: float, errors: Float64, slopes: Float64, rests: Bool) -> Float64:
-    """Return the cheapest levels of one BAP, float64 (T,): at each frame, one of the two nearest.
+    """Return the cheapest levels of a BAP, float64 (T,): at each frame, one of the two nearest.
 
     wanted: (T,), in steps. first: the first level; NaN if it is free. errors: (T, P, 3), metres by which the
-    other BAPs leave points off; slopes: (T, P, 3), metres for a step of this one. rests: bool (T, P).
+    other BAPs leave points off; slopes: (T, P, 3), metres for a step of this BAP. rests: bool (T, P).
     """
     count, points = errors.shape[0], errors.shape[1]
     if len(wanted) != count or slopes.shape != errors.shape or errors.shape[2] != 3:
@@ -182,11 +190,11 @@ def _find_path(wanted: Float64, first: float, errors: Float64, slopes: Float64, 
     costs = np.zeros((count, 2))
     came_from = np.zeros((count, 2), np.int64)
     for frame in range(count):
-        for one in range(2):
-            level = np.trunc(wanted[frame]) + one * np.sign(wanted[frame])
+        for choice in range(2):
+            level = np.trunc(wanted[frame]) + choice * np.sign(wanted[frame])
             off = level - wanted[frame]
             if abs(off) >= 1.0 or (frame == 0 and not np.isnan(first) and level != first):
-                costs[frame, one] = np.inf
+                costs[frame, choice] = np.inf
                 continue
             cost = off * off
             for point in range(points):
@@ -195,27 +203,27 @@ def _find_path(wanted: Float64, first: float, errors: Float64, slopes: Float64, 
                     error = errors[frame, point, axis] + slopes[frame, point, axis] * off
                     cost += weight * error * error
             least = 0.0 if frame == 0 else np.inf
-            for other in range(2 if frame > 0 else 0):
-                way = costs[frame - 1, other]
-                before = np.trunc(wanted[frame - 1]) + other * np.sign(wanted[frame - 1])
-                if way == np.inf:
+            for previous in range(2 if frame > 0 else 0):
+                path_cost = costs[frame - 1, previous]
+                before = np.trunc(wanted[frame - 1]) + previous * np.sign(wanted[frame - 1])
+                if path_cost == np.inf:
                     continue
                 if before != level:
-                    way += CHANGE
+                    path_cost += CHANGE_COST
                 for point in range(points):
                     if rests[frame, point] and rests[frame - 1, point]:
                         for axis in range(3):
                             moved = errors[frame, point, axis] + slopes[frame, point, axis] * off
                             moved -= errors[frame - 1, point, axis]
                             moved -= slopes[frame - 1, point, axis] * (before - wanted[frame - 1])
-                            way += STIR_WEIGHT * moved * moved
-                if way < least:
-                    least = way
-                    came_from[frame, one] = other
-            costs[frame, one] = cost + least
+                            path_cost += STIR_WEIGHT * moved * moved
+                if path_cost < least:
+                    least = path_cost
+                    came_from[frame, choice] = previous
+            costs[frame, choice] = cost + least
     levels = np.zeros(count)
-    one = 0 if costs[count - 1, 0] <= costs[count - 1, 1] else 1
+    choice = 0 if costs[count - 1, 0] <= costs[count - 1, 1] else 1
     for frame in range(count - 1, -1, -1):
-        levels[frame] = np.trunc(wanted[frame]) + one * np.sign(wanted[frame])
-        one = int(came_from[frame, one])
+        levels[frame] = np.trunc(wanted[frame]) + choice * np.sign(wanted[frame])
+        choice = int(came_from[frame, choice])
     return levels

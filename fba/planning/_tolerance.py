@@ -1,4 +1,4 @@
-"""`Tolerance`: how far what a stream shows may be from its source, and how far streams are."""
+"""`Tolerance`: how far a stream may be from its source; and the errors of streams."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from fba.codec import EncoderStatistics
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a face and a body may be from where the source has them, at every frame.
+    """How far a face and a body may be from those of the source, at every frame.
 
     face: metres by which a vertex of the face may move, in the frame of the head. head: degrees by which each
-    of the head's three angles (FAPs 48 to 50) may differ. gaze: the same of the eyes (FAPs 23 to 26).
-    joint: metres by which a point 3 cm from a joint may move. foot: metres by which a foot may move while it
-    stands on the ground.
+    of the head's three angles (FAPs 48 to 50) may differ. gaze: degrees for those of the eyes (FAPs 23 to
+    26). joint: metres by which a point 3 cm from a joint may move. foot: metres by which a foot may move
+    while it stands on the ground.
 
-    ValueError for what is not a positive, finite number.
+    ValueError for values that are not positive, finite numbers.
     """
 
     face: float = 0.0005
@@ -37,8 +37,8 @@ class Tolerance:
 class FaceErrors:
     """How far a decoded face is from its source, at all frames of the source.
 
-    largest, percentile_99: metres, of a vertex, in the frame of the head; frame, vertex: where it is
-    largest. head, gaze: degrees, the most that one of the head's three angles, or of an eye's, is off.
+    largest, percentile_99: metres, of a vertex, in the frame of the head; frame, vertex: where the error is
+    largest. head, gaze: degrees, the largest error of the head's three angles, and of the eyes'.
     """
 
     largest: float
@@ -49,7 +49,7 @@ class FaceErrors:
     gaze: float
 
     def is_within(self, tolerance: Tolerance) -> bool:
-        """Whether all are within a tolerance."""
+        """Return whether all errors are within a tolerance."""
         pairs = ((self.largest, tolerance.face), (self.head, tolerance.head), (self.gaze, tolerance.gaze))
         return all(off <= allowed for off, allowed in pairs)
 
@@ -70,17 +70,17 @@ class BodyErrors:
     foot: float
 
     def is_within(self, tolerance: Tolerance) -> bool:
-        """Whether joints and feet are within a tolerance."""
+        """Return whether joints and feet are within a tolerance."""
         return self.largest <= tolerance.joint and self.foot <= tolerance.foot
 
 
 @dataclass(frozen=True, eq=False)
 class NearLossless:
-    """What encoding within a tolerance came to.
+    """Result of encoding within a tolerance.
 
-    statistics: of the encoder. fap_quant, bap_quant: quantisers. left_out: frames that are not sent. face,
-    body: errors, None for a part that there is not, or that does not move. compact: whether nothing was
-    smaller than what keeps all that is shown.
+    statistics: of the encoder. fap_quant, bap_quant: quantisers. left_out: number of frames that are not
+    sent. face, body: errors, None for a part that is absent or does not move. compact: whether no stream was
+    smaller than that of the preset "compact", which keeps all that is shown.
     """
 
     statistics: EncoderStatistics

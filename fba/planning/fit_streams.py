@@ -20,18 +20,17 @@ from fba.planning._derived_faps import interpolated_faps
 from fba.planning._plan import encode_planned
 from fba.tracks import FaceTrack
 
-MOST_OFF = 0.003
-"""Metres: a FAP that the FIT gives worse than this, at the vertex that it moves most, is sent."""
+MAX_FIT_ERROR = 0.003
+"""Metres, at the vertex that a FAP moves most: FAPs are sent for which the FIT's error is larger."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitStream:
     """A stream for a head that computes most FAPs.
 
-    sent: numbers of the FAPs that it sends. added: those of them that the head would give, but not well
-    enough. distances: float64 (T,), metres, by which the worst vertex of each frame is off when the head
-    plays it, in its own frame. All FAPs of the animation, played on the same head, are what it is compared
-    with.
+    sent: numbers of the FAPs that it sends. added: those of them that the head would compute, but with too
+    large errors. distances: float64 (T,), metres by which the worst vertex of each frame is off, in the frame
+    of the head, compared with all FAPs of the animation played on the same head.
     """
 
     data: bytes
@@ -42,7 +41,7 @@ class FitStream:
 
     @property
     def errors(self) -> Spread:
-        """How far off the worst vertex of each frame is, mm."""
+        """Distances by which the worst vertices of frames are off, in mm."""
         return Spread.measure(self.distances * 1000)
 
 
@@ -51,17 +50,17 @@ def encode_with_fit(
     model: FaceModel,
     options: EncoderOptions | None = None,
     *,
-    most_off: float = MOST_OFF,
+    most_off: float = MAX_FIT_ERROR,
 ) -> FitStream:
-    """Return a stream that leaves to the FIT of a head what that gives well enough.
+    """Return a stream without the FAPs that the FIT of a head computes well enough.
 
-    Sent are the FAPs that the FIT starts from, those to which none of its links leads, and those that it
-    would give wrong by more than `most_off` metres in some frame, at the vertex that the FAP moves most. A
-    player must have the head (`fba play --model`); on others, left/right mates and lips at best fill in what
-    is missing. The body is sent as it is.
+    It sends the FAPs that the FIT starts from, those that no link of the FIT leads to, and those whose error
+    would exceed `most_off` metres in some frame, at the vertex that the FAP moves most. A player must have
+    the head (`fba play --model`); on other heads, left/right mates and lips replace some missing FAPs at
+    best. The body is sent as it is.
 
     ModelError for a model without FIT, OptionError for an animation without a face, ValueError for a
-    `most_off` that is not positive; else as `fba.codec.encode`.
+    `most_off` that is not positive; else as `fba.encode`.
     """
     if model.fit is None:
         raise ModelError(
@@ -78,7 +77,7 @@ def encode_with_fit(
     reduced = sent = send_sources(animation.face, model.fit)
     linked = linked_columns(model.fit)
     values, known = known_faps(animation.face)
-    for columns in (linked, ~linked):  # what the table gives first: mates copy it
+    for columns in (linked, ~linked):  # FAPs of the table first: mates copy them
         missed = _missed(wanted, resolve(sent, model), deformer, most_off) & columns
         sent = _send(sent, values, missed & known.all(axis=0))
     asked = interpolated_faps(sent.mask, sent.mask | linked)
@@ -98,7 +97,7 @@ def encode_with_fit(
 
 
 def _missed(wanted: Float32, shown: Float32, deformer: Deformer, most_off: float) -> Bool:
-    """Return bool (68,): FAPs that are further off than this distance in metres."""
+    """Return bool (68,): FAPs that are off by more than this distance in metres."""
     reach = np.linalg.norm(displacements(deformer), axis=2).max(axis=1, initial=0.0) / 1000
     missed: Bool = np.abs(shown - wanted).max(axis=0) * reach > most_off
     return missed
@@ -111,5 +110,5 @@ def _send(track: FaceTrack, values: Int32, added: Bool) -> FaceTrack:
 
 
 def _numbers(mask: Bool) -> tuple[int, ...]:
-    """Return the numbers of the FAPs that a mask (T, 68) has anywhere."""
+    """Return the numbers of the FAPs that a mask (T, 68) has in any frame."""
     return tuple((np.flatnonzero(mask.any(axis=0)) + 1).tolist())

@@ -17,7 +17,7 @@ import fba
 from fba import Animation, BodyTrack, EncoderOptions
 from fba.body import BapSolver, gait, plausibility
 from fba.body.plausibility import Doubt, find_doubt
-from fba.codec import encode_with_statistics
+from fba.codec import encode_animation
 from fba.parameters import bap_numbers, bap_steps
 
 TABLES = ("iso", "visage")
@@ -33,7 +33,7 @@ def hello() -> Animation:
 
 def doubt_of(animation: Animation, made: str, read: str, quant: int = 1) -> Doubt | None:
     """What is thought of an animation that was encoded with one table and decoded with another."""
-    data, _ = encode_with_statistics(
+    data, _ = encode_animation(
         animation, EncoderOptions(bap_steps=made, bap_quant=quant, clamp=True, mark=False)
     )
     return doubt(fba.decode(data, bap_steps=read), read)

@@ -114,7 +114,7 @@ def test_an_option_of_another_command_is_named_with_it(run: Run, tmp_path: Path)
     fba.write(tmp_path / "wild.fap", Animation(25, np.arange(1), fba.FaceTrack(values, mask)))
     code, _, err = run("convert", tmp_path / "wild.fap", tmp_path / "wild.fba")
     assert code == 1
-    assert err.endswith("or bring what does not fit as near as can be with --clamp of `fba encode`\n")
+    assert err.endswith("or send the nearest value that fits with --clamp of `fba encode`\n")
 
 
 def test_joints_that_names_do_not_tell_can_be_given(run: Run, bvh: Path, tmp_path: Path) -> None:

@@ -174,7 +174,7 @@ def test_alphabets_of_one_symbol_cost_nothing() -> None:
     assert coder.decode(as_bytes("01"), 0, [0, 1, 2]) == (OK, 2, [0, 0, 0])
 
 
-def test_23_zeros_are_damage_where_the_inserted_1_is_missing() -> None:
+def test_23_zeros_are_damage_if_the_inserted_1_is_missing() -> None:
     coder = Coder((2,))
     status, bit, _ = coder.decode(as_bytes("111" + "0" * 61), 3, [0] * 40, adaptive=False)
     assert (status, bit) == (BAD_GUARD, 3 + 22)
@@ -237,7 +237,7 @@ def test_random_bits_as_the_textbook_reads_them() -> None:
         ([], [], 1, "a segment beyond its arrays"),
     ],
 )
-def test_what_would_be_written_past_an_end_is_refused(
+def test_writing_past_the_end_of_an_array_is_refused(
     slots: list[int], symbols: list[int], room: int, message: str, adaptive: bool
 ) -> None:
     models, data = Coder(SIZES).models, np.zeros(64, dtype=np.uint8)
@@ -249,7 +249,7 @@ def test_what_would_be_written_past_an_end_is_refused(
 
 
 @pytest.mark.parametrize(("slots", "symbols"), [([4], [7]), ([3], [-1]), ([0, 1], [0])])
-def test_nothing_is_learnt_of_symbols_beyond_their_models(slots: list[int], symbols: list[int]) -> None:
+def test_symbols_beyond_their_models_are_not_learnt(slots: list[int], symbols: list[int]) -> None:
     models = Coder(SIZES).models
     with pytest.raises(IndexError, match="beyond"):
         learn(np.array(slots, dtype=np.int64), np.array(symbols, dtype=np.int64), models)
@@ -264,7 +264,7 @@ def test_a_segment_is_not_decoded_beyond_its_arrays() -> None:
 
 
 @pytest.mark.parametrize("adaptive", [True, False])
-def test_the_longest_segments_fit_the_room_that_is_asked_for(adaptive: bool) -> None:
+def test_the_longest_segments_fit_the_required_room(adaptive: bool) -> None:
     """16 bits for each symbol and 16 more: rare symbols of the largest models, and zeros that are guarded."""
     coder = Coder((3721, 3721, 2), (0, 3720, 0))
     for _ in range(TOTAL_MAX - 3722):

@@ -51,7 +51,7 @@ def written(crc: int) -> bytes:
 
 
 @pytest.mark.parametrize("options", [SECTIONS, UNALIGNED, EncoderOptions(clamp=True)])
-def test_the_list_is_as_the_docs_say_to_the_byte(options: EncoderOptions) -> None:
+def test_the_list_has_the_documented_bytes(options: EncoderOptions) -> None:
     """Borders come from the second decoder: an I plane's first bit, or the start code before it."""
     data, plain = stream(options), bare(options)
     borders = []
@@ -128,7 +128,7 @@ def test_a_wrong_period_is_named_and_left_out(options: EncoderOptions, period: i
 
 
 @pytest.mark.parametrize("size", [1, 11, 100_000])
-def test_who_reads_it_in_pieces_learns_it_at_the_end(size: int) -> None:
+def test_readers_of_pieces_report_wrong_periods_at_the_end(size: int) -> None:
     data, planes = silent_flip(SECTIONS, 3)
     for mode in ("raise", "salvage"):
         decoder, frames = Decoder(on_error=mode, bap_steps="visage"), 0  # type: ignore[arg-type]
@@ -160,14 +160,14 @@ def test_the_only_period_is_returned_as_doubtful() -> None:
     assert verify_stream(data).doubtful > 0
 
 
-def test_missing_periods_are_said() -> None:
+def test_missing_periods_are_reported() -> None:
     data = stream(SECTIONS)
     codes = [at for at in range(len(data)) if data.startswith(b"\0\0\1\xbb", at)]
     with pytest.raises(BitstreamError, match="1 of 6 I periods of the object are missing"):
         fba.decode(data[: codes[1]] + data[codes[2] :])
 
 
-def test_off_where_it_is_not_asked_for() -> None:
+def test_checksums_can_be_switched_off() -> None:
     for options in (EncoderOptions(mark=False, clamp=True), EncoderOptions(checksums=False, clamp=True)):
         assert b"crc32" not in stream(options)
     face = motion.animation(motion.face(9))
@@ -188,7 +188,7 @@ def test_frame_by_frame_gives_the_same_list() -> None:
     assert fba.decode(data + ending.ending()) == fba.decode(stream(SECTIONS))[:-1]
 
 
-def test_right_streams_match_their_checks() -> None:
+def test_undamaged_streams_match_their_checks() -> None:
     """Planes that had to be moved apart by start codes, empty ones, parts that come and go."""
     from random import Random
 

@@ -10,12 +10,12 @@ from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
 from fba.codec import (
     Encoder,
     coarsest_quantisers,
-    code_lengths,
     count_rounded,
     exact_quantisers,
     quantise,
 )
 from fba.parameters import bap_steps, faps
+from fba.planning._code_lengths import code_lengths
 
 
 def test_estimated_lengths_are_those_of_the_coder() -> None:
@@ -31,7 +31,7 @@ def test_estimated_lengths_are_those_of_the_coder() -> None:
     assert length == pytest.approx(estimated + planes, rel=0.01)
 
 
-def test_estimates_between_any_cuts_are_those_of_the_frames_alone() -> None:
+def test_estimates_between_cuts_equal_those_of_these_frames_alone() -> None:
     rng = np.random.default_rng(6)
     values = np.cumsum(rng.integers(-9, 10, (90, 296)), axis=0).astype(np.int32) * 128
     values[:, 20:] = 0
@@ -111,7 +111,7 @@ def test_values_between_steps_are_counted_and_kept_where_planes_can_carry_them()
     assert count_rounded(Animation(25, np.arange(4), FaceTrack.empty(4)), options) == {}
 
 
-def test_what_the_next_plane_may_bring() -> None:
+def test_prices_of_the_next_plane() -> None:
     values = np.zeros((12, 68), dtype=np.int32)
     values[:, 13] = [0] + [5] * 10 + [8]
     animation = Animation(25, np.arange(12), FaceTrack(values, np.tile(np.arange(68) == 13, (12, 1))))
@@ -121,10 +121,10 @@ def test_what_the_next_plane_may_bring() -> None:
     before = encoder.bits
     plane = encoder.next_plane(animation[11:12])
     assert plane is not None
-    assert plane.levels(np.ones(372), 0.0).tolist() == [3]
-    assert plane.levels(np.full(372, np.inf), np.inf).tolist() == [3]
-    assert plane.levels(np.ones(372), np.inf).tolist() == [0]
-    cheap, dear = (plane.levels(np.full(372, weight), 1.0) for weight in (100.0, 1e-3))
+    assert plane.levels(np.ones(364), 0.0).tolist() == [3]
+    assert plane.levels(np.full(364, np.inf), np.inf).tolist() == [3]
+    assert plane.levels(np.ones(364), np.inf).tolist() == [0]
+    cheap, dear = (plane.levels(np.full(364, weight), 1.0) for weight in (100.0, 1e-3))
     assert cheap.tolist() == [3]
     assert dear.tolist() == [0]  # what is still stays still
     assert plane.with_levels(np.array([2])).face.values[0, 13] == 7  # type: ignore[union-attr]
@@ -137,7 +137,7 @@ def test_what_the_next_plane_may_bring() -> None:
     assert encoder.next_plane(Animation(25, np.arange(12), more)[11:12]) is None
 
 
-def test_a_segment_begins_with_an_i_plane_and_ranges_of_its_own() -> None:
+def test_a_segment_begins_with_an_i_plane_and_new_ranges() -> None:
     values = np.zeros((60, 68), dtype=np.int32)
     values[:, 13] = np.where(np.arange(60) < 30, np.arange(60) % 2 * 900, np.arange(60) % 2)
     animation = Animation(25, np.arange(60), FaceTrack(values, np.tile(np.arange(68) == 13, (60, 1))))
@@ -151,7 +151,7 @@ def test_a_segment_begins_with_an_i_plane_and_ranges_of_its_own() -> None:
 
 
 @pytest.mark.parametrize("cuts", [[0, 4], [-1, 3], [0, 2, 2], [3, 0]])
-def test_cuts_that_are_no_frames_are_refused(cuts: list[int]) -> None:
+def test_cuts_outside_the_frames_are_refused(cuts: list[int]) -> None:
     track = BodyTrack(np.ones((3, 296), dtype=np.int32), np.ones((3, 296), dtype=bool))
     with pytest.raises(ValueError, match="cuts must increase from 0 to 3 frames"):
         code_lengths(track, np.array(cuts), EncoderOptions())

@@ -10,12 +10,11 @@ import pytest
 import fba
 from fba import Animation, FaceTrack
 from fba.codec import EncoderOptions, FrameRate, TimeCode
-from fba.codec._headers import time_code
 from fba.codec._plane import slots
 from fba.codec._plane.loops import SKIP_MAX
 from fba.codec._ranges import Ranges
 from fba.codec._runs import mask_types
-from fba.codec._stream.clock import StreamClock
+from fba.codec._stream.clock import StreamClock, time_code
 from fba.codec._time_base import TimeBase
 from fba.errors import RangeError
 
@@ -58,13 +57,13 @@ def test_a_stream_may_begin_with_its_time_code() -> None:
     assert clock.index == 0
 
 
-def test_a_new_rate_goes_on_at_the_next_whole_frame() -> None:
+def test_a_new_rate_begins_at_the_next_whole_frame() -> None:
     clock = clock_after(1, FrameRate(25))
     clock.begin_intra(FrameRate(30), None)  # 1/25 s is frame 1.2
     assert clock.index == 2
 
 
-def test_a_time_code_of_the_present_moment_is_no_step_back() -> None:
+def test_a_time_code_of_the_present_moment_changes_nothing() -> None:
     clock = clock_after(25, FrameRate(25))
     assert clock.begin_intra(None, TimeCode(0, 0, 1)) == []
     assert clock.index == 25
@@ -155,7 +154,7 @@ def test_types_of_masks() -> None:
 
 
 @pytest.mark.parametrize("quant", [1, 2, 5, 30])
-def test_the_largest_value_that_an_error_names_is_the_largest_that_goes(quant: int) -> None:
+def test_errors_name_the_largest_value_that_can_be_coded(quant: int) -> None:
     options = EncoderOptions(fap_quant=quant)
     with pytest.raises(RangeError) as caught:
         fba.encode(face(10**6), options)
@@ -178,7 +177,7 @@ def test_a_range_that_was_widened_stays_wide() -> None:
     assert encoder.statistics.intra_planes <= 3  # the first, and one for each direction
 
 
-def test_differences_get_one_step_more_than_a_clamped_value_lacks() -> None:
+def test_ranges_of_differences_exceed_what_a_clamped_value_lacks() -> None:
     ranges = Ranges(slots.FACE_BIT, EncoderOptions())
     column = np.array([slots.FAPS.start])
     ranges.widen_to_catch_up(column, np.array([1861]))  # 1 beyond 31 x 60, in the next step

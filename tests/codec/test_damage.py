@@ -196,7 +196,7 @@ def test_positions_of_errors_count_from_the_start_of_the_stream() -> None:
     }
 
 
-def test_salvage_tells_what_was_lost() -> None:
+def test_salvaging_reports_what_was_lost() -> None:
     data = stream("both in sections")
     bad = bytearray(data)
     at = start_codes(data)[1] + 4
@@ -209,7 +209,7 @@ def test_salvage_tells_what_was_lost() -> None:
 
 
 @pytest.mark.parametrize("lost", [1, 4, 20])
-def test_a_stream_that_one_joins_in_the_middle(lost: int) -> None:
+def test_joining_a_stream_in_the_middle(lost: int) -> None:
     """Without the object's start code: salvaging starts at the first I plane behind a plane start code."""
     data, frames = stream("body"), truth("body")
     tail = data[lost:]
@@ -331,7 +331,7 @@ def test_sections_in_any_order_and_number() -> None:
         assert len(decoder.damage) == sum(bad for _, bad in chosen)
 
 
-def test_nothing_decodable() -> None:
+def test_streams_without_decodable_planes() -> None:
     for data in (b"", b"\0", OBJECT[:3], OBJECT, b"\0\0\1\xbb", b"\0" * 1000, b"text"):
         result = checked_animation(data, "raise")
         assert isinstance(result, BitstreamError)

@@ -9,7 +9,7 @@ import pytest
 
 import fba
 from fba import Animation
-from fba.codec import EncoderOptions, EncoderStatistics, encode_with_statistics
+from fba.codec import EncoderOptions, EncoderStatistics, encode_animation
 from fba.codec._ranges import _extremes
 from fba.parameters import bap_numbers, bap_steps
 from fba.tracks import BodyTrack
@@ -35,7 +35,7 @@ def motion(columns: dict[int, list[int] | np.ndarray]) -> Animation:
 def coded(animation: Animation, **options: object) -> tuple[np.ndarray, EncoderStatistics]:
     """The BAPs that a decoder returns, as int64, and what the encoder counted."""
     chosen = EncoderOptions(**options)  # type: ignore[arg-type]
-    data, statistics = encode_with_statistics(animation, chosen)
+    data, statistics = encode_animation(animation, chosen)
     track = fba.decode(data, bap_steps=chosen.bap_steps).body
     assert track is not None
     return track.values.astype(np.int64), statistics
@@ -48,7 +48,7 @@ def angle_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("far", [4539, 0])
 @pytest.mark.parametrize("clamp", [True, False])
-def test_a_turn_past_half_a_turn_keeps_its_way(clamp: bool, far: int) -> None:
+def test_a_turn_past_half_a_turn_keeps_its_direction(clamp: bool, far: int) -> None:
     """Frames 57 to 61 of a capture that came out turned round: no I plane carries a root 4.5 m away."""
     turn = [312233, 313766, -313255, -312200, -311524]
     walk = [0, 0, 3000, *[far] * 5]
@@ -64,7 +64,7 @@ def test_a_turn_past_half_a_turn_keeps_its_way(clamp: bool, far: int) -> None:
     assert statistics.intra_planes == (1 if clamp else 2)
 
 
-def test_an_angle_beyond_half_a_turn_starts_within() -> None:
+def test_a_first_angle_beyond_half_a_turn_is_moved_within() -> None:
     """No I plane carries 7 rad; 7 - 2 pi is the same direction."""
     got, statistics = coded(motion({TURN: [700_000, 710_000]}), bap_steps="visage", clamp=True)
     assert angle_between(got[:, TURN - 1], np.array([700_000, 710_000])).max() <= 86
@@ -80,7 +80,7 @@ def test_i_planes_that_are_due_are_written_where_a_person_turns_round_and_round(
     assert statistics.clamped == 0
 
 
-def test_the_plane_that_misses_by_less_is_taken() -> None:
+def test_the_plane_with_the_smaller_error_is_chosen() -> None:
     """A root that is 4 mm, or 2 m, beyond what I planes carry, and that jumps sideways by 5 m."""
     near = motion({FORWARD: [3000, 3724, 3724], SIDEWAYS: [-2000, 3000, 3000]})
     got, statistics = coded(near, bap_steps="visage", clamp=True)
@@ -96,7 +96,7 @@ def test_the_plane_that_misses_by_less_is_taken() -> None:
     assert named.off == 1280
 
 
-def test_a_value_that_stays_too_far_is_named_by_its_worst_frame() -> None:
+def test_a_value_out_of_reach_is_reported_with_its_worst_frame() -> None:
     got, statistics = coded(motion({FORWARD: [5000, 6000, 6000, 6000]}), bap_steps="visage", clamp=True)
     assert got[:, FORWARD - 1].tolist() == [3720, 6000, 6000, 6000]
     named = statistics.clamped_parameters[f"BAP {FORWARD} HumanoidRoot_tr_frontal"]
@@ -106,7 +106,7 @@ def test_a_value_that_stays_too_far_is_named_by_its_worst_frame() -> None:
 @pytest.mark.parametrize("table", ["iso", "visage"])
 @pytest.mark.parametrize("quant", SCALES)
 @pytest.mark.parametrize("period", [None, 0.5])
-def test_every_value_is_sent_or_named(table: str, quant: int, period: float | None) -> None:
+def test_every_value_is_sent_or_reported(table: str, quant: int, period: float | None) -> None:
     """Angles that wander through many turns, written within +-pi, and a root that wanders off."""
     random = np.random.default_rng(3)
     angles = np.cumsum(random.normal(0, 20_000, (150, 3)), axis=0) + random.normal(0, 200_000, (1, 3))
@@ -131,7 +131,7 @@ def test_every_value_is_sent_or_named(table: str, quant: int, period: float | No
         assert statistics.clamped == 0
 
 
-def test_without_clamp_values_stay_what_they_are() -> None:
+def test_without_clamp_values_do_not_change() -> None:
     """Only the pose must be kept with clamp; without, a decoder returns the very numbers."""
     turn = [0, 170_000, 312_800, -312_800, -170_000]
     got, statistics = coded(motion({TURN: turn}), bap_steps="visage")
@@ -139,7 +139,7 @@ def test_without_clamp_values_stay_what_they_are() -> None:
     assert statistics.intra_planes == 2
 
 
-def test_ranges_of_angles_are_those_of_the_short_way() -> None:
+def test_ranges_of_angles_fit_the_shorter_turns() -> None:
     """From 310,000 to -308,318 it is 10,000, as before: 618,318 would cost bits in every frame."""
     values = np.array([[300_000], [310_000], [-308_318]], dtype=np.int32)
     extremes = np.zeros((4, 1), dtype=np.int64)

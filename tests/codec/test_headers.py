@@ -124,9 +124,7 @@ def resting() -> Animation:
 
 @given(plane_settings(True), plane_settings(False))
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_written_elements_as_the_independent_reader_names_them(
-    one: PlaneSettings, two: PlaneSettings
-) -> None:
+def test_the_independent_reader_reads_the_written_elements(one: PlaneSettings, two: PlaneSettings) -> None:
     data = encode_planes(resting(), [one, two])
     elements = list(trace(data))
     position = 0
@@ -197,7 +195,7 @@ def test_sizes_of_the_groups() -> None:
     assert sum(len(group) for group in bap_groups()) == 296
 
 
-def test_warned_time_codes() -> None:
+def test_time_codes_with_warnings() -> None:
     """Time codes that a second plane puts back are told of by the decoder (the settings keep them)."""
     part = PartSettings((0,) * 10, np.zeros(68, dtype=bool))
     planes = [

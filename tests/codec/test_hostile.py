@@ -70,7 +70,7 @@ def behind_start_code(bits: str) -> tuple[bytes, int]:
         ),
     ],
 )
-def test_what_is_reserved_or_contradictory(bits: str, at: int, message: str) -> None:
+def test_reserved_or_contradictory_values(bits: str, at: int, message: str) -> None:
     """Each tells plane and bit; salvaging goes on behind the next start code."""
     data, start = behind_start_code(bits + "1" * 40)
     frames, error, _ = decoded(data)

@@ -101,7 +101,7 @@ def test_the_same_error_whatever_the_chunks(data: st.DataObject) -> None:
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_a_frame_comes_with_the_byte_that_holds_its_last_bit(name: str) -> None:
+def test_a_frame_comes_with_the_byte_of_its_last_bit(name: str) -> None:
     data = stream(name)
     decoder = Decoder()
     came = {}
@@ -129,7 +129,7 @@ def test_a_stream_that_ends_in_half_a_start_code() -> None:
         assert len(frames) == 12
 
 
-def test_errors_wait_until_the_frames_before_them_were_given() -> None:
+def test_errors_come_after_the_frames_before_them() -> None:
     good = packed(jaw_intra(5) + jaw_predicted(-2))
     bad = b"\0\0\1\xbb" + b"\x80"  # an I plane with fba_object_mask 0
     decoder = Decoder()
@@ -234,7 +234,7 @@ def test_frames_leave_the_encoder_one_behind() -> None:
         encoder.push(animation[0])
 
 
-def test_an_encoder_refuses_what_does_not_go_on() -> None:
+def test_an_encoder_refuses_frames_that_cannot_follow() -> None:
     face = motion.face(3)
     encoder = Encoder()
     with pytest.raises(ValueError, match="no frame to encode"):
@@ -248,7 +248,7 @@ def test_an_encoder_refuses_what_does_not_go_on() -> None:
 
 @pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("pushed", [1, 4, 9])
-def test_copies_go_on_as_their_originals_do(name: str, pushed: int) -> None:
+def test_copies_continue_like_their_originals(name: str, pushed: int) -> None:
     """A copy whose arrays are no longer parts of one another would code with some old ranges and steps."""
     animation = performance(name)
     original, begun = Encoder(), bytearray()
@@ -271,7 +271,7 @@ def test_copies_go_on_as_their_originals_do(name: str, pushed: int) -> None:
     assert frames[-1].index == 11
 
 
-def test_decoders_go_without_the_garbage_collector() -> None:
+def test_decoders_are_freed_without_the_garbage_collector() -> None:
     """Each holds megabytes, and a program that reads many short streams makes many."""
     decoder = Decoder()
     decoder.push(encode(performance("talking")))
@@ -285,7 +285,7 @@ def test_decoders_go_without_the_garbage_collector() -> None:
         gc.enable()
 
 
-def test_an_error_holds_no_bytes_and_no_models() -> None:
+def test_an_error_keeps_no_bytes_and_no_models_alive() -> None:
     """A program may collect the errors of thousands of streams."""
     data = encode(performance("walking")) + OBJECT + bytes(2_000_000)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from codec_streams import WIDEST, largest_level, steps
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack, FbaWarning, RangeError, decode, encode
-from fba.codec import encode_with_statistics
+from fba.codec import encode_animation
 from fba.parameters import baps, faps
 
 
@@ -63,7 +63,7 @@ def test_the_largest_value(table: str, part: str, numbers: tuple[int, ...], quan
     st.sampled_from(["iso", "visage"]),
 )
 @settings(max_examples=120, deadline=None)
-def test_the_quantiser_that_is_named_would_do(
+def test_the_recommended_quantiser_suffices(
     parameter: tuple[str, int], quant: int, value: int, table: str
 ) -> None:
     """... and every smaller one would not; where none is named, none would."""
@@ -92,13 +92,13 @@ def test_the_quantiser_that_is_named_would_do(
     assert not other or carried(int(other[2]), other[1])
 
 
-def test_clamped_values_are_counted_and_the_nearest_there_are() -> None:
+def test_clamped_values_are_counted_and_the_nearest_possible() -> None:
     """FAP 48 at fap_quant 1: 1860 steps of 170 in an I plane; the P planes after it catch up."""
     largest = WIDEST * 170
     animation = one_value("face", 48, [400_000, 400_000, 400_000, 0, -400_000, -400_000])
     with pytest.raises(RangeError, match="400000 cannot be carried"):
         encode(animation)
-    coded, statistics = encode_with_statistics(animation, EncoderOptions(clamp=True))
+    coded, statistics = encode_animation(animation, EncoderOptions(clamp=True))
     got = decode(coded).face
     assert got is not None
     values = got.values[:, 47].tolist()
@@ -110,7 +110,7 @@ def test_clamped_values_are_counted_and_the_nearest_there_are() -> None:
     assert statistics.clamped >= 1
     assert statistics.planes == 6
     inside = one_value("face", 48, [largest, -largest, 0])
-    _, statistics = encode_with_statistics(inside, EncoderOptions(clamp=True))
+    _, statistics = encode_animation(inside, EncoderOptions(clamp=True))
     assert statistics.clamped == 0
 
 
@@ -120,7 +120,7 @@ def test_clamping_leaves_other_parameters_alone() -> None:
     mask[:, [2, 47]] = True
     values[:, 2] = [4, 8, -12, 400]
     values[:, 47] = [1_000_000, 170, -1_000_000, 340]
-    coded, statistics = encode_with_statistics(
+    coded, statistics = encode_animation(
         Animation(Fraction(25), np.arange(4), FaceTrack(values, mask)), EncoderOptions(clamp=True)
     )
     got = decode(coded).face
@@ -156,7 +156,7 @@ def test_amounts_out_of_range(field: str, column: int, value: int) -> None:
         encode(animation())
     assert caught.value.frame == 1
     assert caught.value.limits == (0, 63)
-    coded, statistics = encode_with_statistics(animation(), EncoderOptions(clamp=True))
+    coded, statistics = encode_animation(animation(), EncoderOptions(clamp=True))
     track = decode(coded).face
     assert track is not None
     assert statistics.clamped == 1
@@ -195,6 +195,6 @@ def test_a_value_at_the_end_of_int32_is_rounded_inwards(sign: int) -> None:
     assert error.max() < 512
 
 
-def test_what_is_clamped_is_named_in_a_warning() -> None:
+def test_a_warning_names_clamped_parameters() -> None:
     with pytest.warns(FbaWarning, match=r"FAP 3 open_jaw \(3; frame 0: 90000 sent as 7440\)"):
         encode(one_value("face", 3, [90_000] * 3), EncoderOptions(clamp=True))

@@ -53,7 +53,7 @@ def test_a_plane_may_still_be_moved_when_its_first_byte_could_leave() -> None:
         assert len(list(planes_read(live, byte_aligned=True))) == count
 
 
-def test_planes_without_content_take_six_bits_all_the_same() -> None:
+def test_planes_without_content_take_six_bits() -> None:
     """The guard writes a start code before the last of them at most, not before each."""
     longer, shorter = (len(encode(face({3: [0] * count}, viseme=True))) for count in (401, 201))
     assert abs(longer - shorter - 200 * 6 / 8) <= 5

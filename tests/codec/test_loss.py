@@ -108,7 +108,7 @@ def test_frames_behind_damage_keep_their_time(rate: Fraction) -> None:
             assert abs(damage.frames_lost - len(lost)) <= damage.uncertainty
 
 
-def test_without_time_codes_lost_frames_are_estimated() -> None:
+def test_lost_frames_are_estimated_without_time_codes() -> None:
     animation = performance(400)
     data = encode(animation, replace(EVERY_SECOND, time_codes=False))
     misses = []
@@ -166,7 +166,7 @@ def test_every_bit_flipped_leaves_the_times_behind_it_alone() -> None:
     assert misread == 0
 
 
-def test_a_misread_skip_does_not_push_the_rest_away() -> None:
+def test_a_misread_skip_does_not_delay_later_frames() -> None:
     """`decode` leaves out frames that the time code behind them overtakes; a `Decoder` closes up to them."""
     rate = "1" + f"{25:08b}" + "00000"
     skipping = jaw_intra(5, time=rate + "0" + "1" + "1111" * 20 + "0000")  # 300 frames
@@ -195,7 +195,7 @@ def test_a_time_code_that_jumps_where_none_did_before_is_reported() -> None:
     assert "time code 0:00:03 says that 25 frames are missing" in str(damage)
 
 
-def test_a_damaged_time_code_is_not_followed_for_hours() -> None:
+def test_a_damaged_time_code_does_not_move_the_clock_by_hours() -> None:
     data = encode(performance(100), EVERY_SECOND)
     at = 8 * restarts(data)[1] + 32 + 4 + 13 + 1  # the first bit of the hours: 16 more
     bad = bytearray(data)
@@ -252,7 +252,7 @@ def test_damage_as_a_line_of_text() -> None:
     assert str(guessed) == "bytes 4..9 were lost: it broke; about 1 frame (give or take 2) lost"
 
 
-def test_restart_points_without_time_codes_are_expected_where_they_came_so_far() -> None:
+def test_restart_points_are_expected_at_past_intervals() -> None:
     """Half a second at 25 frames/s: 13 and 12 frames in turn. The estimate alone would be some frames off."""
     options = EncoderOptions(intra_period=Fraction(1, 2), start_codes=True, time_codes=False)
     animation = performance(200)
@@ -266,7 +266,7 @@ def test_restart_points_without_time_codes_are_expected_where_they_came_so_far()
         assert decoder.damage[0].frames_lost == len(lost)
 
 
-def test_restart_points_in_turn() -> None:
+def test_alternating_intervals_of_restart_points() -> None:
     points = RestartPoints()
     for index in (0, 13, 25, 38, 50):
         points.add(index, behind_loss=False)
@@ -277,7 +277,7 @@ def test_restart_points_in_turn() -> None:
     assert points.nearest(100) is None
 
 
-def test_a_time_code_that_was_too_high_is_taken_back() -> None:
+def test_a_time_code_that_was_too_high_is_corrected() -> None:
     """The one behind damage is believed; two behind it that agree with each other are believed more."""
     data = encode(performance(200), EVERY_SECOND)
     points = restarts(data)
@@ -291,7 +291,7 @@ def test_a_time_code_that_was_too_high_is_taken_back() -> None:
     assert animation.index.tolist() == [*range(75), *range(150, 200)]
 
 
-def test_a_single_time_code_that_goes_ahead_is_taken_back_by_the_next() -> None:
+def test_the_next_time_code_corrects_a_jump_ahead() -> None:
     data = bytearray(encode(performance(200), EVERY_SECOND))
     at = 8 * restarts(data)[3] + 32 + 4 + 13 + 1 + 12 + 5  # 0:00:04 becomes 0:00:05
     data[at >> 3] ^= 128 >> (at & 7)

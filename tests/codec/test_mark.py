@@ -48,7 +48,7 @@ def test_the_mark_stands_behind_the_end_and_changes_nothing_else() -> None:
     assert stream("iso", clamp=True).endswith(b"fba bap_steps=iso;")
 
 
-def test_what_needs_no_mark_has_none() -> None:
+def test_faces_and_unquantised_bodies_need_no_mark() -> None:
     values, mask = np.zeros((3, 68), np.int32), np.zeros((3, 68), bool)
     mask[:, 2] = True
     face = Animation(25, range(3), FaceTrack(values, mask))  # type: ignore[arg-type]
@@ -57,7 +57,7 @@ def test_what_needs_no_mark_has_none() -> None:
     assert not marked_table(stream(bap_quant=0))  # unquantised: the same under every table
 
 
-def test_decoders_go_by_the_mark() -> None:
+def test_decoders_use_the_table_of_the_mark() -> None:
     data = stream()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -70,7 +70,7 @@ def test_decoders_go_by_the_mark() -> None:
     assert probe_stream(stream(mark=False)).bap_steps is None
 
 
-def test_streams_one_after_another_each_go_by_their_own() -> None:
+def test_joined_streams_each_use_their_mark() -> None:
     plain, iso = stream(mark=False), stream("iso", mark=True)
     unmarked = shoulder(fba.decode(plain))
     for parts, wanted in (
@@ -84,7 +84,7 @@ def test_streams_one_after_another_each_go_by_their_own() -> None:
     assert marked_table(stream() + iso) is None
 
 
-def test_a_mark_says_nothing_of_objects_behind_the_next() -> None:
+def test_a_mark_applies_only_to_the_object_before_it() -> None:
     """The second object has user data, but no mark: it is not "visage", as the first."""
     data = stream() + stream(mark=False) + b"\0\0\1\xb2somebody's words"
     with warnings.catch_warnings():
@@ -95,7 +95,7 @@ def test_a_mark_says_nothing_of_objects_behind_the_next() -> None:
 
 
 @pytest.mark.parametrize("size", [1, 7, 100])
-def test_a_decoder_that_was_not_told_says_so_at_the_end(size: int) -> None:
+def test_a_decoder_with_the_wrong_table_warns_at_the_end(size: int) -> None:
     data, decoder = stream(), Decoder()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -112,13 +112,13 @@ def test_a_decoder_that_was_not_told_says_so_at_the_end(size: int) -> None:
     assert told.mark == "visage"
 
 
-def test_what_is_asked_for_is_done_in_spite_of_the_mark() -> None:
+def test_a_given_table_overrides_the_mark() -> None:
     with pytest.warns(FbaWarning, match="made with the BAP steps 'visage'"):
         decoded = fba.decode(stream(), bap_steps="iso")
     assert decoded == fba.decode(stream(mark=False), bap_steps="iso")
 
 
-def test_salvage_knows_the_mark() -> None:
+def test_salvaging_uses_the_mark() -> None:
     options = EncoderOptions(bap_steps="visage", checksums=False, start_codes=True, intra_period=0.2)
     data = bytearray(fba.encode(body(40), options))
     data[3] = 0  # the object start code is lost
@@ -129,20 +129,20 @@ def test_salvage_knows_the_mark() -> None:
 
 
 @pytest.mark.parametrize("cut", range(1, len(MARK) - 3))
-def test_a_mark_that_was_cut_off_is_said(cut: int) -> None:
+def test_a_mark_that_was_cut_off_gives_a_warning(cut: int) -> None:
     data = stream()[:-cut]
     assert marked_table(data) is None
     with pytest.warns(FbaWarning, match="a mark of the stream was cut off or is damaged"):
         assert fba.decode(data) == fba.decode(stream(mark=False))
 
 
-def test_a_table_of_the_future_is_named() -> None:
+def test_an_unknown_table_is_named() -> None:
     data = stream(mark=False) + MARK.replace(b"visage", b"better")
     with pytest.warns(FbaWarning, match="made with the BAP steps 'better', which are not known here"):
         assert fba.decode(data) == fba.decode(stream(mark=False))
 
 
-def test_other_user_data_and_data_inside_are_no_mark() -> None:
+def test_other_user_data_are_not_a_mark() -> None:
     plain = stream(mark=False)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -176,7 +176,7 @@ def test_a_mark_before_the_object_counts_from_the_first_plane_on(size: int) -> N
             assert [one["bap"][SHOULDER + 1] for one in found] == RIGHT
 
 
-def test_streams_in_a_pipe_each_go_by_what_is_before_them() -> None:
+def test_streams_in_a_pipe_use_the_table_before_them() -> None:
     other = write_opening("iso") + stream("iso", mark=False)
     iso = shoulder(fba.decode(stream("iso", mark=False)))
     with warnings.catch_warnings():
@@ -194,7 +194,7 @@ def test_streams_in_a_pipe_each_go_by_what_is_before_them() -> None:
         (stream(mark=False) + MARK + b"colour=red;", "cut off or is damaged"),
     ],
 )  # fmt: skip
-def test_marks_that_contradict_or_are_damaged_are_said(data: bytes, said: str) -> None:
+def test_contradictory_or_damaged_marks_give_warnings(data: bytes, said: str) -> None:
     for read in (lambda: fed(data, 1), lambda: fed(data, 50), lambda: fba.decode(data)):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
@@ -211,7 +211,7 @@ def test_the_second_decoder_reads_nothing_behind_the_end() -> None:
     assert names[-2:] == [("user_data_start_code", 0x1B2), ("user_data", "fba bap_steps=visage;")]
 
 
-def test_files_say_their_table(tmp_path: object) -> None:
+def test_files_contain_their_table(tmp_path: object) -> None:
     path = f"{tmp_path}/a.fba"
     for options, marked in (({"bap_steps": "visage"}, "visage"), ({}, "iso"), ({"mark": False}, None),
                             ({"bap_steps": "visage", "mark": False}, None)):  # fmt: skip

@@ -69,7 +69,7 @@ def test_planes_in_an_order_that_cannot_be_coded(planes: list[PlaneSettings], me
         encode_planes(jaw(0), planes)
 
 
-def test_a_value_that_the_ranges_do_not_hold() -> None:
+def test_a_value_outside_the_ranges() -> None:
     """By default, levels are within 1860: 1860 x 4 = 7440 for FAP 3."""
     with pytest.raises(
         RangeError, match="plane 0 codes the value 99999 as level 25000, which the ranges"
@@ -128,7 +128,7 @@ def test_frames_that_come_too_late_for_an_encoder() -> None:
         encoder.push_animation(first)
 
 
-def test_a_description_as_plain_numbers() -> None:
+def test_a_description_for_json() -> None:
     planes = [replace(INTRA, skip=2), predicted(11), predicted(12)]
     stream = encode_planes(jaw(0, 4, 8), planes)
     info = probe(stream)
@@ -146,7 +146,7 @@ def test_a_description_as_plain_numbers() -> None:
     assert (plain["intra_planes"], plain["start_codes"], plain["damage"]) == (1, 0, [])
 
 
-def test_decoded_frames_of_nothing_and_of_a_part_that_comes_late() -> None:
+def test_a_frame_buffer_without_frames_and_with_a_late_part() -> None:
     frames = FrameBuffer()
     with pytest.raises(ValueError, match="there is no frame to make an animation of"):
         frames.decoded().animation()

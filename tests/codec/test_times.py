@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from codec_streams import END, OBJECT, RATES, decoded, jaw_intra, packed
 from fba import Animation, Decoder, EncoderOptions, FbaWarning, RangeError, decode, encode
 from fba.codec import Block, FrameBuffer, FrameRate, PlaneSettings, TimeCode, encode_planes
-from fba.codec._compact_buffer import CompactBuffer
+from fba.codec._frame_buffers import CompactBuffer
 from fba.limits import DEFAULT_LIMITS
 from tools import synthetic_motion as motion
 
@@ -110,7 +110,7 @@ def test_an_animation_that_starts_at_a_whole_second(rate: Fraction, seconds: int
 
 
 @pytest.mark.parametrize("start", [1, 13, -25, 25 * 32 * 3600, 10**15])
-def test_a_start_that_no_time_code_says(start: int) -> None:
+def test_a_start_without_a_possible_time_code(start: int) -> None:
     animation = motion.animation(motion.face(2, faps_sent=(3,)), index=[start, start + 1])
     with pytest.warns(FbaWarning, match=r"starts at .* s, which no time code says; the stream starts at 0"):
         coded = encode(animation)
@@ -169,7 +169,7 @@ def test_a_rate_that_changes() -> None:
         ((FrameRate(255, 1), FrameRate(30, 0, 1), FrameRate(255, 15)), Fraction(4095, 16)),
     ],
 )
-def test_rates_that_change_have_one_in_common(rates: tuple[FrameRate, ...], common: Fraction) -> None:
+def test_rates_that_change_get_a_common_rate(rates: tuple[FrameRate, ...], common: Fraction) -> None:
     """The lowest that holds all times, or the highest of the stream; however it is cut into blocks."""
     planes = [replace(INTRA, frame_rate=rate) if not t else PREDICTED for rate in rates for t in range(40)]
     data = written(*planes)
@@ -196,7 +196,7 @@ def test_rates_that_change_have_one_in_common(rates: tuple[FrameRate, ...], comm
 
 
 @pytest.mark.filterwarnings("ignore:.*the frame rate changes")
-def test_a_common_rate_holds_the_time_codes_too() -> None:
+def test_a_common_rate_makes_time_codes_exact() -> None:
     """60000/1001 frames/s would hold both rates, but not a frame at 8 s sharp."""
     data = written(
         replace(INTRA, frame_rate=FrameRate(30, 0, 1)),
@@ -227,7 +227,7 @@ def test_masks_that_change_from_plane_to_plane() -> None:
     assert [(np.flatnonzero(row) + 1).tolist() for row in face.mask] == sent
 
 
-def test_a_rate_said_again_changes_nothing() -> None:
+def test_a_repeated_rate_changes_nothing() -> None:
     rate = FrameRate(30, 0, 1)
     planes = [replace(INTRA, frame_rate=rate)] * 3
     frames, error, _ = decoded(written(*planes))
@@ -235,7 +235,7 @@ def test_a_rate_said_again_changes_nothing() -> None:
     assert [frame.time for frame in frames] == [0, Fraction(1001, 30000), Fraction(2002, 30000)]
 
 
-def test_time_codes_on_the_way() -> None:
+def test_time_codes_within_a_stream() -> None:
     data = written(
         replace(INTRA, frame_rate=FrameRate(25), time_code=TimeCode(0, 0, 7)),
         PREDICTED,
@@ -256,7 +256,7 @@ def test_time_codes_on_the_way() -> None:
         ),
     ],
 )
-def test_time_codes_that_are_not_followed(code: TimeCode, message: str) -> None:
+def test_time_codes_that_are_ignored(code: TimeCode, message: str) -> None:
     data = written(
         replace(INTRA, frame_rate=FrameRate(25), time_code=TimeCode(0, 0, 7)), replace(INTRA, time_code=code)
     )
@@ -264,7 +264,7 @@ def test_time_codes_that_are_not_followed(code: TimeCode, message: str) -> None:
         assert decode(data).index.tolist() == [175, 176]
 
 
-def test_no_rate_at_all() -> None:
+def test_a_stream_without_a_rate() -> None:
     data = OBJECT + packed(jaw_intra(5, time="000")) + END
     with pytest.warns(FbaWarning, match="the first I plane says no frame rate; 25 frames/s assumed"):
         assert decode(data).rate == 25

@@ -15,7 +15,7 @@ POINTS = RNG.normal(size=(12, 3))
 
 
 @pytest.mark.parametrize("reflected", [False, True])
-def test_a_similarity_is_found_again(reflected: bool) -> None:
+def test_a_similarity_is_recovered(reflected: bool) -> None:
     turn = TURN @ np.diag([-1.0, 1.0, 1.0]) if reflected else TURN
     fit = fit_similarity(POINTS, 2.5 * POINTS @ turn.T + (4, -1, 2), reflected=reflected)
     assert fit.rotation == pytest.approx(turn, abs=1e-12)
@@ -25,7 +25,7 @@ def test_a_similarity_is_found_again(reflected: bool) -> None:
 
 
 @pytest.mark.parametrize(("signs", "determinant"), [((1, 1, 1), 1), ((-1, 1, 1), -1)])
-def test_a_fit_of_either_hand_takes_the_closer(signs: tuple[int, int, int], determinant: int) -> None:
+def test_a_fit_may_be_a_rotation_or_a_reflection(signs: tuple[int, int, int], determinant: int) -> None:
     fit = fit_similarity(POINTS, POINTS @ TURN.T * signs, reflected=None)
     assert np.linalg.det(fit.rotation) == pytest.approx(determinant)
     assert float(fit.misfit) == pytest.approx(0, abs=1e-12)
@@ -49,7 +49,7 @@ def test_a_given_rotation_leaves_size_and_place_to_fit() -> None:
     assert float(fit.error) == 1
 
 
-def test_flat_points_are_laid_in_space() -> None:
+def test_flat_points_are_fitted_in_space() -> None:
     flat = POINTS[:, :2]
     targets = 3 * np.column_stack([flat, np.zeros(12)]) @ TURN.T + (4, -1, 2)
     assert fit_similarity(flat, targets).apply(flat) == pytest.approx(targets)
@@ -72,7 +72,7 @@ def test_noisy_points_fit_as_in_scipy() -> None:
     assert fit_similarity(POINTS, targets, weights).rotation == pytest.approx(expected.as_matrix(), abs=1e-9)
 
 
-def test_several_fits_at_once_are_those_of_each() -> None:
+def test_several_fits_at_once_equal_single_fits() -> None:
     several = RNG.normal(size=(4, 12, 3))
     fits = fit_similarity(several, several @ TURN.T * 3)
     assert fits.rotation == pytest.approx(np.tile(TURN, (4, 1, 1)), abs=1e-12)

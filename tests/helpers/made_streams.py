@@ -18,7 +18,7 @@ import numpy as np
 import fba
 from fba import Animation, BodyTrack, EncoderOptions
 from fba.body import gait
-from fba.codec import encode_with_statistics
+from fba.codec import encode_animation
 from fba.formats.step_choice import UNSURE, choose_steps
 from fba.parameters import BapTable, bap_numbers
 
@@ -54,7 +54,7 @@ def made_streams(count: int, seed: int = 13) -> Iterator[Made]:
             "clamp": True,
         }
         unmarked, marked = (
-            encode_with_statistics(animation, EncoderOptions(mark=mark, **given))[0] for mark in (False, True)
+            encode_animation(animation, EncoderOptions(mark=mark, **given))[0] for mark in (False, True)
         )
         yield Made(kind, table, unmarked, marked)
 

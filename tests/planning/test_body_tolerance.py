@@ -73,7 +73,7 @@ def test_a_body_stays_within_a_centimetre_in_far_fewer_bytes(gesture: tuple[byte
     )
 
 
-def test_frames_between_which_a_player_finds_the_same_are_left_out(
+def test_frames_that_a_player_can_interpolate_are_left_out(
     gesture: tuple[bytes, NearLossless],
 ) -> None:
     data, near = gesture
@@ -160,7 +160,7 @@ def test_a_bend_of_the_spine_needs_few_vertebrae() -> None:
     np.testing.assert_array_equal(reduce_joints(target, 1e-9), values)
 
 
-def test_room_of_a_bap_reaches_to_the_tolerance_and_no_further() -> None:
+def test_the_room_of_a_bap_reaches_to_the_tolerance_and_no_further() -> None:
     """A turn about z through the origin, of points at 1 and 2 along x: the farther one has least room."""
     points = np.array([[[1.0, 0, 0], [2.0, 0, 0]]], dtype=np.float32)
     errors = np.zeros_like(points)
@@ -178,7 +178,7 @@ def test_room_of_a_bap_reaches_to_the_tolerance_and_no_further() -> None:
     assert low == high == pytest.approx(-3.0, abs=1e-3)
 
 
-def test_rows_stand_for_all_points_of_rigid_parts() -> None:
+def test_rows_represent_all_points_of_rigid_parts() -> None:
     skeleton = Skeleton.default()
     whole = BodyRows(skeleton, set())
     assert len(whole.joints) < 60  # of 261

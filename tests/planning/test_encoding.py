@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import fba
-from fba import Animation, BodyTrack, EncoderOptions, FaceTrack, codec
+from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
+from fba.codec import encode_animation
 from fba.face import FaceModel
 from fba.planning import (
     BitRate,
@@ -44,10 +45,10 @@ HEAD = FaceModel.default()
 @pytest.mark.parametrize(
     ("animation", "options", "keywords", "expected"),
     [
-        (FACE, None, {}, lambda: codec.encode(FACE)),
-        (FACE, None, {"fap_quant": 4}, lambda: codec.encode(FACE, EncoderOptions(fap_quant=4))),
-        (BOTH, VISAGE, {}, lambda: codec.encode(BOTH, VISAGE)),
-        (BOTH, VISAGE, {"preset": "reference"}, lambda: codec.encode(BOTH, VISAGE)),
+        (FACE, None, {}, lambda: encode_animation(FACE)[0]),
+        (FACE, None, {"fap_quant": 4}, lambda: encode_animation(FACE, EncoderOptions(fap_quant=4))[0]),
+        (BOTH, VISAGE, {}, lambda: encode_animation(BOTH, VISAGE)[0]),
+        (BOTH, VISAGE, {"preset": "reference"}, lambda: encode_animation(BOTH, VISAGE)[0]),
         (BOTH, VISAGE, {"preset": "exact"}, lambda: encode_planned(BOTH, VISAGE)[0]),
         (FACE, None, {"preset": "compact"}, lambda: encode_planned(FACE, preset="compact")[0]),
         (FACE, EncoderOptions(preset="compact"), {}, lambda: encode_planned(FACE, preset="compact")[0]),
@@ -100,7 +101,7 @@ def test_every_choice_makes_the_stream_of_its_function(
         ((FACE,), {"bit_rate": 1500, "bap_quant": 2, "intra_period": 2}, "leave bap_quant and intra_period"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_encoded_says_what_to_do(
+def test_errors_say_what_can_be_encoded(
     arguments: tuple[Any, ...], keywords: dict[str, Any], text: str
 ) -> None:
     with pytest.raises(fba.OptionError, match=re.escape(text)):

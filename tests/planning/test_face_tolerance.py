@@ -129,7 +129,7 @@ def test_visemes_and_expressions_are_kept_and_no_frame_of_them_left_out() -> Non
     assert measure(spoken, data)[0] <= 0.5
 
 
-def test_a_fap_at_0_holds_against_its_mate_and_against_a_viseme() -> None:
+def test_a_fap_sent_as_0_overrides_its_mate_and_a_viseme() -> None:
     values = np.zeros((40, 68), dtype=np.int32)
     values[:, 31 - 1] = np.rint(60 * np.sin(np.arange(40) / 5)) * 2  # raise_l_i_eyebrow
     brows = Animation(
@@ -229,7 +229,7 @@ def test_wrong_tolerances() -> None:
             Tolerance(**wrong)
 
 
-def test_slopes_hold_up_to_where_a_closed_jaw_would_open() -> None:
+def test_slopes_are_valid_until_a_closed_jaw_would_open() -> None:
     basis = ErrorBasis(DisplacementMeter(FaceModel.default()), Tolerance())
     shown = np.zeros((2, 68))
     shown[:, 2] = -50, 300  # open_jaw: below 0 it moves nothing

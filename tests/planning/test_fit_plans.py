@@ -110,7 +110,7 @@ def test_a_mate_that_the_table_needs_is_sent_and_one_that_it_gives_is_not_copied
     )
 
 
-def test_a_fap_held_at_0_against_the_table_is_sent() -> None:
+def test_a_fap_at_0_that_overrides_the_table_is_sent() -> None:
     table = InterpolationTable([Link(["open_jaw"], {"push_t_lip": share("open_jaw", 1.0)})])
     animation = moving(open_jaw=np.arange(LENGTH) * 4)
     assert animation.face is not None

@@ -64,7 +64,7 @@ def test_what_the_head_computes_is_not_sent(head: FaceModel) -> None:
     assert sent.interpolated[:, R_CORNER - 1].all()
 
 
-def test_what_the_head_gets_wrong_by_too_much_is_sent(head: FaceModel) -> None:
+def test_faps_with_too_large_errors_are_sent(head: FaceModel) -> None:
     """The lip is 50 units off: 50 / 1024 of the distance from nose to mouth, about 1 mm."""
     jaw = walk(1)
     given = face(f3=jaw, f4=jaw // 2 + 50, f5=0 * jaw)

@@ -56,7 +56,7 @@ def sent_at(data: bytes) -> list[set[int]]:
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_all_that_is_shown_comes_back(seed: int) -> None:
+def test_all_shown_values_come_back(seed: int) -> None:
     rng = np.random.default_rng(seed)
     options = made_options(rng)
     animation = made_animation(seed)
@@ -87,7 +87,7 @@ def test_a_plane_leaves_when_the_next_frame_comes() -> None:
     assert encoder.statistics.planes == 40
 
 
-def test_mates_are_sent_from_the_frame_on_at_which_they_part() -> None:
+def test_mates_are_sent_from_the_frame_at_which_they_differ() -> None:
     left = np.arange(40) % 9
     right = np.where(np.arange(40) < 20, left, -left)
     data, encoder = encoded(face_of({19: left, 20: right}))
@@ -105,7 +105,7 @@ def test_what_is_0_is_not_sent_before_it_moves() -> None:
     assert encoder.statistics.intra_planes == 2
 
 
-def test_ranges_reach_twice_as_far_as_changes_that_broke_them() -> None:
+def test_ranges_become_twice_as_wide_as_changes_beyond_them() -> None:
     values = np.full(60, 5)
     values[20:] += 100  # more than 60 at once: an I plane
     values[30:] += 190  # less than twice that: none
@@ -129,7 +129,7 @@ def test_a_face_with_expressions_is_sent_as_it_comes(start: int) -> None:
     assert_same_shown(encoded(animation)[0], animation, EncoderOptions())
 
 
-def test_what_cannot_be_kept_is_said() -> None:
+def test_a_warning_says_what_cannot_be_kept() -> None:
     animation = face_of({19: 5, 20: 5}, 3)
     assert animation.face is not None
     mask = np.array(animation.face.mask)

@@ -9,7 +9,7 @@ import pytest
 
 import fba
 from fba import Animation, EncoderOptions, FaceTrack
-from fba.codec import level_bits
+from fba.planning._code_lengths import level_bits
 from fba.planning._paths import Bounds, find_path
 
 

@@ -12,13 +12,20 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
-from fba.codec import Encoder, coarsest_quantisers, count_rounded, encode, exact_quantisers, quantise
+from fba.codec import (
+    Encoder,
+    coarsest_quantisers,
+    count_rounded,
+    encode_animation,
+    exact_quantisers,
+    quantise,
+)
+from fba.encoder_options import PRESETS
 from fba.errors import FbaWarning, OptionError
 from fba.face.resolve import resolve, shown_faps
 from fba.parameters import faps
 from fba.planning import encode_planned, plan_compact, plan_exact
 from fba.planning._segments import Cuts, cheapest_segments, find_cuts
-from fba.presets import PRESETS
 from made_motion import LENGTH, MATES, made_animation, made_face, made_options
 
 
@@ -29,7 +36,7 @@ def held(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", range(24))
 @pytest.mark.parametrize("preset", ["exact", "compact"])
-def test_a_face_shows_the_same_and_a_body_holds_the_same(seed: int, preset: str) -> None:
+def test_a_face_shows_the_same_and_a_body_has_the_same_values(seed: int, preset: str) -> None:
     animation = made_animation(seed)
     rng = np.random.default_rng(seed)
     options = made_options(rng)
@@ -72,7 +79,7 @@ def test_what_a_player_derives_is_not_sent() -> None:
     assert np.array_equal(shown_faps(decoded).values, values)
 
 
-def test_sides_that_part_late_are_worth_an_i_plane() -> None:
+def test_sides_that_differ_late_get_an_i_plane() -> None:
     rng = np.random.default_rng(3)
     values = np.zeros((600, 68), dtype=np.int32)
     for one, other in MATES:
@@ -87,7 +94,7 @@ def test_sides_that_part_late_are_worth_an_i_plane() -> None:
     assert plan.animation.face.mask[200].sum() * 2 == plan.animation.face.mask[400].sum()
 
 
-def test_what_comes_later_is_not_sent_before() -> None:
+def test_faps_that_come_later_are_not_sent_before() -> None:
     rng = np.random.default_rng(4)
     values = np.cumsum(rng.integers(-1, 2, (200, 68)), axis=0).astype(np.int32) * 2
     values[:, :2] = 0
@@ -109,7 +116,7 @@ def test_a_still_side_beside_one_that_moves_is_sent() -> None:
         assert track.mask[:, [30, 31]].all()
 
 
-def test_a_fap_held_at_0_against_a_viseme_is_sent() -> None:
+def test_a_fap_at_0_that_overrides_a_viseme_is_sent() -> None:
     mask = np.zeros((20, 68), dtype=bool)
     mask[:, [0, 2]] = True  # the viseme, and open_jaw
     viseme = np.tile(np.array([10, 0, 63, 0], dtype=np.int16), (20, 1))
@@ -145,7 +152,7 @@ def test_segments_are_the_cheapest_of_all() -> None:
         assert sum(bits[a, b] for a, b in cheapest_segments(bits, cuts)) == least
 
 
-def test_cuts_are_where_they_must_be_and_few() -> None:
+def test_cuts_are_few_and_include_all_needed() -> None:
     needed = np.zeros(100_000, dtype=bool)
     needed[[7, 77_777]] = True
     cuts = find_cuts(needed)
@@ -208,12 +215,12 @@ def test_presets_of_options_are_those_of_plans() -> None:
         sizes.append(len(data))
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[2] < sizes[0]
-    assert fba.encode(animation) == encode(animation)
+    assert fba.encode(animation) == encode_animation(animation)[0]
     with pytest.raises(OptionError, match=r"the preset 'compact' needs all frames.*fba\.encode"):
         Encoder(EncoderOptions(preset="compact"))
 
 
-def test_what_a_plan_clamps_is_said() -> None:
+def test_values_that_a_plan_clamps_are_reported() -> None:
     values = np.zeros((3, 68), dtype=np.int32)
     values[1, 2] = 1 << 24
     animation = Animation(25, np.arange(3), FaceTrack(values, np.ones_like(values, dtype=bool)))
@@ -266,7 +273,7 @@ def test_values_between_steps_become_those_of_the_reference_encoder() -> None:
     assert np.array_equal(face.values, reference.values)
 
 
-def test_masks_are_kept_where_that_is_asked_for() -> None:
+def test_masks_are_kept_on_request() -> None:
     values = np.zeros((30, 68), dtype=np.int32)
     values[:, 47] = np.arange(30) * 170
     mask = np.ones((30, 68), dtype=bool)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -17,7 +18,8 @@ from fba.errors import OptionError, RangeError
 from fba.face.resolve import resolve
 from fba.parameters import bap_steps, fap_steps
 from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate, measure_errors
-from fba.planning.rate._visibility import slot_weights
+from fba.planning.rate._encoder import TUNING
+from fba.planning.rate._errors import error_weights
 
 VISAGE = EncoderOptions(bap_steps="visage", clamp=True, mark=False)
 FACE = [3, 4, 5, 6, 7, 12, 13, 14, 19, 20, 23, 24, 31, 32, 48, 49, 50]
@@ -126,9 +128,9 @@ def test_every_plane_fits_the_buffer(kind: str, fps: Fraction | int, rate: float
 
 
 @pytest.mark.parametrize("kind", ["shock", "noise"])
-def test_planes_fit_however_little_is_given_up(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fba.planning.rate._encoder.COARSEST", 1e-9)
-    monkeypatch.setattr("fba.planning.rate._encoder.FULL", 10.0)
+def test_planes_fit_even_if_hardly_any_error_is_allowed(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    generous = replace(TUNING, max_error=1e-9, full_share=10.0)
+    monkeypatch.setattr("fba.planning.rate._encoder.TUNING", generous)
     animation = made(kind)
     encoder = RateEncoder(950, 1.0, VISAGE, finest=0)
     data = encoder.push_animation(animation) + encoder.finish()
@@ -204,7 +206,7 @@ def test_what_players_derive_is_not_sent() -> None:
 
 
 @pytest.mark.parametrize("whole", [True, False])
-def test_a_buffer_that_no_i_plane_fits_says_which_does(whole: bool) -> None:
+def test_an_error_names_a_buffer_that_an_i_plane_fits(whole: bool) -> None:
     animation = made("speech", 30)
 
     def encode(rate: float, buffer: float) -> bytes:
@@ -257,7 +259,7 @@ def test_a_bit_rate_decides_where_i_planes_come() -> None:
         RateEncoder(900, 1.0, EncoderOptions(intra_period=1))
 
 
-def test_an_angle_that_goes_on_past_half_a_turn_takes_the_short_way() -> None:
+def test_an_angle_that_continues_past_half_a_turn_takes_the_short_way() -> None:
     animation = made("body", 60)
     assert animation.body is not None
     values = animation.body.values.copy()
@@ -272,7 +274,7 @@ def test_an_angle_that_goes_on_past_half_a_turn_takes_the_short_way() -> None:
     assert np.abs(off).max() < 2000
 
 
-def test_what_is_still_stays_still() -> None:
+def test_still_parameters_stay_still() -> None:
     animation = made("noise", 150)
     assert animation.face is not None
     values = animation.face.values.copy()
@@ -303,7 +305,7 @@ def test_a_live_blink_is_seen() -> None:
     assert np.abs(shown - values[:, 18]).max() < 100
 
 
-def test_what_begins_later_comes_as_soon_as_there_is_room() -> None:
+def test_parameters_that_come_later_are_sent_once_there_is_room() -> None:
     animation = made("speech", 120)
     assert animation.face is not None
     mask = animation.face.mask.copy()
@@ -319,7 +321,7 @@ def test_what_begins_later_comes_as_soon_as_there_is_room() -> None:
     assert decoded.face.mask[-1, 47:50].all()
 
 
-def test_what_begins_later_and_never_fits_is_not_sent() -> None:
+def test_parameters_that_come_later_and_never_fit_are_not_sent() -> None:
     animation = made("speech", 60)
     assert animation.face is not None
     mask = animation.face.mask.copy()
@@ -345,10 +347,10 @@ def test_the_next_plane_at_no_price_and_at_any() -> None:
     encoder.settle(1)
     plane = encoder.next_plane(animation[1:2])
     assert plane is not None
-    still = plane.with_levels(plane.levels(slot_weights(), np.inf))
+    still = plane.with_levels(plane.levels(error_weights(), np.inf))
     assert still.face is not None
     assert np.array_equal(still.face.values[0], animation.face.values[0])
-    levels = plane.levels(slot_weights(), 0.0)
+    levels = plane.levels(error_weights(), 0.0)
     exact = plane.with_levels(levels)
     assert exact == animation[1:2]
     before, plane_bits = encoder.bits, plane.bits(levels)

@@ -87,7 +87,7 @@ def test_a_joint_that_rests_between_two_levels_stays_on_one() -> None:
         assert not np.diff(held(animation)[:, WRIST]).any()
 
 
-def test_it_leaves_a_level_at_the_best_time() -> None:
+def test_a_level_changes_at_the_best_time() -> None:
     """A joint that goes on after a rest is not late, as it would be with a dead zone."""
     ramp = np.concatenate([np.full(30, 10.4), np.linspace(10.4, 14.4, 40), np.full(30, 14.4)])
     assert (held(one_bap(ramp * STEP))[:, WRIST] == np.rint(np.rint(ramp * STEP) / STEP) * STEP).all()
@@ -115,7 +115,7 @@ def test_values_are_multiples_less_than_a_step_off(table: str, quant: int) -> No
     assert (np.abs(result - np.rint(values)) < steps).all()
 
 
-def test_angles_go_on_past_half_a_turn() -> None:
+def test_angles_continue_past_half_a_turn() -> None:
     turn = 2 * np.pi * 1e5
     values = np.linspace(0, 1.5 * turn, 300)
     animation = one_bap(np.rint((values + turn / 2) % turn - turn / 2), TURN)
@@ -125,7 +125,7 @@ def test_angles_go_on_past_half_a_turn() -> None:
     assert np.abs(held(animation, literal) - animation.body.values).max() < STEP
 
 
-def test_what_has_nothing_to_hold_stays_as_it_is() -> None:
+def test_animations_without_quantised_bodies_stay_as_they_are() -> None:
     values = np.zeros((4, 68), dtype=np.int32)
     face = fba.Animation(25, np.arange(4), fba.FaceTrack(values, np.ones((4, 68), dtype=bool)))
     unquantised = one_bap(np.arange(4) + 100)
@@ -133,7 +133,7 @@ def test_what_has_nothing_to_hold_stays_as_it_is() -> None:
     assert hold_still(unquantised, EncoderOptions(bap_quant=0)) is unquantised
 
 
-def test_what_is_not_sent_does_not_matter() -> None:
+def test_unsent_values_do_not_matter() -> None:
     """A hand that is sent for half of the time only is held as long as it is, and its mask stays."""
     animation = one_bap(np.full(10, 1000.0))
     assert animation.body is not None

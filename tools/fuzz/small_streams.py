@@ -8,7 +8,8 @@ from fractions import Fraction
 import numpy as np
 
 from fba.animation import Animation, FaceTrack
-from fba.codec import EncoderOptions, encode, write_mark, write_opening
+from fba.codec import EncoderOptions, write_mark, write_opening
+from fba.planning import encode
 from tools import synthetic_motion as motion
 
 _END_CODE = b"\0\0\1\xb1"

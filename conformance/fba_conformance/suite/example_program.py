@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba.codec import Damage, Decoder, EncoderOptions, encode
+from fba.codec import Damage, Decoder, EncoderOptions, encode_animation
 from fba.errors import FbaError, FbaWarning
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, BapTable
 from fba_conformance._values import HEADER, Listing, PlaneValues, block_values, read_values, trace_values
@@ -120,7 +120,7 @@ def main() -> None:
     )
     try:
         animation = animation_of(read_values(arguments.input.read_text(encoding="utf-8")), arguments.rate)
-        arguments.output.write_bytes(encode(animation, options))
+        arguments.output.write_bytes(encode_animation(animation, options)[0])
     except FbaError as error:
         sys.exit(str(error))
 

@@ -16,10 +16,10 @@ from fba.cli.coding.tolerance_options import tolerance_in_metres, tolerance_line
 from fba.cli.inputs import input_file, read_model
 from fba.cli.outputs import display_name
 from fba.cli.printing import rate_text, seconds_text
+from fba.encoder_options import PRESETS
 from fba.errors import FbaWarning
 from fba.limits import Limits
 from fba.parameters import BapTable
-from fba.presets import PRESETS
 
 if TYPE_CHECKING:
     from fba.cli.recordings.inputs import Inputs

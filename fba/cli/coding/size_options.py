@@ -12,8 +12,7 @@ from fba.cli import options
 from fba.cli.coding.rate_options import bit_rate_option, buffer_option, check_buffer
 from fba.cli.coding.tolerance_options import LengthType
 from fba.cli.option_fields import option, option_like
-from fba.encoder_options import QUANT_MAX, EncoderOptions
-from fba.presets import Preset
+from fba.encoder_options import QUANT_MAX, EncoderOptions, Preset
 
 QUANTISER = click.IntRange(0, QUANT_MAX)
 

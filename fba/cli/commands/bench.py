@@ -43,7 +43,7 @@ def command(
 
 def _measure(file: Path, rounds: int, reading: Reading) -> dict[str, Any]:
     """Return the symbols of a stream, and seconds and symbols per second of decoding and encoding it."""
-    from fba.codec import Decoder, EncoderOptions, decode, encode_with_statistics
+    from fba.codec import Decoder, EncoderOptions, decode, encode_animation
     from fba.compiled import is_compiled
 
     with input_file(file) as path:
@@ -65,7 +65,7 @@ def _measure(file: Path, rounds: int, reading: Reading) -> dict[str, Any]:
     for name, run in (
         ("decode", lambda: decode(data, bap_steps=bap_steps, limits=limits)),
         ("decode in chunks of 512 bytes", stream),
-        ("encode", lambda: encode_with_statistics(animation, encoder)),
+        ("encode", lambda: encode_animation(animation, encoder)),
     ):
         run()
         times = []

@@ -52,8 +52,9 @@ def command(
     made instead. The sample files are copied into the folder.
     """
     from fba import player
-    from fba.codec import encode, probe_stream
+    from fba.codec import probe_stream
     from fba.formats import merge, read
+    from fba.planning import encode
 
     folder = out if out is not None else Path(tempfile.mkdtemp(prefix="fba-demo-"))
     folder.mkdir(parents=True, exist_ok=True)
@@ -98,8 +99,8 @@ def command(
 
 def _encode_capture(capture: Path, stream: Path, outputs: Outputs) -> None:
     """Encode markers on a face, with the path of the head, and print what became of them."""
-    from fba.codec import encode
     from fba.formats import read
+    from fba.planning import encode
 
     face = read(capture, rate=25)
     data = encode(face, EncoderOptions(bap_steps=BAP_STEPS))

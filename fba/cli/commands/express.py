@@ -194,12 +194,12 @@ def _perform(blend: Blend, motion: _Motion, send: Sending) -> Animation:
 
 def _count_bits(blend: Blend, motion: _Motion) -> dict[str, int | None]:
     """Return the bits of the stream for each way of sending; None where FAP 2 cannot say it."""
-    from fba.codec import EncoderOptions, encode
+    from fba.codec import EncoderOptions, encode_animation
 
     bare = EncoderOptions(mark=False)
     ways: dict[Sending, bool] = {"expression": blend.fields is not None, "faps": True}
     return {
-        way: 8 * len(encode(_perform(blend, motion, way), bare)) if possible else None
+        way: 8 * len(encode_animation(_perform(blend, motion, way), bare)[0]) if possible else None
         for way, possible in ways.items()
     }
 

@@ -143,7 +143,7 @@ def _write_walk(
 def _write_stream(
     animation: Animation, output: Path, outputs: Outputs, table: BapTable, *, marked: bool
 ) -> None:
-    from fba.codec import encode
+    from fba.planning import encode
 
     step_tables.warn_of_coarse_steps(animation, table)
     options = EncoderOptions(bap_steps=table, mark=marked, clamp=True)

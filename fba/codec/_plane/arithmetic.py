@@ -9,18 +9,18 @@ inserted after every 22 zero bits in a row, so that no start code can appear.
 All counts start at 1 and grow by 1 each time their symbol is coded; at a total of 16383 they are
 halved. A model therefore stores only what was *added* to the initial counts: `added[s]`, and a Fenwick
 tree of partial sums, in which finding a symbol and raising a count take log2(size) steps: alphabets reach
-3721 symbols. One symbol of each model, `usual`, is outside its tree and needs no search: that of no change,
-the most frequent one in a predictive codec.
+3721 symbols. The symbol of no change, the most frequent in a predictive codec, is the `usual` symbol of its
+model; it is outside the tree and needs no search.
 
 The models of all slots are rows of arrays (slots, STRIDE). Coding a plane only reads them; `learn` updates
-them afterwards: a model is used at most once in a plane, so an incomplete or damaged plane changes nothing.
+them afterwards. A plane uses each model at most once, so an incomplete or damaged plane changes nothing.
 
 All functions work on NumPy arrays and plain integers, and also run uncompiled.
 
 Bounds: slots are rows of `Counts` (`coder_state.Models` makes room for a part before its first plane). In
 each row sizes are at most ALPHABET_MAX, which `header_loops.begin_models` checks, so that symbols and nodes
-of trees up to the size lie within STRIDE. That symbols are below the size, and arrays long enough, is checked
-here. IndexError for what is not so: a fault of the caller, never of a stream.
+of trees up to the size lie within STRIDE. The functions here check that symbols are below the size and that
+arrays are long enough. Otherwise they raise IndexError: a fault of the caller, never of a stream.
 """
 
 from __future__ import annotations
@@ -93,10 +93,11 @@ def decode_segment(
 
     data: the stream, valid up to bit `end`; zeros are assumed beyond. adaptive: P planes; in I planes all
     counts are 1. Returns OK and the bit after the segment, OUT_OF_DATA if it needs bits beyond `end`, or the
-    kind of damage and its bit. IndexError where `end` is beyond the data, or symbols are fewer than slots.
+    kind of damage and its bit. IndexError if `end` is beyond the data, or symbols are fewer than slots.
 
-    Bounds: bits are read before `end` only. A symbol is that whose share of the counts contains the target,
-    which is below their total, since the code stays within the interval: it is below the model's size.
+    Bounds: bits are read before `end` only. The target is below the total of the counts, since the code stays
+    within the interval. So the symbol, whose share of the counts contains the target, is below the model's
+    size.
     """
     if len(symbols) < len(slots) or end > 8 * len(data) or bit < 0:
         raise IndexError("a segment beyond its arrays")
@@ -162,7 +163,7 @@ def decode_segment(
 
 @inlined
 def _counts_below(models: Counts, slot: int, symbol: int) -> int:
-    """Return the sum of the counts of all symbols below one."""
+    """Return the sum of the counts of all symbols below this one, of the usual symbol too."""
     usual = int(models.usual[slot])
     if symbol == usual:
         return int(models.below_usual[slot])
@@ -176,8 +177,8 @@ def encode_segment(
 ) -> int:
     """Encode symbols[k] for slot slots[k] into one segment that starts at `bit`; return the bit after it.
 
-    data: zeroed from `bit` on, with room for 16 bits for each symbol and 16 more; IndexError without. The
-    same for a symbol that its model does not have, or fewer symbols than slots.
+    data: zeroed from `bit` on, with room for 16 bits for each symbol and 16 more. IndexError without that
+    room, for a symbol that its model does not have, and for fewer symbols than slots.
 
     Bounds: a symbol narrows the interval to no less than 1 / TOTAL_MAX of its size, which is more than
     QUARTER; to grow beyond that again takes at most 15 doublings, each of which writes a bit at once or
@@ -286,7 +287,7 @@ def _find(tree: UInt16, slot: int, size: int, target: int) -> tuple[int, int]:
 
 @compiled
 def _sum_below(tree: UInt16, slot: int, symbol: int) -> int:
-    """Return the sum of the counts of the symbols below this one."""
+    """Return the sum of the counts in the tree of the symbols below this one."""
     below = symbol
     node = symbol
     while node > 0:

@@ -15,7 +15,7 @@ from fba.codec.settings import RANGE_UNIT, PartSettings
 from fba.parameters import EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, BapTable, baps, faps
 
 UNDEFINED = -1
-"""Limit of a parameter without a default range, for which none was sent."""
+"""Limit of a parameter without a default range, as long as no range was sent."""
 
 _SELECTS = (0, 1, 3, 5)
 _SELECT_LIMITS = np.array(
@@ -39,9 +39,9 @@ class Models:
 
     `i_minimum`, `i_size`, `minimum`, `size`: smallest level and number of symbols, for I and P planes.
     `step`, `last`: quantiser step and last value. `lowest`, `highest`: limits of values. All are rows of
-    `state`, which also holds the adaptive models of P planes (see `arithmetic`): those of the body once one
-    comes, because they take 4 MB. The rows are looked up, never kept: in a copy they would be arrays apart
-    from its state.
+    `state`, which also has the adaptive models of P planes (see `arithmetic`); models of the body take 4 MB
+    and are made when a body comes. The rows are looked up each time: stored views would not follow a copy's
+    state.
     """
 
     i_minimum, i_size = _row(loops.I_MINIMUM), _row(loops.I_SIZE)
@@ -49,7 +49,7 @@ class Models:
     step, last = _row(loops.STEP), _row(loops.LAST)
     lowest, highest = _row(loops.LOWEST), _row(loops.HIGHEST)
 
-    def __init__(self, bap_table: BapTable = "iso") -> None:
+    def __init__(self, bap_table: BapTable) -> None:
         self.bap_table = bap_table
         self.limits = default_limits().copy()
         numbers = np.zeros((loops.NUMBERS, slots.SLOTS), dtype=np.int64)
@@ -63,7 +63,7 @@ class Models:
         self.highest[list(_SELECTS)] = _SELECT_LIMITS[list(_SELECTS)]
 
     def begin_object(self) -> None:
-        """Forget all ranges that were sent; the I planes that must come set the rest."""
+        """Forget all ranges that were sent; the next I planes set the rest of the state."""
         self.limits[:] = default_limits()
 
     def begin_intra(self, part: int, settings: PartSettings) -> None:
@@ -92,7 +92,7 @@ class Models:
         self.state.tree[: len(face.tree)] = face.tree
 
     def undefined(self, settings: PartSettings, part: int) -> int | None:
-        """Return a slot that the settings code without a range having been sent for it, or None."""
+        """Return a slot that the settings send although it has no range, or None."""
         if part == slots.FACE_BIT:
             return None
         missing = np.flatnonzero((self.limits[:, slots.BAPS] == UNDEFINED).any(axis=0) & settings.mask)
@@ -108,8 +108,9 @@ def _table(count: int) -> UInt16:
 def default_limits() -> Int64:
     """Return the default ranges, int64 (4, 372): magnitudes of I max, I min, P max, P min.
 
-    Unscaled. FAPs: symmetric, the largest limit in the standard's table rounded up to a multiple of 60; FAP
-    47 as in the reference decoder. BAPs: those of the table. Extension BAPs have none: UNDEFINED.
+    Not yet divided by the quantiser's scale. FAPs: symmetric, the largest limit in the standard's table
+    rounded up to a multiple of 60; FAP 47 as in the reference decoder. BAPs: the limits of the table.
+    Extension BAPs have no range: UNDEFINED.
     """
     limits = np.zeros((4, slots.SLOTS), dtype=np.int64)
     for fap in faps()[2:]:

@@ -23,12 +23,13 @@ BAD_RANGE_MARKER = 22
 """A marker bit in a range list is 0."""
 
 MASK_NONE, MASK_KEEP, MASK_INTERPOLATE, MASK_ALL = range(4)
-PREDICTIVE, DCT = 0, 1
+DCT = 1
+"""object_coding_type of DCT segments; 0 is predictive coding."""
 
 RANGE_BITS = 5
 MARKER_EVERY = 4
 
-# Fields of a part: quant, gender and coding type, and whether each of the four range lists is there.
+# Fields of a part: quant, gender and coding type, and whether each of the four range lists is present.
 QUANT, GENDER, CODING_TYPE, FIRST_LIST = range(4)
 FIELDS = FIRST_LIST + 4
 
@@ -60,7 +61,7 @@ def groups(part: int) -> Groups:
 
 
 class Header(NamedTuple):
-    """What is read: mask types (G,), mask bool (columns,), range codes uint8 (4, columns), fields int64."""
+    """A header: mask types (G,), mask bool (columns,), range codes uint8 (4, columns), fields int64."""
 
     types: Int64
     mask: Bool
@@ -96,7 +97,7 @@ def read_part_header(data: UInt8, bit: int, end: int, part: Groups, header: Head
     BAD_MASK_TYPE the number of the group, from 1 on; with BAD_RANGE_MARKER that of the list, from 0 on.
 
     Bounds: groups and header are those of the same part (`groups`, `empty_header`), so that members are
-    columns of its arrays. Bits are read before `end`, which IndexError is raised for beyond the data.
+    columns of its arrays. Bits are read before `end` only; IndexError if that is beyond the data.
     """
     if end > 8 * len(data) or bit < 0:
         raise IndexError("a header beyond its data")
@@ -117,12 +118,12 @@ def read_part_header(data: UInt8, bit: int, end: int, part: Groups, header: Head
             return BAD_MASK_TYPE, bit + 1, group + 1
         bit += 3
         types[group] = kind
-        own = kind in (MASK_KEEP, MASK_INTERPOLATE)
-        if own and bit + stop - first > end:
+        has_mask = kind in (MASK_KEEP, MASK_INTERPOLATE)
+        if has_mask and bit + stop - first > end:
             return OUT_OF_DATA, end, 0
         for member in range(first, stop):
-            mask[part.members[member]] = _bits(data, bit, 1) == 1 if own else kind == MASK_ALL
-            bit += 1 if own else 0
+            mask[part.members[member]] = _bits(data, bit, 1) == 1 if has_mask else kind == MASK_ALL
+            bit += 1 if has_mask else 0
         first = stop
     if bit + 2 > end:
         return OUT_OF_DATA, end, 0
@@ -167,15 +168,15 @@ def begin_models(span: tuple[int, int], scale: int, limits: Int64, high_level: I
 
     limits: int64 (4, slots), magnitudes of I max, I min, P max, P min. high_level: limits of the slots before
     the first FAP with ranges: those of visemes and expressions, which are 0..limit in I planes. IndexError
-    for slots that the state has no models for, and for an alphabet larger than ALPHABET_MAX: that of no
-    range.
+    for slots that the state has no models for, and for an alphabet larger than ALPHABET_MAX, which no range
+    has.
     """
     if span[0] < 0 or span[1] > len(state.added) or span[1] > limits.shape[1]:
         raise IndexError("slots without models")
     intra, predicted = coding_of(state, False), coding_of(state, True)
     models = predicted.models
     for slot in range(span[0], span[1]):
-        if models.total[slot] != models.size[slot]:  # only few models have learnt something
+        if models.total[slot] != models.size[slot]:  # only a few models have learnt something
             for symbol in range(models.size[slot] + 1):
                 models.added[slot, symbol] = 0
                 models.tree[slot, symbol] = 0

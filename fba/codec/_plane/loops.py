@@ -5,8 +5,8 @@ coded without returning to Python. I planes have new settings: `fba.codec._plane
 `decode_values` and `encode_values` here their values.
 
 Bounds: a layout's segments are consecutive parts of its order, whose slots are rows of the state
-(`slots.coding_order`); segments have at most two flags. The length of everything else is checked by the
-functions that are called from Python, or by those of `arithmetic`: IndexError for a fault of the caller.
+(`slots.coding_order`); segments have at most two flags. The functions that are called from Python, or those
+of `arithmetic`, check the length of everything else: IndexError for a fault of the caller.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ START_CODE_ROOM = 40
 """Bits of a start code and of the alignment before it, at most."""
 
 AFTER_CODE = -2
-"""Instead of the first bit of the plane before: a start code ends here, and no reader looks for another."""
+"""In place of the first bit of the plane before: a start code ends here, and no reader looks for another."""
 
 START_CODE_ZEROS = 23
-"""Zero bits that begin a start code, and nothing else at a byte boundary."""
+"""Number of zero bits that at a byte boundary only a start code begins with."""
 
 # Results of `find_start_code` without a start code.
 NO_START_CODE = -1
@@ -77,8 +77,8 @@ class Layouts(NamedTuple):
 class Coding(NamedTuple):
     """How values become symbols.
 
-    int64 (slots,) each: smallest level, quantiser step, limits and last value of the parameter. models: of
-    the symbols.
+    int64 (slots,) each: smallest level, quantiser step, limits and last value of the parameter. models: those
+    of the symbols.
     """
 
     minimum: Int64
@@ -89,13 +89,13 @@ class Coding(NamedTuple):
     models: Counts
 
 
-# Rows of `State.numbers`. Those that differ between I and P planes: smallest level, size of the alphabet.
+# Rows of `State.numbers`. Smallest level and size of the alphabet differ between I and P planes.
 I_MINIMUM, I_SIZE, P_MINIMUM, P_SIZE, STEP, LOWEST, HIGHEST, LAST, USUAL, TOTAL, BELOW_USUAL = range(11)
 NUMBERS = 11
 
 
 class State(NamedTuple):
-    """All that encoder and decoder must share of the slots, in few arrays: passing an array takes a while.
+    """All that encoder and decoder must share of the slots, in few arrays: passing an array takes time.
 
     numbers: int64 (NUMBERS, slots), one row for each array of `Coding` and `Counts`. added, tree: those of
     `Counts`, for as many slots as are in use.
@@ -173,10 +173,10 @@ def find_start_code(data: UInt8, bit: int, end: int, after_code: bool) -> tuple[
 
 @compiled
 def _zeros_ahead(data: UInt8, start: int, stop: int) -> int:
-    """Return how many bits of the plane start..stop are 0 from where a reader looks ahead up to the first 1.
+    """Return how many bits of the plane start..stop are 0 between a reader's look-ahead and the first 1.
 
-    Readers that do not check alignment look at the next byte boundary, behind a byte 0x7F if they stand on
-    one. -1 - zeros if no 1 follows in this plane: what is written behind it decides.
+    Readers that do not check alignment look at the next byte boundary, and behind a byte 0x7F if they stand
+    on a boundary. -1 - zeros if no 1 follows in this plane: what is written behind it decides.
     """
     bit = (start + 7) >> 3 << 3
     if bit == start and data[bit >> 3] == 0x7F:
@@ -192,7 +192,7 @@ def _zeros_ahead(data: UInt8, start: int, stop: int) -> int:
 
 @compiled
 def hides_plane(data: UInt8, start: int, stop: int) -> bool:
-    """Whether a start code written at `stop`, behind its alignment, hides the plane start..stop.
+    """Return whether a start code written at `stop`, behind its alignment, hides the plane start..stop.
 
     A reader that stands at `start` and looks ahead at the byte boundary then finds the start code there, or
     zeros before it, and takes the plane for alignment.
@@ -307,7 +307,7 @@ def decode_values(
 def decode_intra(
     data: UInt8, bit: int, end: int, layout: Layout, state: State, values: Int64, flags: Int64
 ) -> tuple[int, int]:
-    """Do the same as `decode_values` for an I plane."""
+    """Decode an I plane as `decode_values` does."""
     symbols = np.zeros(len(layout.order), np.int64)
     plane = PlaneValues(symbols, values, flags)
     return decode_values(data, bit, end, layout, coding_of(state, False), False, plane)
@@ -315,7 +315,7 @@ def decode_intra(
 
 @compiled
 def _body_layout(layouts: Layouts) -> Layout:
-    """Return the layout of planes with BAPs alone."""
+    """Return the layout of planes with BAPs only."""
     segments = layouts.segments[layouts.face_segments :].copy()
     for segment in range(len(segments)):
         segments[segment, 0] -= layouts.face_slots
@@ -437,7 +437,7 @@ def quantise_size(size: int, step: int) -> int:
 
 @compiled
 def quantise_change(value: int, last: int, step: int) -> int:
-    """Return the level of a difference: nearest to value - last, but such that its sum stays an int32."""
+    """Return the level of a difference: nearest to value - last, but such that the sum stays an int32."""
     level = quantise(value - last, step)
     rounded = last + level * step
     if rounded > _INT32_MAX:
@@ -475,7 +475,7 @@ def encode_values(
 
 @compiled
 def encode_intra(data: UInt8, bit: int, layout: Layout, state: State, symbols: Int64, flags: Int64) -> int:
-    """Do the same as `encode_values` for an I plane."""
+    """Encode an I plane as `encode_values` does."""
     return encode_values(data, bit, layout, coding_of(state, False), False, symbols, flags)
 
 
@@ -566,24 +566,23 @@ def measure_plane(
     bit: int,
     before: int,
     object_mask: int,
-    skip: int,
     layout: Layout,
     state: State,
     levels: Int64,
     flags: Int64,
 ) -> int:
-    """Return the bit after one P plane, written to `data` at `bit` as `encode_run` does; no model learns.
+    """Return the bit after a P plane without a skip, written to `data` at `bit` as `encode_run` does.
 
-    levels: int64, of the differences, by layout.order. data: a copy, with room for the plane (`room_for`).
-    IndexError for another number of levels, and without that room.
+    No model learns. levels: int64, of the differences, by layout.order. data: a copy, with room for the plane
+    (`room_for`). IndexError for another number of levels, and without that room.
     """
-    if len(levels) != len(layout.order) or bit < 0 or bit + room_for(skip, layout) > 8 * len(data):
+    if len(levels) != len(layout.order) or bit < 0 or bit + room_for(0, layout) > 8 * len(data):
         raise IndexError("a plane beyond its arrays")
     coding = coding_of(state, True)
     symbols = np.zeros(len(levels), np.int64)
     for position in range(len(levels)):
         symbols[position] = levels[position] - coding.minimum[int(layout.order[position])]
-    after = _write_header(data, bit, object_mask, skip)
+    after = _write_header(data, bit, object_mask, 0)
     after = encode_values(data, after, layout, coding, True, symbols, flags)
     if before != AFTER_CODE:
         after, before = guard_plane(data, before, bit, after)

@@ -1,4 +1,4 @@
-"""Approximate frames: P planes with values near the wanted ones that take fewer bits."""
+"""Approximations of frames: P planes whose values are near those of the frame and take fewer bits."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from fba.compiled import compiled
 
 
 class NextPlane:
-    """What the next P plane may bring for a frame, of which nothing is written yet.
+    """Prices of what the next P plane may send of a frame; nothing of it is written yet.
 
-    It holds until the next plane is written. frame: the frame as it should be. mask: fba_object_mask.
-    row: int32 (columns,), its values.
+    It is valid until the next plane is written. frame: the frame to approximate. mask: fba_object_mask.
+    row: int32 (columns,), the frame's values.
     """
 
     def __init__(self, writer: PlaneWriter, frame: Animation, mask: int, row: Int32) -> None:
@@ -31,16 +31,17 @@ class NextPlane:
     def levels(self, weights: Float64, price: float) -> Int64:
         """Return the differences to code, in quantiser steps: int64 (parameters coded,).
 
-        Of every parameter the level with the least weight x error^2 + price x bits, by the models as they
-        are. weights: float64 (372,), see `slots`; infinite for the nearest level that the ranges hold, at any
-        price. An infinite price: no change.
+        For each parameter the level with the least weight x error^2 + price x bits, by the present models.
+        weights: float64 (364,), of the FAPs, then of the BAPs; infinite for the nearest level that the
+        ranges contain, at any price, as for visemes and expressions. An infinite price: no change.
         """
-        return choose_levels(self._layout, self._writer.models.state, self._row, weights, price)
+        by_slot = slots.weights_of_slots(weights)
+        return choose_levels(self._layout, self._writer.models.state, self._row, by_slot, price)
 
-    def bits(self, levels: Int64, skip: int = 0) -> int:
-        """Return the bits of the plane with these differences. skip: frames left out after it."""
+    def bits(self, levels: Int64) -> int:
+        """Return the bits of the plane with these differences."""
         flags = self._row[slots.FLAGS].astype(np.int64)
-        return self._writer.bits_of(self._mask, levels, flags, skip)
+        return self._writer.bits_of(self._mask, levels, flags)
 
     def with_levels(self, levels: Int64) -> Animation:
         """Return the frame as these differences show it."""
@@ -57,8 +58,8 @@ class NextPlane:
 def choose_levels(layout: Layout, state: State, row: Int32, weights: Float64, price: float) -> Int64:
     """Return the level of the difference of each slot that a plane codes: int64 (slots coded,).
 
-    Bounds: a level is between 0 and the nearest one that the range holds; every range of P planes holds 0, so
-    each level that is priced has a symbol.
+    Bounds: a level is between 0 and the nearest level that the range contains; every range of P planes
+    contains 0, so each level that is priced has a symbol.
     """
     coding = coding_of(state, True)
     result = np.zeros(len(layout.order), np.int64)
@@ -72,8 +73,8 @@ def choose_levels(layout: Layout, state: State, row: Int32, weights: Float64, pr
 def _choose_level(coding: Coding, slot: int, value: int, weight: float, price: float) -> int:
     """Return the level of a slot: the nearest, or a level on the way to it that takes fewer bits.
 
-    A still value stays still, and no value overshoots or moves back, even where that would take fewer bits:
-    it would be seen to tremble.
+    A still value stays still, and no value overshoots or moves back, even if that would take fewer bits: it
+    would visibly tremble.
     """
     low = int(coding.minimum[slot])
     high = low + int(coding.models.size[slot]) - 1
@@ -86,7 +87,7 @@ def _choose_level(coding: Coding, slot: int, value: int, weight: float, price: f
     best = nearest
     least = _cost(coding, slot, nearest, value, weight, price)
     cost = _cost(coding, slot, 0, value, weight, price)
-    if cost <= least:  # which is so nearly always: it shortens the search
+    if cost <= least:  # nearly always; this shortens the search
         best, least = 0, cost
     towards = -1 if nearest > 0 else 1
     level = nearest + towards

@@ -23,7 +23,7 @@ ROUNDED_AMOUNT_MAX = max((INTENSITY_MAX + quant // 2) // quant * quant for quant
 
 
 def scale(part: int, quant: int) -> int:
-    """Return the divisor of range limits, which is the factor of table steps; 1 without quantisation."""
+    """Return the factor of table steps, by which limits of ranges are divided; 1 without quantisation."""
     return max(quant if part == slots.FACE_BIT else BAP_PREDICTIVE_SCALE[quant], 1)
 
 

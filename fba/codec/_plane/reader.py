@@ -16,8 +16,8 @@ from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, TimeCode
 from fba.errors import BitstreamError, UnsupportedError
 from fba.parameters import BapTable
 
-_RUN = 512
-"""Largest number of planes that a call of the compiled loop decodes."""
+_MAX_RUN = 512
+"""Most planes that a call of the compiled loop decodes."""
 _PARTS = ((slots.FACE_BIT, "FAPs"), (slots.BODY_BIT, "BAPs"))
 
 
@@ -26,8 +26,8 @@ class Planes:
     """An I plane, or P planes after it; see `fba.codec.Block` for rows, columns, parts and settings.
 
     borders: int64 (T + 1,), first bit of each plane, and the bit after the last. skips: int64 (T,). doubtful:
-    they depend on ranges that may have been replaced in a lost plane. complete: False if it is known that the
-    plane behind them needs more data.
+    they depend on ranges that a lost plane may have replaced. complete: False if the plane behind them needs
+    more data, as far as that was read.
     """
 
     rows: Int32
@@ -42,7 +42,7 @@ class Planes:
 
 @dataclass(frozen=True)
 class _Run:
-    """What decoding P planes needs besides the models: layouts, and rows for values of columns (K,)."""
+    """Layouts of P planes with some settings, the columns (K,) of their rows, and room for rows."""
 
     layouts: Layouts
     columns: Int64
@@ -55,20 +55,20 @@ class _Run:
         face = slots.coding_order(masks[0], None)
         layouts = Layouts(sum(settings), *slots.coding_order(*masks), *map(len, face))
         columns = _columns(layouts.order, masks[0])
-        return cls(layouts, columns, np.zeros((_RUN, len(columns)), dtype=np.int32))
+        return cls(layouts, columns, np.zeros((_MAX_RUN, len(columns)), dtype=np.int32))
 
 
 def _columns(order: Int64, face_mask: Bool | None) -> Int64:
-    """Return the columns of rows for slots in this order: those, and the flags if there are any."""
+    """Return the columns of rows for slots in this order: the slots, and the flags if the face has any."""
     flags = face_mask is not None and face_mask[:2].any()
     return np.append(order, np.arange(slots.FLAGS.start, slots.FLAGS.stop)) if flags else order
 
 
 @dataclass
 class _BegunIntra:
-    """An I plane of which not all bytes may be there yet.
+    """An I plane that may not be complete yet.
 
-    bits: how many of its bits were read. mask: fba_object_mask. settings, values: of the parts that were
+    bits: number of its bits that were read. mask: fba_object_mask. settings, values: of the parts that were
     read; values are slots (K,) and values (K,).
     """
 
@@ -97,20 +97,15 @@ class PlaneReader:
     Bits in errors count from the start of the data that was passed in.
     """
 
-    def __init__(self, bap_table: BapTable = "iso") -> None:
+    def __init__(self, bap_table: BapTable) -> None:
         self._models = Models(bap_table)
         self._settings: dict[int, PartSettings] = {}
         self._doubtful_ranges = 0  # parts, added up, whose ranges may have been replaced in a lost plane
         self._begun: _BegunIntra | None = None  # the plane at which data ran out
         self._run: _Run | None = None  # for P planes with these settings, once there are any
-        self._parts = np.zeros(_RUN, dtype=np.uint8)
-        self._skips = np.zeros(_RUN, dtype=np.int64)
-        self._borders = np.zeros(_RUN + 1, dtype=np.int64)
-
-    @property
-    def bap_table(self) -> str:
-        """The table of BAP steps."""
-        return self._models.bap_table
+        self._parts = np.zeros(_MAX_RUN, dtype=np.uint8)
+        self._skips = np.zeros(_MAX_RUN, dtype=np.int64)
+        self._borders = np.zeros(_MAX_RUN + 1, dtype=np.int64)
 
     def begin_object(self, bap_table: BapTable) -> None:
         """Reset all state, including ranges. bap_table: of the BAP steps in this object."""
@@ -132,10 +127,10 @@ class PlaneReader:
     def read(self, data: UInt8, bit: int, end: int, *, after_code: bool) -> Planes | None:
         """Return the plane at `bit` and the P planes that follow it; None if none is complete.
 
-        after_code: a start code ends at `bit`. Raises OutOfDataError if the first plane goes beyond `end`;
+        after_code: a start code ends at `bit`. Raises OutOfDataError if the first plane extends beyond `end`;
         the next call must be for that plane with more data, unless `forget_values` comes before. Raises
-        BitstreamError and UnsupportedError for the first plane. After an error, only state that the next I
-        plane sets has changed.
+        BitstreamError and UnsupportedError for the first plane. An error changes only state that the next I
+        plane sets.
         """
         if bit >= end:
             raise OutOfDataError
@@ -144,7 +139,7 @@ class PlaneReader:
         return self._read_predicted(data, bit, end, after_code)
 
     def _read_intra(self, reader: BitReader, after_code: bool) -> Planes:
-        """Read an I plane, whose first bit has been read; an incomplete plane from where it ended."""
+        """Read an I plane, whose first bit has been read; continue one that was incomplete."""
         start = reader.bit - 1
         if self._begun is None:
             self._begun = _BegunIntra.read(reader, start)
@@ -212,14 +207,14 @@ class PlaneReader:
         """Return slots (K,) and values (K,) of a part in an I plane; also write flags (3,)."""
         face = part == slots.FACE_BIT
         layout = Layout(*slots.coding_order(settings.mask if face else None, None if face else settings.mask))
-        values, own_flags = np.zeros_like(layout.order), np.zeros(3, dtype=np.int64)
+        values, face_flags = np.zeros_like(layout.order), np.zeros(3, dtype=np.int64)
         status, place = loops.decode_intra(
-            reader.data, reader.bit, reader.end, layout, self._models.state, values, own_flags
+            reader.data, reader.bit, reader.end, layout, self._models.state, values, face_flags
         )
         self._check(status, place, reader.bit)
         reader.bit = place
         if face:
-            flags[:] = own_flags
+            flags[:] = face_flags
         return layout.order, values
 
     def _read_predicted(self, data: UInt8, bit: int, end: int, after_code: bool) -> Planes | None:

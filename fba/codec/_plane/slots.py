@@ -8,7 +8,7 @@ BAPs.
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,17 +23,12 @@ AMOUNTS = [2, 4, 6]
 """Viseme blend and expression intensities."""
 FAPS = slice(7, 73)
 FLAGS = slice(73, 76)
-VISEME_DEF, INIT_FACE, EXPRESSION_DEF = 73, 74, 75
+VISEME_DEF, INIT_FACE = 73, 74
 BAPS = slice(76, 372)
 SLOTS = 372
 
 FACE_BIT, BODY_BIT = 1, 2
 """Bits of fba_object_mask."""
-
-
-def row_width(*, body: bool) -> int:
-    """Return the number of columns in a row of values."""
-    return SLOTS if body else FLAGS.stop
 
 
 def fap_slot(number: int) -> int:
@@ -44,12 +39,6 @@ def fap_slot(number: int) -> int:
 def bap_slot(number: int) -> int:
     """Return the slot of a BAP, 1..296."""
     return BAPS.start + number - 1
-
-
-@cache
-def body_order() -> Int64:
-    """Return the slots (296,) of the BAPs in coding order: by group, as each group lists them."""
-    return np.array([bap_slot(number) for group in bap_groups() for number in group], dtype=np.int64)
 
 
 def part_of(slot: int) -> int:
@@ -88,7 +77,7 @@ def coding_order(face_mask: Bool | None, body_mask: Bool | None) -> tuple[Int64,
 
 @lru_cache(maxsize=64)
 def _coding_order(face: bytes | None, body: bytes | None) -> tuple[Int64, Int64]:
-    """Do the same with bytes, so that results can be cached: streams of I planes ask for every plane."""
+    """Return the same from bytes, which can be keys of the cache: streams of I planes ask for every plane."""
     face_mask = np.frombuffer(face, dtype=np.bool_) if face is not None else None
     body_mask = np.frombuffer(body, dtype=np.bool_) if body is not None else None
     order: list[int] = []
@@ -105,15 +94,15 @@ def _coding_order(face: bytes | None, body: bytes | None) -> tuple[Int64, Int64]
             add_segment(list(range(EXPRESSION.start, EXPRESSION.stop)), 2)
         add_segment((np.flatnonzero(face_mask[2:]) + FAPS.start).tolist(), 0)
     if body_mask is not None:
-        in_order = body_order()
-        add_segment(in_order[body_mask[in_order - BAPS.start]].tolist(), 0)
+        in_order = [number for group in bap_groups() for number in group]
+        add_segment([bap_slot(number) for number in in_order if body_mask[number - 1]], 0)
     return np.array(order, dtype=np.int64), np.array(segments, dtype=np.int64).reshape(-1, 3)
 
 
 def track_rows(face: FaceTrack | None, body: BodyTrack | None) -> Int32:
     """Return the values of tracks of T frames as rows, int32 (T, columns), 0 for a part without a track."""
     count = len(face if face is not None else body or ())
-    result = np.zeros((count, row_width(body=body is not None)), dtype=np.int32)
+    result = np.zeros((count, FLAGS.stop if body is None else SLOTS), dtype=np.int32)
     if face is not None:
         result[:, VISEME] = face.viseme[:, :3]
         result[:, VISEME_DEF] = face.viseme[:, 3]
@@ -126,7 +115,7 @@ def track_rows(face: FaceTrack | None, body: BodyTrack | None) -> Int32:
 
 
 def with_values(frame: Animation, row: Int32) -> Animation:
-    """Return a frame with the low-level FAPs and the BAPs of row (columns,); the rest as it is."""
+    """Return a frame with the low-level FAPs and the BAPs of row (columns,), otherwise unchanged."""
     face, body = frame.face, frame.body
     if face is not None:
         values = np.concatenate([np.zeros(2, np.int32), row[FAPS]])[None]
@@ -137,7 +126,7 @@ def with_values(frame: Animation, row: Int32) -> Animation:
 
 
 def weights_of_slots(weights: Float64) -> Float64:
-    """Return the weights of slots, float64 (372,), from those of the FAPs and then the BAPs, (364,).
+    """Return the weights of slots, float64 (372,), from those of the FAPs and the BAPs after them, (364,).
 
     Infinite for visemes and expressions.
     """

@@ -37,8 +37,8 @@ PLANE_CODES = (0xBB, 0x03)
 END_CODE = 0xB1
 """Last byte of visual_object_sequence_end_code, which closes the last object of a stream."""
 LAYER_CODES = (0xB0, 0xB5)
-"""Last bytes of the start codes of a visual object sequence and of a visual object, whose headers may stand
-before the next object: they, too, close an object."""
+"""Last bytes of the start codes of a visual object sequence and of a visual object. Their headers may stand
+before the next object, so they close an object, too."""
 
 LISTS = ("i_max", "i_min", "p_max", "p_min")
 

@@ -1,4 +1,4 @@
-"""Write planes with given settings: the part of the encoder that makes no decisions."""
+"""Writer of planes with given settings: the part of the encoder that makes no decisions."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from fba.codec._plane.loops import Layout
 from fba.codec.settings import PartSettings, PlaneSettings
 from fba.parameters import BapTable
 
-_SEGMENT_BITS = 20
+_MAX_SEGMENT_BITS = 20
 """Most bits that a segment takes besides its symbols."""
 
 
 class DoesNotFitError(Exception):
-    """A level does not fit its range. Never leaves the codec.
+    """A level that does not fit its range. Users of the codec never get it.
 
     slot: the parameter. level: its level. position: number of the row.
     """
@@ -33,11 +33,11 @@ class DoesNotFitError(Exception):
 class PlaneWriter:
     """Writes an FBA object.
 
-    planes: number of planes written. taken: bytes that `take_bytes` has returned. intra_bit: where the last I
-    plane begins, or the plane start code before it; 0 in the first, where the object begins.
+    planes: number of planes written. taken: number of bytes that `take_bytes` has returned. intra_bit: where
+    the last I plane begins, or the plane start code before it; 0, where the object begins, for the first.
     """
 
-    def __init__(self, bap_table: BapTable = "iso") -> None:
+    def __init__(self, bap_table: BapTable) -> None:
         self.models = Models(bap_table)
         self.planes = 0
         self.taken = 0
@@ -48,7 +48,7 @@ class PlaneWriter:
         self._before = loops.AFTER_CODE  # see `loops.encode_run`
 
     def take_bytes(self) -> bytes:
-        """Return the complete bytes written since the last call, but not those that may have to move."""
+        """Return the complete bytes written since the last call, without those that may have to move."""
         writer = self._writer
         if self._before >= 0 and not loops.hides_plane(writer.data, self._before, writer.bit):
             self._before = -1
@@ -105,7 +105,7 @@ class PlaneWriter:
         return int(models.last[slot]) + nearest * int(models.step[slot])
 
     def intra(self, settings: PlaneSettings, row: Int32, *, clamp: bool = False) -> list[int]:
-        """Write an I plane with the values of row (columns,); return slots that were clamped to their range.
+        """Write an I plane with the values of row (columns,); return the slots that were clamped.
 
         Raises DoesNotFitError before anything is written, unless `clamp`.
         """
@@ -147,7 +147,7 @@ class PlaneWriter:
         flags = row[slots.FLAGS].astype(np.int64)
         for part, part_settings, order, segments, levels in plan:
             syntax.write_part(writer, part, part_settings)
-            writer.reserve(17 * len(order) + _SEGMENT_BITS * len(segments))
+            writer.reserve(17 * len(order) + _MAX_SEGMENT_BITS * len(segments))
             symbols = levels - models.i_minimum[order]
             layout = Layout(order, segments)
             writer.bit = loops.encode_intra(writer.data, writer.bit, layout, models.state, symbols, flags)
@@ -157,7 +157,7 @@ class PlaneWriter:
         if self._before == loops.AFTER_CODE:
             self._before = -1
         else:
-            writer.reserve(_SEGMENT_BITS + 80)
+            writer.reserve(_MAX_SEGMENT_BITS + 80)
             writer.bit, self._before = loops.guard_plane(writer.data, self._before, start, writer.bit)
         if self.planes:
             self.intra_bit = self.bits - length - 32 * (self._before < 0)
@@ -197,16 +197,16 @@ class PlaneWriter:
             self._layouts[mask] = Layout(*slots.coding_order(face, body))
         return self._layouts[mask]
 
-    def bits_of(self, mask: int, levels: Int64, flags: Int64, skip: int) -> int:
-        """Return the bits of the next P plane, with those that must precede it; nothing is written.
+    def bits_of(self, mask: int, levels: Int64, flags: Int64) -> int:
+        """Return the bits of the next P plane without a skip, and of what must precede it; write nothing.
 
-        levels: of the differences of what `layout` lists, within their ranges. flags: viseme_def, init_face,
-        expression_def.
+        levels: of the differences in the order of `layout`, within their ranges. flags: viseme_def,
+        init_face, expression_def.
         """
         layout, trial = self.layout(mask), self._writer.copy()
-        trial.reserve(loops.room_for(skip, layout))
+        trial.reserve(loops.room_for(0, layout))
         end = loops.measure_plane(
-            trial.data, trial.bit, self._before, mask, skip, layout, self.models.state, levels, flags
+            trial.data, trial.bit, self._before, mask, layout, self.models.state, levels, flags
         )
         return end - self._writer.bit
 

@@ -1,4 +1,4 @@
-"""Buffer of bytes that arrive in chunks and are dropped at the front, as a NumPy array for compiled code."""
+"""Buffer of bytes that are added at the end and dropped at the front, as a NumPy array for compiled code."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from fba.arrays import UInt8
 
-_SMALLEST = 4096
+_MIN_BYTES = 4096
+"""Smallest size of the buffer, and least number of bytes to drop: moving fewer is not worthwhile."""
 
 
 class Buffer:
@@ -15,11 +16,11 @@ class Buffer:
     def __init__(self) -> None:
         self.length = 0
         self.offset = 0
-        self._allocate(_SMALLEST)
+        self._allocate(_MIN_BYTES)
 
     @property
     def data(self) -> UInt8:
-        """The bytes as an array that compiled code can read, a view of those that are searched."""
+        """The bytes, as an array that compiled code can read without a copy."""
         return np.frombuffer(self._bytes, dtype=np.uint8)
 
     def append(self, chunk: bytes | bytearray | memoryview) -> None:
@@ -34,15 +35,15 @@ class Buffer:
         self.length = need
 
     def can_drop(self, count: int) -> bool:
-        """Whether `drop` drops this number of bytes: not if moving the rest costs too much."""
-        return count >= _SMALLEST and 2 * count >= self.length
+        """Return whether `drop` drops this number of bytes: not if moving the rest costs too much."""
+        return count >= _MIN_BYTES and 2 * count >= self.length
 
     def drop(self, count: int) -> int:
         """Drop `count` bytes at the front, or none (see `can_drop`); return the number dropped."""
         if not self.can_drop(count):
             return 0
         rest = self.data[count : self.length]
-        self._allocate(max(2 * len(rest), _SMALLEST))
+        self._allocate(max(2 * len(rest), _MIN_BYTES))
         self.data[: len(rest)] = rest
         self.length = len(rest)
         self.offset += count

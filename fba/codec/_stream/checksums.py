@@ -1,9 +1,9 @@
-"""CRC-32 checks of the I periods of a stream, by which a flipped bit is noticed that leaves the syntax whole.
+"""CRC-32 checks of the I periods of a stream. They reveal flipped bits that leave the syntax correct.
 
-An I period is an I plane with the planes up to the next one. Its bytes begin with the plane start code before
-its I plane, or without one with the byte in which that plane begins; those of the first period begin with the
-object start code. They end before the next period; where that begins inside a byte, the byte belongs to both.
-Those of the last period end before the start code that ends the object.
+An I period is an I plane with the planes up to the next I plane. Its bytes begin with the plane start code
+before its I plane, or else with the byte in which that plane begins; those of the first period begin with the
+object start code. They end before the next period. A byte in which the next period begins belongs to both.
+The bytes of the last period end before the start code that ends the object.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from zlib import crc32
 from fba.arrays import UInt8
 
 CHECK_BYTES = 4
-_MOST = 1 << 18
-"""Periods that are checked at most: three days with an I plane every second."""
+_MAX_PERIODS = 1 << 18
+"""Most periods that are checked: three days with an I plane every second."""
 
 
 def check_of(crc: int) -> bytes:
-    """Return how a CRC-32 is written: most significant byte first, with ff for 00: no start code."""
+    """Return a CRC-32 as it is written: most significant byte first, ff for 00 to avoid start codes."""
     return crc.to_bytes(CHECK_BYTES, "big").replace(b"\0", b"\xff")
 
 
@@ -28,8 +28,9 @@ class PeriodChecks:
     """Computes the checks of an object's I periods while its bytes come.
 
     byte: at which the object begins. checks: of the periods that have ended, four bytes each. starts: first
-    byte of each. planes: its planes, as the number of the first and of that behind the last. Positions are
-    those in the stream; `data` holds its bytes from `offset` on. left_out: whether a period was abandoned.
+    byte of each. planes: for each, the number of its first plane, and that of the plane after its last.
+    left_out: whether a period was abandoned. Positions are in the stream; `data` are its bytes from `offset`
+    on.
     """
 
     def __init__(self, byte: int = 0) -> None:
@@ -49,7 +50,7 @@ class PeriodChecks:
     @property
     def full(self) -> bool:
         """Whether there may be more periods than are checked."""
-        return len(self) >= _MOST
+        return len(self) >= _MAX_PERIODS
 
     def add(self, data: UInt8, offset: int, stop: int) -> None:
         """Take the bytes up to `stop`, which belong to this period."""
@@ -75,7 +76,7 @@ class PeriodChecks:
         self._open = False
 
     def abandon(self) -> None:
-        """Leave out the period that has begun: damage in it was noticed."""
+        """Leave out the period that has begun, because it is damaged."""
         self._open = self._fresh = False
         self.left_out = True
 

@@ -1,19 +1,23 @@
-"""Times of planes from frame rate, skips and time codes, as exact fractions."""
+"""Times of planes from frame rate, skips and time codes, as exact fractions; and these fields for a time."""
 
 from __future__ import annotations
 
 import math
+import warnings
 from fractions import Fraction
 
 import numpy as np
 
 from fba.arrays import Int64
 from fba.codec.settings import FrameRate, TimeCode
+from fba.errors import FbaWarning, RangeError, Remedy
 
-_BELIEVED_JUMP = 60
-"""Longest jump of a time code, seconds, that is taken for lost frames without other damage."""
+_MAX_JUMP_SECONDS = 60
+"""Longest jump of a time code that is taken for lost frames without other damage."""
 _REPEATED_RATES = 2
-"""Number of I planes with the same rate after which a different rate in a single I plane is damage."""
+"""Number of I planes with the same rate after which another rate in a single I plane is damage."""
+_CODED_HOURS = 32
+"""Time codes are below this number of hours."""
 DEFAULT_RATE = Fraction(25)
 """Frames per second, assumed with a warning if the first I plane states no rate."""
 
@@ -22,20 +26,20 @@ class StreamClock:
     """Computes the times of planes: `index`, `rate` and exact `time` of the next one.
 
     A plane follows the plane before it after one frame period, and the periods that it skips. A time code
-    sets the clock; between two frames, the index is that of the nearer one. A code that names the very frame
-    that comes next anyway leaves the clock alone: codes are whole seconds, and at a rate such as 30000/1001
-    hardly a frame lies on one.
+    sets the clock; between two frames, the index is that of the nearer frame. A code that names the frame
+    that comes next anyway does not change the clock: codes are whole seconds, and at a rate such as
+    30000/1001 hardly any frame is at a whole second.
     """
 
     def __init__(self) -> None:
         self.index = 0
         self.rate: Fraction | None = None
         self.jump: int | None = None
-        """Frames by which the last I plane's time code exceeds the count of planes; None without one."""
+        """Frames by which the time code of the last I plane exceeds the count of planes; None without."""
         self.refused = ""
-        """Which rate or time code of the last I plane was not believed."""
+        """The rate or time code of the last I plane that was not believed, for messages; else empty."""
         self.agreements = 0
-        """Time codes that named the frame that the count of planes had come to."""
+        """Number of time codes that agreed with the count of planes."""
         self._anchor = Fraction(0)  # time of the plane that had index `_anchor_index`
         self._anchor_index = 0
         self._offset: int | None = None  # frames from the count to the last time code that was refused
@@ -60,10 +64,10 @@ class StreamClock:
     ) -> list[str]:
         """Apply the frame rate and time code of an I plane; return warnings about them.
 
-        repair: believe time codes more than the count of planes, which damage may have falsified: also one
-        that lies before the previous plane, as long as it lies behind the last code. A code that goes behind
-        that, or more than a minute ahead of a count with which all codes have agreed, needs another that
-        confirms it, as does a frame rate that changes in a stream that repeats its rate.
+        repair: trust time codes more than the count of planes, which damage may have falsified, even a code
+        before the previous plane, if it is after the last code. Another code must confirm a code that is
+        before the last code, or more than a minute ahead of a count with which all codes have agreed. Another
+        I plane must confirm a new frame rate in a stream that repeats its rate.
         """
         problems = []
         self.refused = ""
@@ -107,27 +111,27 @@ class StreamClock:
         self.index += frames
 
     def begin_object(self) -> None:
-        """Begin another object of the stream: time codes do not go back behind it."""
+        """Begin another object of the stream; time codes do not go back to before its begin."""
         self._object_index = self.index
 
     def _can_go_back(self, index: int) -> bool:
-        """Whether a time code that names an earlier frame corrects the count, or the last time code."""
+        """Return whether a time code for an earlier frame corrects the count, or the last time code."""
         undone = self._last_jump > 0 and index == self.index - self._last_jump
         return self._is_confirmed(index) or index > self._coded_index or undone
 
     def _goes_too_far(self, index: int, rate: Fraction) -> bool:
-        """Whether a time code jumps ahead for the first time."""
-        far = self.agreements > 0 and index - self.index > _BELIEVED_JUMP * rate
+        """Return whether a time code jumps ahead for the first time."""
+        far = self.agreements > 0 and index - self.index > _MAX_JUMP_SECONDS * rate
         return not self._is_confirmed(index) and far
 
     def _is_confirmed(self, index: int) -> bool:
-        """Whether a frame is as far from the count as the last that was compared; within this object."""
+        """Return whether a frame of this object is as far from the count as the last that was compared."""
         offset, before = index - self.index, self._offset
         self._offset = offset
         return offset == before and index >= self._object_index
 
     def _doubts_rate(self, rate: Fraction) -> bool:
-        """Whether a rate changes in a stream that has repeated its rate; a second I plane confirms it."""
+        """Return whether a rate is new in a stream that repeats its rate; a second I plane confirms it."""
         repeated, before = self._repeated_rates, self._doubted_rate
         self._doubted_rate = rate
         self._repeated_rates = repeated + 1 if rate == self.rate else repeated
@@ -143,3 +147,56 @@ class StreamClock:
 def nearest_frame(seconds: int, rate: Fraction) -> int:
     """Return the index of the frame that a time code, in seconds, names; halves are rounded up."""
     return math.floor(seconds * rate + Fraction(1, 2))
+
+
+def frame_rate_fields(rate: Fraction) -> FrameRate:
+    """Return the header fields for a rate. Raises RangeError if the syntax cannot carry it."""
+    fields = FrameRate.from_fraction(rate)
+    if fields is None:
+        nearest = max(Fraction(round(rate * 16), 16), Fraction(1, 16))
+        raise RangeError(
+            f"{rate} frames/s cannot be coded: a rate is n/16 below 256, or 1000/1001 of that"
+        ).with_remedies(
+            Remedy(
+                "rate", "resample first, e.g. with {}", f"{float(min(nearest, Fraction(4095, 16))):g}",
+                "Animation.resample",
+            )
+        )  # fmt: skip
+    return fields
+
+
+def first_time_code(index: int, rate: Fraction) -> TimeCode | None:
+    """Return the time code with which a decoder shows the first plane at this index; None for index 0.
+
+    If no time code gives the index, returns None with an FbaWarning.
+    """
+    if index == 0:
+        return None
+    code = time_code(index, rate)
+    if code is None:
+        warnings.warn(
+            f"the animation starts at {float(index / rate):g} s, which no time code says; the stream starts "
+            "at 0",
+            FbaWarning,
+            stacklevel=3,
+        )
+    return code
+
+
+def time_code(index: int, rate: Fraction) -> TimeCode | None:
+    """Return the time code of the frame with an index, or None.
+
+    Time codes are whole seconds below 32 hours, and name the nearest frame.
+    """
+    seconds = math.floor(index / rate + Fraction(1, 2))
+    if 0 <= seconds < _CODED_HOURS * 3600 and nearest_frame(seconds, rate) == index:
+        return TimeCode(seconds // 3600, seconds // 60 % 60, seconds % 60)
+    return None
+
+
+def last_named_frame(index: float, rate: Fraction) -> int:
+    """Return the last frame up to an index that a time code names."""
+    seconds = math.floor(index / rate) + 1
+    while nearest_frame(seconds, rate) > index:
+        seconds -= 1
+    return nearest_frame(seconds, rate)

@@ -1,4 +1,4 @@
-"""Damage that a salvaging decoder skipped, how many frames went with it, and which planes are in doubt."""
+"""Damage that a salvaging decoder skipped: how many frames are lost, and which planes are in doubt."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from typing import Any
 from fba.arrays import Int64
 from fba.errors import FbaError
 
-DOUBTFUL = 8
-"""Planes before damage that may have been misread; nearly always damage shows within four planes."""
+MAX_DOUBTFUL_PLANES = 8
+"""Planes before damage that may have been misread; damage nearly always shows within four planes."""
 
 
 @dataclass(frozen=True)
 class Damage:
     """Damage that a salvaging decoder skipped.
 
-    error: its text. start, stop: lost bytes of the stream, from the first byte of the damaged
-    plane to where decoding continued (or the end). If decoding continues at a start code in an earlier plane,
-    which had been returned already, start equals stop; as it does where a time code or a missing end code
-    alone shows that something is missing.
+    error: what is wrong. start, stop: lost bytes of the stream, from the first byte of the damaged plane to
+    where decoding continued (or the end). start equals stop if decoding continued at a start code in an
+    earlier plane, which had been returned already, and if only a time code or a missing end code shows that
+    something is missing.
 
-    frames_lost: frame periods between the planes before and behind it that no plane fills; of damages without
-    a plane between them, the last one counts all. uncertainty: by how many that may be wrong: 0 if the plane
-    behind it has a time code, else the number is an estimate from the bytes lost. Both are None if nothing
-    says how much is missing: at the beginning or end of a stream that was cut there.
+    frames_lost: frame periods between the planes before and behind the damage that no plane fills; if several
+    damages have no plane between them, the last damage counts all. uncertainty: by how much that number may
+    be wrong: 0 if the plane behind the damage has a time code; else the number is estimated from the lost
+    bytes. Both are None if nothing says how much is missing: at the cut beginning or end of a stream.
 
-    doubtful: numbers of the planes that were returned before the damage was found and may be wrong: those
+    doubtful: numbers of the planes that were returned before the damage was noticed and may be wrong: those
     shortly before it, or those of an I period that does not match its CRC-32.
     """
 
@@ -66,33 +66,34 @@ class Damage:
 
 
 class DamageLog:
-    """Lists damage, and counts what a decoder needs to know of the planes before it.
+    """Lists damage, and counts the planes before it, from which losses are estimated.
 
-    damage: the list. resuming: the last damage is over, but no plane behind it was decoded yet.
+    damage: the list. resuming: no plane was decoded yet behind the last damage.
     """
 
     def __init__(self) -> None:
         self.damage: list[Damage] = []
         self.resuming = False
-        self._recent: deque[int] = deque(maxlen=DOUBTFUL)  # first bits of the last planes, behind start codes
-        self._recent_skips: deque[int] = deque(maxlen=DOUBTFUL)
+        # of the last planes: first bits, behind start codes, and skips
+        self._recent: deque[int] = deque(maxlen=MAX_DOUBTFUL_PLANES)
+        self._recent_skips: deque[int] = deque(maxlen=MAX_DOUBTFUL_PLANES)
         self._bits = self._frames = 0  # of all planes
         self._lost_from = 0  # first byte of all damage since the last plane
 
     @property
     def first_doubtful_bit(self) -> int | None:
-        """Start of the first plane that would be doubtful if there were damage here."""
+        """First bit of the first plane that damage here would make doubtful."""
         return self._recent[0] if self._recent else None
 
     def add_planes(self, borders: Int64, skips: Int64) -> None:
         """Count planes. borders: int64 (T + 1,), bits of the stream, without start codes. skips: (T,)."""
-        self._recent.extend(borders[-1 - DOUBTFUL : -1].tolist())
-        self._recent_skips.extend(skips[-DOUBTFUL:].tolist())
+        self._recent.extend(borders[-1 - MAX_DOUBTFUL_PLANES : -1].tolist())
+        self._recent_skips.extend(skips[-MAX_DOUBTFUL_PLANES:].tolist())
         self._bits += int(borders[-1] - borders[0])
         self._frames += len(skips) + int(skips.sum())
 
     def confirm_planes(self) -> None:
-        """Count no plane so far as doubtful: it ended where a start code begins."""
+        """Take all planes so far to be right: the last ended where a start code begins."""
         self._recent.clear()
         self._recent_skips.clear()
 
@@ -105,7 +106,7 @@ class DamageLog:
         frames_lost: int | None = None,
         doubtful: range = range(0),
     ) -> None:
-        """Add damage that planes before and behind it are not lost with. stop: `start` by default.
+        """Add damage that does not affect the planes before and behind it. stop: `start` by default.
 
         frames_lost: exactly how many are missing; None if nothing says so. doubtful: planes that are wrong.
         """

@@ -1,13 +1,13 @@
 """The marks of a stream: which table of BAP steps it was made with, and the checks of its I periods.
 
-No bit of an FBA object says so. A mark is user data (user_data_start_code 00 00 01 b2, ISO/IEC 14496-2,
+No field of an FBA object says so. A mark is user data (user_data_start_code 00 00 01 b2, ISO/IEC 14496-2,
 6.2.2) with fields behind the word "fba": `00 00 01 b2 "fba bap_steps=visage;crc32=2;"` and the checks. It
-stands directly behind the end code, and not before the object, because the decoder of visage|SDK, the only
-other one whose source is public, exits unless the first four bytes are an object start code, and goes on
-decoding planes at any start code but the end code. Behind the end code it reads nothing.
+stands directly behind the end code, and not before the object, because of visage|SDK, the only other decoder
+with public source: that exits unless the first four bytes are an object start code, and continues to decode
+planes at any start code but the end code. It reads nothing behind the end code.
 
-Who reads a stream while it comes needs the table before: in pipes, `opening` stands before the object, the
-headers of a visual object sequence with the same user data.
+A program that reads a stream while it comes needs the table before. So in pipes, the headers of a visual
+object sequence with the same user data stand before the object: see `write_opening`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _OBJECT_CODES = tuple(bytes([*syntax.START_CODE_PREFIX, code]) for code in synta
 _NAME = b"fba "
 _FIELD = re.compile(rb"(bap_steps|crc32)=([^;=\0]{1,24});", re.DOTALL)
 _SIMILAR = re.compile(rb"fba |bap_steps=|crc32=")
-"""What is left of a mark in which a bit was flipped."""
+"""Text by which a mark with a flipped bit is recognised."""
 _BEFORE_OBJECT = re.compile(
     re.escape(_SEQUENCE_HEADER[:4]) + rb"." + re.escape(START + _NAME) + rb"[^\0]{0,48}", re.DOTALL
 )
@@ -94,7 +94,7 @@ def write_opening(table: BapTable) -> bytes:
 def bytes_needed(content: bytes, most: int) -> int:
     """Return the number of bytes of a mark after the start code of user data, given its beginning.
 
-    most: I periods of the object at most; a list that claims more is not waited for.
+    most: largest possible number of I periods of the object; a list that claims more is not waited for.
     """
     words, count = _words(content)[1:]
     if count is None:
@@ -135,9 +135,9 @@ def read_mark(content: bytes) -> MarkContent | None:
 
 
 def _words(content: bytes) -> tuple[str | None, int, int | None]:
-    """Return the table that a mark names, the byte behind its words, and how many checks its list counts.
+    """Return the table that a mark names, the byte behind its words, and the number of checks it announces.
 
-    None, 0 and None where there is no such thing.
+    None, 0 and None without them.
     """
     table, position, count = None, 0, None
     if content.startswith(_NAME):
@@ -162,15 +162,15 @@ def find_marks(data: bytes | bytearray | memoryview) -> tuple[Mark, ...]:
         start = position + len(_END_CODE) + len(START)
         table, words, _ = _words(content[start : start + MAX_MARK_BYTES])
         if table in BAP_STEP_TABLES:
-            found = max(content.rfind(code, begin, position) for code in _OBJECT_CODES)
-            marks.append(Mark(table, max(found, begin), start + words))
+            object_start = max(content.rfind(code, begin, position) for code in _OBJECT_CODES)
+            marks.append(Mark(table, max(object_start, begin), start + words))
             begin = start + words
         position = start
     return tuple(marks)
 
 
 def marked_table(data: bytes | bytearray | memoryview) -> BapTable | None:
-    """Return the table that the marks in a stream name; None without a mark, or where they differ."""
+    """Return the table that the marks in a stream name; None without a mark, or if they differ."""
     tables = {mark.table for mark in find_marks(data)}
     for opening in _BEFORE_OBJECT.finditer(bytes(data)):
         table = _words(opening[0][len(_SEQUENCE_HEADER) + len(START) :])[0]

@@ -12,16 +12,16 @@ _DEFAULT_TABLE: BapTable = BAP_STEP_TABLES[0]
 
 
 class ObjectBorders:
-    """What is known of the objects of a stream so far, and of the last one in particular.
+    """The objects of a stream so far, and the state of the last of them.
 
-    bap_steps: the table that all objects were made with; None: the one that a mark names, that before the
-    object rather than that behind it. marks: those behind the objects of the whole stream, where they are
-    known beforehand.
+    bap_steps: the table that all objects were made with; None: the table that a mark names, the mark before
+    an object rather than the mark behind it. marks: those behind the objects of the whole stream, if all its
+    bytes are there.
 
-    count: objects begun. table: of the last one. has_body: whether one of its planes carries BAPs.
-    end_code: last byte of the start code that ended it; None before that. end: byte of the stream behind that
-    code, or behind user data that follow it. mark: the table that its marks name, None without one. checks:
-    what the mark behind it lists, see `checksums`; None without a list.
+    count: number of objects begun. Of the last object, table: of BAP steps; has_body: whether any plane
+    carries BAPs; end_code: last byte of the start code that ended it, None before that; end: byte of the
+    stream behind that code, or behind user data that follow it; mark: the table that its marks name, None
+    without a mark; checks: those that the mark behind it lists, see `checksums`, None without a list.
     """
 
     def __init__(self, bap_steps: BapTable | None, marks: Sequence[Mark]) -> None:
@@ -69,10 +69,10 @@ class ObjectBorders:
         return self._difference("before its planes")
 
     def read_user_data(self, code: int, byte: int, content: bytes) -> list[str]:
-        """Take a start code outside of an object, and read the mark if it begins one.
+        """Read a start code outside of an object, and the mark if a mark begins there; return what is wrong.
 
-        byte: of the stream, at which the start code stands. content: what follows it. Returns what is wrong,
-        e.g. that planes with BAPs were decoded with other steps than the mark says.
+        For example, planes with BAPs were decoded with other steps than the mark says. byte: of the stream,
+        at which the start code stands. content: what follows it.
         """
         directly = byte == self.end and self.count > 0
         if self._in_user_data:
@@ -98,7 +98,7 @@ class ObjectBorders:
         return problems + ([difference] if difference else [])
 
     def _read_before(self, table: BapTable | None) -> list[str]:
-        """Take the table that user data before an object name; the first counts."""
+        """Note the first table that user data before an object name; return what is wrong."""
         if self._before is None or table in (None, self._before):
             self._before = self._before or table
             return []
@@ -114,5 +114,5 @@ class ObjectBorders:
         )
 
     def unread(self, length: int) -> int:
-        """Return how many bytes behind the last object are no user data. length: bytes of the stream."""
+        """Return how many bytes behind the last object are not user data. length: bytes of the stream."""
         return 0 if self._in_user_data else max(length - self.end, 0)

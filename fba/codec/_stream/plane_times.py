@@ -1,4 +1,4 @@
-"""Times of planes: exact in a whole stream, and behind damage the most likely ones."""
+"""Times of planes: exact in an undamaged stream, the most likely times behind damage."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from fba.codec.settings import PlaneSettings
 from fba.errors import BitstreamError
 
 MAX_CYCLE = 2
-"""Largest number of intervals that repeat: half a second at 25 frames/s is 13 and 12 frames in turn."""
+"""Most intervals in a pattern that repeats: half a second at 25 frames/s is 13 and 12 frames in turn."""
 
 
 class PlaneTimes:
     """Gives planes their times.
 
-    log: of the damage; None if the first damage is an error. A log also gets the findings of the times: how
-    many frames were lost, and time codes and frame rates that contradict the planes before them.
+    log: of the damage; None if the first damage is an error. The log also gets what times reveal: how many
+    frames were lost, and time codes and frame rates that contradict the planes before them.
 
-    may_step_back: whether frames may have lower indices than misread ones before. If not, frames that a time
-    code puts before the last one follow it at once.
+    may_step_back: whether frames may have lower indices than misread frames before them. If not, frames that
+    a time code puts before the last frame follow it at once.
     """
 
     def __init__(self, log: DamageLog | None) -> None:
@@ -88,7 +88,7 @@ class PlaneTimes:
         return start, index
 
     def _skip_lost(self, settings: PlaneSettings) -> tuple[int, int] | None:
-        """Leave out as many frames as seem lost before an I plane; return their number and uncertainty."""
+        """Skip as many frames as seem lost before an I plane; return their number and its uncertainty."""
         assert self._log is not None
         clock, code = self._clock, settings.time_code
         lost = self._log.estimate()
@@ -104,12 +104,12 @@ class PlaneTimes:
 
 
 def _describe_jump(settings: PlaneSettings, jump: int) -> str:
-    """Return the text for a time code that contradicts the count of planes, unlike the codes before."""
+    """Return the text for a time code that contradicts the count of planes, unlike earlier time codes."""
     frames = f"{abs(jump)} frame{'s' if abs(jump) != 1 else ''}"
-    found = (
+    finding = (
         f"{frames} are missing before this plane" if jump > 0 else f"the planes before it are {frames} late"
     )
-    return f"the time code {settings.time_code} says that {found}"
+    return f"the time code {settings.time_code} says that {finding}"
 
 
 class RestartPoints:
@@ -145,11 +145,11 @@ class RestartPoints:
         return min(upcoming, key=lambda point: abs(point - index)) if upcoming else None
 
     def _cycle(self) -> list[int]:
-        """Return the intervals that repeat, beginning with the next; empty if they do not."""
-        known = list(self._intervals)
+        """Return the intervals that repeat, the next of them first; empty if none repeat."""
+        past = list(self._intervals)
         for count in range(1, MAX_CYCLE + 1):
-            if len(known) >= 2 * count and known[-count:] == known[-2 * count : -count]:
-                return known[-count:]
+            if len(past) >= 2 * count and past[-count:] == past[-2 * count : -count]:
+                return past[-count:]
         return []
 
     def _upcoming(self, index: int) -> list[int]:

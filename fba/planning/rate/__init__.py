@@ -1,4 +1,4 @@
-"""Bit rates: streams that hold a mean rate within a bounded buffer, live and as files.
+"""Bit rates: streams at a mean rate within a bounded buffer, live and as files.
 
 May use: all of `fba.planning`, the models of faces and bodies.
 """

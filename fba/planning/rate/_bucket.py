@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 @dataclass
 class LeakyBucket:
-    """A buffer that planes are put into, and that a channel empties at a constant rate.
+    """A buffer that planes fill, and that a channel empties at a constant rate.
 
-    rate: bits a second. size: bits that it holds. level: bits in it at `time`, seconds. peak: the highest
-    level so far.
+    rate: bits a second. size: bits that fit. level: bits in it at `time`, in seconds. peak: the highest level
+    so far.
 
     While the level stays within the size, no stretch of the stream takes more than rate x its length + size
-    bits, and a receiver that waits for size / rate seconds before it begins never has to wait again.
+    bits. A receiver that waits for size / rate seconds before it begins never has to wait again.
 
     Raises ValueError for a rate or a size that is not positive.
     """
@@ -32,7 +32,7 @@ class LeakyBucket:
                 raise ValueError(f"{name} must be a positive number, not {value!r}")
 
     def drain(self, time: float) -> None:
-        """Go on to a later time."""
+        """Advance to a later time."""
         self.level = self.level_at(time)
         self.time = time
 
@@ -47,5 +47,5 @@ class LeakyBucket:
 
     @property
     def room(self) -> float:
-        """Bits that it still takes."""
+        """Bits that still fit."""
         return self.size - self.level

@@ -1,4 +1,4 @@
-"""`RateEncoder`: an encoder that holds a mean rate within a bounded buffer, a frame at a time."""
+"""`RateEncoder`: encodes frame by frame at a mean rate, within a bounded buffer."""
 
 from __future__ import annotations
 
@@ -9,51 +9,46 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fba.animation import Animation, Frame
+from fba.animation import Animation, Frame, check_order
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, write_mark
 from fba.errors import FbaWarning, OptionError, RangeError, Remedy
-from fba.planning._live_encoder import check_order
 from fba.planning.rate._bucket import LeakyBucket
+from fba.planning.rate._errors import error_weights
 from fba.planning.rate._expectations import expected_motion, quantiser_for
-from fba.planning.rate._visibility import slot_weights
 from fba.tracks import BodyTrack, FaceTrack
 
-COARSEST = 5.0
-"""Millimetres by which a parameter may be off before it is worth bits, with a full buffer."""
-STEEPNESS = 4.0
-"""How much faster that grows as the buffer fills than in a straight line: e-fold."""
-CHANGE_BITS = 6.0
-"""Bits of a change beyond those of none, about: what makes a price of a tolerance."""
-DEARER = 4.0
-"""Factor between the prices that are tried until a plane fits."""
-MIN_PRICE = 1e-4
-"""Lowest price of a bit that is tried."""
-MAX_PRICE = 1e9
-"""Highest price of a bit that is tried."""
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the control of the rate. Prices are square millimetres for a bit."""
+
+    max_error: float = 5.0  # mm, below which no error is worth bits when the buffer is full
+    steepness: float = 4.0  # e-folds by which that error grows while the buffer fills
+    change_bits: float = 6.0  # typical bits of a change beyond those of no change, to turn errors into prices
+    price_factor: float = 4.0  # between the prices that are tried until a plane fits
+    min_price: float = 1e-4
+    max_price: float = 1e9
+    full_share: float = 0.5  # of the buffer, above which frames are left out if still planes take too much
+    still_share: float = 2.0  # still planes for which the rate has bits before a plane comes, if so full
+    max_gap: float = 0.2  # s between two planes, unless the buffer is full
+    spare_bits: int = 96  # always free: for the end of the stream, and for start codes between planes
+    growth_bits: int = 16  # by which a still plane may cost more after the next plane than now
+
+
+TUNING = Tuning()
 HOLD = math.inf
 """A price at which nothing changes."""
-FULL = 0.5
-"""Part of the buffer above which frames are left out, where planes without a change take too much."""
-STILL_SHARE = 2.0
-"""A plane's share of the rate, in planes without a change, that frames are left out for."""
-MAX_GAP = 0.2
-"""Longest time between two planes, in seconds, unless the buffer is full."""
-SPARE = 96
-"""Bits that always stay free: for the end of the stream, and for start codes that keep planes apart; a mark
-behind the end takes more.
-"""
-LEARNING = 16
-"""Bits by which a plane without a change may cost more after the next plane than it does now."""
 SKIP_BITS = 4
+"""Bits of a skip of up to 14 frames."""
 
 
 @dataclass
 class RateStatistics(EncoderStatistics):
     """Counts of an encoder that holds a rate.
 
-    frames: frames that came. left_out: of these, those without a plane. longest_gap: seconds between planes.
-    peak: bits in the buffer at most. over: planes that did not fit the buffer, which must be 0. not_sent:
-    whether parameters that came later are not sent, since no I plane with them fits the buffer.
+    frames: number of frames pushed. left_out: number of these without a plane. longest_gap: seconds between
+    planes. peak: most bits in the buffer. over: number of planes that did not fit the buffer, which must be
+    0. not_sent: whether parameters that came later are not sent, since no I plane with them fits the buffer.
     """
 
     frames: int = 0
@@ -68,16 +63,16 @@ class RateEncoder:
     """Encodes frames as they come, at a mean rate: `push` and `finish` return the bytes that are complete.
 
     bit_rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size at
-    the time of its frame. A plane is returned when the frame after it comes. options: as for `Encoder`; their
-    quantisers count unless choose_quantisers is set, which takes one that suits the rate and the frame.
+    the time of its frame. A plane is returned when the frame after it comes. options: as for `Encoder`; with
+    choose_quantisers, their quantisers are replaced by those that suit the rate and the frame.
 
-    Each frame is approximated (`Encoder.next_plane`) at a price that grows as the buffer fills: what is seen
-    least stays behind first, by `finest` millimetres even where there is room. Frames are left out where
-    planes without a change would take too much of the rate; players move on smoothly from one plane to the
-    next. I planes come at the beginning and when something is sent that was not before; frames are left out
-    until the buffer has room for one. The mark has no checksums, for which bits would have to stay free.
+    Each frame is approximated (`Encoder.next_plane`) at a price that grows as the buffer fills: the least
+    visible parameters lag behind first, by `finest` millimetres even if there is room. Frames are left out if
+    planes without a change would take too much of the rate; players interpolate between planes. I planes come
+    at the beginning, and when parameters are sent that were not sent before; frames are left out until the
+    buffer has room for an I plane. The mark has no checksums, for which bits would have to stay free.
 
-    Raises RangeError where the first I plane does not fit the buffer at all, and as `Encoder` does,
+    Raises RangeError if the first I plane does not fit the buffer at all, and as `Encoder` does,
     OptionError for an intra_period, ValueError for a rate or a buffer that is not positive.
     """
 
@@ -97,7 +92,7 @@ class RateEncoder:
         self._encoder = Encoder(replace(options or EncoderOptions(), checksums=False))
         self._choose = choose_quantisers
         self._finest = finest
-        self._spare = SPARE
+        self._spare = TUNING.spare_bits
         self._expected: Animation | None = None
         self._exactly = False
         self._last: Animation | None = None  # the last frame with a plane, as it was pushed
@@ -116,7 +111,7 @@ class RateEncoder:
     def expect(self, animation: Animation, *, exactly: bool = False) -> None:
         """Begin with ranges for the least and the largest values of an animation.
 
-        exactly: its changes from frame to frame are those that will come, too; else they are estimated.
+        exactly: its changes from frame to frame will come, too; else changes are estimated.
         ValueError after the first frame.
         """
         if self._last is not None:
@@ -187,17 +182,17 @@ class RateEncoder:
 
     def _count(self) -> None:
         """Bring the statistics up to date."""
-        own, theirs = self.statistics, self._encoder.statistics
-        own.planes, own.intra_planes = theirs.planes, theirs.intra_planes
-        own.clamped_parameters = theirs.clamped_parameters
-        own.left_out = own.frames - self._planes
-        own.peak = self.bucket.peak
+        statistics, encoder = self.statistics, self._encoder.statistics
+        statistics.planes, statistics.intra_planes = encoder.planes, encoder.intra_planes
+        statistics.clamped_parameters = encoder.clamped_parameters
+        statistics.left_out = statistics.frames - self._planes
+        statistics.peak = self.bucket.peak
 
     def _push_intra(self, frame: Animation) -> bytes | None:
-        """Encode a frame as an I plane; None where the buffer has no room for that yet."""
+        """Encode a frame as an I plane; None if the buffer has no room for that yet."""
         index = int(frame.index[0])
         marked = frame.body is not None and self.options.mark
-        spare = SPARE + 8 * len(write_mark(self.options.bap_steps)) if marked else self._spare
+        spare = TUNING.spare_bits + 8 * len(write_mark(self.options.bap_steps)) if marked else self._spare
         trial = copy.deepcopy(self._encoder)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FbaWarning)  # given below
@@ -222,7 +217,7 @@ class RateEncoder:
         self.bucket.add(bits)
         after = trial.next_plane(frame)
         assert after is not None
-        self._plan_gap(frame, after.bits(after.levels(slot_weights(), HOLD)))
+        self._plan_gap(frame, after.bits(after.levels(error_weights(), HOLD)))
         return data
 
     def _begin_segment(self, encoder: Encoder, frame: Animation) -> None:
@@ -242,13 +237,13 @@ class RateEncoder:
         room = self.bucket.room - self._spare - SKIP_BITS
         plane = self._encoder.next_plane(frame)
         assert plane is not None
-        price, weights = self._price(), slot_weights()
+        price, weights = self._price(), error_weights()
         while True:
             levels = plane.levels(weights, price)
             bits = plane.bits(levels)
             if bits <= room or price == HOLD:
                 break
-            price = max(price, MIN_PRICE) * DEARER if price < MAX_PRICE else HOLD
+            price = max(price, TUNING.min_price) * TUNING.price_factor if price < TUNING.max_price else HOLD
         self.statistics.over += bits > room
         self.bucket.add(bits)
         self._plan_gap(frame, plane.bits(plane.levels(weights, HOLD)))
@@ -256,20 +251,23 @@ class RateEncoder:
         return data
 
     def _price(self) -> float:
-        """Return the square millimetres that a bit is worth, by the level of the buffer."""
+        """Return the price of a bit at this level of the buffer."""
         full = min(self.bucket.level / self.bucket.size, 1.0)
-        tolerance = max(self._finest, COARSEST * math.expm1(STEEPNESS * full) / math.expm1(STEEPNESS))
-        return tolerance * tolerance / CHANGE_BITS
+        tolerance = max(
+            self._finest,
+            TUNING.max_error * math.expm1(TUNING.steepness * full) / math.expm1(TUNING.steepness),
+        )
+        return tolerance * tolerance / TUNING.change_bits
 
     def _plan_gap(self, frame: Animation, still: int) -> None:
-        """Set from which frame on a plane may come. still: bits of a plane without a change."""
+        """Set the first frame that may have a plane again. still: bits of a plane without a change."""
         bucket, period = self.bucket, float(1 / frame.rate)
-        self._needed = still + LEARNING + self._spare + SKIP_BITS
-        longest = max(1, math.floor(MAX_GAP / period + 1e-9))
+        self._needed = still + TUNING.growth_bits + self._spare + SKIP_BITS
+        longest = max(1, math.floor(TUNING.max_gap / period + 1e-9))
         gap = 1
         while gap < longest and (
-            gap * period * bucket.rate < STILL_SHARE * still
-            and bucket.level_at(bucket.time + gap * period) > FULL * bucket.size
+            gap * period * bucket.rate < TUNING.still_share * still
+            and bucket.level_at(bucket.time + gap * period) > TUNING.full_share * bucket.size
         ):
             gap += 1
         over = bucket.level + SKIP_BITS + self._needed - bucket.size  # must have drained
@@ -293,35 +291,35 @@ class RateEncoder:
 
 
 def _sending_as(frame: Animation, last: Animation) -> Animation:
-    """Return a frame that sends the parameters that the last one sent; what it lacks keeps its value."""
+    """Return a frame that sends the parameters of the last frame; those that it lacks keep their values."""
     face, body = last.face, last.body
     if face is not None and frame.face is not None:
         new = frame.face
         values = np.where(face.mask, np.where(new.mask, new.values, face.values), 0)
         viseme, expression = (
-            theirs if new.mask[0, column] else own
-            for column, (own, theirs) in enumerate(
+            after if new.mask[0, column] else before
+            for column, (before, after) in enumerate(
                 ((face.viseme, new.viseme), (face.expression, new.expression))
             )
         )
         face = FaceTrack(values, face.mask, viseme, expression, face.interpolated)
     if body is not None and frame.body is not None:
-        other = frame.body
-        values = np.where(body.mask, np.where(other.mask, other.values, body.values), 0)
+        moved = frame.body
+        values = np.where(body.mask, np.where(moved.mask, moved.values, body.values), 0)
         body = BodyTrack(values, body.mask)
     return replace(frame, face=face, body=body)
 
 
 def _sends_other(frame: Animation, last: Animation) -> bool:
-    """Whether a frame sends other parameters than the last one."""
-    for one, other in ((frame.face, last.face), (frame.body, last.body)):
-        if (one is None) != (other is None):
+    """Return whether a frame sends other parameters than the last frame."""
+    for now, before in ((frame.face, last.face), (frame.body, last.body)):
+        if (now is None) != (before is None):
             return True
-        if one is not None and other is not None and not np.array_equal(one.mask, other.mask):
+        if now is not None and before is not None and not np.array_equal(now.mask, before.mask):
             return True
     if frame.face is None or last.face is None:
         return False
-    wanted, before = frame.face.interpolated, last.face.interpolated
-    if wanted is None or before is None:
-        return wanted is not before
-    return not np.array_equal(wanted, before)
+    asked, asked_before = frame.face.interpolated, last.face.interpolated
+    if asked is None or asked_before is None:
+        return asked is not asked_before
+    return not np.array_equal(asked, asked_before)

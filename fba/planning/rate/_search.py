@@ -1,4 +1,4 @@
-"""`encode_at_rate`: a whole animation at a mean rate, with the quantiser that loses least."""
+"""`encode_at_rate`: a whole animation at a mean rate, with the quantiser that gives the least errors."""
 
 from __future__ import annotations
 
@@ -10,32 +10,34 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.animation import Animation
-from fba.codec import EncoderOptions, code_lengths, decode, quantise
+from fba.arrays import Bool, Int16
+from fba.codec import EncoderOptions, decode, quantise
 from fba.errors import FbaWarning, RangeError
 from fba.face import resolve
 from fba.face.resolve import known_faps
+from fba.planning._code_lengths import code_lengths
 from fba.planning._derived_faps import choose_faps, interpolated_faps
 from fba.planning._plan import NO_LIMITS, plan_compact
 from fba.planning._segments import Cuts
 from fba.planning.rate._encoder import RateEncoder, RateStatistics
 from fba.planning.rate._errors import mean_distance
-from fba.planning.rate._expectations import GAP
+from fba.planning.rate._expectations import TUNING
 from fba.tracks import BodyTrack, FaceTrack, hold
 
 QUANTISERS = (1, 2, 3, 4, 6, 8)
-"""Those that are tried."""
-FINEST = (0.05, 0.0, 0.1)
-"""Millimetres; see `RateEncoder`: the first is tried with all quantisers, the others with the best one."""
+"""Quantisers that are tried."""
+FINEST_ERRORS = (0.05, 0.0, 0.1)
+"""Millimetres, see `RateEncoder`: the first is tried with all quantisers, the others with the best."""
 TRIED_SECONDS = 30
-"""Of the beginning, on which quantisers are tried."""
+"""Length of the beginning on which settings are tried."""
 
 
 @dataclass(frozen=True, eq=False)
 class RatedStream:
     """A stream at a bit rate.
 
-    data: its bytes. shown: what a decoder returns for it. options: with the quantisers chosen. statistics:
-    what the encoder counted. rate: bits a second over the whole length.
+    data: its bytes. shown: the decoded animation. options: with the chosen quantisers. statistics: of the
+    encoder. rate: bits a second over the whole length.
     """
 
     data: bytes
@@ -48,11 +50,11 @@ class RatedStream:
 def encode_at_rate(
     animation: Animation, bit_rate: float, buffer: float = 1.0, options: EncoderOptions | None = None
 ) -> RatedStream:
-    """Return the stream that loses least at a bit rate.
+    """Return the stream with the least errors at a bit rate.
 
-    bit_rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size. What
-    players derive by the standard's rules is not sent, as in `plan_compact`, with one choice for all frames.
-    Quantisers are tried on the first half minute; those in `options` do not count.
+    bit_rate: bits a second. buffer: seconds of that rate; every plane fits a `LeakyBucket` of this size. FAPs
+    that players derive by the standard's rules are not sent, as in `plan_compact`, but with the same choice
+    for all frames. Quantisers are tried on the first half minute; those in `options` are ignored.
 
     A stream that needs less than the rate takes less. Raises RangeError for a buffer that no I plane fits,
     ValueError for an animation without frames and for a rate or a buffer that is not positive.
@@ -62,18 +64,18 @@ def encode_at_rate(
     options = options or EncoderOptions()
     sent = _to_send(quantise(animation, replace(options, fap_quant=1, bap_quant=1)), options)
     beginning = sent[: max(1, math.ceil(TRIED_SECONDS * float(animation.rate)))]
-    stride = max(1, int(GAP * float(sent.rate)))
-    coarse = [_Setting(one, FINEST[0], stride) for one in QUANTISERS]
+    stride = max(1, int(TUNING.gap * float(sent.rate)))
+    coarse = [_Setting(quantiser, FINEST_ERRORS[0], stride) for quantiser in QUANTISERS]
     best = _best_setting(beginning, sent, bit_rate, buffer, coarse, options)
-    finer = [_Setting(best.quantiser, finest, stride) for finest in FINEST]
+    finer = [_Setting(best.quantiser, finest, stride) for finest in FINEST_ERRORS]
     if stride > 1:
-        finer += [_Setting(one.quantiser, one.finest, 1) for one in finer]
+        finer += [setting._replace(stride=1) for setting in finer]
     best = _best_setting(beginning, sent, bit_rate, buffer, finer, options)
     return _encode(sent, sent, bit_rate, buffer, best, options)
 
 
 class _Setting(NamedTuple):
-    """A quantiser of FAPs and BAPs, `finest` of a `RateEncoder`, and frames whose change a plane carries."""
+    """A quantiser, the `finest` error of a `RateEncoder`, and how many frames apart ranges allow changes."""
 
     quantiser: int
     finest: float
@@ -84,17 +86,17 @@ def _best_setting(
     animation: Animation, expected: Animation, rate: float, buffer: float, settings: list[_Setting],
     options: EncoderOptions,
 ) -> _Setting:  # fmt: skip
-    """Return the setting that loses least. Raises RangeError where none fits, as the last one does."""
+    """Return the setting with the least errors. Raises the last RangeError if no setting fits."""
     best, least = None, math.inf
     for setting in settings:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", FbaWarning)  # given with the stream itself
-                found = _encode(animation, expected, rate, buffer, setting, options)
+                rated = _encode(animation, expected, rate, buffer, setting, options)
         except RangeError as error:
             failure = error
             continue
-        distance = mean_distance(animation, found.shown)
+        distance = mean_distance(animation, rated.shown)
         if distance < least:
             best, least = setting, distance
     if best is None:
@@ -117,7 +119,7 @@ def _encode(
 
 
 def _changes_over(animation: Animation, stride: int) -> Animation:
-    """Return an animation, and behind it every `step`-th of its frames, backwards, with larger changes."""
+    """Return an animation, followed by every `stride`-th of its frames backwards, with larger changes."""
     order = np.arange(len(animation))
     if stride > 1:
         order = np.concatenate([order, order[::-1][::stride]])
@@ -130,12 +132,11 @@ def _changes_over(animation: Animation, stride: int) -> Animation:
 
 
 def _to_send(animation: Animation, options: EncoderOptions) -> Animation:
-    """Return an animation with what must be sent for a player to show the same; one choice for all frames."""
+    """Return an animation that sends, in all frames, the parameters with which a player shows the same."""
     face, body = animation.face, animation.body
     if body is not None:
-        held = hold(body.values, body.mask, np.zeros_like(body.values[0]))
-        moves = np.broadcast_to(held.any(axis=0), held.shape)
-        body = BodyTrack(np.where(moves, held, 0).astype(np.int32), moves)
+        values = hold(body.values, body.mask, np.zeros_like(body.values[0]))
+        body = BodyTrack(values, np.broadcast_to(values.any(axis=0), values.shape))
     if face is not None:
         thin = _face_to_send(face, options)
         if not np.array_equal(resolve(thin), resolve(face)):  # visemes and expressions
@@ -147,7 +148,7 @@ def _to_send(animation: Animation, options: EncoderOptions) -> Animation:
 
 
 def _face_to_send(face: FaceTrack, options: EncoderOptions) -> FaceTrack:
-    """Return a face that sends the same FAPs in every frame, and not those that are derived from others."""
+    """Return a face that sends the same FAPs in every frame, without those derived from others."""
     values, known = known_faps(face)
     known = np.broadcast_to(known.any(axis=0), known.shape)
     shown = FaceTrack(values, known)
@@ -157,11 +158,11 @@ def _face_to_send(face: FaceTrack, options: EncoderOptions) -> FaceTrack:
     moves = known & values.any(axis=0)
     mask[:, :2] = face.mask[:, :2].any(axis=0) & np.array([face.viseme.any(), face.expression.any()])
     return FaceTrack(
-        np.where(mask, values, 0), mask, _held(face.viseme, face.mask[:, :1]),
-        _held(face.expression, face.mask[:, 1:2]), interpolated_faps(mask, moves),
+        np.where(mask, values, 0), mask, _in_force(face.viseme, face.mask[:, :1]),
+        _in_force(face.expression, face.mask[:, 1:2]), interpolated_faps(mask, moves),
     )  # fmt: skip
 
 
-def _held(fields: np.ndarray, mask: np.ndarray) -> np.ndarray:
+def _in_force(fields: Int16, mask: Bool) -> Int16:
     """Return the fields of a viseme or an expression in force at every frame."""
     return hold(fields, mask, np.zeros_like(fields[0]))

@@ -70,8 +70,9 @@ def probe_encoded(animation: Animation) -> StreamInfo | None:
     tracks = [track for track in (animation.face, animation.body) if track is not None]
     if not len(animation) or sum(int(track.mask.sum()) for track in tracks) > MAX_VALUES:
         return None
-    from fba.codec import encode, probe_stream
+    from fba.codec import probe_stream
     from fba.errors import FbaError
+    from fba.planning import encode
 
     try:
         return probe_stream(encode(animation))

@@ -1,32 +1,132 @@
-"""The blocks of a whole stream, joined without unsent parameters, for `decode`."""
+"""Buffers that join decoded blocks: of a live stream at any time, of a whole stream at its end."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
-from fba.animation import Animation
+from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Array, Bool, Int64
 from fba.codec._block import Block
 from fba.codec._coded_frames import CodedFrames, Masks
 from fba.codec._plane import slots, syntax
-from fba.codec._rows import Rows
+from fba.codec._rows import GrowingMasks, Rows
 from fba.codec._time_base import TimeBase
-from fba.codec.settings import PartSettings
 from fba.limits import Limits
-from fba.parameters import BAP_COUNT, FAP_COUNT
+from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
+from fba.tracks import trusted
 
 _FRAME_BYTES = 16
-"""Memory of a frame besides its values: its index, and the number of its masks."""
+"""Memory of a frame in a `CompactBuffer` besides its values: its index, and the number of its masks."""
 _MASKS_BYTES = 1000
 """Memory of a set of masks, with its key."""
+
+
+@dataclass(frozen=True)
+class DecodedFrames:
+    """All frames decoded so far: the fields of `fba.Animation`, and the sizes and types of planes.
+
+    plane_bits: int64 (T,). plane_intra: bool (T,), True for I planes.
+    """
+
+    rate: Fraction
+    index: Int64
+    face: FaceTrack | None
+    body: BodyTrack | None
+    plane_bits: Int64
+    plane_intra: Bool
+
+    def animation(self, name: str = "") -> Animation:
+        """Return these frames as an animation. ValueError without frames."""
+        if not len(self.index):
+            raise ValueError("there is no frame to make an animation of")
+        return Animation(self.rate, self.index, self.face, self.body, name)
+
+
+class FrameBuffer:
+    """Collects decoded blocks in stream order; `decoded` returns all their frames without a copy.
+
+    Arrays that it returned do not change when more blocks come. frames: their number.
+    left_out: "a face" or "a body" if it first came after `fix_parts`, else "".
+    """
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self.left_out = ""
+        self._parts_fixed = False
+        self._times = TimeBase()
+        self._bits = Rows((), np.int64)
+        self._intra = Rows((), np.bool_)
+        self._face: dict[str, Any] = {}
+        self._body: dict[str, Any] = {}
+
+    def fix_parts(self) -> None:
+        """Ignore a face or body from now on if there has been none so far."""
+        self._parts_fixed = True
+
+    def add(self, block: Block) -> None:
+        """Append the frames of a block."""
+        count = len(block.index)
+        if not count:
+            return
+        if block.face is not None and not self._face and self._accepts("a face"):
+            self._face = {
+                "values": self._rows(FAP_COUNT, np.int32),
+                "mask": GrowingMasks(FAP_COUNT, self.frames),
+                "viseme": self._rows(len(VISEME_FIELDS), np.int16),
+                "expression": self._rows(len(EXPRESSION_FIELDS), np.int16),
+                "interpolated": GrowingMasks(FAP_COUNT, self.frames),
+            }
+        if block.body is not None and not self._body and self._accepts("a body"):
+            self._body = {
+                "values": self._rows(BAP_COUNT, np.int32),
+                "mask": GrowingMasks(BAP_COUNT, self.frames),
+            }
+        self._times.add(block.index, block.start, block.rate)
+        self._bits.append(np.diff(block.borders), count)
+        self._intra.append(block.settings.intra, count)
+        for fields, track in ((self._face, block.face), (self._body, block.body)):
+            for name, field in fields.items():
+                rows: Array | None = getattr(track, name) if track is not None else None
+                if rows is not None and isinstance(field, GrowingMasks) and block.same_parts:
+                    rows = rows[0]
+                field.append(rows, count)
+        self.frames += count
+
+    def decoded(self) -> DecodedFrames:
+        """Return all frames so far."""
+        face = {name: field.view() for name, field in self._face.items()}
+        if face and not self._face["interpolated"].any:
+            face["interpolated"] = None
+        body = {name: field.view() for name, field in self._body.items()}
+        return DecodedFrames(
+            self._times.rate,
+            self._times.index(),
+            trusted(FaceTrack, **face) if face else None,
+            trusted(BodyTrack, **body) if body else None,
+            self._bits.view(),
+            self._intra.view(),
+        )
+
+    def _accepts(self, part: str) -> bool:
+        """Return whether a new part may be added; otherwise set `left_out`."""
+        if self._parts_fixed:
+            self.left_out = part
+        return not self._parts_fixed
+
+    def _rows(self, columns: int, dtype: type[np.generic]) -> Rows:
+        """Return rows of zeros for all frames so far."""
+        return Rows((columns,), dtype, self.frames)
 
 
 class CompactBuffer:
     """Collects decoded blocks in stream order; `animation` returns all their frames, once, at the end.
 
-    Columns are stored for slots that were sent, and each set of masks once. limits: LimitError beyond them.
+    It stores columns for slots that were sent, and each set of masks once. LimitError beyond `limits`.
     source: bytes of the stream. frames: their number.
     """
 
@@ -39,9 +139,9 @@ class CompactBuffer:
         self._rows = Rows((0,), np.int32, in_place=True)
         self._kinds = Rows((), np.int32, in_place=True)  # which of `_masks` a frame has
         self._masks: list[tuple[Bool, Bool | None, Bool]] = []  # FAPs, those to be interpolated, BAPs
-        self._kind_of: dict[tuple[bytes, bytes, bytes], int] = {}
+        self._kind_of: dict[object, int] = {}
         self._parts = 0
-        self._known: tuple[Int64 | None, Int64 | slice] = None, slice(0)  # result of `_columns`
+        self._last_columns: tuple[Int64 | None, Int64 | slice] = None, slice(0)  # slots, result of `_columns`
 
     def add(self, block: Block) -> None:
         """Append the frames of a block."""
@@ -62,8 +162,8 @@ class CompactBuffer:
     def animation(self, wrong: Sequence[range] = ()) -> Animation:
         """Return all frames. ValueError without frames.
 
-        Frames before damage whose index the frames after it repeat were misread, and are left out. wrong:
-        planes of I periods that do not match their CRC-32; they are left out unless they are all.
+        Frames before damage were misread if frames after it repeat their index; they are left out. wrong:
+        planes of I periods that do not match their CRC-32; they are left out, unless all planes are wrong.
         """
         if not self.frames:
             raise ValueError("there is no frame to make an animation of")
@@ -92,26 +192,29 @@ class CompactBuffer:
 
     def _columns(self, wanted: Int64) -> Int64 | slice:
         """Return the columns of rows for these slots, making new columns where needed."""
-        if wanted is not self._known[0]:
+        if wanted is not self._last_columns[0]:
             new = wanted[self._places[wanted] < 0]
             if len(new):
                 used = int(self._places.max()) + 1
                 if used + len(new) > self._rows.width:
-                    # More than are needed, because making columns copies all rows.
+                    # more than needed, because new columns make a copy of all rows
                     self._rows.widen(min(max(used + len(new), 2 * used), slots.SLOTS))
                 self._places[new] = np.arange(used, used + len(new))
             columns = self._places[wanted]
             start, stop = int(columns.min(initial=slots.SLOTS)), int(columns.max(initial=-1)) + 1
             in_order = np.array_equal(columns, np.arange(start, stop))
-            self._known = wanted, slice(start, stop) if in_order else columns
-        return self._known[1]
+            self._last_columns = wanted, slice(start, stop) if in_order else columns
+        return self._last_columns[1]
 
     def _kind(self, block: Block, parts: int) -> int:
         """Return the number of the masks of a plane with these parts of a block."""
         self._parts |= parts
         face = block.settings.face if parts & slots.FACE_BIT else None
         body = block.settings.body if parts & slots.BODY_BIT else None
-        key = (*_face_key(face), body.mask.tobytes() if body is not None else b"")
+        key = (
+            (face.mask.tobytes(), face.mask_types) if face is not None else None,
+            body.mask.tobytes() if body is not None else None,
+        )
         if key not in self._kind_of:
             self._kind_of[key] = len(self._masks)
             self._masks.append(
@@ -129,11 +232,6 @@ class CompactBuffer:
         self._limits.check_frames(frames, "the stream")
         memory = frames * (4 * self._rows.width + _FRAME_BYTES) + len(self._masks) * _MASKS_BYTES
         self._limits.check_bytes(memory, "the decoded stream", source=self._source)
-
-
-def _face_key(face: PartSettings | None) -> tuple[bytes, bytes]:
-    """Return a key that is equal for equal masks of FAPs."""
-    return (face.mask.tobytes(), bytes(face.mask_types)) if face is not None else (b"", b"")
 
 
 def _masks(rows: list[Bool], kinds: Array) -> Masks:

@@ -1,4 +1,4 @@
-"""Code lengths: how many bits a parameter takes between two I planes, without coding it."""
+"""Code lengths: the bits that a parameter takes between two I planes, computed without coding it."""
 
 from __future__ import annotations
 
@@ -7,48 +7,47 @@ from functools import lru_cache
 import numpy as np
 
 from fba.arrays import Float64, Int64
-from fba.codec._plane import quantiser, slots
-from fba.codec._quantisation import levels
-from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
+from fba.codec import levels, range_limit, step_scale
 from fba.compiled import compiled
 from fba.encoder_options import EncoderOptions
 from fba.tracks import BodyTrack, FaceTrack
 
+BEYOND_RANGES = 1 << 20
+"""A level, or a number of levels, beyond every range."""
 RANGE_BITS = 4 * 5
 """Bits of the four range codes of a parameter."""
 INTRA_BITS = 64
-"""Bits of an I plane that no parameter pays for: its header, mask types, and the coder's flush."""
+"""Bits of an I plane apart from its parameters: its header, mask types, and the coder's flush."""
 UNCODABLE_BITS = 500
-"""What a difference counts that no P plane carries: about an I plane for it alone."""
+"""Bits counted for a difference that no P plane carries: about those of an I plane for it."""
 IMPOSSIBLE_BITS = 1e9
-"""What a value counts that no I plane carries: no segment is to begin there if any other can."""
+"""Bits counted for a value that no I plane carries, so that no segment begins there if any other can."""
 
 
 def code_lengths(track: FaceTrack | BodyTrack, cuts: Int64, options: EncoderOptions) -> Float64:
     """Return the bits of each parameter between cuts: float64 (68 or 296, C, C).
 
     The element (n, a, b) is the bits of parameter n + 1 if frames cuts[a] to cuts[b] - 1 are an I plane and
-    the P planes after it, with ranges that fit them: its ranges, its first value, and the differences. Their
-    length by the adaptive model follows from how often each comes, in whatever order. 0 for a parameter that
-    is 0 throughout, and where b <= a. FAPs 1 and 2 count nothing.
+    the P planes after it, with ranges that fit them: its ranges, its first value, and the differences. The
+    adaptive model codes differences in a length that depends on how often each occurs, not on their order. 0
+    for a parameter that is 0 throughout, for FAPs 1 and 2, and where b <= a.
 
     cuts: int64 (C,), increasing, from 0 to the number of frames; ValueError for others.
     """
     if len(cuts) and not (cuts[0] >= 0 and cuts[-1] <= len(track) and (np.diff(cuts) > 0).all()):
         raise ValueError(f"cuts must increase from 0 to {len(track)} frames, not {cuts.tolist()}")
-    part = slots.BODY_BIT if isinstance(track, BodyTrack) else slots.FACE_BIT
-    scale = quantiser.scale(part, slots.quantiser_of(options, part))
+    scale = step_scale(options, body=isinstance(track, BodyTrack))
     values = levels(track, options)
     result = np.zeros((values.shape[1], len(cuts), len(cuts)))
     logarithms, factorials = _logarithms(len(values))
     for column in np.flatnonzero(values.any(axis=0)).tolist():
-        one = np.ascontiguousarray(values[:, column])
-        _add_lengths(one, cuts, scale, logarithms, factorials, result[column])
+        own = np.ascontiguousarray(values[:, column])
+        _add_lengths(own, cuts, scale, logarithms, factorials, result[column])
     return result
 
 
 def level_bits(values: Int64, scale: int) -> float:
-    """Return the bits of one parameter's levels (T,), an I plane and the P planes after it.
+    """Return the bits of a parameter with these levels (T,), in an I plane and the P planes after it.
 
     As `code_lengths` counts them. scale: `step_scale` of the part.
     """
@@ -61,21 +60,10 @@ def level_bits(values: Int64, scale: int) -> float:
     return float(result[0, 1])
 
 
-def step_scale(options: EncoderOptions, *, body: bool) -> int:
-    """Return how many table steps the quantiser of BAPs, or of FAPs, takes: the divisor of range limits."""
-    part = slots.BODY_BIT if body else slots.FACE_BIT
-    return quantiser.scale(part, slots.quantiser_of(options, part))
-
-
-def range_limit(level: int, scale: int) -> int:
-    """Return the limit of the tightest range that holds a level from 0 up, in levels."""
-    return int(_limit(level, scale))
-
-
 @lru_cache(maxsize=4)
 def _logarithms(count: int) -> tuple[Float64, Float64]:
-    """Return log2(n) and log2(n!) for n from 0 on, as many as `count` planes and all symbols need."""
-    symbols = 2 * RANGE_CODE_MAX * RANGE_UNIT + 1
+    """Return log2(n) and log2(n!) for n from 0 up to the sum of `count` planes and all symbols."""
+    symbols = 2 * range_limit(BEYOND_RANGES, 1) + 1
     logarithms = np.log2(np.maximum(np.arange(count + symbols + 1, dtype=np.float64), 1))
     return logarithms, np.cumsum(logarithms)
 
@@ -84,7 +72,7 @@ def _logarithms(count: int) -> tuple[Float64, Float64]:
 def _add_lengths(
     values: Int64, cuts: Int64, scale: int, logarithms: Float64, factorials: Float64, result: Float64
 ) -> None:
-    """Fill in result (C, C) for one parameter. values: int64 (T,), levels.
+    """Fill in result (C, C) for a parameter. values: int64 (T,), levels.
 
     logarithms, factorials: log2(n) and log2(n!) for n from 0 on.
 
@@ -92,13 +80,13 @@ def _add_lengths(
     counted up to `largest` either way, and neither they nor limits of ranges exceed what `_logarithms` has
     room for.
     """
-    largest = RANGE_CODE_MAX * RANGE_UNIT // scale
+    largest = range_limit(BEYOND_RANGES, scale)
     counts = np.zeros(2 * largest + 1, dtype=np.int64)
     for first in range(len(cuts) - 1):
         counts[:] = 0
         learnt, coded, beyond, high, low = 0.0, 0, 0, 0, 0
         start = int(cuts[first])
-        intra = RANGE_BITS + logarithms[_limit(abs(int(values[start])), scale) + 1]
+        intra = RANGE_BITS + logarithms[range_limit(abs(int(values[start])), scale) + 1]
         if abs(int(values[start])) > largest:
             intra += IMPOSSIBLE_BITS
         frame = start
@@ -115,13 +103,6 @@ def _add_lengths(
                         high, low = max(high, change), max(low, -change)
                 frame += 1
             # Counts start at 1: the shares of all symbols multiply to others! c1! c2! .. / (others + coded)!
-            others = _limit(high, scale) + _limit(low, scale)
+            others = range_limit(high, scale) + range_limit(low, scale)
             differences = factorials[others + coded] - factorials[others] - learnt
             result[first, last] = intra + differences + UNCODABLE_BITS * beyond
-
-
-@compiled
-def _limit(level: int, scale: int) -> int:
-    """Return the limit of the tightest range that holds a level from 0 up."""
-    code = min(-(-level * scale // RANGE_UNIT), RANGE_CODE_MAX)
-    return RANGE_UNIT * code // scale

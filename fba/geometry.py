@@ -1,4 +1,4 @@
-"""Rotations and similarities that fit points or matrices best, by least squares.
+"""Rotations and similarities that fit points or matrices best, by least squares: for faces and bodies.
 
 Arun, Huang and Blostein, "Least-squares fitting of two 3-D point sets", 1987; Umeyama, "Least-squares
 estimation of transformation parameters between two point patterns", 1991.
@@ -36,8 +36,8 @@ class Similarity:
 class FittedSimilarity(Similarity):
     """A similarity between two sets of points; `centre` and `target` are their weighted means.
 
-    error: (...), root mean square distance that is left, in the unit of the targets. misfit: (...), share of
-    the targets' variance that is left, 0 to 1; NaN where all points or all targets coincide.
+    error: (...), root mean square of the remaining distances, in the unit of the targets. misfit: (...), the
+    remaining share of the targets' variance, 0 to 1; NaN where all points or all targets coincide.
     """
 
     error: Float64
@@ -112,7 +112,7 @@ def principal_axes(points: Float64) -> tuple[Float64, Float64]:
 
 
 def _mean(points: Floating, share: Float64) -> Float64:
-    """Return the weighted mean of points (..., N, P), which is exact where all of them coincide."""
+    """Return the weighted mean of points (..., N, P); exact if all of them coincide."""
     first = points[..., :1, :]
     return np.asarray(first[..., 0, :] + share @ (points - first))
 
