@@ -109,7 +109,6 @@ fba_player
 fba.player
 fba.cli
 fba.cli.recordings
-fba.cli.emotions
 fba.cli.coding
 fba.cli.subcommands
 fba.cli.commands

@@ -1,4 +1,4 @@
-"""Reports of `fba encode` on motion capture: what differs from the source, and joints beyond human limits."""
+"""Reports of `fba encode` on motion capture: differences from the source, joints beyond human limits."""
 
 from __future__ import annotations
 
@@ -23,26 +23,28 @@ if TYPE_CHECKING:
     from fba.capture.preparation import Preparation
     from fba.codec import ClampedParameter
 
-NAME_WIDTH, PART_WIDTH = 16, 24
-MOST_NAMES = 12
-SAMPLE = 2048
-"""Frames that are compared where no report is asked for."""
-PICTURES = 4
-"""Frames that a report shows."""
-APART = 0.5
-"""Seconds between these, at least."""
+NAME_WIDTH = 16
+PART_WIDTH = 24
+"""Characters of columns."""
+MAX_NAMES = 12
+"""Most joints in a line."""
+SAMPLED_FRAMES = 2048
+"""Frames that are compared without a report."""
+SHOWN_FRAMES = 4
+"""Frames in the picture of a report."""
+MIN_SECONDS_APART = 0.5
+"""Least seconds between these frames."""
 SUFFIXES = (".html", ".png")
-"""Of files for reports."""
+"""Suffixes of files for reports."""
 
 
 @dataclass(frozen=True, eq=False)
 class CaptureReport:
     """A capture beside the person that its stream shows.
 
-    path: of the capture. motion: what was read of it. mapped: joint of the standard -> number of the
-    source's. animation: what a decoder returns. comparison: how they differ. bones: what `retarget_report`
-    says of the motion before coding; None where no report was asked for. up: what brings the source's axis up
-    that the user named; None if that was found. scale: metres in one unit of the source, as given; else None.
+    motion: as captured. mapped: joint of the standard -> number of the source's joint. animation: as decoded.
+    comparison: of both. bones: `retarget_report` of the motion before coding; None without `--report`. up:
+    the rotation to the axis that points up. scale: metres per unit of the source, if given.
     """
 
     path: Path
@@ -56,7 +58,7 @@ class CaptureReport:
 
 
 def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str, Any]]:
-    """Return the animation, clamped to the limits of human motion if limits is "clamp"; and a report."""
+    """Return the animation, clamped to the limits of human motion if `limits` is "clamp", and a report."""
     if limits == "off" or animation.body is None:
         return animation, {}
     from fba.body import JointLimits
@@ -80,7 +82,7 @@ def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str
 class CodedBody:
     """A captured body before coding and after.
 
-    clamped: what the encoder clamped. lead: frames of the capture that are before the first one.
+    clamped: the parameters that the encoder clamped. lead: count of frames of the capture before the first.
     """
 
     before: Animation
@@ -97,10 +99,10 @@ def compare_captures(
     *,
     detailed: bool,
 ) -> list[CaptureReport]:
-    """Return reports of captures.
+    """Return reports about captures.
 
-    options: those with which captures were read, of which ground, joints, rest, up and scale count. detailed:
-    compare all frames, and bones before coding.
+    options: with which captures were read; ground, joints, rest, up and scale are used. detailed: compare all
+    frames, and bones before coding.
     """
     from fba import rotations
     from fba.capture import measure_bones
@@ -109,7 +111,7 @@ def compare_captures(
 
     reports = []
     for file in captures:
-        if file.animation.body is None:  # the file has a face alone, and the body comes from another
+        if file.animation.body is None:  # the body is in another file
             continue
         try:
             motion, ready = _find_motion(file, options, reading)
@@ -124,12 +126,10 @@ def compare_captures(
         path, scale = file.path, options["scale"]
         level = 0.0 if options["ground"] == "floor" else None
         up = rotations.between(read_axis(ready.up), np.array([0.0, 1.0, 0.0]))
-        most = None if detailed else SAMPLE
+        most = None if detailed else SAMPLED_FRAMES
         comparison = compare(motion, body.after, ready.mapped, scale=scale, up=up, level=level, most=most)
         comparison = comparison.with_more(_clamped_differences(body.clamped))
-        bones = None
-        if detailed:
-            bones = asdict(measure_bones(ready, body.before, scale=scale))
+        bones = asdict(measure_bones(ready, body.before, scale=scale)) if detailed else None
         reports.append(CaptureReport(path, motion, ready.mapped, body.after, comparison, bones, up, scale))
     return reports
 
@@ -137,13 +137,13 @@ def compare_captures(
 def _find_motion(
     file: ReadFile, options: Mapping[str, Any], reading: Reading
 ) -> tuple[SkeletonMotion, Preparation]:
-    """Return the motion that a body was made of, and how it was prepared.
+    """Return the motion of which a body was made, and its preparation.
 
-    A file with BAPs has not been read as a motion, and one of the standard's own joints not been prepared.
+    A file with BAPs was not read as a motion, and a skeleton of the standard's joints was not prepared.
     """
     from fba.body import Skeleton
     from fba.capture.preparation import prepare
-    from fba.cli.joint_options import read_capture
+    from fba.cli.map_options import read_capture
 
     assert file.captured is not None  # the caller names captures only
     motion, ready = file.captured.capture, file.captured.ready
@@ -152,7 +152,7 @@ def _find_motion(
     if ready is None:
         asked = {name: options[name] for name in ("joints", "rest", "up")}
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)  # the reader has said it
+            warnings.simplefilter("ignore", FbaWarning)  # the reader gave them
             ready = prepare(motion, Skeleton.default(), **asked)
     return motion, ready
 
@@ -160,39 +160,39 @@ def _find_motion(
 def report_values(report: CaptureReport) -> dict[str, Any]:
     """Return a report for programs."""
     differences = [
-        {**asdict(one), "grade": one.grade, "unit": _unit(one)} for one in report.comparison.differences
+        {**asdict(each), "grade": each.grade, "unit": _unit(each)} for each in report.comparison.differences
     ]
     verdict = {"verdict": report.comparison.verdict, "differences": differences}
     return {"input": str(report.path), **verdict, **(report.bones or {})}
 
 
 def report_lines(report: CaptureReport) -> list[str]:
-    """Return a report as lines of text: the worst part of each measure, and all that is not good."""
+    """Return a report as lines of text: the worst part of each measure, and all parts that are not good."""
     comparison = report.comparison
     result = [f"{report.path}: {comparison.frames} frames beside the source: {comparison.verdict}"]
     result.append(
         f"  {'measure':{NAME_WIDTH}}{'part':{PART_WIDTH}}{'typical':>8}{'worst':>8}  unit     frame  grade"
     )
     shown: set[str] = set()
-    for one in comparison.differences:
-        if one.measure in shown and one.grade == "good":
+    for each in comparison.differences:
+        if each.measure in shown and each.grade == "good":
             continue
-        shown.add(one.measure)
+        shown.add(each.measure)
         result.append(
-            f"  {one.measure:{NAME_WIDTH}}{one.part:{PART_WIDTH}}{one.typical:8.1f}{one.worst:8.1f}  "
-            f"{_unit(one):8} {one.frame:5}  {colour_grade(one.grade, one.grade)}"
+            f"  {each.measure:{NAME_WIDTH}}{each.part:{PART_WIDTH}}{each.typical:8.1f}{each.worst:8.1f}  "
+            f"{_unit(each):8} {each.frame:5}  {colour_grade(each.grade, each.grade)}"
         )
     bones = report.bones or {}
     result += [f"  {what}: {reason}" for what, reason in bones.get("found", {}).items()]
     for what, key in (("unused joints of the source", "unused"), ("joints that the source lacks", "missing")):
         if names := bones.get(key):
-            more = f", and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-            result.append(f"  {what}: {', '.join(names[:MOST_NAMES])}{more}")
+            more = f", and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+            result.append(f"  {what}: {', '.join(names[:MAX_NAMES])}{more}")
     return result
 
 
 def limit_lines(limits: Mapping[str, Any]) -> list[str]:
-    """Return what `apply_limits` reports as lines of text."""
+    """Return the report of `apply_limits` as lines of text."""
     if "limits" not in limits:
         return []
     if not limits["limits"]:
@@ -206,7 +206,7 @@ def limit_lines(limits: Mapping[str, Any]) -> list[str]:
 
 
 def poor_line(report: CaptureReport, *, detailed: bool) -> str:
-    """Return a line, in red, that says what is wrong with a poor result; "" for any other."""
+    """Return a line, in red, with the fault of a poor result; "" for other results."""
     reasons = report.comparison.reasons
     if report.comparison.verdict != "poor":
         return ""
@@ -223,7 +223,7 @@ def draw_report(report: CaptureReport) -> bytes:
     from PIL import Image
 
     file = BytesIO()
-    Image.fromarray(draw_sights(report, PICTURES)).save(file, "png", optimize=True)
+    Image.fromarray(draw_sights(report, SHOWN_FRAMES)).save(file, "png", optimize=True)
     return file.getvalue()
 
 
@@ -233,22 +233,22 @@ def draw_sights(report: CaptureReport, count: int) -> UInt8:
     from fba_player.export.capture_sheet import Sight, draw_sheet
 
     rate = float(report.animation.rate)
-    worst = report.comparison.worst_frames(count, max(1, round(APART * rate)))
-    frames = [one.frame for one in worst]
+    worst = report.comparison.worst_frames(count, max(1, round(MIN_SECONDS_APART * rate)))
+    frames = [each.frame for each in worst]
     sticks = find_sticks(
         report.motion, report.animation, report.mapped, frames, scale=report.scale, up=report.up
     )
     sights = [
         Sight(
-            one.frame,
-            one.sentence,
-            f"frame {one.frame}, {one.frame / rate:.2f} s: {one.grade} (fair from "
-            f"{bounds()[one.measure].fair:g}, poor from {bounds()[one.measure].poor:g} {_unit(one)})",
-            one.grade,
-            "right" if one.part.startswith("right") else "left",
+            each.frame,
+            each.sentence,
+            f"frame {each.frame}, {each.frame / rate:.2f} s: {each.grade} (fair from "
+            f"{bounds()[each.measure].fair:g}, poor from {bounds()[each.measure].poor:g} {_unit(each)})",
+            each.grade,
+            "right" if each.part.startswith("right") else "left",
             stick,
         )
-        for one, stick in zip(worst, sticks, strict=True)
+        for each, stick in zip(worst, sticks, strict=True)
     ]
     headline = f"{report.path.name}: {report.comparison.verdict}"
     return draw_sheet(report.animation, sights, headline, report.comparison.verdict)
@@ -263,13 +263,13 @@ def write_page(report: CaptureReport) -> bytes:
 
     comparison = report.comparison
     rows = "".join(
-        f'<tr class="{one.grade}"><td>{escape(one.measure)}<td>{escape(one.part)}<td>{one.typical:.1f}'
-        f"<td>{one.worst:.1f}<td>{escape(_unit(one))}<td>{one.frame}<td>{bounds()[one.measure].fair:g}"
-        f"<td>{bounds()[one.measure].poor:g}<td>{one.grade}\n"
-        for one in comparison.differences
+        f'<tr class="{each.grade}"><td>{escape(each.measure)}<td>{escape(each.part)}<td>{each.typical:.1f}'
+        f"<td>{each.worst:.1f}<td>{escape(_unit(each))}<td>{each.frame}<td>{bounds()[each.measure].fair:g}"
+        f"<td>{bounds()[each.measure].poor:g}<td>{each.grade}\n"
+        for each in comparison.differences
     )
     picture = b64encode(draw_report(report)).decode()
-    measures = "".join(f"<dt>{one.measure}<dd>{escape(one.says)}\n" for one in bounds().values())
+    measures = "".join(f"<dt>{bound.measure}<dd>{escape(bound.says)}\n" for bound in bounds().values())
     name = escape(report.path.name)
     return _PAGE.format(
         name=name, verdict=comparison.verdict, frames=comparison.frames, rows=rows, picture=picture,
@@ -302,23 +302,23 @@ source's bones. Blue is left, red is right; palms are light, backs of hands dark
 
 
 def _clamped_differences(clamped: Mapping[str, ClampedParameter]) -> tuple[Difference, ...]:
-    """Return what the encoder clamped of bodies, in degrees and mm."""
+    """Return the errors of clamped BAPs, in degrees and mm."""
     from math import degrees
 
     from fba.capture.comparison import Difference
 
     result = []
-    for label, one in clamped.items():
+    for label, cut in clamped.items():
         kind, number, name = label.split(maxsplit=2)
         if kind != "BAP":
             continue
         angle = baps()[int(number) - 1].unit != "mm"
-        worst = degrees(one.off * 1e-5) if angle else float(one.off)
-        result.append(Difference("clamped" if angle else "clamped root", name, 0.0, worst, one.frame))
+        worst = degrees(cut.off * 1e-5) if angle else float(cut.off)
+        result.append(Difference("clamped" if angle else "clamped root", name, 0.0, worst, cut.frame))
     return tuple(result)
 
 
-def _unit(one: Difference) -> str:
+def _unit(difference: Difference) -> str:
     from fba.capture.comparison import bounds
 
-    return bounds()[one.measure].unit
+    return bounds()[difference.measure].unit

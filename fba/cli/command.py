@@ -1,8 +1,12 @@
-"""Commands: how they take `--debug`, show help, and say errors in the words of the command line."""
+"""Commands: `--debug`, help, errors in the words of the command line, the words that start the program."""
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
+import shutil
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,23 +14,25 @@ from typing import Any, TypeVar
 
 import click
 
-from fba.cli.program import as_typed
-from fba.errors import FbaError, FbaWarning, Remedy
+from fba.errors import FbaError, FbaWarning, OptionError, Remedy
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
+NAME = "fba"
+DEV = "FBA_DEV"
+"""Environment variable that `./dev` sets for the commands it starts: its own path, as the user typed it."""
 OPTIONS = {name: name for name in (
     "source_rate", "rate", "bit_rate", "buffer", "format", "salvage", "clamp", "points", "kind", "replace",
     "clip", "face", "aspect", "neutral", "sync", "offset", "rest", "up", "scale",
 )} | {"limits": "limit", "joints": "maps", "markers": "maps"}  # fmt: skip
-"""Arguments of the library, and the parameters of commands that do the same."""
+"""Parameters of commands, by the arguments of the library that do the same."""
 OTHER_COMMANDS = (("encode",), ("convert",), ("model", "import"))
-"""Commands that may have an option which the current one lacks."""
+"""Commands that may have an option which the current command lacks."""
 STANDARD_INPUT = "standard input"
 
 
 class Command(click.Command):
-    """A subcommand: takes --debug anywhere, and its help shows commands as the user types them here."""
+    """A subcommand with `--debug`, whose help shows commands as the user types them."""
 
     def __init__(self, *arguments: Any, **settings: Any) -> None:
         super().__init__(*arguments, **settings)
@@ -51,7 +57,7 @@ class Group(Command, click.Group):
 
 
 def examples(*lines: str) -> str:
-    """Return an epilog of the help that shows commands as they are typed."""
+    """Return an epilog of the help that shows commands."""
     return "Examples:\n\n\b\n" + "\n".join(f"  {line}" for line in lines) + "\n"
 
 
@@ -64,7 +70,7 @@ def describe(error: FbaError | FbaWarning) -> str:
 
 
 def _as_options(remedies: Iterable[Remedy], context: click.Context) -> tuple[Remedy, ...]:
-    """Return remedies with options for arguments: of this command, else of another, else as Python."""
+    """Return remedies that name options, of this command or another, in place of arguments, else Python."""
     return tuple(Remedy("", _remedy_text(remedy, context), "") for remedy in remedies)
 
 
@@ -77,7 +83,7 @@ def _remedy_text(remedy: Remedy, context: click.Context) -> str:
     if remedy.call.endswith(".import_body") and not any(
         param.name == "body" for param in context.command.params
     ):
-        name = None  # the joints of a body that is shown, not of a capture
+        name = None  # joints of a body that is shown, not of a capture
     option = _option_text(context.command, name, remedy.value)
     if option is not None:
         return remedy.fill_in(option)
@@ -106,7 +112,7 @@ def _option_text(command: click.Command, name: str | None, value: str) -> str | 
 
 @contextmanager
 def usage_errors(prefix: str = "") -> Iterator[None]:
-    """Turn a plain ValueError, which options caused, into a usage error. prefix: left out of its text."""
+    """Turn a plain ValueError, which options caused, into a usage error. prefix: removed from its text."""
     try:
         yield
     except ValueError as error:
@@ -115,8 +121,17 @@ def usage_errors(prefix: str = "") -> Iterator[None]:
         raise click.UsageError(str(error).removeprefix(prefix)) from error
 
 
+@contextmanager
+def option_errors(prefix: str = "") -> Iterator[None]:
+    """Turn an OptionError into a usage error. prefix: put before its text."""
+    try:
+        yield
+    except OptionError as error:
+        raise click.UsageError(f"{prefix}{error}") from error
+
+
 class EachFile:
-    """Goes on with the next file where one is bad, and names the bad ones.
+    """Loop over files that goes on after a bad file, and names the bad ones.
 
     ::
 
@@ -133,30 +148,69 @@ class EachFile:
 
     @contextmanager
     def file(self, path: Path) -> Iterator[None]:
-        """Print the error of one of several files; raise that of a single one, with its name."""
+        """Print the error of one of several files; raise that of a single file. Both name the file."""
         name = STANDARD_INPUT if str(path) == "-" else str(path)
         try:
             yield
-        except FbaError as error:
-            if name not in error.finding:
+        except (FbaError, click.UsageError, OSError) as error:
+            if isinstance(error, FbaError) and name not in error.finding:
                 error.args = (f"{name}: {error.finding}",)
             if not self._several:
                 raise
-            self._fail(describe(error))
-        except click.UsageError as error:
-            if not self._several:
-                raise
-            self._fail(error.message if name in error.message else f"{name}: {error.message}")
-        except OSError as error:
-            if not self._several:
-                raise
-            self._fail(f"{name}: {error.strerror or error}")
-
-    def _fail(self, text: str) -> None:
-        self._failed += 1
-        click.echo(f"fba: error: {as_typed(' '.join(text.split()))}", err=True)
+            if isinstance(error, FbaError):
+                text = describe(error)
+            elif isinstance(error, OSError):
+                text = f"{name}: {error.strerror or error}"
+            else:
+                text = error.message if name in error.message else f"{name}: {error.message}"
+            self._failed += 1
+            click.echo(f"fba: error: {as_typed(' '.join(text.split()))}", err=True)
 
     def finish(self) -> None:
         """End the command with exit code 1 if a file failed."""
         if self._failed:
             raise click.exceptions.Exit(1)
+
+
+def program_words() -> str:
+    """Return the words that start this program again from the user's folder, quoted for a shell.
+
+    That is "fba" if it is on the PATH, else ".venv/bin/fba", "python3 -m fba" or "./dev fba", as it was
+    started.
+    """
+    dev = os.environ.get(DEV)
+    if dev:
+        return f"{shlex.quote(dev)} {NAME}"
+    if os.path.basename(sys.argv[0]) == "__main__.py":
+        return f"{_typed(sys.orig_argv[0])} -m {NAME}"
+    return _typed(sys.argv[0])
+
+
+def with_program(text: str, program: str, commands: Iterable[str]) -> str:
+    """Return a text in which every command, such as `fba info FILE`, starts with the words of `program`.
+
+    commands: the names of the subcommands; "fba" before other words stays.
+    """
+    if program == NAME:
+        return text
+    mention = rf"(?<![\w./-]){NAME} (?=(?:{'|'.join(commands)})\b)"
+    return re.sub(rf"{re.escape(program)} |{mention}", lambda _: f"{program} ", text)
+
+
+def as_typed(text: str, context: click.Context | None = None) -> str:
+    """Return a text with its commands as the user types them, such as `./dev fba info` for `fba info`."""
+    root = (context or click.get_current_context()).find_root()
+    assert isinstance(root.command, click.Group)
+    return with_program(text, root.info_name or NAME, root.command.list_commands(root))
+
+
+def _typed(path: str) -> str:
+    """Return the name of a file alone if the PATH leads to it, else its path."""
+    folder, name = os.path.split(path)
+    if os.name == "nt":
+        name = name.removesuffix(".exe")
+    # An installed script gets its whole path, whatever was typed. Links are not followed: the Python of a
+    # virtual environment is a link to another Python.
+    first = shutil.which(name)
+    on_path = first is not None and os.path.abspath(os.path.dirname(first)) == os.path.abspath(folder)
+    return name if on_path or not folder else shlex.quote(path)

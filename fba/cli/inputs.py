@@ -1,4 +1,4 @@
-"""Files that commands read: animations of any format, standard input, models."""
+"""Inputs of commands: animations of any format, standard input, models."""
 
 from __future__ import annotations
 
@@ -26,12 +26,10 @@ from fba.source import read_whole
 
 if TYPE_CHECKING:
     from fba.body import BodyModel
-    from fba.capture import Captured, FaceCapture
+    from fba.capture import Captured
     from fba.codec import StreamInfo
     from fba.face import FaceModel
     from fba.formats import Format
-    from fba.formats.gltf.bodies import PersonInfo
-    from fba.formats.gltf.clips import ClipInfo
 
 
 @contextmanager
@@ -46,9 +44,9 @@ def input_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def spooled(source: BinaryIO, name: str, head: bytes = b"") -> Iterator[Path]:
-    """Give a temporary file that holds a stream, read to its end.
+    """Give a temporary file with the content of a stream, read to its end.
 
-    name: of the stream, for messages. head: what was read from it before.
+    name: of the stream, for messages. head: the bytes that were read before.
     """
     with tempfile.TemporaryDirectory(prefix="fba-") as folder:
         path = Path(folder) / "stdin"
@@ -62,7 +60,7 @@ def spooled(source: BinaryIO, name: str, head: bytes = b"") -> Iterator[Path]:
 
 @contextmanager
 def renamed(path: Path, name: str) -> Iterator[None]:
-    """Give a temporary file a name that the user knows in errors and warnings."""
+    """Name a temporary file in errors and warnings as the user does."""
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", FbaWarning)
@@ -84,13 +82,13 @@ def renamed(path: Path, name: str) -> Iterator[None]:
 class Reading:
     """How files are read: options that most commands share.
 
-    bap_steps: "auto" prints which table a stream is decoded with, and why; a table warns if the stream names
-    another one or, where it names none, if its BAPs look wrong with these steps.
+    bap_steps: "auto" prints the table with which a stream is decoded, and why; a table warns if the stream
+    names another table or, without a name, if its BAPs look wrong with these steps.
     """
 
     format: str | None = options.format_option
     source_rate: Fraction | None = option(
-        "--source-fps", type=options.RateType(), metavar="RATE", help="Frame rate of a file that has none."
+        "--source-fps", type=options.RATE, metavar="RATE", help="Frame rate of a file that has none."
     )
     clip: str | None = option(
         metavar="NAME",
@@ -105,11 +103,11 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class ReadFile:
-    """An animation, and what else its file says.
+    """An animation and its file.
 
-    path, format: of the file. rate: of the file, before it was resampled. captured: what a capture was made
-    of; None for other files. table: of BAP steps, of a stream with a body; else None. doubt: the warning that
-    this table looks wrong; None without.
+    rate: of the file, before it was resampled. captured: a capture with its animation; None for other files.
+    table: of BAP steps, of a stream with a body; else None. doubt: the warning that this table looks wrong,
+    or None.
     """
 
     path: Path
@@ -122,11 +120,7 @@ class ReadFile:
 
 
 def read_input(
-    path: Path,
-    reading: Reading,
-    *,
-    rate: Fraction | None = None,
-    name: str | None = None,
+    path: Path, reading: Reading, *, rate: Fraction | None = None, name: str | None = None
 ) -> Animation:
     """Return the animation of a file; see `read_file`."""
     return read_file(path, reading, rate=rate, name=name).animation
@@ -140,10 +134,10 @@ def read_file(
     name: str | None = None,
     capture: Mapping[str, object] | None = None,
 ) -> ReadFile:
-    """Return the animation of a file of any format, or of the one that `reading` names.
+    """Return the animation of a file of any format, or of the format that `reading` names.
 
-    rate: to resample the animation to, and motion capture before it is retargeted. name: of a file that has
-    none. capture: options for the readers of motion capture.
+    rate: to which the animation is resampled, and motion capture before it is retargeted. name: of a file
+    without a name. capture: options for the readers of motion capture.
     """
     from fba.codec import marked_table
 
@@ -152,9 +146,8 @@ def read_file(
     marked: BapTable | None = None
     doubt: str | None = None
     with input_file(path) as file:
-        reader = _find_format(file, reading.format)
-        is_stream = reader.name == "fba"
-        if is_stream:
+        reader = find_format(file, reading.format)
+        if reader.name == "fba":
             data = read_whole(file)
             marked = marked_table(data)
             table = step_tables.table_to_read(path, data, reading.bap_steps, limits)
@@ -168,7 +161,7 @@ def read_file(
             "clip": reading.clip,
             **(capture or {}),
         }
-        taken = _taken(reader, given)
+        taken = taken_options(given, reader.read_options)
         captured = reader.read_captured(file, **taken) if reader.is_capture else None
         animation = reader.read(file, **taken) if captured is None else captured.animation
     if animation.body is None:
@@ -181,49 +174,33 @@ def read_file(
     return ReadFile(path, animation, reader, read_rate, captured, table, doubt)
 
 
-def probe_input(path: Path, reading: Reading, *, face: str | None = None) -> StreamInfo:
-    """Return what a file of any format holds. face: the one to read of several."""
+def probe_input(path: Path, reading: Reading) -> StreamInfo:
+    """Return the content of a file of any format."""
     from fba.formats import probe
 
-    reader = _find_format(path, reading.format)
-    given = {
-        "source_rate": reading.source_rate,
-        "salvage": reading.salvage or None,
-        "clip": reading.clip,
-        "face": face,
-    }
-    taken = {} if reader.name == "fba" else _taken(reader, given)
+    reader = find_format(path, reading.format)
+    given = {"source_rate": reading.source_rate, "salvage": reading.salvage or None, "clip": reading.clip}
+    taken = {} if reader.name == "fba" else taken_options(given, reader.read_options)
     return probe(path, format=reader.name, limits=reading.limit, **taken)
-
-
-def list_clips(path: Path, format: str | None, limits: Limits) -> tuple[ClipInfo, ...]:
-    """Return the animations of a file in a format that holds several; none for other formats."""
-    reader = _find_format(path, format)
-    return () if reader.list_clips is None else reader.list_clips(path, limits=limits)
-
-
-def describe_person(path: Path, format: str | None, limits: Limits) -> PersonInfo | None:
-    """Return what a file without an animation shows; None for a file with one, or without a person."""
-    reader = _find_format(path, format)
-    return None if reader.describe_person is None else reader.describe_person(path, limits=limits)
 
 
 def check_clip(reading: Reading, files: Iterable[Path]) -> None:
     """Raise click.UsageError for `--clip` without a file whose format holds several animations."""
     if reading.clip is None:
         return
-    formats = {_find_format(file, reading.format) for file in files if str(file) != "-"}
+    formats = {find_format(file, reading.format) for file in files if str(file) != "-"}
     if formats and all(entry.list_clips is None for entry in formats):
         names = " and ".join(sorted(entry.name.upper() for entry in formats))
         raise click.UsageError(f"--clip is for glTF, which may hold several animations, not for {names}")
 
 
-def _taken(reader: Format, options: Mapping[str, object]) -> dict[str, Any]:
-    """Return the options that are given and that a reader takes."""
-    return {key: value for key, value in options.items() if value is not None and key in reader.read_options}
+def taken_options(given: Mapping[str, object], known: Iterable[str]) -> dict[str, Any]:
+    """Return the given options that are not None and that a reader knows."""
+    return {name: value for name, value in given.items() if value is not None and name in known}
 
 
-def _find_format(file: Path, format: str | None) -> Format:
+def find_format(file: Path, format: str | None) -> Format:
+    """Return the format of a file. format: value of `--from`."""
     from fba.formats import format_of
 
     try:
@@ -234,47 +211,32 @@ def _find_format(file: Path, format: str | None) -> Format:
 
 def has_skeleton(path: Path, format: str | None) -> bool:
     """Whether a file holds the motion of a skeleton; False for standard input, which is read only once."""
-    return str(path) != "-" and _find_format(path, format).read_motion is not None
+    return str(path) != "-" and find_format(path, format).read_motion is not None
 
 
 def has_markers(path: Path, format: str | None) -> bool:
     """Whether a file holds the motion of markers; False for standard input, which is read only once."""
-    return str(path) != "-" and _find_format(path, format).has_markers
-
-
-def read_face(
-    path: Path, reading: Reading, capture: Mapping[str, object] | None = None
-) -> tuple[str, FaceCapture] | None:
-    """Return the name of the format and the captured face as it is in a file; None for other files.
-
-    capture: further options of the readers of captures.
-    """
-    reader = _find_format(path, reading.format)
-    if reader.read_face is None:
-        return None
-    given: dict[str, Any] = {"source_rate": reading.source_rate, **(capture or {})}
-    taken = {name: given[name] for name in given if name in reader.face_options and given[name] is not None}
-    return reader.name, reader.read_face(path, limits=reading.limit, **taken)
+    return str(path) != "-" and find_format(path, format).has_markers
 
 
 def check_capture_options(given: Mapping[str, str], files: Iterable[Path], reading: Reading) -> None:
     """Raise click.UsageError for options of captures that no reader of the files takes.
 
-    given: those that were typed, by the readers' name for them.
+    given: the readers' names of the options that were typed, and their flags.
     """
     from fba.formats import formats
 
-    readers = {_find_format(file, reading.format) for file in files if str(file) != "-"}
+    readers = {find_format(file, reading.format) for file in files if str(file) != "-"}
     for name, flag in given.items():
         if readers and not any(name in reader.read_options for reader in readers):
-            able = [one.name.upper() for one in formats() if one.is_capture and name in one.read_options]
-            takers = " and ".join([*([", ".join(able[:-1])] if able[:-1] else []), *able[-1:]])
-            names = " and ".join(sorted(one.name.upper() for one in readers))
+            able = [each.name.upper() for each in formats() if each.is_capture and name in each.read_options]
+            takers = " and ".join(filter(None, [", ".join(able[:-1]), *able[-1:]]))
+            names = " and ".join(sorted(each.name.upper() for each in readers))
             raise click.UsageError(f"{flag} is for {takers}, not for {names}")
 
 
 def read_model(path: Path | None) -> FaceModel | None:
-    """Return the face of `--model`, or None for the built-in one."""
+    """Return the face of `--model`, or None for the built-in head."""
     if path is None:
         return None
     from fba.face.importers import import_model
@@ -283,7 +245,7 @@ def read_model(path: Path | None) -> FaceModel | None:
 
 
 def read_body(path: Path | None, joints: Mapping[str, str] | None = None) -> BodyModel | None:
-    """Return the body of `--body`, or None for the built-in one. joints: see `fba.capture.from_skeleton`."""
+    """Return the body of `--body`, or None for the built-in person. joints: see `from_skeleton`."""
     if path is None:
         return None
     from fba.formats.gltf.bodies import import_body

@@ -1,9 +1,9 @@
-"""End on Ctrl-C, `kill` and a closed terminal with everything cleaned up, at a moment when Python can do so.
+"""Clean end on Ctrl-C, `kill` and a closed terminal, at a moment when Python can clean up.
 
-Compiled loops are loaded by LLVM, which calls Python back while it does so. An error raised in there is
-printed ("Exception ignored in") and lost, or leaves LLVM with half a function: the program then crashes.
-moderngl's C code crashes, too, where what it calls back fails. In such a moment, and in any other callback or
-finalizer, an interruption waits, and is raised again soon.
+LLVM loads compiled loops, and calls Python back meanwhile. An error in such a callback is printed ("Exception
+ignored in") and lost, or leaves LLVM with half a function, and the program crashes. moderngl's C code crashes
+as well if a callback fails. In such a moment, and in any other callback or finalizer, an interruption waits,
+and is raised again soon.
 """
 
 from __future__ import annotations
@@ -20,18 +20,13 @@ from typing import Any, Protocol
 from fba.cli.startup import INTERRUPTED, leave
 
 CHECK_AFTER = 1.0
-"""Seconds after which it is checked whether an interruption was swallowed by somebody's `except:`."""
+"""Seconds after which an interruption is repeated, if an `except:` of a library swallowed it."""
 RETRY_AFTER = 0.05
-"""Seconds until a delayed interruption comes again."""
+"""Seconds until a delayed interruption is raised again."""
 FRAGILE = (
-    "llvmlite.",
-    "numba.core.caching",
-    "numba.core.codegen",
-    "numba.core.runtime",
-    "moderngl",
-    "_moderngl",
-)
-"""Beginnings of names of modules that must not be interrupted; none of their calls takes long."""
+    "llvmlite.", "numba.core.caching", "numba.core.codegen", "numba.core.runtime", "moderngl", "_moderngl"
+)  # fmt: skip
+"""Beginnings of names of modules that must not be interrupted; their calls are short."""
 
 
 class _Unraisable(Protocol):
@@ -51,7 +46,7 @@ _delayed: list[int] = []
 
 
 def raise_delayed() -> None:
-    """Raise KeyboardInterrupt where an interruption came in a fragile moment and waits for its end.
+    """Raise KeyboardInterrupt if an interruption waits for the end of a fragile moment.
 
     To be called before a signal gets another meaning.
     """
@@ -61,10 +56,10 @@ def raise_delayed() -> None:
 
 
 class Interruptions:
-    """Makes Ctrl-C safe while the `with` statement lasts; for the main thread, which alone gets signals.
+    """Safe Ctrl-C within a `with` statement, for the main thread, which alone gets signals.
 
     SIGTERM and SIGHUP, unless they are ignored, interrupt as Ctrl-C does, so that no temporary file stays.
-    exit_code: that of an interrupted process: 128 and the number of the signal.
+    exit_code: of an interrupted process: 128 plus the number of the signal.
     """
 
     def __init__(self) -> None:
@@ -92,7 +87,7 @@ class Interruptions:
             signal.signal(number, handler)
 
     def caused(self, error: BaseException) -> bool:
-        """Whether Ctrl-C caused an error: by the error's own causes, or because an interruption was lost."""
+        """Whether Ctrl-C caused an error, which its causes show; also if an interruption was lost."""
         return _is_interruption(error) or self._lost
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
@@ -113,7 +108,7 @@ class Interruptions:
         raise KeyboardInterrupt
 
     def _check(self, number: int) -> None:
-        """Interrupt again, now and then, until the program ends: a library may have swallowed the first."""
+        """Interrupt again and again until the program ends: a library may have swallowed an interruption."""
         while True:
             time.sleep(CHECK_AFTER)
             if self._over:
@@ -150,7 +145,7 @@ def _interrupt_later(number: int) -> None:
 
 
 def _interrupt_main(number: int) -> None:
-    """Interrupt the main thread, where the system can do so also while it waits."""
+    """Interrupt the main thread, where possible also while it waits."""
     if sys.platform == "win32":
         _thread.interrupt_main(signal.Signals(number))
     else:

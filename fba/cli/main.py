@@ -1,4 +1,4 @@
-"""Entry point of the `fba` command: finds subcommands, turns errors into one line and an exit code."""
+"""Entry point of the `fba` command: finds subcommands, turns errors into a line and an exit code."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from typing import Any, NoReturn
 import click
 
 from fba import __version__
-from fba.cli.command import Group, describe, examples
+from fba.cli.command import NAME, Group, describe, examples, program_words, with_program
 from fba.cli.interruptions import Interruptions
-from fba.cli.program import NAME, program_words, with_program
 from fba.cli.startup import INTERRUPTED, TEXT, collect_less
 from fba.compiled import compilation_listener
 from fba.errors import FbaError, FbaWarning, did_you_mean
@@ -44,17 +43,17 @@ _COMMANDS = {
 }
 
 BAD_DATA, BAD_USAGE = 1, 2
-
+"""Exit codes."""
 COMPILED_FUNCTIONS = 5
-"""The notice is printed when this many functions are to be compiled; fewer take less than about 2 s."""
+"""Count of functions to be compiled at which the notice is printed; fewer take less than about 2 s."""
 COMPILE_SECONDS = {"info": 8, "stats": 5, "decode": 5, "bench": 8, "encode": 13, "convert": 13}
-"""How long compiling everything that a command may need takes, in seconds of one core."""
+"""Seconds of a core for compiling all functions that a command may need."""
 LONGEST_COMPILE_SECONDS = 35
-"""The same for all other commands."""
+"""Seconds of a core for compiling all functions that any command may need."""
 
 
 class CompileNotice:
-    """Prints one line to standard error when a command is about to compile for seconds.
+    """Printer of a line to standard error before a command compiles for seconds.
 
     It is called before each function that is compiled.
     """
@@ -70,7 +69,7 @@ class CompileNotice:
 
 
 class _OutputClosedError(Exception):
-    """The reader of our output has closed it. Not BrokenPipeError, for which click exits with 1."""
+    """The reader of the output has closed it. Not a BrokenPipeError, for which click exits with 1."""
 
 
 @contextmanager
@@ -86,7 +85,7 @@ def _closed_output() -> Iterator[None]:
 
 
 class _Commands(Group):
-    """Lists subcommands without importing them."""
+    """The group of all subcommands, which are listed without importing them."""
 
     def make_context(self, *arguments: Any, **extra: Any) -> click.Context:
         with _closed_output():
@@ -120,11 +119,7 @@ class _Commands(Group):
 @click.group(
     cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog=examples(
-        "fba encode walk.bvh -o walk.fba",
-        "fba info walk.fba",
-        "fba play walk.fba",
-    ),
+    epilog=examples("fba encode walk.bvh -o walk.fba", "fba info walk.fba", "fba play walk.fba"),
 )
 @click.version_option(__version__, prog_name="fba")
 def group() -> None:
@@ -134,11 +129,11 @@ def group() -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 bad data, 2 bad usage, 130 interrupted, 143 terminated.
 
-    A reader of its output that goes away early, as `head` does, is not an error: 0, without a word.
+    If the reader of its output ends early, as `head` does, the exit code is 0, and no message is printed.
 
-    arguments: None for those of the process, which then is taken as doing nothing else.
+    arguments: None for those of the process, which then does nothing else.
     """
-    program, own = NAME, arguments is None
+    program, whole_process = NAME, arguments is None
     if arguments is None:
         collect_less()
         program = program_words()
@@ -147,7 +142,8 @@ def main(arguments: list[str] | None = None) -> None:
     warnings.simplefilter("always", FbaWarning)
     warnings.showwarning = _warning_display()
     interruptions = Interruptions()
-    notice = CompileNotice(next((one for one in arguments if one in _COMMANDS), "")) if own else None
+    command = next((word for word in arguments if word in _COMMANDS), "")
+    notice = CompileNotice(command) if whole_process else None
     try:
         with interruptions, compilation_listener(notice):
             result = group.main(arguments, prog_name=program, standalone_mode=False)
@@ -159,7 +155,7 @@ def main(arguments: list[str] | None = None) -> None:
     except (KeyboardInterrupt, click.Abort):
         _exit_interrupted(interruptions.exit_code)
     except _OutputClosedError:
-        # Python would complain once more while it shuts down.
+        # Without an output, Python does not complain again while it shuts down.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except (FbaError, OSError, MemoryError) as error:
@@ -195,9 +191,9 @@ def _one_line(error: BaseException) -> str:
 
 
 def _warning_display() -> Callable[..., None]:
-    """Return a function that prints each warning of one command, once however often it is given.
+    """Return a function that prints each warning of a command once.
 
-    Commands that read a file twice would otherwise say everything twice.
+    Commands that read a file twice would otherwise print its warnings twice.
     """
     shown: set[str] = set()
 

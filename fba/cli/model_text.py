@@ -6,6 +6,7 @@ import shutil
 import sys
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,11 +17,11 @@ if TYPE_CHECKING:
     from fba.face import FaceModel
     from fba.face.checks import Finding
 
-MOST_ERRORS = 8
+LISTED_ERRORS = 8
 """Most errors that are listed after an import."""
-FAIR = 10
+MAX_FAIR_ERRORS = 10
 """Most errors of a face on which streams still look right on the whole."""
-UNITS = {
+FAPU_DISTANCES = {
     "IRISD": "height of the lid opening",
     "ES": "between the pupils",
     "ENS": "pupils to nose",
@@ -30,7 +31,7 @@ UNITS = {
 
 
 def summary(model: FaceModel) -> str:
-    """Return a line: vertices, feature points, FAPs."""
+    """Return a line with counts of vertices, feature points and FAPs."""
     from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
     every = FAP_COUNT - FIRST_LOW_LEVEL_FAP + 1
@@ -42,7 +43,7 @@ def summary(model: FaceModel) -> str:
 
 
 def lost_lines(model: FaceModel) -> list[str]:
-    """Return lines of FAPs without effect, one line for each reason."""
+    """Return a line for each reason why FAPs have no effect, with these FAPs."""
     from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 
     reasons = defaultdict(list)
@@ -73,7 +74,7 @@ def model_as_json(model: FaceModel) -> dict[str, Any]:
             }
             for part in model.parts
         ],
-        "fapu": {unit: model.fapu[unit] for unit in (*UNITS, "AU")},
+        "fapu": {unit: model.fapu[unit] for unit in (*FAPU_DISTANCES, "AU")},
         "feature_points": {
             name: [round(float(number), 7) for number in place]
             for name, place in zip(names(), model.points, strict=True)
@@ -114,7 +115,7 @@ def print_model(model: FaceModel) -> None:
         surface = surface or ("colours" if part.colours is not None else "plain")
         parts.append((part.name, part.kind, str(len(part.vertices)), str(len(part.triangles)), surface))
     units = []
-    for unit, what in UNITS.items():
+    for unit, what in FAPU_DISTANCES.items():
         step = model.fapu[unit]
         units.append((unit, f"{step * PER_DISTANCE * 1000:.1f} mm", f"{step * 1e6:.1f} um", what))
     for head, rows, to_right in (
@@ -125,21 +126,12 @@ def print_model(model: FaceModel) -> None:
 
 
 def findings_as_json(findings: Sequence[Finding]) -> dict[str, Any]:
-    """Return counts of findings, and every finding."""
+    """Return the findings with their counts."""
     errors = sum(finding.severity == "error" for finding in findings)
     return {
         "errors": errors,
         "warnings": len(findings) - errors,
-        "findings": [
-            {
-                "severity": finding.severity,
-                "subject": finding.subject,
-                "rule": finding.rule,
-                "found": finding.found,
-                "expected": finding.expected,
-            }
-            for finding in findings
-        ],
+        "findings": [{"severity": finding.severity, **asdict(finding)} for finding in findings],
     }
 
 
@@ -147,9 +139,11 @@ def error_lines(findings: Sequence[Finding]) -> list[str]:
     """Return a line for each of the first errors."""
     errors = [finding for finding in findings if finding.severity == "error"]
     lines = [
-        f"error    {one.subject}: {one.rule}: {one.found}, not {one.expected}" for one in errors[:MOST_ERRORS]
+        f"error    {error.subject}: {error.rule}: {error.found}, not {error.expected}"
+        for error in errors[:LISTED_ERRORS]
     ]
-    return [*lines, f"         and {len(errors) - MOST_ERRORS} more"] if len(errors) > MOST_ERRORS else lines
+    more = len(errors) - LISTED_ERRORS
+    return [*lines, f"         and {more} more"] if more > 0 else lines
 
 
 def judge_import(findings: Sequence[Finding]) -> tuple[str, str]:
@@ -158,7 +152,7 @@ def judge_import(findings: Sequence[Finding]) -> tuple[str, str]:
     counts = f"{_count(errors, 'error')}, {_count(len(findings) - errors, 'warning')}"
     if not errors:
         return "good", f"it meets the standard ({counts}; fba model validate lists them)"
-    if errors <= FAIR:
+    if errors <= MAX_FAIR_ERRORS:
         return "fair", f"it plays, but not all FAPs are right ({counts}; fba model validate lists them)"
     return (
         "poor",
@@ -181,7 +175,7 @@ def print_findings(name: str, findings: Sequence[Finding]) -> None:
 
 
 def _width() -> int:
-    """Return how many characters wide a table may be."""
+    """Return the most characters in a line of a table."""
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
 
 

@@ -1,7 +1,7 @@
 """Options of commands from fields: those of dataclasses, and the parameters of the command itself.
 
-A field or parameter with `option` becomes an option: its name, type and default are those of the field. One
-whose type is a dataclass stands for all options of that::
+A field or parameter with `option` becomes an option with its name, type and default. A field or parameter
+whose type is a dataclass stands for all options of that dataclass::
 
     @dataclass(frozen=True, kw_only=True)
     class Walk:
@@ -21,7 +21,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import MISSING, Field, field, fields, is_dataclass
 from fractions import Fraction
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, cast, get_args, get_origin, get_type_hints
 
 import click
 
@@ -34,10 +34,10 @@ _OPTION, _GROUP = "option", "group"
 def option(*flags: str, default: Any = None, typed: str = "", required: bool = False, **settings: Any) -> Any:
     """Return a dataclass field, or a default of a parameter, that is an option of a command.
 
-    flags: as the user types them; without any, the name of the field: --in-place for `in_place`. A bool is a
-    switch: with the default False it has this flag alone, else --no-... as well. typed: the default as the
-    user would type it, where its type has another text. settings: those of `click.Option`; they replace what
-    the type says. Dataclasses may share the field under one name, if all are `kw_only`.
+    flags: as the user types them; by default the name of the field: --in-place for `in_place`. A bool is a
+    switch: with the default False it has this flag alone, else also --no-.... typed: the default as the user
+    types it, if its type has another text. settings: of `click.Option`; they replace those of the type.
+    Dataclasses may share a field under the same name, if all are `kw_only`.
     """
     if required:
         settings["required"] = True
@@ -49,24 +49,24 @@ def option(*flags: str, default: Any = None, typed: str = "", required: bool = F
 def option_like(kind: type, name: str, *flags: str, by_default: str = "", **settings: Any) -> Any:
     """Return an option with the default and the text of a field of a dataclass of the library.
 
-    The text is what the docstring of the dataclass says of the field. by_default: added to the text: what a
-    command does without the option, where the default is None. settings: as for `option`, in place of these.
+    The text is that of the field in the docstring of the dataclass. by_default: the effect of the default
+    None, added to the text. settings: as for `option`, in place of these.
     """
-    default = next(one.default for one in fields(kind) if one.name == name)
+    default = next(each.default for each in fields(kind) if each.name == name)
     text = documented(kind, name) + (f" Default: {by_default}." if by_default else "")
     return option(*flags, **{"default": default, "help": text, **settings})
 
 
 def group(*names: str, **changed: Any) -> Any:
-    """Return a field, or a default of a parameter, that stands for the options of a dataclass: its type.
+    """Return a field, or a default of a parameter, that stands for the options of the dataclass of its type.
 
-    names: fields that are options here; without any, all. changed: other options for some of them.
+    names: fields that are options here, by default all. changed: other options for some of them.
     """
     return field(metadata={_GROUP: (names, changed)})
 
 
 def documented(kind: type, name: str) -> str:
-    """Return what the docstring of a dataclass says of a field: the paragraph that begins "name: "."""
+    """Return the text of a field in the docstring of a dataclass: the paragraph that begins "name: "."""
     pattern = rf"^(?:\w+, )*{name}(?:, \w+)*: (.*(?:\n {{4}}.*)*)"
     # Python 3.13 takes the indentation off docstrings itself.
     match = re.search(pattern, inspect.cleandoc(kind.__doc__ or ""), re.MULTILINE)
@@ -75,12 +75,12 @@ def documented(kind: type, name: str) -> str:
 
 
 def with_options(command: Decorated) -> Decorated:
-    """Add the options that the parameters of a function name; the command calls it with their values.
+    """Add the options of the parameters of a function, which gets their values.
 
-    Parameters of other kinds get what other decorators give.
+    Other parameters get the values of other decorators.
     """
     parameters = inspect.signature(command).parameters
-    hints = {name: _resolved(one.annotation, command) for name, one in parameters.items()}
+    hints = {name: _resolved(each.annotation, command) for name, each in parameters.items()}
     asked = {
         name: (hints[name], _field(parameter.default))
         for name, parameter in parameters.items()
@@ -89,26 +89,22 @@ def with_options(command: Decorated) -> Decorated:
 
     @functools.wraps(command)
     def calling(**values: Any) -> Any:
-        made = {name: _value(name, hint, one, values) for name, (hint, one) in asked.items()}
+        made = {name: _value(name, hint, used, values) for name, (hint, used) in asked.items()}
         return command(**made, **values)
 
     decorated: Any = calling
-    added = [
-        click_option for name, (hint, one) in asked.items() for click_option in _options(name, hint, one)
-    ]
-    for add in reversed(added):
+    for add in reversed([add for name, (hint, used) in asked.items() for add in _options(name, hint, used)]):
         decorated = add(decorated)
-    return decorated  # type: ignore[no-any-return]
+    return cast("Decorated", decorated)
 
 
 def _field(default: Any) -> Field[Any]:
-    """Return the field that is the default of a parameter; without, one for all options of a dataclass."""
-    made: Field[Any] = default if isinstance(default, Field) else group()
-    return made
+    """Return the field that is the default of a parameter, else a field for all options of a dataclass."""
+    return cast("Field[Any]", default if isinstance(default, Field) else group())
 
 
 def _resolved(annotation: Any, command: Callable[..., Any]) -> Any:
-    """Return the type that an annotation names; None for a name that exists for type checkers alone."""
+    """Return the type of an annotation; None for a name that only type checkers know."""
     if not isinstance(annotation, str):
         return annotation
     try:
@@ -118,40 +114,40 @@ def _resolved(annotation: Any, command: Callable[..., Any]) -> Any:
 
 
 def _members(kind: type, group_field: Field[Any]) -> Iterator[tuple[str, Any, Field[Any]]]:
-    """Yield name, type and field of the members of a dataclass that are options or groups of such."""
+    """Yield name, type and field of the members of a dataclass that are options or groups of options."""
     names, changed = group_field.metadata.get(_GROUP, ((), {}))
     hints = get_type_hints(kind)
-    for one in sorted(
-        fields(kind), key=lambda one: one.name not in kind.__annotations__
-    ):  # inherited ones last
-        used: Field[Any] = changed.get(one.name, one)
-        is_option = _OPTION in used.metadata or _GROUP in used.metadata or is_dataclass(hints[one.name])
-        if is_option and (not names or one.name in names or one.name in changed):
-            yield one.name, hints[one.name], used
+    inherited_last = sorted(fields(kind), key=lambda member: member.name not in kind.__annotations__)
+    for member in inherited_last:
+        name, hint = member.name, hints[member.name]
+        used: Field[Any] = changed.get(name, member)
+        is_option = _OPTION in used.metadata or _GROUP in used.metadata or is_dataclass(hint)
+        if is_option and (not names or name in names or name in changed):
+            yield name, hint, used
 
 
-def _options(name: str, hint: Any, one: Field[Any]) -> Iterator[Callable[[Any], Any]]:
-    """Yield the decorators of click for a field: one, or those of all fields of a dataclass."""
-    if _OPTION not in one.metadata:
-        for member in _members(hint, one):
+def _options(name: str, hint: Any, used: Field[Any]) -> Iterator[Callable[[Any], Any]]:
+    """Yield the decorators of click for an option, or for all options of a dataclass."""
+    if _OPTION not in used.metadata:
+        for member in _members(hint, used):
             yield from _options(*member)
         return
-    flags, given = one.metadata[_OPTION]
-    settings = _settings(hint, one.default) | given
+    flags, given = used.metadata[_OPTION]
+    settings = _settings(hint, used.default) | given
     if settings.get("multiple"):
         del settings["default"]  # that of click is ()
+    both = settings.pop("both", False)
     if not flags:
         flag = name.replace("_", "-")
-        flags = (f"--{flag}/--no-{flag}",) if settings.pop("both", False) else (f"--{flag}",)
-    settings.pop("both", None)
+        flags = (f"--{flag}/--no-{flag}" if both else f"--{flag}",)
     yield click.option(name, *flags, **settings)
 
 
-def _value(name: str, hint: Any, one: Field[Any], values: dict[str, Any]) -> Any:
+def _value(name: str, hint: Any, used: Field[Any], values: dict[str, Any]) -> Any:
     """Take the value of an option, or an instance of a dataclass, out of the values of a command."""
-    if _OPTION in one.metadata:
+    if _OPTION in used.metadata:
         return values.pop(name)
-    made = {member: _value(member, kind, used, values) for member, kind, used in _members(hint, one)}
+    made = {member: _value(member, kind, field, values) for member, kind, field in _members(hint, used)}
     made |= {each.name: values.pop(each.name) for each in fields(hint) if each.name in values}
     return hint(**made)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
@@ -16,14 +17,18 @@ from fba.encoder_options import EncoderOptions
 from fba.errors import did_you_mean
 from fba.limits import DEFAULT_LIMITS, Limits
 
-RATES = (Fraction(1, 3600), Fraction(10_000))
-"""Smallest and largest frame rate that can be asked for, as in BVH files."""
-LARGEST_LIMIT = 10**18
+MIN_RATE = Fraction(1, 3600)
+"""Lowest frame rate, as in BVH files."""
+MAX_FRAME_RATE = Fraction(10_000)
+"""Highest frame rate, as in BVH files."""
+MAX_LIMIT = 10**18
+MAX_SIZE = 16384
+"""Largest width and height of a picture, in pixels."""
 NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
 
 
 class ExistingPath(click.Path):
-    """A file or folder that exists; the error for one that does not names the nearest that does."""
+    """A file or folder that exists; the error for another path suggests a similar name."""
 
     def __init__(self, *, file_okay: bool = True, dir_okay: bool = True, allow_dash: bool = False) -> None:
         super().__init__(
@@ -38,7 +43,7 @@ class ExistingPath(click.Path):
 
 
 def _neighbours(path: Path) -> list[str]:
-    """Return the names in the folder of a path, none if it cannot be listed."""
+    """Return the names in the folder of a path; none if it cannot be listed."""
     try:
         return os.listdir(path.parent)
     except OSError:
@@ -55,7 +60,7 @@ class InputType(ExistingPath):
         if str(value) in NAMES_OF_STANDARD_INPUT:
             return Path("-")
         path = super().convert(value, param, ctx)
-        return path if str(path) != "-" else path.absolute()  # it was "./-", a file of that name
+        return path if str(path) != "-" else path.absolute()  # "./-" is a file
 
 
 EXISTING = InputType()
@@ -63,108 +68,116 @@ EXISTING = InputType()
 FILE = ExistingPath(dir_okay=False)
 
 
-class RateType(click.ParamType[Fraction]):
-    """A frame rate: 25, 29.97, 30000/1001."""
+class TextType(click.ParamType[Any]):
+    """A value that is typed as text.
 
-    name = "rate"
+    name: of the value. parse: returns it; its ValueError is the text of a usage error.
+    """
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
-        from fba.formats.text.frame_rates import parse_rate
+    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
+        self.name = name
+        self._parse = parse
 
-        low, high = RATES
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value  # a default
         try:
-            rate = parse_rate(value)
+            return self._parse(value)
         except ValueError as error:
-            self.fail(f"{error}; it may be {low} to {high}", param, ctx)
-        if not low <= rate <= high:
-            self.fail(f"{value} frames/s are out of reach: a frame rate may be {low} to {high}", param, ctx)
-        return rate
+            self.fail(str(error), param, ctx)
 
 
-class PeriodType(click.ParamType[Fraction]):
-    """A positive number of seconds."""
-
-    name = "seconds"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
-        try:
-            seconds = Fraction(value)
-        except (ValueError, ZeroDivisionError):
-            self.fail(f"{value!r} is not a number of seconds", param, ctx)
-        if seconds <= 0:
-            self.fail(f"{value} is not positive", param, ctx)
-        return seconds
+def parse_number(text: str) -> float:
+    """Return a finite number; NaN for other text."""
+    try:
+        number = float(text)
+    except ValueError:
+        return math.nan
+    return number if math.isfinite(number) else math.nan
 
 
-class MomentType(click.ParamType[float]):
-    """A time in an animation, in seconds; it may be negative."""
+def _parse_rate(text: str) -> Fraction:
+    from fba.formats.text.frame_rates import parse_rate
 
-    name = "seconds"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        try:
-            seconds = float(value)
-        except ValueError:
-            seconds = math.nan
-        if not math.isfinite(seconds):
-            self.fail(f"{value!r} is not a number of seconds", param, ctx)
-        return seconds
+    try:
+        rate = parse_rate(text)
+    except ValueError as error:
+        raise ValueError(f"{error}; it may be {MIN_RATE} to {MAX_FRAME_RATE}") from error
+    if not MIN_RATE <= rate <= MAX_FRAME_RATE:
+        allowed = f"{MIN_RATE} to {MAX_FRAME_RATE}"
+        raise ValueError(f"{text} frames/s are out of reach: a frame rate may be {allowed}")
+    return rate
 
 
-class LimitType(click.ParamType[tuple[str, int]]):
-    """A limit and its value: frames=10000000."""
-
-    name = "limit"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, int]:
-        name, _, number = str(value).partition("=")
-        known = [limit.name for limit in fields(Limits)]
-        if name not in known:
-            self.fail(
-                f"there is no limit {name!r}{did_you_mean(name, known)}; they are {', '.join(known)}",
-                param,
-                ctx,
-            )
-        try:
-            exact = Fraction(number)
-        except (ValueError, ZeroDivisionError):
-            self.fail(f"{number!r} is not a number; write e.g. {name}={getattr(Limits(), name)}", param, ctx)
-        if exact < 1 or exact.denominator != 1 or exact > LARGEST_LIMIT:
-            self.fail(f"{name}={number}: a limit is a whole number from 1 to {LARGEST_LIMIT}", param, ctx)
-        return name, int(exact)
+def _parse_period(text: str) -> Fraction:
+    try:
+        seconds = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        raise ValueError(f"{text!r} is not a number of seconds") from None
+    if seconds <= 0:
+        raise ValueError(f"{text} is not positive")
+    return seconds
 
 
-class SizeType(click.ParamType[tuple[int, int]]):
-    """Width and height in pixels: 1280x720."""
+def _parse_moment(text: str) -> float:
+    seconds = parse_number(text)
+    if math.isnan(seconds):
+        raise ValueError(f"{text!r} is not a number of seconds")
+    return seconds
 
-    name = "size"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        width, _, height = str(value).lower().partition("x")
-        if not (width.isdecimal() and height.isdecimal()) or not (0 < int(width) <= 16384 > int(height) > 0):
-            self.fail(f"{value!r} is not a size; write e.g. 1280x720", param, ctx)
-        return int(width), int(height)
+def _parse_limit(text: str) -> tuple[str, int]:
+    name, _, number = text.partition("=")
+    known = [limit.name for limit in fields(Limits)]
+    if name not in known:
+        raise ValueError(
+            f"there is no limit {name!r}{did_you_mean(name, known)}; they are {', '.join(known)}"
+        )
+    try:
+        exact = Fraction(number)
+    except (ValueError, ZeroDivisionError):
+        example = f"{name}={getattr(Limits(), name)}"
+        raise ValueError(f"{number!r} is not a number; write e.g. {example}") from None
+    if exact < 1 or exact.denominator != 1 or exact > MAX_LIMIT:
+        raise ValueError(f"{name}={number}: a limit is a whole number from 1 to {MAX_LIMIT}")
+    return name, int(exact)
+
+
+def _parse_size(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    is_size = width.isdecimal() and height.isdecimal()
+    if not is_size or not (0 < int(width) <= MAX_SIZE > int(height) > 0):
+        raise ValueError(f"{text!r} is not a size; write e.g. 1280x720")
+    return int(width), int(height)
+
+
+RATE = TextType("rate", _parse_rate)
+"""A frame rate: 25, 29.97, 30000/1001."""
+PERIOD = TextType("seconds", _parse_period)
+"""A positive number of seconds."""
+MOMENT = TextType("seconds", _parse_moment)
+"""A time in an animation, in seconds; it may be negative."""
+LIMIT = TextType("limit", _parse_limit)
+"""A limit and its value: frames=10000000."""
+SIZE = TextType("size", _parse_size)
+"""Width and height in pixels: 1280x720."""
 
 
 def is_given(name: str) -> bool:
-    """Whether an option of the running command, by the name of its field, was given and is no default."""
+    """Whether an option of the running command was given. name: of its field."""
     source = click.get_current_context().get_parameter_source(name)
     return source is not None and source is not click.core.ParameterSource.DEFAULT
 
 
 def rate_option(text: str) -> Any:
     """Return `--fps`, the frame rate of the result. text: its help."""
-    return option("--fps", type=RateType(), metavar="RATE", help=text)
+    return option("--fps", type=RATE, metavar="RATE", help=text)
 
 
 def size_option(**settings: Any) -> Any:
     """Return `--size` of pictures and films. settings: as for `option`."""
     default = {"help": "Default: 1280x720; of a GIF, 480x270."}
-    return option(type=SizeType(), metavar="WxH", **(settings or default))
+    return option(type=SIZE, metavar="WxH", **(settings or default))
 
 
 def model_option(text: str, *flags: str) -> Any:
@@ -186,14 +199,14 @@ face_option = option(metavar="NAME", help="Captures of several faces: the one to
 limit_option = option(
     "--limit",
     default=DEFAULT_LIMITS,
-    type=LimitType(),
+    type=LIMIT,
     metavar="NAME=VALUE",
     multiple=True,
     callback=lambda _, __, given: Limits(**dict(given)),
     help="Read more than usual from a file that is to be trusted, e.g. bytes=4e9; "
     f"names: {', '.join(limit.name for limit in fields(Limits))}.",
 )
-"""`--limit`, several times if need be; its value is `Limits`."""
+"""`--limit`, which is repeatable; its value is `Limits`."""
 read_steps_option = option(
     default="auto",
     help="Table of BAP steps of a stream, the standard's or one vendor's; auto: the one that it names, else "

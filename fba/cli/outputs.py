@@ -1,7 +1,7 @@
-"""Where commands write: files that are checked before the work begins, or standard output.
+"""Outputs of commands: files that are checked before the work begins, or standard output.
 
-Every command that writes files says which by an `Outputs`. It refuses to overwrite what the command reads,
-sends what goes to "-" to standard output, and keeps everything else off it.
+Every command that writes files lists them in an `Outputs`, which refuses to overwrite what the command reads,
+sends the output "-" to standard output, and keeps everything else off it.
 """
 
 from __future__ import annotations
@@ -36,13 +36,14 @@ TEXT_FORMATS = ("fap", "bap", "epf", "bvh", "livelink")
 """Formats that a terminal can show."""
 REFERRING = (".gltf", ".obj", ".mtl", ".fdp", ".xml")
 """Suffixes of text files that name other files, which are read with them."""
-MOST_TEXT = 1 << 26
-"""Bytes of such a file that are searched for names."""
-CHUNK = 1 << 20
+MAX_TEXT_BYTES = 1 << 26
+"""Most bytes of such a file that are searched for names."""
+CHUNK_BYTES = 1 << 20
+"""Bytes that are copied at once."""
 
 
 class OutputType(click.ParamType[Path]):
-    """A file to write, "-" for standard output. folders: an existing folder will do as well."""
+    """A file to write, "-" for standard output. folders: whether an existing folder is allowed."""
 
     name = "file"
 
@@ -60,7 +61,7 @@ class OutputType(click.ParamType[Path]):
                 self.fail(f"{text} is a folder; give the name of a file to write", param, ctx)
         elif text.endswith(("/", os.sep)):
             self.fail(f"there is no folder {text}; make it first, or leave the slash out", param, ctx)
-        # Path("./-") would be "-"
+        # as a path, "./-" would be "-"
         return Path(text) if Path(text) != STANDARD else Path(os.path.abspath(text))
 
 
@@ -78,8 +79,8 @@ def further_output_option(metavar: str, text: str, *flags: str) -> Any:
 class Output:
     """A file to write.
 
-    option: how the command line says so, for messages. path: its name, `STANDARD` for standard output.
-    text: whether a terminal can show it. source: the input that it is made from, where there are several.
+    option: on the command line, for messages. path: its name, `STANDARD` for standard output. text: whether a
+    terminal can show it. source: the input that it is made from, if there are several.
     """
 
     option: str
@@ -90,6 +91,11 @@ class Output:
     def __str__(self) -> str:
         return f"{self.option} {self.path}"
 
+    @staticmethod
+    def of_format(option: str, path: Path, writing: Format) -> Output:
+        """Return the output for an animation in a format."""
+        return Output(option, path, writing.name in TEXT_FORMATS)
+
     @property
     def standard(self) -> bool:
         return self.path == STANDARD
@@ -98,12 +104,12 @@ class Output:
 class Outputs:
     """The files that a command writes.
 
-    inputs: the files that it reads, `STANDARD` for standard input; None is passed over. no_clobber: existing
-    files are not overwritten.
+    inputs: the files that it reads, `STANDARD` for standard input; None is ignored. no_clobber: do not
+    overwrite existing files.
 
-    Raises click.UsageError where an output is an input, also by another name or through a link, or a file
-    that an input refers to; where two outputs are one file; where binary data would go to a terminal.
-    Raises FormatError where a file cannot be written, or exists and no_clobber says that it stays.
+    Raises click.UsageError if an output is an input, also by another name or through a link, or a file that
+    an input refers to; if two outputs are one file; if binary data would go to a terminal. Raises FormatError
+    if a file cannot be written, or exists and no_clobber is set.
     """
 
     def __init__(
@@ -124,7 +130,7 @@ class Outputs:
                 _check_place(output.path, no_clobber=no_clobber)
 
     def say(self, line: str) -> None:
-        """Print a line of a report: on standard output, unless data goes there."""
+        """Print a line of a report on standard output, or on standard error if data goes to the former."""
         click.echo(line, err=self.standard)
 
     def print_json(self, value: object) -> None:
@@ -138,12 +144,33 @@ class Outputs:
         with self.file(path) as name, atomic(name) as file:
             file.write(data)
 
+    def write_animation(self, path: Path, animation: Animation, writing: Format, **settings: Any) -> None:
+        """Write an animation in a format, for an output. settings: of the writer."""
+        from fba.formats import write
+
+        with self.file(path) as file:
+            write(file, animation, format=writing.name, **settings)
+
+    def write_stream(
+        self, path: Path, data: bytes, animation: Animation, table: BapTable, quant: int = 1, *, marked: bool
+    ) -> None:
+        """Write the stream of an animation, for an output.
+
+        A stream with a mark goes to a pipe with its table of BAP steps before it, as others may read it while
+        it arrives; but not without BAPs, or with unquantised ones, which are the same with every table.
+        """
+        from fba.codec import write_opening
+
+        if marked and animation.body is not None and quant and _goes_to_pipe(path):
+            data = write_opening(table) + data
+        self.write(path, data)
+
     @contextmanager
     def file(self, path: Path, suffix: str = "") -> Iterator[Path]:
-        """The name of a file to write for an output, for a `with` statement.
+        """Give the name of a file to write for an output, for a `with` statement.
 
-        It is the output itself where that is a file. For standard output, a device or a pipe, and for a name
-        without the suffix that the writer wants, it is a temporary file, which is copied there at the end.
+        That is the output itself if it is a file. For standard output, a device or a pipe, and for a name
+        without the suffix that the writer needs, it is a temporary file, which is copied there at the end.
         """
         if not _is_direct(path) and suffix in ("", path.suffix.lower()):
             yield path
@@ -153,14 +180,14 @@ class Outputs:
             with renamed(temporary, display_name(path)):
                 yield temporary
             with temporary.open("rb") as file, _opened(path) as target:
-                while chunk := file.read(CHUNK):
+                while chunk := file.read(CHUNK_BYTES):
                     target.write(chunk)
 
 
 def find_writer(path: Path, to: str | None) -> Format:
     """Return the format to write. to: value of `--to`.
 
-    Raises click.UsageError for standard output without `to`, and what `fba.formats.writer_for` raises.
+    Raises click.UsageError for standard output without `to`, and as `fba.formats.writer_for` does.
     """
     from fba.formats import writer_for
 
@@ -174,16 +201,11 @@ def display_name(path: Path) -> str:
     return "standard output" if path == STANDARD else str(path)
 
 
-def opening_for(output: Path, animation: Animation, table: BapTable, quant: int, *, marked: bool) -> bytes:
-    """Return what goes before a stream that others may read while it comes; b"" for a file.
-
-    Nothing in streams without a mark, and without BAPs that the table makes a difference to.
-    """
-    from fba.codec import write_opening
-
-    if not marked or animation.body is None or quant == 0 or not _goes_to_pipe(output):
-        return b""
-    return write_opening(table)
+def check_glb(output: Path) -> None:
+    """Raise click.UsageError for a suffix that a face model does not have."""
+    if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
+        name = output.with_suffix(".glb").name
+        raise click.UsageError(f"--output {output}: face models are written as glTF; name it {name}")
 
 
 def _check_inputs(output: Output, inputs: list[Path]) -> None:
@@ -254,13 +276,13 @@ def _state(path: Path, number: int) -> os.stat_result | None:
 
 
 def _same(output: Path, other: Path, standard: int) -> bool:
-    """Whether writing one would change the other: one file under two names, or one name twice.
+    """Whether writing to one path would change the other: a file under two names, or the same name.
 
-    standard: 0 where the other is read, 1 where it is written, too.
+    standard: 0 if the other is read, 1 if it is written.
     """
     first, second = _state(output, 1), _state(other, standard)
     if first is not None and second is not None:
-        # devices such as /dev/null, terminals and the two ends of a socket may be both
+        # devices such as /dev/null, terminals and the two ends of a socket may be read and written
         named = STANDARD not in (output, other)
         return os.path.samestat(first, second) and (
             stat.S_ISREG(first.st_mode) or (named and stat.S_ISFIFO(first.st_mode))
@@ -274,7 +296,7 @@ def _same(output: Path, other: Path, standard: int) -> bool:
 
 
 def _ignores_case(folder: str) -> bool:
-    """Whether names that differ in their case mean one file there, as the folder's own name shows."""
+    """Whether names that differ in their case mean the same file in a folder, as its own name shows."""
     while os.path.basename(folder):
         parent, name = os.path.split(folder)
         if name.swapcase() != name:
@@ -291,7 +313,7 @@ def _within(path: Path, folder: Path) -> bool:
 
 
 def _refers(source: Path, output: Path) -> bool:
-    """Whether a text file, or a file that it names, has the name of an existing output in its folder."""
+    """Whether a text file, or a material file that it names, names an existing output in its folder."""
     folder = Path(os.path.realpath(source)).parent
     if source.suffix.lower() not in REFERRING or not _within(output, folder):
         return False
@@ -311,13 +333,13 @@ def _named(name: str, text: bytes) -> bool:
 def _text(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(MOST_TEXT)
+            return file.read(MAX_TEXT_BYTES)
     except OSError:
         return b""  # its reader says why
 
 
 def _goes_to_pipe(path: Path) -> bool:
-    """Whether somebody may read an output while it is written: in a pipe or a device, but not in a file."""
+    """Whether others may read an output while it is written: a pipe or a device, but not a file."""
     if path != STANDARD:
         return path.exists() and not path.is_file()
     try:
@@ -327,7 +349,7 @@ def _goes_to_pipe(path: Path) -> bool:
 
 
 def _is_direct(path: Path) -> bool:
-    """Whether data must go to what is there already, which no new file can replace."""
+    """Whether data must go to an existing pipe or device, which no new file can replace."""
     from fba.atomic import check_target
 
     return path == STANDARD or check_target(path).direct
@@ -349,7 +371,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def _named_pipe(path: Path) -> BinaryIO | None:
-    """Return a named pipe, opened as soon as it has a reader; None for everything else."""
+    """Return a named pipe, opened as soon as it has a reader; None for other paths."""
     if not path.is_fifo() or str(path).startswith(("/dev/fd/", "/proc/")):
         return None
     try:

@@ -14,14 +14,15 @@ from fba.cli.option_fields import option
 if TYPE_CHECKING:
     from fba.animation import Animation
 
-MOST = 2
-"""A frame has room for two visemes and two expressions."""
-LARGEST = 2**31 - 1
+MAX_SELECTS = 2
+"""Most visemes, and most expressions, in a frame."""
+MAX_FAP = 2**31 - 1
+"""Largest value of a FAP."""
 
 
 @dataclass(frozen=True)
 class Pose:
-    """A face as it is typed; a name may be a number."""
+    """A face as typed; a name may be a number."""
 
     faps: tuple[str, ...] = option(
         "--fap",
@@ -51,7 +52,7 @@ class Pose:
 
 
 def still_animation(pose: Pose) -> Animation:
-    """Return an animation of one frame that sends the FAPs, visemes and expressions of a pose, nothing else.
+    """Return an animation of one frame that sends only the FAPs, visemes and expressions of a pose.
 
     Raises click.UsageError, which suggests similar names.
     """
@@ -89,8 +90,9 @@ def _parse_fap(text: str) -> tuple[int, int]:
     name = name.strip()
     numbers = {key: number for key, number in fap_numbers().items() if number >= FIRST_LOW_LEVEL_FAP}
     if name in ("1", "2", "viseme", "expression"):
-        raise click.UsageError(f"--fap {text}: visemes and expressions have options of their own, --viseme "
-                               "and --expression")  # fmt: skip
+        raise click.UsageError(
+            f"--fap {text}: visemes and expressions have options of their own, --viseme and --expression"
+        )
     if name.isdecimal() and FIRST_LOW_LEVEL_FAP <= int(name[:9]) <= FAP_COUNT:
         number = int(name)
     elif name in numbers:
@@ -103,8 +105,8 @@ def _parse_fap(text: str) -> tuple[int, int]:
     try:
         value = int(amount)
     except ValueError:
-        value = LARGEST + 1
-    if not equals or abs(value) > LARGEST:
+        value = MAX_FAP + 1
+    if not equals or abs(value) > MAX_FAP:
         raise click.UsageError(
             f"--fap {text}: a value is missing or no whole number; write e.g. --fap {name}=200"
         )
@@ -112,12 +114,12 @@ def _parse_fap(text: str) -> tuple[int, int]:
 
 
 def _parse_selects(kind: str, texts: tuple[str, ...]) -> list[tuple[int, int | None]]:
-    """Return (select, amount or None) of each viseme or expression."""
+    """Return the select of each viseme or expression, and its amount or None."""
     from fba.parameters import EXPRESSIONS, INTENSITY_MAX, VISEMES
 
     names = VISEMES if kind == "viseme" else EXPRESSIONS
-    if len(texts) > MOST:
-        raise click.UsageError(f"--{kind}: a frame holds at most {MOST}, not {len(texts)}")
+    if len(texts) > MAX_SELECTS:
+        raise click.UsageError(f"--{kind}: a frame holds at most {MAX_SELECTS}, not {len(texts)}")
     pairs = []
     for text in texts:
         name, equals, amount = text.partition("=")
@@ -137,7 +139,7 @@ def _parse_selects(kind: str, texts: tuple[str, ...]) -> list[tuple[int, int | N
 
 
 def _select(name: str, names: tuple[str, ...]) -> int | None:
-    """Return the number for a name, a viseme's sound, or a number as text; None for other text."""
+    """Return the number of a viseme or expression, from its name, sound or number; None for other text."""
     if name.isdecimal():
         number = int(name[:9])
         return number if 0 < number < len(names) else None

@@ -1,4 +1,4 @@
-"""What commands print: JSON, times, frame rates, and progress bars."""
+"""Output of commands: JSON, times, frame rates, tables, and progress bars."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from typing import TextIO
 
 import click
 
-NARROWEST = 12
-"""Characters to which a column of a table is folded at most."""
-BAR_WIDTH, BAR_PERIOD = 30, 0.1
-"""Characters of a progress bar, and seconds after which it is drawn again."""
+MIN_WIDTH = 12
+"""Characters of a column below which it is not folded."""
+BAR_WIDTH = 30
+"""Characters of a progress bar."""
+BAR_PERIOD = 0.1
+"""Seconds after which a progress bar is drawn again."""
 
 
 def print_json(value: object) -> None:
@@ -45,9 +47,9 @@ def rate_text(rate: Fraction) -> str:
 
 
 def colour_grade(text: str, grade: str) -> str:
-    """Return text in the colour of a grade, where colours are wanted; `click.echo` drops it for files.
+    """Return text in the colour of a grade, "good", "fair" or "poor", unless the environment forbids colours.
 
-    grade: "good", "fair" or "poor".
+    `click.echo` removes colours from files.
     """
     if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
         return text
@@ -55,10 +57,9 @@ def colour_grade(text: str, grade: str) -> str:
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], first: str = "file") -> None:
-    """Print rows of a file and cells, under the names of the columns behind that of the file.
+    """Print rows of a file and its cells. columns: names of the cells. first: name of the first column.
 
-    first: what the first column has, if it is no file. On a terminal, long names are folded; a program that
-    reads it finds every row on one line.
+    On a terminal, long names are folded; for a program, every row is on one line.
     """
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     click.echo(
@@ -76,12 +77,12 @@ def table_lines(
 ) -> list[str]:
     """Return the lines of a table, its columns `gap` spaces apart.
 
-    to_right: numbers of the columns, from 0, whose cells end at the right edge. width: characters of a line
-    at most; cells are folded to keep to it, the widest columns first.
+    to_right: numbers of the columns, from 0, whose cells are aligned right. width: most characters of a line;
+    cells are folded to keep it, those of the widest columns first.
     """
     table = [head, *rows]
     sizes = [max(map(len, column)) for column in zip(*table, strict=True)]
-    while width is not None and sum(sizes) + gap * (len(sizes) - 1) > width and max(sizes) > NARROWEST:
+    while width is not None and sum(sizes) + gap * (len(sizes) - 1) > width and max(sizes) > MIN_WIDTH:
         sizes[sizes.index(max(sizes))] -= 1
     lines = []
     for row in table:

@@ -1,6 +1,6 @@
 """Setup of the `fba` command before its imports: Ctrl-C without a traceback, fewer garbage collections.
 
-Imports next to nothing itself, since Ctrl-C is not handled until this module is loaded.
+It imports little, as Ctrl-C is not handled before this module is loaded.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ TEXT = "fba: interrupted"
 
 
 def leave_on_interrupt() -> None:
-    """Make Ctrl-C end this process at once, without a traceback; call it in the main thread.
+    """Let Ctrl-C end this process at once, without a traceback; to be called in the main thread.
 
     For the imports before a command and the shutdown after it, when there is nothing to clean up;
-    `Interruptions` takes over in between. A process that was started to ignore Ctrl-C goes on ignoring it.
+    `Interruptions` handles Ctrl-C in between. A process that was started to ignore Ctrl-C still ignores it.
     """
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, leave)
@@ -32,10 +32,10 @@ def leave(_number: int, _frame: object) -> None:
 
 
 def collect_less() -> None:
-    """Make the garbage collector run less often in this process, which runs one command.
+    """Let the garbage collector run less often in this process, which runs one command.
 
-    Python's threshold of 700 objects costs a third of a second while numba is imported, and its search of
-    all objects at the end is in vain.
+    Python's threshold of 700 objects costs a third of a second while numba is imported, and its search of all
+    objects at the end is useless.
     """
     gc.set_threshold(100_000)
     atexit.register(gc.freeze)

@@ -1,4 +1,4 @@
-"""Which table of BAP steps a stream is read and written with, and what users are told about it."""
+"""The table of BAP steps with which a stream is read or written, and messages about it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fba.choices import BapTableOrAuto
-from fba.cli.program import as_typed
+from fba.cli.command import as_typed
 from fba.errors import FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT, BapTable, bap_numbers, bap_steps
@@ -23,7 +23,7 @@ FINE: BapTable = "visage"
 
 
 def explain_choice(data: bytes, asked: BapTableOrAuto, limits: Limits = DEFAULT_LIMITS) -> str:
-    """Return a stream's table, and why: "visage: the stream says so"; "" if it makes no difference."""
+    """Return a stream's table and the reason: "visage: the stream says so"; "" if it makes no difference."""
     from fba.formats.step_choice import choose_steps
 
     if asked != BAP_STEPS_AUTO:
@@ -39,10 +39,10 @@ def table_to_read(
     *,
     shown: bool = True,
 ) -> BapTable:
-    """Return the table with which a stream is to be decoded; print in one line which it is, and why.
+    """Return the table with which a stream is to be decoded; print a line with it and the reason.
 
-    asked: the value of --bap-steps. shown: whether its BAPs are shown or written at all. Nothing is printed
-    where they are not, where `asked` names a table, or where none makes a difference.
+    asked: the value of --bap-steps. shown: whether BAPs are shown or written. Nothing is printed if they are
+    not, if `asked` names a table, or if the table makes no difference.
     """
     from fba.formats.step_choice import choose_steps
 
@@ -60,7 +60,7 @@ def table_to_write(
     """Return the table with which a body is to be encoded.
 
     asked: the value of --bap-steps. made: whether the body is motion capture, or was generated. marked:
-    whether the stream will say which table it is. read: the table of the stream that the body comes from.
+    whether the stream will name its table. read: the table of the stream with the body.
     """
     if asked != BAP_STEPS_AUTO:
         return asked
@@ -72,9 +72,9 @@ def table_to_write(
 def remind(
     output: Path, animation: Animation, table: BapTable, quant: int = 1, *, marked: bool = True
 ) -> None:
-    """Print the option that later commands need to read a stream that was just written, if any.
+    """Print the option that later commands need to read a written stream, if any.
 
-    Unquantised BAPs (quant 0) are the same under every table.
+    Unquantised BAPs (quant 0) are the same with every table.
     """
     if animation.body is not None and table != BAP_STEPS_DEFAULT and quant > 0 and not marked:
         again = as_typed(f"fba play {shlex.quote(str(output))} --bap-steps {table}")
@@ -84,13 +84,13 @@ def remind(
 def warn_of_coarse_steps(
     animation: Animation, table: BapTable, quant: int = 1, *, captured: bool = False
 ) -> None:
-    """Warn if a body is about to be coded with the standard's steps and its root moves by less than them.
+    """Warn if a body is coded with the standard's steps and its root moves by less than a step.
 
-    captured: the body is motion capture, whose angles these steps may cut as well.
+    captured: whether the body is motion capture, whose angles these steps may cut as well.
     """
     if animation.body is None or table != BAP_STEPS_DEFAULT or quant == 0:
         return
-    root = [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in ("vertical", "lateral", "frontal")]
+    root = [bap_numbers()[f"HumanoidRoot_tr_{axis}"] - 1 for axis in ("vertical", "lateral", "frontal")]
     steps = bap_steps(table)[root]
     between = any((batch.values[:, root] % steps).any() for batch in batches(animation.body))
     if captured or between:
@@ -107,8 +107,8 @@ def warn_of_doubt(
 ) -> str | None:
     """Warn if a decoded body was read with the wrong table; return the warning.
 
-    marked: the table that the stream names, which is right beyond doubt. Without one, the wrong table is the
-    one under which the body looks wrong while it looks right under the other.
+    marked: the table that the stream names, which is right. Without it, a table is wrong if the body looks
+    wrong with it, and right with the other.
     """
     from fba.body.plausibility import find_doubt
 
@@ -118,7 +118,7 @@ def warn_of_doubt(
     if marked is None:
         doubt = find_doubt(animation.body, animation.index, animation.rate, table)
     elif any((batch.values % bap_steps(table)).any() for batch in batches(animation.body)):
-        doubt = None  # BAPs that are not quantised are the same with every table
+        doubt = None  # unquantised BAPs are the same with every table
     else:
         doubt = (
             f"the stream says that its BAP steps are {marked!r}, but it is read with {table!r}, as given; "
@@ -132,7 +132,7 @@ def warn_of_doubt(
 
 
 def warn_of_doubtful_stream(name: str | Path, data: bytes, table: BapTable) -> None:
-    """Do the same for a stream, of which the first frames with a body are decoded."""
+    """Warn as `warn_of_doubt` does about a stream, of which the first frames with a body are decoded."""
     from fba.codec import marked_table
     from fba.formats.step_choice import first_frames
 

@@ -14,11 +14,9 @@ from fba.cli.inputs import read_body, read_model
 from fba.cli.option_fields import option
 
 if TYPE_CHECKING:
-    from fba.body import BodyModel
     from fba.formats import Format
 
-UNITS = {"cm": 100.0, "m": 1.0, "mm": 1000.0, "in": 1 / 0.0254}
-"""Lengths in the file for one metre."""
+UNITS_PER_METRE = {"cm": 100.0, "m": 1.0, "mm": 1000.0, "in": 1 / 0.0254}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +26,9 @@ class WriterOptions:
     joints: Literal["all", "moving"] | None = option(
         help="BVH: all joints of the standard (default), or only what moves, and the limbs."
     )
-    unit: str | None = option(type=click.Choice(list(UNITS)), help="BVH: unit of lengths; default: cm.")
+    unit: str | None = option(
+        type=click.Choice(list(UNITS_PER_METRE)), help="BVH: unit of lengths; default: cm."
+    )
     mesh: bool | None = option(help="glTF: the person (default), or the skeleton alone.")
     model: Path | None = options.model_option("glTF: the face; default: the built-in head.")
     body: Path | None = option(
@@ -56,11 +56,11 @@ def settings(
     for name in given:
         if name not in writing.write_options:
             raise click.UsageError(_misplaced_text(name, target, writing))
-
-    def read_person(path: Path) -> BodyModel | None:
-        return read_body(path, joints)
-
-    converters: dict[str, Callable[[Any], Any]] = {**_CONVERTERS, "body": read_person}
+    converters: dict[str, Callable[[Any], Any]] = {
+        "unit": UNITS_PER_METRE.__getitem__,
+        "model": read_model,
+        "body": lambda path: read_body(path, joints),
+    }
     return {name: converters[name](value) if name in converters else value for name, value in given.items()}
 
 
@@ -73,14 +73,8 @@ def _misplaced_text(name: str, target: Path, writing: Format) -> str:
     from fba.formats import formats
 
     takers = [entry.name.upper() for entry in formats() if name in entry.write_options]
-    taken = [flag(one.name) for one in fields(WriterOptions) if one.name in writing.write_options]
+    taken = [flag(each.name) for each in fields(WriterOptions) if each.name in writing.write_options]
     return (
         f"{flag(name)} is an option for {' and '.join(takers)}, and {target} becomes "
         f"{writing.name.upper()}, which takes {', '.join(taken) or 'none of these options'}"
     )
-
-
-_CONVERTERS: dict[str, Callable[[Any], Any]] = {
-    "unit": UNITS.__getitem__,
-    "model": read_model,
-}

@@ -14,7 +14,7 @@ from fba.formats._registry import (
     write,
     writer_for,
 )
-from fba.formats.merge import merge
+from fba.formats.synchronisation import merge
 
 __all__ = [
     "Format",

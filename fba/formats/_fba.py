@@ -1,9 +1,9 @@
-"""FBA files (.fba): the layer between a file and the codec."""
+"""FBA files (.fba): recognise, decode and encode them."""
 
 from __future__ import annotations
 
-import os
-from dataclasses import fields
+from dataclasses import fields, replace
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fba.codec import EncoderOptions
 
 START_CODES = (b"\0\0\1\xba", b"\0\0\1\x01")
-"""fba_object_start_code, and the one of old streams."""
+"""fba_object_start_code, and that of old streams."""
 _BEFORE = (b"\0\0\1\xb0", b"\0\0\1\xb5")
 """Visual object sequence and visual object: the layers of a stream that may stand before the object."""
 
@@ -25,8 +25,8 @@ _BEFORE = (b"\0\0\1\xb0", b"\0\0\1\xb5")
 def sniff_fba(head: bytes, suffix: str) -> bool:
     """Whether a file with this beginning is an FBA stream.
 
-    MPEG program streams begin with the same start code, but a 0 bit follows. In an FBA object the 1 bit of
-    the first I plane follows, or the start code of a plane, perhaps with a byte of stuffing before it.
+    MPEG program streams begin with the same start code, followed by a 0 bit. In an FBA object, the 1 bit of
+    the first I plane follows, or the start code of a plane, with or without a byte of stuffing before it.
     """
     for code in START_CODES:
         if head.startswith(code):
@@ -45,10 +45,10 @@ def read_fba(
 ) -> Animation:
     """Decode an FBA file.
 
-    bap_steps: "iso" or "visage", the table of BAP steps with which it was encoded; None: the one that its
-    mark names, "iso" without a mark; "auto": without a mark, the one with which it moves like a person (see
+    bap_steps: "iso" or "visage", the table of BAP steps with which it was encoded; None: the table that its
+    mark names, "iso" without a mark; "auto": without a mark, the table with which it moves like a person (see
     `fba.formats.step_choice`). salvage: skip damage with an FbaWarning instead of raising. limits: see
-    `fba.Limits`. The animation is named after the file.
+    `fba.Limits`. An animation without a name is named after the file.
 
     Raises FormatError for the file, BitstreamError, UnsupportedError and LimitError for the stream.
     """
@@ -63,8 +63,7 @@ def read_fba(
         animation = decode(
             data, bap_steps=bap_steps, on_error="salvage" if salvage else "raise", limits=limits
         )
-    name = animation.name or os.path.splitext(os.path.basename(os.fspath(path)))[0]
-    return Animation(animation.rate, animation.index, animation.face, animation.body, name)
+    return replace(animation, name=animation.name or FilePath(path).stem)
 
 
 def write_fba(
@@ -72,9 +71,9 @@ def write_fba(
 ) -> None:
     """Encode an animation into an FBA file.
 
-    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. settings: these, and what else
-    `fba.encode` takes: `preset`, `tolerance` and `bit_rate`. Raises as `fba.encode` does, FormatError if the
-    file cannot be written.
+    options: an EncoderOptions. settings: its fields as keywords instead, e.g. `fap_quant=2`, and the other
+    arguments of `fba.encode`: `preset`, `tolerance` and `bit_rate`. Raises as `fba.encode` does, and
+    FormatError if the file cannot be written.
     """
     from fba.planning import encode
 

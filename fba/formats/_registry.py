@@ -1,6 +1,6 @@
-"""Table of all file formats, and `read`, `write` and `probe`, which use it.
+"""Table of all file formats; `read`, `write` and `probe`, which use it.
 
-The content of a file decides its format, the suffix only where several formats fit. The modules of formats
+The content of a file decides its format; its suffix decides between formats that fit. The modules of formats
 are imported when they are used.
 """
 
@@ -27,16 +27,12 @@ if TYPE_CHECKING:
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
 
-
-UNKNOWN = Remedy("format", "if it is one of them, name it with {}", "'bvh'")
-
-
 COMMON_SUFFIXES = (".csv", ".json", ".txt")
-"""Suffixes that say nothing of the content."""
+"""Suffixes that say nothing about the content."""
 
 
 class Lazy:
-    """A function by name, "module:function", imported on the first call."""
+    """A function that is imported on the first call. place: "module:function"."""
 
     def __init__(self, place: str) -> None:
         self._place = place
@@ -61,17 +57,17 @@ class Lazy:
 class Format:
     """A file format.
 
-    name: as in `format=`. suffixes: lower case, with the dot; the first is the usual one. sniff: whether a
-    file with this beginning (up to 64 KiB) and this lower-case suffix has this format. write: Animation to
-    file; None if there is no writer. carries: the parts that a file can hold. written: description of a
-    written file, if `description` says more than the writer can do.
+    name: as in `format=`. suffixes: lower case, with the dot, the usual suffix first. sniff: whether a file
+    with this beginning (up to 64 KiB) and this lower-case suffix has this format. write: Animation to file;
+    None without a writer. carries: the parts that a file can hold. written: description of a written file, if
+    `description` says more than the writer can do.
 
-    A file is read by one of these: read_animation: FAPs and BAPs, or what decodes to them. read_motion: the
-    motion of a skeleton. read_face: a captured face as it is, markers and points among them. Of motions and
-    faces, `read` makes an animation. read_person: a file that may hold any of these.
-    kind: of the capture, see `fba.capture.capture_options`; "" for files of FAPs and BAPs.
+    One of these reads a file: read_animation: FAPs and BAPs, or what decodes to them. read_motion: the motion
+    of a skeleton. read_face: a captured face as it is, markers and points included. read_person: a file that
+    may hold any of these. `read` makes animations of motions and faces. kind: of the capture, see
+    `fba.capture.capture_options`; "" for files of FAPs and BAPs.
 
-    list_clips: describes the animations of a file, for formats that hold several; `read` takes one as `clip`.
+    list_clips: describes the animations of a file, for formats that hold several; `clip` of `read` chooses.
     describe_person: describes the person in a file without an animation.
     """
 
@@ -97,7 +93,7 @@ class Format:
         return self.read_captured(path, **options).animation
 
     def read_captured(self, path: Path, **options: Any) -> Captured:
-        """Return the animation of a capture, and what it was made of. options: of `read_options`."""
+        """Return the animation of a capture, and the capture. options: of `read_options`."""
         from fba.capture import SkeletonOptions, make_animation
 
         given = {name: options[name] for name in options if name in self.capture_options}
@@ -116,17 +112,17 @@ class Format:
 
     @property
     def is_capture(self) -> bool:
-        """Whether files hold what was captured of somebody, of which `read` makes FAPs or BAPs."""
+        """Whether files hold captures, of which `read` makes FAPs or BAPs."""
         return (self.read_motion, self.read_face) != (None, None)
 
     @property
     def has_markers(self) -> bool:
-        """Whether files hold markers or points, whose places on the face a map can give."""
+        """Whether files hold markers or points, whose places on the face may be given in a map."""
         return self.kind in ("markers", "points")
 
     @property
     def capture_options(self) -> tuple[str, ...]:
-        """Names of the options that say how a capture becomes an animation."""
+        """Names of the options by which a capture becomes an animation."""
         if not self.kind:
             return ()
         from fba.capture import capture_options
@@ -145,7 +141,7 @@ class Format:
 
     @property
     def write_options(self) -> tuple[str, ...]:
-        """Names of the keyword options of `write`; empty where there is no writer."""
+        """Names of the keyword options of `write`; empty without it."""
         return () if self.write is None else _option_names(self.write)
 
 
@@ -218,7 +214,7 @@ _FORMATS = (
     _face("pyfeat", ".csv", "blendshapes or action units of py-feat", "_pyfeat"),
     _face(
         "livelink", ".csv", "table of blendshapes: Live Link Face's, or with ARKit's names", "_livelink_csv",
-        write=_lazy("face_tables._livelink_writer", "write"),
+        write=_lazy("face_tables._livelink_csv", "write"),
         written="table of blendshapes as Live Link Face's",
     ),
     _face("livelink-udp", ".udp", "recorded datagrams of Live Link Face", "livelink_udp"),
@@ -239,18 +235,17 @@ _FORMATS = (
     ),
     _markers("markers", (".csv", ".tsv"), "table of a face's markers, wide or long", "markers._table"),
 )  # fmt: skip
-"""In the order in which they are tried on a content: those quick to import first."""
 
 
 def formats() -> tuple[Format, ...]:
-    """Return all formats, in the order in which they are tried on a content: those quick to import first."""
+    """Return all formats in the order in which a content is tried on them: those quick to import first."""
     return _FORMATS
 
 
 def format_of(path: Path, format: str | None = None) -> Format:
-    """Return the format of a file to be read. format: its name, if it is known already.
+    """Return the format of a file to be read. format: its name; None to recognise it.
 
-    Raises FormatError if the file cannot be read or has no known format, OptionError for an unknown name.
+    Raises FormatError if the file cannot be read or its format is unknown, OptionError for an unknown name.
     Warns (FbaWarning) of content that does not fit the suffix.
     """
     if format is not None:
@@ -260,11 +255,13 @@ def format_of(path: Path, format: str | None = None) -> Format:
     others = [entry for entry in formats() if entry not in by_suffix]
     match = next((entry for entry in (*by_suffix, *others) if entry.sniff(head, suffix)), None)
     if match is None and by_suffix and suffix not in COMMON_SUFFIXES:
-        return by_suffix[0]  # the error of its reader will say what is wrong
+        return by_suffix[0]  # its reader raises an error that says what is wrong
     if match is None:
         kind = recognition_hint(head)
         error = FormatError(f"is in no format known here: {_list_formats()}{kind}", path=path)
-        raise error if kind else error.with_remedies(UNKNOWN)
+        if kind:
+            raise error
+        raise error.with_remedies(Remedy("format", "if it is one of them, name it with {}", "'bvh'"))
     if by_suffix and match not in by_suffix and suffix not in COMMON_SUFFIXES:
         warnings.warn(
             f"{os.fspath(path)}: is named {suffix}, but holds {match.name.upper()} content; "
@@ -276,12 +273,11 @@ def format_of(path: Path, format: str | None = None) -> Format:
 
 
 def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
-    """Read an animation from a file of any known format.
+    """Read an animation from a file of any format, see `formats()`.
 
-    format: its name; otherwise the content decides. options: those of the format, see `formats()`: of its
-    reader, e.g. `fba.formats.text.fap.read_fap`; of captures also how they become animations, see
-    `fba.capture.SkeletonOptions`, `from_markers` and `from_points`. Raises FormatError, BitstreamError,
-    UnsupportedError or OptionError.
+    format: its name; None to recognise it. options: of its reader, e.g. `fba.formats.text.fap.read_fap`; for
+    captures also those of `fba.capture.SkeletonOptions`, `from_markers` and `from_points`. Raises
+    FormatError, BitstreamError, UnsupportedError or OptionError.
     """
     reader = format_of(path, format)
     _check_options(reader.name, "reading", options, reader.read_options)
@@ -291,7 +287,7 @@ def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
 def read_motion(path: Path, *, format: str | None = None, **options: Any) -> SkeletonMotion:
     """Return the motion of a captured skeleton as the file has it, before it is retargeted.
 
-    format and errors: as for `read`. options: those of the format, e.g. `limits`, or `clip` for glTF.
+    format and errors: as for `read`. options: of the reader, e.g. `limits`, or `clip` for glTF.
     """
     reader = format_of(path, format)
     motion: SkeletonMotion = _call_reader(reader, reader.read_motion, "a captured skeleton", path, options)
@@ -302,7 +298,7 @@ def read_face(path: Path, *, format: str | None = None, **options: Any) -> Any:
     """Return a captured face as the file has it, before FAPs are made of it.
 
     Shape weights give a ShapeMotion, action units an ActionUnitMotion, markers a MarkerMotion, points of an
-    image a PointMotion. format and errors: as for `read`. options: those of the format, e.g. `limits`.
+    image a PointMotion. format and errors: as for `read`. options: of the reader, e.g. `limits`.
     """
     reader = format_of(path, format)
     return _call_reader(reader, reader.read_face, "a captured face", path, options)
@@ -318,11 +314,10 @@ def _call_reader(
 
 
 def write(path: Path, animation: Animation, *, format: str | None = None, **options: Any) -> None:
-    """Write an animation; the suffix of `path` chooses the format, unless `format` names it.
+    """Write an animation in the format of the suffix of `path`, or in that which `format` names.
 
-    The file is complete or, after an error, unchanged. Parts that the format cannot hold are left out with an
-    FbaWarning.
-    Raises FormatError, RangeError, UnsupportedError or OptionError.
+    The file is complete or, after an error, unchanged. Parts that the format cannot hold are left out, with
+    an FbaWarning. Raises FormatError, RangeError, UnsupportedError or OptionError.
     """
     writer = writer_for(path, format)
     _check_options(writer.name, "writing", options, writer.write_options)
@@ -340,9 +335,9 @@ def write(path: Path, animation: Animation, *, format: str | None = None, **opti
 
 
 def writer_for(path: Path, format: str | None = None) -> Format:
-    """Return the format for writing a file of this name. format: its name, used instead of the suffix.
+    """Return the format for writing a file. format: its name, in place of the suffix.
 
-    Raises FormatError for an unknown suffix, UnsupportedError for a format that can be read only.
+    Raises FormatError for an unknown suffix, UnsupportedError for a format without a writer.
     """
     if format is not None:
         writer = _find_format(format)
@@ -373,13 +368,11 @@ def probe(
     limits: Limits = DEFAULT_LIMITS,
     **options: Any,
 ) -> StreamInfo:
-    """Return what an FBA stream, in memory or in a file, or a file of another format contains.
+    """Return the content of an FBA stream, in memory or in a file, or of a file of another format.
 
     bap_steps: as for `fba.decode`; it only affects what counts as damage. format: as for `read`. limits: see
-    `fba.Limits`. options: those of the reader, for formats other than FBA. Damage in a stream is skipped and
-    listed.
-
-    Raises FormatError, BitstreamError.
+    `fba.Limits`. options: of the reader, for formats other than FBA. Damage in a stream is skipped and
+    listed. Raises FormatError, BitstreamError.
     """
     from fba.codec import StreamInfo, probe_stream
     from fba.source import naming_file, read_whole

@@ -1,4 +1,4 @@
-"""Read the arrays of numbers in files of NumPy (.npy, .npz), without ever loading Python objects."""
+"""Read arrays of numbers from files of NumPy (.npy, .npz); Python objects in them are never loaded."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from fba.limits import Limits
 from fba.source import Path, read_whole
 
 NPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"
+"""First bytes of an array, and of an archive of arrays."""
 MOST_ARRAYS = 1000
 
 
 def read_arrays(path: Path, limits: Limits, *, single: str, objects: bool = False) -> dict[str, Any]:
-    """Return the arrays of numbers in a file as float64, by name; others are left out.
+    """Return the arrays of numbers in a file as float64, by name; other arrays are left out.
 
-    single: the name for the array of an .npy file. objects: leave out arrays of Python objects, too, instead
-    of refusing the file. Raises FormatError for damage, LimitError.
+    single: the name for the array of an .npy file. objects: leave out arrays of Python objects as well;
+    otherwise they are an error. Raises FormatError, LimitError.
     """
     data = read_whole(path)
     if data.startswith(NPY):
@@ -50,21 +51,19 @@ def read_arrays(path: Path, limits: Limits, *, single: str, objects: bool = Fals
 
 
 def _read_array(data: bytes, path: Path, limits: Limits, objects: bool) -> Any:
-    """Return an array of numbers as float64; None for one of something else."""
+    """Return an array of numbers as float64; None for an array of other values."""
     file = io.BytesIO(data)
     try:
-        version = np.lib.format.read_magic(file)
-        read = (
-            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        )
-        shape, _, dtype = read(file)
+        if np.lib.format.read_magic(file) == (1, 0):
+            shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+        else:
+            shape, _, dtype = np.lib.format.read_array_header_2_0(file)
     except (ValueError, TypeError, SyntaxError, EOFError, TokenError) as error:
         raise FormatError(f"is no array that can be read: {error}", path=path) from error
     if dtype.kind not in "fiu":
         if dtype.hasobject and not objects:
             raise FormatError(
-                "holds Python objects, which are not read, as they may run programs; save numbers",
-                path=path,
+                "holds Python objects, which are not read, as they may run programs; save numbers", path=path
             )
         return None
     count = math.prod(shape)

@@ -1,7 +1,8 @@
-"""Choose the table of BAP steps with which a stream is to be decoded: `choose_steps`."""
+"""`choose_steps`: the table of BAP steps with which a stream is to be decoded."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack
 from fba.codec import Decoder, marked_table
+from fba.errors import FbaError, FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEPS_DEFAULT, BapTable
 
@@ -17,21 +19,20 @@ if TYPE_CHECKING:
     from fba.codec import Block
 
 FRAMES_CHECKED = 2048
-"""Frames with a body that are decoded to see how they move."""
+"""Frames with a body that are decoded to see how it moves."""
 FRAMES_SEARCHED = 1 << 14
-"""Frames among which a body is looked for."""
-_CHUNK = 1 << 14
+"""Frames that are searched for a body."""
+CHUNK_BYTES = 1 << 14
+"""Bytes that are decoded at once."""
 CERTAIN, LIKELY, UNSURE = "certain", "likely", "unsure"
-"""How sure a choice is."""
 
 
 @dataclass(frozen=True)
 class StepChoice:
     """A table of BAP steps.
 
-    reason: in words, why it was chosen; "" where the table makes no difference. confidence: "certain" where
-    the stream names the table, "likely" where its motion looks wrong with the other one, and "unsure" where
-    nothing tells.
+    reason: why it was chosen; "" if the table makes no difference. confidence: "certain" if the stream names
+    the table, "likely" if its motion looks wrong with the other table, "unsure" if nothing tells.
     """
 
     table: BapTable
@@ -46,15 +47,15 @@ class StepChoice:
         """The table, how sure that is, and why: "visage (likely): ..."; "" if it makes no difference."""
         if not self.reason:
             return ""
-        unproved = "" if self.confidence == CERTAIN else f" ({self.confidence})"
-        return f"{self.table}{unproved}: {self.reason}"
+        doubt = "" if self.confidence == CERTAIN else f" ({self.confidence})"
+        return f"{self.table}{doubt}: {self.reason}"
 
 
 def choose_steps(data: bytes | bytearray | memoryview, *, limits: Limits = DEFAULT_LIMITS) -> StepChoice:
-    """Return the table that a stream's mark names; without one, that under which it moves like a person.
+    """Return the table that a stream's mark names, else the table with which it moves like a person.
 
-    Where its motion does not tell, that is the standard's. Damage and errors are left to the decoder; a
-    stream that none can read gets the standard's table without a reason.
+    If its motion does not tell, that is the standard's. Damage and errors are left to the decoder: a stream
+    that cannot be decoded gets the standard's table, without a reason.
     """
     marked = marked_table(data)
     if marked is not None:
@@ -76,9 +77,9 @@ def choose_steps(data: bytes | bytearray | memoryview, *, limits: Limits = DEFAU
 def first_frames(
     data: bytes | bytearray | memoryview, table: BapTable, limits: Limits = DEFAULT_LIMITS
 ) -> Animation | None:
-    """Return the body in the first frames that have one; None if the table makes no difference to them.
+    """Return the first frames with a body; None if the table makes no difference to them.
 
-    It makes none without BAPs, and where they are sent unquantised.
+    It makes no difference without BAPs, and if BAPs are sent unquantised.
     """
     blocks: list[Block] = []
     count, searched, quantised = 0, 0, False
@@ -104,17 +105,13 @@ def first_frames(
 
 
 def _blocks(data: memoryview, table: BapTable, limits: Limits) -> Iterator[Block]:
-    """Yield what can be decoded of a stream, up to an error that stops the decoder."""
-    import warnings
-
-    from fba.errors import FbaError, FbaWarning
-
+    """Yield the blocks of a stream, up to an error that stops the decoder."""
     decoder = Decoder(bap_steps=table, on_error="salvage", limits=limits)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # who decodes all of it gives them
+        warnings.simplefilter("ignore", FbaWarning)  # decoding the whole stream gives them
         try:
-            for start in range(0, len(data), _CHUNK):
-                yield from decoder.push_blocks(data[start : start + _CHUNK])
+            for start in range(0, len(data), CHUNK_BYTES):
+                yield from decoder.push_blocks(data[start : start + CHUNK_BYTES])
             yield from decoder.finish_blocks()
         except FbaError:
             return

@@ -1,35 +1,76 @@
-"""Recordings of one moment on one clock: by their time codes, or by an offset that is given."""
+"""Two animations as one: joined by frame number, or recordings of one moment put on one clock."""
 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil
-from typing import get_args
+from typing import TypeVar, get_args
 
 import numpy as np
+import numpy.typing as npt
 
-from fba.animation import Animation
+from fba.animation import Animation, BodyTrack, FaceTrack
+from fba.arrays import Intp
 from fba.choices import Sync
 from fba.errors import FbaWarning, FormatError, OptionError, Remedy
-from fba.formats.merge import merge
 from fba.formats.time_codes import DAY, seconds_between
 from fba.limits import DEFAULT_LIMITS, Limits
 
 SYNCS: tuple[Sync, ...] = get_args(Sync)
-STRAIGHT = 0.02
+CLOCK_TOLERANCE = 0.02
 """Share of a frame by which two clocks may differ and still share their frames."""
-FINEST = 1000
-"""Steps a second, at least, to which a clock that lies between frames is moved."""
+MIN_STEPS = 1000
+"""Fewest steps per second to which a clock between frames is rounded."""
 START_TOGETHER = Remedy("sync", "let both begin together with {}", "'offset'")
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+def merge(face_animation: Animation, body_animation: Animation) -> Animation:
+    """Return the face of one animation with the body of the other, joined by frame number.
+
+    The result has the frame numbers of both; in a frame that a part lacks, it is not sent. The name is that
+    of the face, else that of the body. Raises FormatError if a part is missing or the frame rates differ.
+    """
+    face, body, rate = face_animation.face, body_animation.body, face_animation.rate
+    names = [repr(one.name) if one.name else "the animation" for one in (face_animation, body_animation)]
+    if face is None:
+        raise FormatError(f"nothing to join: {names[0]} has no face")
+    if body is None:
+        raise FormatError(f"nothing to join: {names[1]} has no body")
+    if rate != body_animation.rate:
+        resample = Remedy("rate", "resample one of them first, with {}", f"{rate}", "Animation.resample")
+        raise FormatError(f"{names[0]} has {rate} frames/s, {names[1]} {body_animation.rate}").with_remedies(
+            resample
+        )
+    index = np.union1d(face_animation.index, body_animation.index)
+    rows = np.searchsorted(index, face_animation.index)
+    joined_face = FaceTrack(
+        _spread(face.values, rows, len(index)),
+        _spread(face.mask, rows, len(index)),
+        _spread(face.viseme, rows, len(index)),
+        _spread(face.expression, rows, len(index)),
+        _spread(face.interpolated, rows, len(index)) if face.interpolated is not None else None,
+    )
+    rows = np.searchsorted(index, body_animation.index)
+    joined_body = BodyTrack(_spread(body.values, rows, len(index)), _spread(body.mask, rows, len(index)))
+    name = face_animation.name or body_animation.name
+    return Animation(rate, index, joined_face, joined_body, name)
+
+
+def _spread(values: npt.NDArray[Scalar], rows: Intp, count: int) -> npt.NDArray[Scalar]:
+    """Return an array (count, columns) with values (K, columns) in rows (K,), zeros (False) elsewhere."""
+    spread = np.zeros((count, values.shape[1]), dtype=values.dtype)
+    spread[rows] = values
+    return spread
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
     """A face or a body, and when it was recorded.
 
-    name: of the file, for messages. start: time of day at frame index 0, in seconds; None where unknown.
+    name: of the file, for messages. start: time of day at frame index 0, in seconds; None if unknown.
     """
 
     name: str
@@ -47,10 +88,10 @@ class Recording:
 class Together:
     """Two recordings as one animation.
 
-    spans: seconds from the animation's index 0 on, where each recording begins and ends. how: "timecode" or
-    "offset". resampled: the rates of recordings that were brought to another one, by their names. start: time
-    of day at index 0; None where unknown. body_rows: rows of the animation with the body, whose own first
-    `body_lead` frames are left out.
+    body_rows: rows of the animation that have the body. body_lead: count of frames of the body before them.
+    spans: begin and end of each recording, in seconds from the animation's index 0. how: "timecode" or
+    "offset". resampled: the rates of resampled recordings, by name. start: time of day at index 0; None if
+    unknown.
     """
 
     animation: Animation
@@ -80,15 +121,15 @@ def join(
 ) -> Together:
     """Return a face and a body as one animation, at the higher of their rates.
 
-    The frames of the body stay as they are, those of the face are interpolated at their times.
+    The frames of the body stay as they are; the face is interpolated at their times.
 
-    sync: "timecode" places them by the times of day at which they were recorded, which may lie on both sides
-    of midnight; "offset" lets the second begin `offset` seconds after the first; None takes time codes where
-    both have them. begins: the second recording's time of day, which replaces its own. trim: what only one of
-    them covers is left out; otherwise it is kept, and the other part is not sent there.
+    sync: "timecode" places recordings by the times of day at which they were made, before or after midnight;
+    "offset" lets the second begin `offset` seconds after the first; None takes time codes if both have them.
+    begins: the time of day that replaces the second recording's. trim: leave out the frames that only one of
+    them covers; otherwise these are kept, without the other part.
 
     Raises FormatError if they do not overlap, OptionError, LimitError. Warns (FbaWarning) of a recording
-    without the time code that is asked for: it begins with the other one.
+    without the time code that `sync` asks for: both begin together.
     """
     starts = first.start, second.start if begins is None else begins
     if begins is not None and first.start is None:
@@ -125,7 +166,7 @@ def join(
 def _choose_clock(
     recordings: tuple[Recording, Recording], starts: tuple[float | None, float | None], sync: Sync | None
 ) -> str:
-    """Return "timecode" or "offset". Warns of recordings without the time code that is asked for."""
+    """Return "timecode" or "offset". Warns of recordings without the time code that `sync` asks for."""
     if sync is not None and sync not in SYNCS:
         raise OptionError(f"sync must be one of {', '.join(SYNCS)}, not {sync!r}")
     without = [one.name for one, start in zip(recordings, starts, strict=True) if start is None]
@@ -149,7 +190,7 @@ def _trim(animation: Animation, face: Animation, body: Animation) -> Animation:
 
 
 def _shift(animation: Animation, frames: int) -> Animation:
-    return Animation(animation.rate, animation.index + frames, animation.face, animation.body, animation.name)
+    return replace(animation, index=animation.index + frames)
 
 
 def _check_overlap(first: Recording, second: Recording, later: float, how: str) -> None:
@@ -167,7 +208,7 @@ def _check_overlap(first: Recording, second: Recording, later: float, how: str) 
 
 
 def _clock(seconds: float, start: float | None) -> str:
-    """Return a time of day, or seconds where none is known."""
+    """Return a time of day as text; seconds without `start`."""
     if start is None:
         return f"{seconds:.2f} s"
     minutes, rest = divmod(round(start + seconds, 2) % DAY, 60)
@@ -175,19 +216,14 @@ def _clock(seconds: float, start: float | None) -> str:
 
 
 def _place(animation: Animation, later: float, rate: Fraction, limits: Limits) -> Animation:
-    """Return an animation `later` seconds later, at a rate whose frames need not be its own.
+    """Return an animation `later` seconds later, at another rate.
 
-    Where these lie between its own frames, values are interpolated (`Animation.resample`).
+    Frames between its own frames are interpolated (`Animation.resample`).
     """
     frames = later * float(animation.rate)
-    if abs(frames - round(frames)) <= STRAIGHT and rate == animation.rate:
+    if abs(frames - round(frames)) <= CLOCK_TOLERANCE and rate == animation.rate:
         return _shift(animation, round(frames))
-    fine = ceil(FINEST / animation.rate)
-    moved = Animation(
-        animation.rate * fine,
-        animation.index * fine + round(frames * fine),
-        animation.face,
-        animation.body,
-        animation.name,
-    )
+    fine = ceil(MIN_STEPS / animation.rate)
+    index = animation.index * fine + round(frames * fine)
+    moved = replace(animation, rate=animation.rate * fine, index=index)
     return moved.resample(rate, limits=limits)

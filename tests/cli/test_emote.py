@@ -126,7 +126,7 @@ def test_mistakes(run: Run, still: Path, tmp_path: Path, given: tuple[str, ...],
         ("seconds,emotion,intensity\n1,\udcff,5\n", "is not UTF-8 text (byte 28); save it as UTF-8"),
     ],
 )
-def test_tables_that_are_none(run: Run, still: Path, tmp_path: Path, table: str, said: str) -> None:
+def test_damaged_tables_of_keys(run: Run, still: Path, tmp_path: Path, table: str, said: str) -> None:
     keys, out = tmp_path / "keys.csv", tmp_path / "out.fba"
     keys.write_text(table, encoding="utf-8", errors="surrogateescape")
     done = run("emote", still, "-o", out, "--keys", keys)

@@ -50,7 +50,7 @@ def test_a_stream_at_a_rate(run: Run, talk: Path, tmp_path: Path) -> None:
     assert said["face"]["head_degrees"] == pytest.approx(np.degrees(1e-5 * off), rel=1e-3)
 
 
-def test_what_is_printed(run: Run, talk: Path, tmp_path: Path) -> None:
+def test_the_report_of_a_bit_rate(run: Run, talk: Path, tmp_path: Path) -> None:
     done = run("encode", talk, "-o", tmp_path / "a.fba", "--bitrate", "0.7kbit/s", "--buffer", "900ms")
     first, held, face, units = done.out.splitlines()
     assert first.startswith(str(tmp_path / "a.fba"))
@@ -88,7 +88,9 @@ def test_too_few_bits_for_an_i_plane(run: Run, talk: Path, tmp_path: Path) -> No
         (["--bitrate", "900", "--intra-period", "1"], "--intra-period and --bitrate contradict each other"),
     ],
 )
-def test_what_is_refused(run: Run, talk: Path, tmp_path: Path, given: list[str], answer: str) -> None:
+def test_invalid_bit_rates_are_refused(
+    run: Run, talk: Path, tmp_path: Path, given: list[str], answer: str
+) -> None:
     done = run("encode", talk, "-o", tmp_path / "a.fba", *given)
     assert done.code == 2
     assert answer in " ".join(done.err.split())

@@ -96,7 +96,7 @@ def test_a_header_can_be_supplied(run: Run, tmp_path: Path, face_file: Path) -> 
     assert len(fba.read(stream)) == 2 * frames - 1
 
 
-def test_what_does_not_fit_is_named_or_clamped(run: Run, tmp_path: Path) -> None:
+def test_values_beyond_the_codable_range_are_named_or_clamped(run: Run, tmp_path: Path) -> None:
     values = np.zeros((2, 68), dtype=np.int32)
     values[:, 13] = 2000, 2100  # FAP 14 thrust_jaw: step 1, so 1860 at most
     mask = np.zeros((2, 68), dtype=bool)
@@ -329,7 +329,7 @@ def test_an_interrupted_write_leaves_the_old_file(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["face.fap", "x.fba"]
 
 
-def test_what_an_epf_file_says_is_not_said_twice(run: Run, tmp_path: Path, face_file: Path) -> None:
+def test_options_contradict_an_epf_file(run: Run, tmp_path: Path, face_file: Path) -> None:
     stream = tmp_path / "a.fba"
     run("encode", face_file, "-o", stream)
     run("decode", stream, "--epf", tmp_path / "a.epf")

@@ -146,7 +146,7 @@ def test_joints_of_a_body_are_given_as_options(run: Run, tmp_path: Path, face: A
     assert err.endswith("name each joint's counterpart in the standard with --map Pelvis=HumanoidRoot\n")
 
 
-def test_what_another_command_can_do_is_shown_as_its_option(run: Run, tmp_path: Path) -> None:
+def test_remedies_name_options_of_other_commands(run: Run, tmp_path: Path) -> None:
     """A trunk with shoulders alone does not tell how long its unit is."""
     path = tmp_path / "trunk.bvh"
     joints = {
@@ -283,7 +283,7 @@ def test_a_row_of_stats_for_a_program_is_one_line_however_long_the_name(
 
 
 @pytest.mark.parametrize("command", ["stats", "bench", "decode", "info --trace"])
-def test_what_is_no_stream_is_said_to_be_what_it_is(
+def test_errors_about_other_files_name_their_format(
     run: Run, tmp_path: Path, streams: list[Path], command: str
 ) -> None:
     more = ["--fap", str(tmp_path)] if command == "decode" else []

@@ -224,7 +224,7 @@ def test_outputs_that_contradict(run: Run, here: Path, line: str, text: str) -> 
     assert sorted(here.rglob("*")) == before
 
 
-def test_names_that_are_one_where_case_does_not_matter(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_names_that_differ_in_case_may_be_one_file(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     new = [Output("--fap", here / "X.out"), Output("--bap", here / "x.out")]
     Outputs(new)
     monkeypatch.setattr(outputs, "_ignores_case", lambda _: True)
@@ -340,7 +340,7 @@ def test_a_closed_pipe_is_no_error(here: Path, line: str) -> None:
 
 
 @POSIX
-def test_what_cannot_be_written_to_standard_output(here: Path) -> None:
+def test_a_full_or_closed_standard_output(here: Path) -> None:
     if Path("/dev/full").exists():
         with open("/dev/full", "wb") as full:
             command = [*FBA, "decode", "both.fba", "--fap", "-"]

@@ -121,7 +121,7 @@ def test_the_aspect_of_a_picture_may_be_given(persona: Path, run: Run, tmp_path:
     assert run(*play, "--aspect", "16:9")[::2] == (0, "")
 
 
-def test_what_is_no_recording(persona: Path, run: Run, tmp_path: Path) -> None:
+def test_files_without_tracked_points_are_refused(persona: Path, run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.fap").write_text("2.1 a 25 1\n" + "0 " * 67 + "0\n0\n")
     code, _, err = run("persona", "learn", tmp_path / "a.fap", "-o", tmp_path / "a.persona")
     assert code == 1

@@ -119,7 +119,7 @@ def test_broken_sound(run: Run, window: Window, talk: Path, tmp_path: Path) -> N
     assert window.scene is None
 
 
-def test_what_is_dropped_is_played_next(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
+def test_dropped_files_are_played_next(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.fba"
     other.write_bytes(talk.read_bytes())
     write_wav(tmp_path / "other.wav")
@@ -173,7 +173,7 @@ def test_comparing(run: Run, window: Window, talk: Path, tmp_path: Path, face: A
         (("-", "-"), "standard input"),
     ],
 )
-def test_what_makes_no_sense_is_refused(
+def test_contradictory_options_are_refused(
     run: Run, window: Window, talk: Path, words: tuple[str, ...], said: str
 ) -> None:
     refused = run("play", talk, *words)
@@ -280,7 +280,7 @@ def test_nothing_on_standard_input(run: Run, window: Window, monkeypatch: pytest
     assert window.scene is None
 
 
-def test_a_body_of_ones_own(run: Run, window: Window, tmp_path: Path, talk: Path) -> None:
+def test_a_body_from_a_file(run: Run, window: Window, tmp_path: Path, talk: Path) -> None:
     (tmp_path / "body.glb").write_bytes(b"no glTF")
     refused = run("play", talk, "--body", tmp_path / "body.glb")
     assert refused.code == 1

@@ -44,7 +44,7 @@ def test_a_body_with_a_face(run: Run, opened: list[tuple[Any, dict[str, Any]]], 
     assert scene.view_for(scene.timeline.faps(0.0), scene.timeline.baps(0.0)).faces
 
 
-def test_what_needs_a_file(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
+def test_options_that_need_a_file(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
     (tmp_path / "mine.glb").write_bytes(b"")
     for words, said in (
         ((), "--model or --body"),

@@ -140,7 +140,7 @@ def head(folder: Path, table: InterpolationTable | None) -> Path:
     return path
 
 
-def test_what_the_receivers_head_gives_is_not_sent(run: Run, tmp_path: Path) -> None:
+def test_faps_that_the_receivers_head_computes_are_not_sent(run: Run, tmp_path: Path) -> None:
     """Push_b_lip is twice open_jaw, by the head's own table."""
     function = Function([Term(2.0, {"open_jaw": 1})])
     model = head(tmp_path, InterpolationTable([Link(["open_jaw"], {"push_b_lip": function})]))
@@ -182,7 +182,9 @@ def test_heads_that_give_nothing(run: Run, tmp_path: Path, archive: Animation) -
 
 
 @pytest.mark.parametrize("suffix", ["fap", "bap"])
-def test_no_frames_and_one(run: Run, tmp_path: Path, archive: Animation, suffix: str) -> None:
+def test_files_without_frames_and_with_one_frame(
+    run: Run, tmp_path: Path, archive: Animation, suffix: str
+) -> None:
     one = replace(archive[:1], **{"body" if suffix == "fap" else "face": None})
     given, out = tmp_path / f"a.{suffix}", tmp_path / "a.fba"
     fba.write(given, one)

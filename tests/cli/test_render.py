@@ -324,7 +324,7 @@ def test_several_files_stand_in_one_picture(run: Run, clip: Path, tmp_path: Path
         (("-o", "a.png", "--start", "0", "--time", "0"), "belong to a film"),
     ],
 )
-def test_what_does_not_go_together(
+def test_options_that_contradict_each_other(
     run: Run, clip: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], text: str
 ) -> None:
     monkeypatch.chdir(clip.parent)

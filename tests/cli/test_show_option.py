@@ -24,9 +24,7 @@ FACE = ("--fap", "open_jaw=200", "--size", "64x48", "--camera", "front")
     ],
 )
 @pytest.mark.parametrize("command", ["render", "play"])
-def test_what_does_not_exist_is_bad_usage(
-    run: Run, tmp_path: Path, command: str, text: str, said: str
-) -> None:
+def test_unknown_switches_are_bad_usage(run: Run, tmp_path: Path, command: str, text: str, said: str) -> None:
     file = tmp_path / "none.fap"
     file.write_text("2.1 none 25 0\n")
     output = ("-o", tmp_path / "out.png") if command == "render" else ()

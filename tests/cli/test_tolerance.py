@@ -51,7 +51,7 @@ def test_the_file_keeps_what_is_printed(run: Run, talk: Path, tmp_path: Path) ->
     assert np.linalg.norm(moved, axis=2).max() * 1000 == pytest.approx(near["face"]["largest_mm"], abs=1e-4)
 
 
-def test_what_is_printed(run: Run, talk: Path, tmp_path: Path) -> None:
+def test_the_report_of_a_tolerance(run: Run, talk: Path, tmp_path: Path) -> None:
     done = run("encode", talk, "-o", tmp_path / "a.fba", "--tolerance", "500 um")
     size, face, left_out = done.out.splitlines()
     assert size.startswith(str(tmp_path / "a.fba"))
@@ -75,7 +75,7 @@ def test_what_is_printed(run: Run, talk: Path, tmp_path: Path) -> None:
         ("1e999mm", "'1e999mm' is not a length"),
     ],
 )
-def test_lengths_that_are_none(run: Run, talk: Path, tmp_path: Path, given: str, answer: str) -> None:
+def test_invalid_lengths(run: Run, talk: Path, tmp_path: Path, given: str, answer: str) -> None:
     done = run("encode", talk, "-o", tmp_path / "a.fba", f"--tolerance={given}")
     assert done.code == 2
     assert answer in " ".join(done.err.split())
@@ -85,13 +85,15 @@ def test_lengths_that_are_none(run: Run, talk: Path, tmp_path: Path, given: str,
 @pytest.mark.parametrize(
     "options", [("--preset", "exact"), ("--quant", 3), ("--bap-quant", 3), ("--unsent", "keep")]
 )
-def test_what_a_tolerance_decides(run: Run, talk: Path, tmp_path: Path, options: tuple[str, ...]) -> None:
+def test_options_that_contradict_a_tolerance(
+    run: Run, talk: Path, tmp_path: Path, options: tuple[str, ...]
+) -> None:
     done = run("encode", talk, "-o", tmp_path / "a.fba", "--tolerance", "1mm", *options)
     assert done.code == 2
     assert f"{options[0]} and --tolerance contradict each other" in " ".join(done.err.split())
 
 
-def test_a_head_of_ones_own(run: Run, talk: Path, tmp_path: Path) -> None:
+def test_a_tolerance_on_the_vertices_of_another_head(run: Run, talk: Path, tmp_path: Path) -> None:
     alone = run("encode", talk, "-o", tmp_path / "a.fba", "--every-frame")
     assert alone.code == 2
     assert "--every-frame goes with --tolerance" in alone.err
@@ -131,7 +133,7 @@ def test_a_body_stays_within_its_own_tolerance(run: Run, gesture: Path, tmp_path
     assert sizes[0] < sizes[1]
 
 
-def test_what_is_printed_of_a_body(run: Run, gesture: Path, tmp_path: Path) -> None:
+def test_the_report_of_a_body_tolerance(run: Run, gesture: Path, tmp_path: Path) -> None:
     given = ("-o", tmp_path / "a.fba", "--bap-steps", "visage", "--body-tolerance")
     body, left_out = run("encode", gesture, *given, "1cm").out.splitlines()[1:3]
     assert body.startswith("body: points 3 cm from joints move by at most ")
@@ -157,7 +159,9 @@ def test_a_capture_is_compared_with_the_frames_that_players_fill_in(run: Run, tm
     assert found["verdict"] == "good"
 
 
-def test_a_tolerance_is_for_what_is_there(run: Run, talk: Path, gesture: Path, tmp_path: Path) -> None:
+def test_tolerances_must_fit_the_parts_of_the_input(
+    run: Run, talk: Path, gesture: Path, tmp_path: Path
+) -> None:
     given = ("-o", tmp_path / "a.fba", "--bap-steps", "visage", "--body-tolerance", "1cm")
     done = run("encode", talk, *given)
     assert done.code == 2

@@ -45,7 +45,7 @@ def streams(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("cut", 1, (False, 50, False, 1, None, 0)),
     ],
 )
-def test_what_a_report_says(
+def test_the_report_about_a_stream(
     streams: Path, run: Run, name: str, code: int, expected: tuple[object, ...]
 ) -> None:
     status, out, _ = run("verify", "--json", streams / f"{name}.fba")

@@ -135,7 +135,7 @@ def test_a_folder_of_files(run: Run, tmp_path: Path, stream: Path, face: Animati
     assert not (tmp_path / "talk.fap").exists()  # nothing is half done
 
 
-def test_only_what_was_asked_for_is_missed(run: Run, tmp_path: Path, stream: Path) -> None:
+def test_a_missing_part_matters_only_if_it_is_to_be_written(run: Run, tmp_path: Path, stream: Path) -> None:
     code, _, err = run("decode", stream, "--fap", tmp_path / "a.fap")
     assert (code, err) == (0, "")
     code, _, err = run("decode", stream, "--fap", tmp_path / "a.fap", "--bap", tmp_path / "a.bap")

@@ -56,7 +56,7 @@ def test_indices_beyond_int64(tmp_path: Path, digits: int) -> None:
 
 
 @pytest.mark.parametrize("count", ["inf", "-inf", "nan", "1e30", "3.5"])
-def test_a_count_of_corners_that_is_none(tmp_path: Path, count: str) -> None:
+def test_invalid_counts_of_corners(tmp_path: Path, count: str) -> None:
     ply = tmp_path / "a.ply"
     ply.write_text(
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -82,7 +82,7 @@ def test_frame_times_of_many_digits_are_numbers(tmp_path: Path, time: str) -> No
 
 
 @pytest.mark.parametrize("time", ["1e-99999", "1e99999", "1e-" + "9" * 5000, "nan", "0." + "0" * 5000 + "1"])
-def test_frame_times_that_are_none(tmp_path: Path, time: str) -> None:
+def test_invalid_frame_times(tmp_path: Path, time: str) -> None:
     path = tmp_path / "a.bvh"
     path.write_text(BVH % time)
     with pytest.raises(FormatError, match=r"a\.bvh:13"):

@@ -119,7 +119,7 @@ def too_many_keys(whole: dict[str, Any]) -> None:
         (too_many_keys, "more than the 4194304 elements"),
     ],
 )
-def test_what_is_no_skeleton(
+def test_damaged_skeletons_are_refused(
     tmp_path: Path, bones: bytes, change: Callable[[dict[str, Any]], None], message: str
 ) -> None:
     path = tmp_path / "a.glb"
@@ -145,7 +145,7 @@ def split(whole: dict[str, Any]) -> None:
         (split, "has several skeletons; 'HumanoidRoot' is read, the others are left out: vl5"),
     ],
 )
-def test_what_is_there_is_played_and_the_rest_is_told(
+def test_the_rest_of_a_damaged_skeleton_is_read_with_a_warning(
     tmp_path: Path, bones: bytes, change: Callable[[dict[str, Any]], None], message: str
 ) -> None:
     path = tmp_path / "a.glb"

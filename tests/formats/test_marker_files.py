@@ -127,7 +127,7 @@ def test_a_file_that_is_cut_short(tmp_path: Path) -> None:
         ("long.csv", b"frame,time", b"a,b", "no column time or frame"),
     ],
 )
-def test_what_is_wrong_is_named(
+def test_errors_name_the_fault_of_a_file(
     tmp_path: Path, name: str, old: bytes, new: bytes, message: str | None
 ) -> None:
     path = marker_files.write(tmp_path, name, cloud())
@@ -172,7 +172,7 @@ def test_motion_beyond_all_faps_is_an_error(tmp_path: Path) -> None:
         fba.read(path, source_rate=30)
 
 
-def test_what_is_read_is_limited(tmp_path: Path) -> None:
+def test_limits_apply_to_markers(tmp_path: Path) -> None:
     path = marker_files.write(tmp_path, "wide.csv", cloud())
     with pytest.raises(LimitError):
         read(path, limits=Limits(frames=11))

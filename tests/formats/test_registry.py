@@ -103,7 +103,7 @@ def test_other_files(tmp_path: Path, content: bytes) -> None:
         (performance(), "not Animation; give its name"),
     ],
 )
-def test_what_is_no_name_of_a_file(given: Any, text: str) -> None:
+def test_names_of_files_of_wrong_types(given: Any, text: str) -> None:
     for read in (fba.read, functools.partial(fba.read, format="fap")):
         with pytest.raises(OptionError, match=re.escape(text)) as caught:
             read(given)

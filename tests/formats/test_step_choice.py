@@ -194,7 +194,7 @@ def test_nothing_is_said_where_the_table_makes_no_difference() -> None:
 def test_only_the_beginning_is_decoded_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     data = keyed([0, 90, 35, 60, 5, 75])
     monkeypatch.setattr(step_choice, "FRAMES_CHECKED", 5)
-    monkeypatch.setattr(step_choice, "_CHUNK", 64)
+    monkeypatch.setattr(step_choice, "CHUNK_BYTES", 64)
     found = step_choice.first_frames(data, "iso")
     assert found is not None
     assert 5 <= len(found) < 40

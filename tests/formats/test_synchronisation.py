@@ -81,7 +81,7 @@ def test_midnight_lies_between() -> None:
     assert join(body(start=0.5), face(start=86_399.0)).start == pytest.approx(86_399.0)
 
 
-def test_where_only_one_is() -> None:
+def test_frames_that_only_one_recording_covers() -> None:
     """It is kept, and the other part not sent; with trim it is left out."""
     result = join(face(2.0), body(2.0), offset=1.0)
     animation = result.animation
@@ -115,7 +115,7 @@ def test_no_common_moment() -> None:
         join(face(), body(), offset=4.0)
 
 
-def test_time_codes_that_are_not_there() -> None:
+def test_missing_time_codes() -> None:
     with pytest.warns(FbaWarning, match=r"no time code in b\.bvh: both begin together.*offset=2\.4"):
         result = join(face(start=100.25), body(), sync="timecode")
     assert difference(result.animation) == 0

@@ -1,4 +1,4 @@
-"""Streams that commands write: how small, from what, and what is said of them.
+"""Streams that commands write: options about their size and captures, and reports.
 
 May use: the rest of the command line but for its commands.
 """

@@ -1,4 +1,4 @@
-"""How a capture becomes BAPs and FAPs: the options of `fba encode` that say it."""
+"""The options of `fba encode` for captures, which become BAPs and FAPs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from fba.choices import Gaze, Ground, Origin, SignedUpAxis, Spine, Swap
-from fba.cli import joint_options, marker_options, options
+from fba.cli import map_options, options
 from fba.cli.inputs import Reading, check_capture_options
 from fba.cli.option_fields import option
 from fba.cli.outputs import further_output_option
@@ -32,12 +32,12 @@ class CaptureOptions:
         help="Motion capture: bend legs a little where feet would otherwise miss the ground, or slip on it.",
     )
     origin: Origin = option(default="source", help="Motion capture: what is placed at the default position.")
-    maps: joint_options.Maps = joint_options.map_option
+    maps: map_options.Maps = map_options.map_option
     map_out: Path | None = further_output_option(
         "FILE.toml", "Motion capture: write the joints or markers that were found, for --map."
     )
     rest: str | int = option(
-        type=joint_options.RestType(),
+        type=map_options.REST,
         default="auto",
         metavar="auto|file|first|motion|N",
         help="Motion capture: the rest pose is the file's own, its first frame, frame N, or found in the "
@@ -55,33 +55,28 @@ class CaptureOptions:
         help="Live Link Face's tables: MouthLeft and MouthRight, JawLeft and JawRight change places.",
     )
     face: str | None = options.face_option
-    neutral: marker_options.Neutral = marker_options.neutral_option("Markers, points: the")
+    neutral: map_options.Neutral = map_options.neutral_option("Markers, points: the")
     gaze: Gaze = option(
         default="none",
         help="Markers, points: eyes turn as their pupils say, if these are there, or keep looking at the "
         "camera.",
     )
-    aspect: float | None = marker_options.aspect_option(
+    aspect: float | None = map_options.aspect_option(
         "Points: width and height of the picture, 16:9 or 1920x1080; default: what makes them a face."
     )
     head_path: bool | None = option(
         help="Markers: where the head goes moves the body; default: unless another file has a body."
     )
 
-    @property
-    def map_files(self) -> list[Path]:
-        """The files among the maps."""
-        return [each for each in self.maps if isinstance(each, Path)]
-
     def for_readers(self, inputs: tuple[Path, ...], reading: Reading) -> dict[str, Any]:
         """Return the options of the readers of captures.
 
-        Raises click.UsageError for one that was given and that no reader of the inputs takes.
+        Raises click.UsageError for a given option that no reader of the inputs takes.
         """
-        names = [one.name for one in fields(self) if one.name not in ("maps", "map_out")]
+        names = [field.name for field in fields(self) if field.name not in ("maps", "map_out")]
         given = {name: f"--{name.replace('_', '-')}" for name in names if options.is_given(name)}
         check_capture_options(given, inputs, reading)
         taken = {name: getattr(self, name) for name in names}
         if self.head_path is None:
-            taken["head_path"] = len(inputs) == 1  # of two files, the other has a body
+            taken["head_path"] = len(inputs) == 1  # a second file has a body
         return taken

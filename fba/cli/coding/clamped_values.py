@@ -1,4 +1,4 @@
-"""Values that no plane can carry: what `fba encode` does about them, and what it says."""
+"""Values that no plane can carry: `fba encode` moves captures for them, and reports what it clamps."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ from fba.tracks import BodyTrack
 if TYPE_CHECKING:
     from fba.codec import ClampedParameter
 
-MOST_LINES = 6
-MOST_STEPS = 1860
-"""Quantiser steps that an I plane carries."""
+MAX_LINES = 6
+"""Most parameters in a report."""
+MAX_STEPS = 1860
+"""Most quantiser steps of a value in an I plane."""
 
 
 def bring_near(animation: Animation, table: BapTable, quant: int) -> Animation:
-    """Return a capture, moved to begin at the default place if no first plane carries where it begins.
+    """Return a capture; if its first plane cannot carry its first place, moved to begin at the default place.
 
     Warns (FbaWarning) that it was moved. table, quant: of the BAPs.
     """
     if animation.body is None:
         return animation
     numbers = bap_numbers()
-    columns = [numbers[f"HumanoidRoot_tr_{way}"] - 1 for way in ("lateral", "frontal")]
+    columns = [numbers[f"HumanoidRoot_tr_{axis}"] - 1 for axis in ("lateral", "frontal")]
     begin = animation.body.values[0, columns]
-    most = (bap_steps(table)[columns] if quant else np.ones(2, dtype=np.int64)) * MOST_STEPS
+    most = (bap_steps(table)[columns] if quant else np.ones(2, dtype=np.int64)) * MAX_STEPS
     if (np.abs(begin) <= most).all():
         return animation
     values = animation.body.values.copy()
@@ -48,18 +49,18 @@ def bring_near(animation: Animation, table: BapTable, quant: int) -> Animation:
 
 
 def clamped_lines(clamped: Mapping[str, ClampedParameter]) -> list[str]:
-    """Return a line for each parameter, those with the most values first, and what helps."""
+    """Return a line for each parameter, those with most values first, and a remedy."""
     order = sorted(clamped.items(), key=lambda pair: (-pair[1].count, pair[0]))
     result = []
-    for label, one in order[:MOST_LINES]:
-        where = f"in frame {one.frame}" if one.count == 1 else f"{one.count} values from frame {one.first} on"
-        worst = "" if one.count == 1 else f"worst in frame {one.frame}: "
+    for label, cut in order[:MAX_LINES]:
+        where = f"in frame {cut.frame}" if cut.count == 1 else f"{cut.count} values from frame {cut.first} on"
+        worst = "" if cut.count == 1 else f"worst in frame {cut.frame}: "
         result.append(
-            f"  clamped: {label} {where}: {worst}{_amount(label, one.value)} sent as "
-            f"{_amount(label, one.sent)}, {_amount(label, one.off)} off"
+            f"  clamped: {label} {where}: {worst}{_amount(label, cut.value)} sent as "
+            f"{_amount(label, cut.sent)}, {_amount(label, cut.off)} off"
         )
-    if len(order) > MOST_LINES:
-        result.append(f"  clamped: {len(order) - MOST_LINES} parameters more (--json lists all)")
+    if len(order) > MAX_LINES:
+        result.append(f"  clamped: {len(order) - MAX_LINES} parameters more (--json lists all)")
     if any(_unit(label) == "mm" for label in clamped):
         result.append(
             "  I planes carry no root this far off: --origin start or middle brings captures nearer"
@@ -68,8 +69,8 @@ def clamped_lines(clamped: Mapping[str, ClampedParameter]) -> list[str]:
 
 
 def clamped_values(clamped: Mapping[str, ClampedParameter]) -> list[dict[str, Any]]:
-    """Return the same for programs, in the order in which they were met."""
-    return [{"parameter": label, **asdict(one), "off": one.off} for label, one in clamped.items()]
+    """Return all parameters for programs, in the order in which they were clamped first."""
+    return [{"parameter": label, **asdict(cut), "off": cut.off} for label, cut in clamped.items()]
 
 
 def _unit(label: str) -> str:
@@ -78,7 +79,7 @@ def _unit(label: str) -> str:
 
 
 def _amount(label: str, value: int) -> str:
-    """Return a value in a unit that people know: degrees or mm; of FAPs as it is, in units of the face."""
+    """Return a value in degrees or mm; a FAP as it is, in units of the face."""
     unit = _unit(label)
     if unit == "1e-5 rad":
         return f"{math.degrees(value * 1e-5):.1f} degrees"

@@ -1,4 +1,4 @@
-"""Streams as `fba encode` makes them, and what it says of them."""
+"""Streams of `fba encode`, and reports about them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from fba.animation import Animation
 from fba.cli.coding.clamped_values import clamped_values
-from fba.cli.coding.rate_options import HeldRate, rate_lines, rate_values
+from fba.cli.coding.rate_options import KeptRate, rate_lines, rate_values
 from fba.cli.coding.size_options import Size
 from fba.cli.coding.tolerance_options import tolerance_in_metres, tolerance_lines, tolerance_values
 from fba.cli.inputs import input_file, read_model
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class CodedStream:
-    """A stream, and what is said of it.
+    """A stream and its report.
 
-    rounded: values of FAP and BAP files that no stream carries as they are. values, lines: how near the
-    stream is to its source, for programs and for people; empty for presets.
+    rounded: count of values of FAP and BAP files that the stream does not carry exactly. values, lines:
+    errors of the stream, for programs and for people; empty for presets.
     """
 
     encoded: Encoded
@@ -63,22 +63,23 @@ class CodedStream:
         return 8 * len(self.data) / float(animation.duration)
 
     def figures(self, animation: Animation) -> dict[str, Any]:
-        """Return what is said of the stream of this animation, for programs."""
+        """Return the report about the stream of this animation, for programs."""
+        counts = self.encoded.statistics
         return {
             "size": len(self.data),
-            "frames": self.encoded.statistics.planes,
-            "intra_planes": self.encoded.statistics.intra_planes,
+            "frames": counts.planes,
+            "intra_planes": counts.intra_planes,
             "rate": str(animation.rate),
             "duration": float(animation.duration),
             "bits_per_second": round(self.bits_per_second(animation), 3),
             "rounded": self.rounded,
-            "clamped": self.encoded.statistics.clamped,
+            "clamped": counts.clamped,
             "clamped_parameters": clamped_values(self.clamped),
             **self.values,
         }
 
     def summary(self, output: Path, animation: Animation) -> str:
-        """Return the same in one line. output: its file."""
+        """Return the report in a line. output: the file of the stream."""
         counts = self.encoded.statistics
         text = (
             f"{display_name(output)}: {counts.planes} frames, {seconds_text(animation.duration)} at "
@@ -95,7 +96,7 @@ class CodedStream:
 def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inputs: Inputs) -> CodedStream:
     """Return the stream of an animation.
 
-    options: with quantisers as `size` says. inputs: where the animation comes from.
+    options: with the quantisers of `size`. inputs: of which the animation was made.
     """
     from fba.planning import encode_stream, hold_still
 
@@ -112,11 +113,11 @@ def encode_stream(animation: Animation, options: EncoderOptions, size: Size, inp
         keep_masks=inputs.text_parts if goal in PRESETS else (),
         every_frame=size.every_frame,
     )
-    return CodedStream(encoded, rounded, *_nearness(encoded, goal, animation))
+    return CodedStream(encoded, rounded, *_errors(encoded, goal, animation))
 
 
 def _goal(animation: Animation, size: Size, inputs: Inputs) -> Goal:
-    """Return what decides how much is sent: what options say, or the preset that fits the inputs."""
+    """Return the goal of encoding: that of the options, or the preset that fits the inputs."""
     from fba.planning import BitRate
 
     if size.fit is not None:
@@ -131,16 +132,22 @@ def _goal(animation: Animation, size: Size, inputs: Inputs) -> Goal:
 
 
 def _read_head(size: Size, goal: Goal) -> FaceModel | None:
-    """Return the head that an option names; None without one."""
-    if goal == "fit":
-        return read_model(size.fit)
-    return _read_model_with_fit(size.model) if goal == "compact" else read_model(size.model)
+    """Return the head that an option names, or None. Warns (FbaWarning) of a head without a FIT."""
+    model = read_model(size.fit if goal == "fit" else size.model)
+    if goal == "compact" and model is not None and model.fit is None:
+        warnings.warn(
+            f"{size.model} has no interpolation table (FIT), which would give FAPs that are not sent; the "
+            "stream is that without this model",
+            FbaWarning,
+            stacklevel=2,
+        )
+    return model
 
 
 def _keep_values(
     animation: Animation, options: EncoderOptions, size: Size, inputs: Inputs
 ) -> tuple[EncoderOptions, int]:
-    """Return options that keep the values of FAP and BAP files, and the number of values that none keeps."""
+    """Return options that keep the values of FAP and BAP files, and the count of values that are rounded."""
     from fba.codec import count_rounded, exact_quantisers
 
     given = {"face": size.fap_quant, "body": size.bap_quant}
@@ -150,8 +157,8 @@ def _keep_values(
     return options, sum(count for part, count in counts.items() if part in kept)
 
 
-def _nearness(encoded: Encoded, goal: Goal, animation: Animation) -> tuple[dict[str, Any], list[str]]:
-    """Return how near a stream is to its source, for programs and for people."""
+def _errors(encoded: Encoded, goal: Goal, animation: Animation) -> tuple[dict[str, Any], list[str]]:
+    """Return the errors of a stream, for programs and for people."""
     from fba.planning import BitRate, NearLossless
     from fba.planning.fit_streams import FitStream
 
@@ -162,23 +169,20 @@ def _nearness(encoded: Encoded, goal: Goal, animation: Animation) -> tuple[dict[
         return {"fit": _fit_values(errors)}, _fit_lines(errors)
     if isinstance(goal, BitRate):
         counts, quant = cast("RateStatistics", encoded.statistics), encoded.options.fap_quant
-        held = HeldRate(goal.bits_per_second, goal.buffer, counts, quant, errors)
-        return {"bitrate": rate_values(held)}, rate_lines(held)
+        kept = KeptRate(goal.bits_per_second, goal.buffer, counts, quant, errors)
+        return {"bitrate": rate_values(kept)}, rate_lines(kept)
     return {}, []
 
 
 def _fit_values(made: FitStream) -> dict[str, Any]:
-    """Return what is sent and how far the head is off, for programs; lengths in mm."""
-    off = made.errors
-    return {
-        "sent": list(made.sent),
-        "added": list(made.added),
-        "millimetres": {"mean": off.mean, "percentile_99": off.percentile_99, "largest": off.largest},
-    }
+    """Return the FAPs that are sent and the errors of the head, for programs; lengths in mm."""
+    errors = made.errors
+    millimetres = {"mean": errors.mean, "percentile_99": errors.percentile_99, "largest": errors.largest}
+    return {"sent": list(made.sent), "added": list(made.added), "millimetres": millimetres}
 
 
 def _fit_lines(made: FitStream) -> list[str]:
-    """Return the same for people."""
+    """Return the FAPs that are sent and the errors of the head, for people."""
     added = f", {len(made.added)} of them as the head would miss them" if made.added else ""
     return [
         f"face: {len(made.sent)} FAPs sent{added}; the head computes the others",
@@ -187,30 +191,17 @@ def _fit_lines(made: FitStream) -> list[str]:
 
 
 def _is_held_still(size: Size, inputs: Inputs) -> bool:
-    """Whether levels of BAPs are those of `hold_still`."""
-    if size.tolerance is not None or size.body_tolerance is not None or size.bit_rate is not None:
-        return False  # these choose levels of their own
+    """Whether `hold_still` chooses the levels of BAPs."""
+    if (size.tolerance, size.body_tolerance, size.bit_rate) != (None, None, None):
+        return False  # these choose levels themselves
     captured = "body" in inputs.formats and inputs.formats["body"].is_capture
     return captured if size.still is None else size.still
-
-
-def _read_model_with_fit(path: Path | None) -> FaceModel | None:
-    """Return the face of `--model`; None without one. Warns (FbaWarning) of one without a FIT."""
-    model = read_model(path)
-    if model is not None and model.fit is None:
-        warnings.warn(
-            f"{path} has no interpolation table (FIT), which would give FAPs that are not sent; the stream "
-            "is that without this model",
-            FbaWarning,
-            stacklevel=2,
-        )
-    return model
 
 
 def encode_as_epf(
     epf: Path, animation: Animation, table: BapTable, limits: Limits, *, marked: bool
 ) -> CodedStream:
-    """Return the stream of an animation, coded plane by plane as an EPF file says.
+    """Return the stream of an animation, coded plane by plane by an EPF file.
 
     table: of BAP steps. marked: whether the stream names it.
     """

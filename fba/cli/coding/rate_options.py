@@ -1,4 +1,4 @@
-"""`--bitrate`: how many bits a second a stream may take, and what holding to that came to."""
+"""`--bitrate`: the bits per second that a stream may take, and reports of the result."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from fba.cli.option_fields import option
-from fba.cli.options import is_given
+from fba.cli.options import TextType, is_given
 
 if TYPE_CHECKING:
     from fba.codec import Encoder
@@ -18,49 +18,47 @@ if TYPE_CHECKING:
     from fba.planning.rate import RateEncoder, RateStatistics, ShownErrors
 
 BITS = {"": 1.0, "bit/s": 1.0, "kbit/s": 1e3, "Mbit/s": 1e6}
-"""Bits a second of the units that a bit rate may have."""
+"""Bits per second of each unit of a bit rate."""
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3}
-LARGEST = 1e9
-MOST_PARAMETERS = 3
-"""Of which errors are named."""
+"""Seconds of each unit of a buffer."""
+MAX_AMOUNT = 1e9
+"""Largest bit rate and buffer."""
+NAMED_PARAMETERS = 3
+"""Most parameters whose errors are printed."""
 
 
-class AmountType(click.ParamType[float]):
-    """A positive number with a unit. what: its name. units: what each unit counts; "" for none."""
+def _amount_type(name: str, units: Mapping[str, float], example: str) -> TextType:
+    """Return the type of a positive number with a unit. units: their factors; "" for a missing unit."""
 
-    def __init__(self, what: str, units: Mapping[str, float], example: str) -> None:
-        self.name = what
-        self._units = units
-        self._example = example
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        text = str(value).strip()
+    def parse(typed: str) -> float:
+        text = typed.strip()
         match = re.fullmatch(r"([0-9.eE+-]+)\s*([a-zA-Z/]*)", text)
         try:
             number = float(match[1]) if match else math.nan
         except ValueError:
             number = math.nan
         if match is None or math.isnan(number):
-            self.fail(f"{text!r} is no {self.name}; write e.g. {self._example}", param, ctx)
-        if match[2] not in self._units:
-            known = ", ".join(one for one in self._units if one)
-            self.fail(f"{match[2]!r} is no unit of a {self.name}; they are {known}", param, ctx)
-        amount = number * self._units[match[2]]
-        if not 0 < amount <= LARGEST:
-            self.fail(
-                f"{text} is out of reach: a {self.name} is positive, and at most {LARGEST:g}", param, ctx
+            raise ValueError(f"{text!r} is no {name}; write e.g. {example}")
+        if match[2] not in units:
+            raise ValueError(
+                f"{match[2]!r} is no unit of a {name}; they are {', '.join(filter(None, units))}"
             )
+        amount = number * units[match[2]]
+        if not 0 < amount <= MAX_AMOUNT:
+            raise ValueError(f"{text} is out of reach: a {name} is positive, and at most {MAX_AMOUNT:g}")
         return amount
+
+    return TextType(name, parse)
 
 
 bit_rate_option = option(
     "--bitrate",
-    type=AmountType("bit rate", BITS, "1500 or 1.5kbit/s"),
+    type=_amount_type("bit rate", BITS, "1500 or 1.5kbit/s"),
     metavar="BITS",
     help="Send what loses least at this mean rate: 1500, 1500bit/s, 1.5kbit/s.",
 )
 buffer_option = option(
-    type=AmountType("buffer", SECONDS, "0.5s"),
+    type=_amount_type("buffer", SECONDS, "0.5s"),
     default=1.0,
     typed="1s",
     metavar="SECONDS",
@@ -74,10 +72,10 @@ def check_buffer() -> None:
         raise click.UsageError("--buffer goes with --bitrate: it says how closely that is held")
 
 
-class HeldRate(NamedTuple):
-    """What holding to a bit rate came to.
+class KeptRate(NamedTuple):
+    """A bit rate that a stream kept, in bits per second, and the result.
 
-    bit_rate: bits a second. buffer: seconds. quant: of FAPs and BAPs. errors: None where they are not known.
+    buffer: seconds. quant: of FAPs and BAPs. errors: None if unknown.
     """
 
     bit_rate: float
@@ -87,22 +85,22 @@ class HeldRate(NamedTuple):
     errors: ShownErrors | None = None
 
 
-def held_by(encoder: Encoder | RateEncoder | LiveEncoder) -> HeldRate | None:
-    """Return what a live encoder held to; None for one without a rate. Its errors are not known."""
+def rate_of(encoder: Encoder | RateEncoder | LiveEncoder) -> KeptRate | None:
+    """Return the bit rate that a live encoder kept, without errors; None for an encoder without a rate."""
     from fba.planning.rate import RateEncoder
 
     if not isinstance(encoder, RateEncoder):
         return None
     bucket = encoder.bucket
-    return HeldRate(bucket.rate, bucket.size / bucket.rate, encoder.statistics, encoder.options.fap_quant)
+    return KeptRate(bucket.rate, bucket.size / bucket.rate, encoder.statistics, encoder.options.fap_quant)
 
 
-def rate_lines(held: HeldRate) -> list[str]:
-    """Return what holding to a rate came to, for people."""
-    counts = held.statistics
+def rate_lines(kept: KeptRate) -> list[str]:
+    """Return the result of a bit rate, for people."""
+    counts = kept.statistics
     text = (
-        f"held to {held.bit_rate:g} bit/s: at most {counts.peak / held.bit_rate:.2f} s ahead, of "
-        f"{held.buffer:g} s; quantiser {held.quant}"
+        f"held to {kept.bit_rate:g} bit/s: at most {counts.peak / kept.bit_rate:.2f} s ahead, of "
+        f"{kept.buffer:g} s; quantiser {kept.quant}"
     )
     if counts.left_out:
         text += (
@@ -111,11 +109,11 @@ def rate_lines(held: HeldRate) -> list[str]:
         )
     if counts.not_sent:
         text += "; what was sent later did not fit, and is not sent: a larger --buffer would hold it"
-    return [text, *(_error_lines(held.errors) if held.errors is not None else ())]
+    return [text, *(_error_lines(kept.errors) if kept.errors is not None else ())]
 
 
 def _error_lines(errors: ShownErrors) -> list[str]:
-    """Return how far what is shown is off."""
+    """Return the errors of the shown face and body, for people."""
     if not errors.parameters:
         return ["nothing that is sent is off"]
     lines = []
@@ -132,8 +130,8 @@ def _error_lines(errors: ShownErrors) -> list[str]:
             f"{errors.body.feet * 1000:.1f} mm"
         )
     named = [
-        f"{one.label} {one.largest:g} (99 %: {one.percentile:g})"
-        for one in errors.parameters[:MOST_PARAMETERS]
+        f"{error.label} {error.largest:g} (99 %: {error.percentile:g})"
+        for error in errors.parameters[:NAMED_PARAMETERS]
     ]
     more = len(errors.parameters) - len(named)
     return [
@@ -142,32 +140,33 @@ def _error_lines(errors: ShownErrors) -> list[str]:
     ]
 
 
-def rate_values(held: HeldRate) -> dict[str, Any]:
-    """Return the same for programs."""
-    counts = held.statistics
+def rate_values(kept: KeptRate) -> dict[str, Any]:
+    """Return the result of a bit rate, for programs."""
+    counts = kept.statistics
     values: dict[str, Any] = {
-        "bits_per_second": held.bit_rate,
-        "buffer": held.buffer,
-        "most_ahead": round(counts.peak / held.bit_rate, 6),
-        "quantiser": held.quant,
+        "bits_per_second": kept.bit_rate,
+        "buffer": kept.buffer,
+        "most_ahead": round(counts.peak / kept.bit_rate, 6),
+        "quantiser": kept.quant,
         "frames_left_out": counts.left_out,
         "longest_gap": round(counts.longest_gap, 6),
     }
-    return values | (_error_values(held.errors) if held.errors is not None else {})
+    return values | (_error_values(kept.errors) if kept.errors is not None else {})
 
 
 def _error_values(errors: ShownErrors) -> dict[str, Any]:
-    """Return how far what is shown is off, for programs."""
+    """Return the errors of the shown face and body, for programs."""
     values: dict[str, Any] = {
         "parameters": {
-            one.label: {"largest": one.largest, "percentile_99": one.percentile} for one in errors.parameters
+            error.label: {"largest": error.largest, "percentile_99": error.percentile}
+            for error in errors.parameters
         }
     }
-    for name, found in (("face", errors.face), ("body", errors.body)):
-        if found is not None:
+    for name, part in (("face", errors.face), ("body", errors.body)):
+        if part is not None:
             values[name] = {
-                "largest_mm": round(found.largest * 1000, 6),
-                "percentile_99_mm": round(found.percentile * 1000, 6),
+                "largest_mm": round(part.largest * 1000, 6),
+                "percentile_99_mm": round(part.percentile * 1000, 6),
             }
     if errors.face is not None:
         values["face"]["head_degrees"] = round(errors.face.head, 6)

@@ -1,4 +1,4 @@
-"""How small a stream is to be: options that say it, and which of them contradict each other."""
+"""Options about the size of a stream, and the contradictions between them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import click
 
 from fba.cli import options
 from fba.cli.coding.rate_options import bit_rate_option, buffer_option, check_buffer
-from fba.cli.coding.tolerance_options import LengthType
+from fba.cli.coding.tolerance_options import LENGTH
 from fba.cli.option_fields import option, option_like
 from fba.encoder_options import QUANT_MAX, EncoderOptions, Preset
 
@@ -19,9 +19,9 @@ QUANTISER = click.IntRange(0, QUANT_MAX)
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
-    """How small a stream is to be, and what may be lost for that, as far as options say it; else None.
+    """Options about the size and the loss of a stream; None if they are not given.
 
-    tolerance, body_tolerance: in metres. bit_rate: bits a second. buffer: seconds.
+    tolerance, body_tolerance: in metres. bit_rate: bits per second. buffer: seconds.
     """
 
     preset: Preset | None = option_like(
@@ -32,13 +32,13 @@ class Size:
         "is not sent; with --tolerance, its vertices count. Default: the built-in head."
     )
     tolerance: float | None = option(
-        type=LengthType(),
+        type=LENGTH,
         metavar="LENGTH",
         help="Send as little as keeps every vertex of the face within this distance (0.5mm, 0.05cm, 500um), "
         "in the head's own frame, each angle of the head within 0.1 degree, and of the eyes within 1 degree.",
     )
     body_tolerance: float | None = option(
-        type=LengthType(),
+        type=LENGTH,
         metavar="LENGTH",
         help="The same for bodies: points 3 cm from every joint stay within this distance, and feet that "
         "stand within half of it. Default, with --tolerance: 1cm.",
@@ -69,15 +69,18 @@ class Size:
 
     def quantisers(self) -> dict[str, int]:
         """Return the quantisers, by default the finest."""
-        return {
-            "fap_quant": 1 if self.fap_quant is None else self.fap_quant,
-            "bap_quant": 1 if self.bap_quant is None else self.bap_quant,
-        }
+        given = {"fap_quant": self.fap_quant, "bap_quant": self.bap_quant}
+        return {name: 1 if quant is None else quant for name, quant in given.items()}
 
 
 LEVELS = ("fap_quant", "bap_quant", "still")
+"""Options of the levels that are sent."""
 PLANES = ("intra_period", "start_codes", "time_codes", "unsent", "gender", "clamp")
 """Options of single planes."""
+BY_TOLERANCE = (
+    ("preset", "fit", "bit_rate", *LEVELS, "unsent"),
+    "the tolerance decides what is sent, and how finely",
+)
 CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "epf": (
         (
@@ -93,27 +96,21 @@ CONTRADICTIONS: Mapping[str, tuple[tuple[str, ...], str]] = {
         ),
         "the EPF file says how planes are coded",
     ),
-    "tolerance": (
-        ("preset", "fit", "bit_rate", *LEVELS, "unsent"),
-        "the tolerance decides what is sent, and how finely",
-    ),
-    "body_tolerance": (
-        ("preset", "fit", "bit_rate", *LEVELS, "unsent"),
-        "the tolerance decides what is sent, and how finely",
-    ),
+    "tolerance": BY_TOLERANCE,
+    "body_tolerance": BY_TOLERANCE,
     "bit_rate": (
         ("preset", "fit", "model", *LEVELS, "unsent", "intra_period"),
         "the bit rate decides what is sent, how finely, and where I planes come",
     ),
     "fit": (("preset", "model", "unsent"), "the table of the head decides what is sent"),
 }
-"""Options that decide all that some others decide, those others, and the reason to give."""
+"""Options, the other options that each excludes, and the reason."""
 
 
 def check_sizes() -> None:
     """Raise click.UsageError for options of the running command that contradict each other."""
     context = click.get_current_context()
-    flags = {one.name: one.opts[0] for one in context.command.params}
+    flags = {param.name: param.opts[0] for param in context.command.params}
     for decider, (others, reason) in CONTRADICTIONS.items():
         for other in others:
             if options.is_given(decider) and options.is_given(other):

@@ -1,4 +1,4 @@
-"""`--tolerance`: how far what is shown may be off, and what encoding within that came to."""
+"""`--tolerance`: the largest error of the shown face and body, and reports of the result."""
 
 from __future__ import annotations
 
@@ -8,41 +8,39 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fba.cli.options import TextType, parse_number
+
 if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.planning import FaceErrors, NearLossless, Tolerance
 
-UNITS = {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "\u00b5m": 1e-6, "\u03bcm": 1e-6}
-"""Metres of the units that a length may have; the last two have the micro sign and the Greek letter."""
+METRES = {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "\u00b5m": 1e-6, "\u03bcm": 1e-6}
+"""Metres of each unit of a length; the last two have the micro sign and the Greek letter."""
 
 
-class LengthType(click.ParamType[float]):
-    """A positive length with its unit, in metres: 0.5mm."""
+def _parse_length(typed: str) -> float:
+    text = typed.strip()
+    match = re.fullmatch(r"([0-9.eE+-]+)\s*([a-zA-Z\u00b5\u03bc]*)", text)
+    number = parse_number(match[1]) if match else math.nan
+    if match is None or math.isnan(number):
+        raise ValueError(f"{text!r} is not a length; write a number and its unit, as 0.5mm")
+    if number <= 0:
+        raise ValueError(f"{text} is not positive")
+    if not match[2]:
+        raise ValueError(f"{text} has no unit; write {match[1]}mm, {match[1]}cm or {match[1]}um")
+    if match[2] not in METRES:
+        raise ValueError(f"{match[2]!r} is not a unit of a tolerance; use mm, cm or um")
+    return number * METRES[match[2]]
 
-    name = "length"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        text = str(value).strip()
-        match = re.fullmatch(r"([0-9.eE+-]+)\s*([a-zA-Z\u00b5\u03bc]*)", text)
-        try:
-            number = float(match[1]) if match else math.nan
-        except ValueError:
-            number = math.nan
-        if match is None or not math.isfinite(number):
-            self.fail(f"{text!r} is not a length; write a number and its unit, as 0.5mm", param, ctx)
-        if number <= 0:
-            self.fail(f"{text} is not positive", param, ctx)
-        if not match[2]:
-            self.fail(f"{text} has no unit; write {match[1]}mm, {match[1]}cm or {match[1]}um", param, ctx)
-        if match[2] not in UNITS:
-            self.fail(f"{match[2]!r} is not a unit of a tolerance; use mm, cm or um", param, ctx)
-        return number * UNITS[match[2]]
+LENGTH = TextType("length", _parse_length)
+"""A positive length with its unit, in metres: 0.5mm."""
 
 
 def tolerance_in_metres(animation: Animation, face: float | None, body: float | None) -> Tolerance:
-    """Return a tolerance in metres; what is None is as `fba.planning.Tolerance` has it by default.
+    """Return a tolerance in metres. None: the default of `fba.planning.Tolerance`.
 
-    body: of points beside joints; half of it holds for feet that stand.
+    body: of points beside joints; half of it applies to feet that stand.
     """
     from fba.planning import Tolerance
 
@@ -61,7 +59,7 @@ def tolerance_in_metres(animation: Animation, face: float | None, body: float | 
 
 
 def tolerance_lines(result: NearLossless, animation: Animation) -> list[str]:
-    """Return what encoding within a tolerance came to, for people."""
+    """Return the result of a tolerance, for people."""
     lines = [] if result.face is None else _face_lines(result, result.face, animation)
     body = result.body
     if body is not None:
@@ -81,7 +79,7 @@ def tolerance_lines(result: NearLossless, animation: Animation) -> list[str]:
 
 
 def _face_lines(result: NearLossless, face: FaceErrors, animation: Animation) -> list[str]:
-    """Return how near the face is."""
+    """Return the errors of the face."""
     head = f"head within {face.head:.3f} degrees, eyes within {face.gaze:.3f}"
     if face.largest:
         lines = [
@@ -97,7 +95,7 @@ def _face_lines(result: NearLossless, face: FaceErrors, animation: Animation) ->
 
 
 def tolerance_values(result: NearLossless) -> dict[str, Any]:
-    """Return the same for programs."""
+    """Return the result of a tolerance, for programs."""
     face = result.face
     values: dict[str, Any] = {
         "fap_quant": result.fap_quant,
@@ -113,8 +111,8 @@ def tolerance_values(result: NearLossless) -> dict[str, Any]:
             "head_degrees": round(face.head, 6),
             "gaze_degrees": round(face.gaze, 6),
         }
-    if result.body is not None:
-        body = result.body
+    body = result.body
+    if body is not None:
         values["body"] = {
             "largest_mm": round(body.largest * 1000, 6),
             "percentile_99_mm": round(body.percentile_99 * 1000, 6),

@@ -42,7 +42,7 @@ def command(
 
 
 def _measure(file: Path, rounds: int, reading: Reading) -> dict[str, Any]:
-    """Return the symbols of a stream, and seconds and symbols per second of decoding and encoding it."""
+    """Return the count of symbols of a stream; seconds and symbols per second of decoding and encoding it."""
     from fba.codec import Decoder, EncoderOptions, decode, encode_animation
     from fba.compiled import is_compiled
 
@@ -74,13 +74,8 @@ def _measure(file: Path, rounds: int, reading: Reading) -> dict[str, Any]:
             run()
             times.append(perf_counter() - start)
         timings[name] = {"seconds": median(times), "symbols_per_second": symbols / median(times)}
-    return {
-        "file": str(file),
-        "frames": len(animation),
-        "symbols": symbols,
-        "compiled": is_compiled(),
-        **timings,
-    }
+    counts = {"file": str(file), "frames": len(animation), "symbols": symbols, "compiled": is_compiled()}
+    return counts | timings
 
 
 def _print(result: dict[str, Any]) -> None:

@@ -1,7 +1,8 @@
-"""`fba capture`: receive, show and record what a telephone or a program sends."""
+"""`fba capture`: receive, show and record the data of a telephone or a program."""
 
 from __future__ import annotations
 
+import queue
 import signal
 import sys
 import threading
@@ -18,6 +19,7 @@ from fba.cli import options
 from fba.cli.coding import rate_options
 from fba.cli.coding.clamped_values import clamped_lines
 from fba.cli.command import Command, examples
+from fba.cli.inputs import read_model
 from fba.cli.interruptions import raise_delayed
 from fba.cli.option_fields import option, option_like, with_options
 from fba.cli.outputs import STANDARD, Output, Outputs, display_name, output_option
@@ -28,9 +30,11 @@ from fba.errors import FbaError
 if TYPE_CHECKING:
     from fba.live import Capture, Receiver, StreamRecorder, Summary
     from fba.live.recording import Target
+    from fba.tracks import BodyTrack, FaceTrack
 
 KINDS = ("livelink", "ifacialmocap", "vtube", "vmc")
 LONGEST_NEUTRAL = 60.0
+"""Seconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,11 +73,11 @@ class _Coding:
 
     @property
     def is_compact(self) -> bool:
-        """Whether only what players do not derive is sent."""
+        """Whether FAPs that players derive are left out."""
         return self.preset == "compact"
 
     def recorder(self, targets: list[Target]) -> StreamRecorder:
-        """Return what encodes frames and writes them to the targets."""
+        """Return the encoder that writes frames to the targets."""
         from fba.live import StreamRecorder
 
         return StreamRecorder(
@@ -95,7 +99,7 @@ class _Request:
     play: bool = option(default=False, help="Show it in a window.")
     network: _Network
     seconds: Fraction | None = option(
-        type=options.PeriodType(), metavar="SECONDS", help="Stop after that; default: on Ctrl-C."
+        type=options.PERIOD, metavar="SECONDS", help="Stop after that; default: on Ctrl-C."
     )
     rate: Fraction | None = options.rate_option(
         "Frame rate of the stream. Default: the sender's own, else 60; vmc: that of its first second."
@@ -142,7 +146,7 @@ def command(request: _Request) -> None:
     if request.play:
         from fba import player
 
-        player.check_display()  # before anything that takes long
+        player.check_display()  # before work that takes long
     from fba.live import Capture, Receiver, find_kind
     from fba.live.recording import warm_up
 
@@ -190,20 +194,43 @@ def _check(request: _Request) -> None:
         )
 
 
-def _targets(output: Path | None, *, play: bool) -> tuple[list[Target], Any]:
-    """Return where the stream goes, and of these the queue of the window, or None."""
+class StreamQueue:
+    """A target of a recorder whose bytes another thread reads: a `fba_player.playback.live.Readable`."""
+
+    def __init__(self) -> None:
+        self._parts: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._ended = False
+
+    def begin(self, opening: bytes) -> None:
+        """Begin the stream with the bytes before it."""
+        self.write(opening, b"")
+
+    def write(self, data: bytes, ending: bytes) -> None:
+        """Add bytes."""
+        if data:
+            self._parts.put(data)
+
+    def close(self) -> None:
+        """End the stream."""
+        self._parts.put(b"")
+
+    def read1(self, _size: int = -1, /) -> bytes:
+        """Return the next bytes, after waiting for them; b"" at the end."""
+        part = b"" if self._ended else self._parts.get()
+        self._ended = self._ended or not part
+        return part
+
+
+def _targets(output: Path | None, *, play: bool) -> tuple[list[Target], StreamQueue | None]:
+    """Return the targets of the stream, and that of the window, or None."""
     from fba.live import StreamFile
     from fba.live.recording import StreamPipe
 
     targets: list[Target] = []
     if output is not None:
         targets.append(StreamPipe(sys.stdout.buffer) if output == STANDARD else StreamFile(output))
-    if not play:
-        return targets, None
-    from fba.cli.live_window import StreamQueue
-
-    stream = StreamQueue()
-    return [*targets, stream], stream
+    stream = StreamQueue() if play else None
+    return [*targets, *([] if stream is None else [stream])], stream
 
 
 @contextmanager
@@ -232,12 +259,10 @@ def _stopping(stop: Callable[[], None]) -> Iterator[None]:
 
 
 def _play(
-    stream: Any, receiver: Receiver, capture: Capture, recorder: StreamRecorder, limit: float | None,
+    stream: StreamQueue, receiver: Receiver, capture: Capture, recorder: StreamRecorder, limit: float | None,
     model: Path | None,
 ) -> None:  # fmt: skip
-    """Receive in a thread, and show the stream in a window until that is closed."""
-    from fba.cli.live_window import show
-
+    """Receive in a thread, and show the stream in a window until it is closed."""
     failures: list[Exception] = []
 
     def receive() -> None:
@@ -250,7 +275,7 @@ def _play(
     thread = threading.Thread(target=receive, name="fba capture", daemon=True)
     thread.start()
     try:
-        show(stream, receiver, capture, recorder, model)
+        _show(stream, receiver, capture, recorder, model)
     except KeyboardInterrupt:
         click.echo("fba: stopped", err=True)
     except FbaError:
@@ -263,8 +288,34 @@ def _play(
         raise failures[0]
 
 
+def _show(
+    stream: StreamQueue, receiver: Receiver, capture: Capture, recorder: StreamRecorder, model: Path | None
+) -> None:
+    """Show a stream in a window until it is closed. Waits for its first frames, without a window.
+
+    Raises BitstreamError if the stream ends before them.
+    """
+    from fba import player
+    from fba.face import FaceModel
+    from fba_player.playback.live import LiveAnimation, LiveTimeline, wait_for
+
+    face = read_model(model) or FaceModel.default()
+    live = LiveAnimation(stream, name=capture.kind.description, bap_steps=recorder.options.bap_steps)
+    wait_for(live, lambda _text: click.echo("fba: waiting for the first face", err=True))
+
+    def newest() -> tuple[FaceTrack | None, BodyTrack | None]:
+        receiver.drain()
+        return capture.newest()
+
+    try:
+        scene = player.Scene(live, face, timeline=LiveTimeline(live, face))  # type: ignore[arg-type]
+        player.play(scene, title=capture.kind.description, newest=newest)
+    finally:
+        live.close()
+
+
 def _nothing(summary: Summary, capture: Capture, receiver: Receiver) -> str:
-    """Return why there is nothing to write."""
+    """Return the reason why there is nothing to write."""
     if not summary.received:
         return (
             f"no datagram came on UDP port {receiver.port}; check that {capture.kind.description} sends to "
@@ -276,9 +327,9 @@ def _nothing(summary: Summary, capture: Capture, receiver: Receiver) -> str:
 def _report(
     outputs: Outputs, output: Path | None, recorder: StreamRecorder, summary: Summary, *, as_json: bool
 ) -> None:  # fmt: skip
-    """Print what was received and written."""
+    """Print counts of received and written frames."""
     clamped = recorder.encoder.statistics.clamped_parameters
-    held = rate_options.held_by(recorder.encoder)
+    kept = rate_options.rate_of(recorder.encoder)
     rate = recorder.rate
     seconds = Fraction(summary.frames) / rate
     if as_json:
@@ -286,7 +337,7 @@ def _report(
         outputs.print_json(
             {
                 **written, "rate": str(rate), "kbit_per_second": _kbit(recorder, seconds), **summary.values(),
-                **({} if held is None else {"bitrate": rate_options.rate_values(held)}),
+                **({} if kept is None else {"bitrate": rate_options.rate_values(kept)}),
             }
         )  # fmt: skip
         return
@@ -299,7 +350,7 @@ def _report(
             f"{display_name(output)}: {summary.frames} frames, {seconds_text(seconds)} at "
             f"{rate_text(rate)} frames/s, {recorder.size} bytes, {_kbit(recorder, seconds):.2f} kbit/s"
         )
-    for line in (*(rate_options.rate_lines(held) if held is not None else ()), *clamped_lines(clamped)):
+    for line in (*(rate_options.rate_lines(kept) if kept is not None else ()), *clamped_lines(clamped)):
         outputs.say(line)
 
 

@@ -1,4 +1,4 @@
-"""`fba conformance`: checks this codec, or other programs, against test vectors."""
+"""`fba conformance`: check this codec, or other programs, against test vectors."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ class _Programs:
 
     @property
     def name(self) -> str:
-        """What is tested."""
+        """The tested program."""
         return self.decoder or self.encoder or "fba"
 
     def checks(self) -> list[Callable[[Vector], Result]]:
-        """Return what is done with each vector."""
+        """Return the checks of each vector."""
         from fba_conformance.suite import programs
         from fba_conformance.suite.runner import check
 
@@ -66,7 +66,7 @@ class _Programs:
 
 @dataclass(frozen=True, kw_only=True)
 class _Report:
-    """How results are shown."""
+    """Forms of the results."""
 
     junit: Path | None = further_output_option("FILE", "Write JUnit XML, too.")
     verbose: bool = option(
@@ -75,7 +75,7 @@ class _Report:
     as_json: bool = options.json_option
 
     def write(self, results: list[Result], outputs: Outputs, name: str) -> None:
-        """Print the results. name: of what was tested."""
+        """Print the results. name: of the tested program."""
         from fba_conformance.suite.result import junit, summary, table
 
         if self.junit is not None:
@@ -83,7 +83,7 @@ class _Report:
         if self.as_json:
             outputs.print_json([result.to_dict() for result in results])
             return
-        for result in results if self.verbose else [one for one in results if not one.exact]:
+        for result in results if self.verbose else [result for result in results if not result.exact]:
             outputs.say(result.line())
         for line in table(results):
             outputs.say(line)
@@ -151,14 +151,11 @@ def _program(option: str, text: str, places: Sequence[str], timeout: float) -> P
     unknown = unknown_places(program, places)
     if unknown:
         known = ", ".join(f"{{{name}}}" for name in places)
-        raise click.BadParameter(
-            f"nothing is put in place of {unknown[0]}; there are {known}", param_hint=option
-        )
+        text = f"nothing is put in place of {unknown[0]}; there are {known}"
+        raise click.BadParameter(text, param_hint=option)
     if shutil.which(program.words[0]) is None:
-        raise click.BadParameter(
-            f"there is no program {program.words[0]!r} here; give its path, or a name on PATH",
-            param_hint=option,
-        )
+        text = f"there is no program {program.words[0]!r} here; give its path, or a name on PATH"
+        raise click.BadParameter(text, param_hint=option)
     return program
 
 
@@ -166,10 +163,13 @@ def _chosen(vectors: Sequence[Vector], names: Sequence[str]) -> Sequence[Vector]
     """Return the vectors of these names or groups, all without names; a usage error for unknown names."""
     if not names:
         return vectors
-    chosen = [one for one in vectors if {one.name, Path(one.name).stem, one.group} & set(names)]
-    known = {name for one in chosen for name in (one.name, Path(one.name).stem, one.group)}
+
+    def names_of(vector: Vector) -> set[str]:
+        return {vector.name, Path(vector.name).stem, vector.group}
+
+    chosen = [vector for vector in vectors if names_of(vector) & set(names)]
     for name in names:
-        if name not in known:
+        if not any(name in names_of(vector) for vector in chosen):
             raise click.BadParameter(f"there is no vector or group {name!r}", param_hint="--only")
     return chosen
 

@@ -1,4 +1,4 @@
-"""`fba convert`: from any format that can be read to any that can be written."""
+"""`fba convert`: a file of any format to any format with a writer."""
 
 from __future__ import annotations
 
@@ -8,21 +8,13 @@ from pathlib import Path
 import click
 
 from fba.choices import BapTableOrAuto
-from fba.cli import joint_options, marker_options, options, step_tables, writer_options
+from fba.cli import map_options, options, step_tables, writer_options
 from fba.cli.coding.coded_streams import encode_stream
 from fba.cli.coding.size_options import Size
 from fba.cli.command import Command, examples
 from fba.cli.inputs import ReadFile, Reading, check_clip, has_markers, has_skeleton, read_file
 from fba.cli.option_fields import group, with_options
-from fba.cli.outputs import (
-    TEXT_FORMATS,
-    Output,
-    Outputs,
-    OutputType,
-    display_name,
-    find_writer,
-    opening_for,
-)
+from fba.cli.outputs import Output, Outputs, OutputType, display_name, find_writer
 from fba.cli.recordings.inputs import Inputs
 from fba.encoder_options import EncoderOptions
 from fba.errors import FormatError
@@ -50,7 +42,7 @@ def command(
     rate: Fraction | None = options.rate_option("Resample to this frame rate; default: the input's own."),
     to: str | None = options.to_option,
     no_clobber: bool = options.no_clobber_option,
-    maps: joint_options.Maps = joint_options.map_option,
+    maps: map_options.Maps = map_options.map_option,
     given: writer_options.WriterOptions = group(),
     mark: bool | None = options.mark_option,
     reading: Reading = group(bap_steps=options.written_steps_option),
@@ -59,27 +51,22 @@ def command(
 
     - is standard input or output. A stream is written as `fba encode` does without options.
     """
-    from fba.formats import write
-
-    writing = find_writer(target, to)  # refuses what cannot be written before anything is read
-    outputs = Outputs(
-        [Output("OUT", target, writing.name in TEXT_FORMATS)],
-        [source, given.model, given.body],
-        no_clobber=no_clobber,
-    )
+    writing = find_writer(target, to)  # raises its errors before anything is read
+    read_files = [source, given.model, given.body]
+    outputs = Outputs([Output.of_format("OUT", target, writing)], read_files, no_clobber=no_clobber)
     captures = [source] if has_skeleton(source, reading.format) else []
     with_markers = has_markers(source, reading.format)
     bodies_map = maps if given.body is not None and not captures and not with_markers else ()
-    joints_of_body = joint_options.read_body_joints(bodies_map, given.body, reading.limit)
+    joints_of_body = map_options.read_body_joints(bodies_map, given.body, reading.limit)
     extra = writer_options.settings(target, writing, given, joints_of_body)
     check_clip(reading, [source])
     if mark is not None and writing.name != "fba":
         raise click.UsageError(f"--mark is for streams, and {display_name(target)} becomes none")
     joints = places = None
     if with_markers:
-        places = marker_options.read_places(maps, [source], reading)
+        places = map_options.read_places(maps, [source], reading)
     elif not bodies_map:
-        joints = joint_options.read_joints(maps, captures, reading)
+        joints = map_options.read_joints(maps, captures, reading)
     read = read_file(source, reading, rate=rate, capture={"joints": joints, "markers": places})
     about = f"{display_name(target)}: {len(read.animation)} frames, {writing.written or writing.description}"
     if writing.name == "fba":
@@ -90,21 +77,19 @@ def command(
         outputs.say(about)
         step_tables.remind(target, read.animation, table, marked=marked)
         return
-    with outputs.file(target) as file:
-        write(file, read.animation, format=writing.name, **extra)
+    outputs.write_animation(target, read.animation, writing, **extra)
     outputs.say(about)
 
 
 def _write_stream(
     read: ReadFile, target: Path, outputs: Outputs, bap_steps: BapTableOrAuto, *, marked: bool
 ) -> BapTable:
-    """Write what was read as a stream; return its table of BAP steps."""
+    """Write the content of a file as a stream; return its table of BAP steps."""
     animation = read.animation
     taken = Inputs(animation, None, None, (read,), animation.rate != read.rate)
     table = step_tables.table_to_write(bap_steps, made=taken.is_captured, marked=marked, read=read.table)
     step_tables.warn_of_coarse_steps(animation, table)
     with naming_file(target):
         coded = encode_stream(animation, EncoderOptions(bap_steps=table, mark=marked), Size(), taken)
-    opening = opening_for(target, animation, table, coded.bap_quant, marked=marked)
-    outputs.write(target, opening + coded.data)
+    outputs.write_stream(target, coded.data, animation, table, coded.bap_quant, marked=marked)
     return table

@@ -11,20 +11,11 @@ import click
 
 from fba.animation import Animation
 from fba.cli import options, step_tables, writer_options
-from fba.cli.command import Command, EachFile, examples
+from fba.cli.command import Command, EachFile, as_typed, examples
 from fba.cli.inputs import Reading, input_file, read_model
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import (
-    STANDARD,
-    TEXT_FORMATS,
-    Output,
-    Outputs,
-    OutputType,
-    display_name,
-    find_writer,
-)
+from fba.cli.outputs import STANDARD, TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
 from fba.cli.printing import Progress
-from fba.cli.program import as_typed
 from fba.parameters import BAP_STEPS_AUTO, BapTable
 
 if TYPE_CHECKING:
@@ -32,8 +23,8 @@ if TYPE_CHECKING:
     from fba.codec import PlaneSettings
     from fba.formats import Format
 
-_CHUNK = 1 << 16
-"""Bytes decoded at once."""
+_CHUNK_BYTES = 1 << 16
+"""Bytes that are decoded at once."""
 _SETTINGS_BYTES = 300
 """Memory of the settings of a plane."""
 _FOLDER_OR_FILE = OutputType(folders=True)
@@ -41,7 +32,7 @@ _FOLDER_OR_FILE = OutputType(folders=True)
 
 @dataclass(frozen=True)
 class _Target:
-    """A file or a folder to write to. suffix: of files in a folder. writing: None for EPF."""
+    """A file, or a folder, to write to. suffix: of files in a folder. writing: the format; None for EPF."""
 
     flag: str
     place: Path
@@ -54,11 +45,11 @@ class _Target:
         return self.place != STANDARD and self.place.is_dir()
 
     def file(self, source: Path) -> Path:
-        """Return the file that the content of a stream is written to."""
+        """Return the file for the content of a stream."""
         return self.place / f"{_name(source)}{self.suffix}" if self.folder else self.place
 
     def output(self, source: Path) -> Output:
-        """Return that file, to be checked."""
+        """Return the output for the content of a stream."""
         text = self.writing is None or self.writing.name in TEXT_FORMATS
         return Output(self.flag, self.file(source), text, source if self.folder else None)
 
@@ -92,7 +83,7 @@ class _Writing:
     options: writer_options.WriterOptions
 
     def targets(self) -> list[_Target]:
-        """Return all files to write; click.UsageError without files, or for options that fit no file."""
+        """Return all files to write; click.UsageError without files, and for options that fit no file."""
         targets = []
         for name in ("fap", "bap", "epf"):
             place = getattr(self, name)
@@ -121,15 +112,16 @@ class _Writing:
     def takes_model(self) -> bool:
         """Whether the writer of `--output` takes a face. Raises where `find_writer` does."""
         if self.output is None or (self.to is None and self.output.is_dir()):
-            return False  # a folder without a format is an error, which is said later
+            return False  # `targets` raises the error
         return "model" in find_writer(self.output, self.to).write_options
 
 
 @dataclass(frozen=True, eq=False)
 class _Decoding:
-    """What is done with each stream.
+    """How each stream is decoded and written.
 
-    settings: for the writer of `--output`. shows: what a face shows, to write that; None for what is sent.
+    settings: for the writer of `--output`. shows: returns the FAPs that a face shows, to be written; None for
+    the FAPs that are sent.
     """
 
     targets: list[_Target]
@@ -141,14 +133,13 @@ class _Decoding:
     def decode(self, path: Path) -> dict[str, Any]:
         """Decode a stream to its files; return a report."""
         from fba.codec import marked_table
-        from fba.formats import write
         from fba.formats.epf.epf import write_epf
 
         asked = self.reading.bap_steps
         with input_file(path) as file:
             data = file.read_bytes()
         writings = [target.writing for target in self.targets]
-        with_body = any(one is not None and "body" in one.carries for one in writings)
+        with_body = any(each is not None and "body" in each.carries for each in writings)
         table = step_tables.table_to_read(path, data, asked, self.reading.limit, shown=with_body)
         animation, planes = _read(data, _name(path), None in writings, table, self.reading)
         if asked != BAP_STEPS_AUTO:
@@ -157,21 +148,21 @@ class _Decoding:
             animation = replace(animation, face=self.shows(animation.face))
         parts = {"face": "FAPs", "body": "BAPs"}
         for target in self.targets:
-            held = parts if target.writing is None else target.writing.carries
-            if all(getattr(animation, part) is None for part in held):
-                lacking = " or ".join(parts[part] for part in held)
+            carried = parts if target.writing is None else target.writing.carries
+            if all(getattr(animation, part) is None for part in carried):
+                lacking = " or ".join(parts[part] for part in carried)
                 raise click.UsageError(f"{path} carries no {lacking}; leave {target.flag} out")
         written = []
         for target in self.targets:
             place = target.file(path)
-            with self.outputs.file(place) as file:
-                if target.writing is None:
+            if target.writing is None:
+                with self.outputs.file(place) as file:
                     write_epf(file, planes)
-                else:
-                    # --fap and --bap name a part: only --output may lose one without being told to
-                    whole = target.flag == "--output"
-                    part = animation if whole else _only(animation, target.writing.carries)
-                    write(file, part, format=target.writing.name, **(self.settings if whole else {}))
+            elif target.flag == "--output":
+                self.outputs.write_animation(place, animation, target.writing, **self.settings)
+            else:  # --fap and --bap name the part, so that no warning tells of the other
+                part = _only(animation, target.writing.carries)
+                self.outputs.write_animation(place, part, target.writing)
             written.append(str(place))
         return {"input": str(path), "frames": len(animation), "rate": str(animation.rate), "written": written}
 
@@ -205,7 +196,7 @@ def command(
     One of the files can be -, standard output.
     """
     face = writing.options.model if writing.shown else None
-    if face is not None and not writing.takes_model():  # it is for --shown alone
+    if face is not None and not writing.takes_model():  # --shown alone uses it
         writing = replace(writing, options=replace(writing.options, model=None))
     targets = writing.targets()
     several = len(inputs) > 1
@@ -241,7 +232,7 @@ def command(
 
 
 def _shows(model: Path | None) -> Callable[[FaceTrack], FaceTrack]:
-    """Return the function from what a stream sends to what a face shows, by default the built-in one."""
+    """Return the function from sent FAPs to those that a face shows, by default the built-in head."""
     from fba.face.resolve import shown_faps
 
     face = read_model(model)
@@ -261,7 +252,7 @@ def _only(animation: Animation, parts: tuple[str, ...]) -> Animation:
 def _read(
     data: bytes, name: str, with_settings: bool, table: BapTable, reading: Reading
 ) -> tuple[Animation, list[PlaneSettings]]:
-    """Return the animation, and if with_settings, how each plane was coded. table: of BAP steps."""
+    """Return the animation, and with_settings: the settings of its planes. table: of BAP steps."""
     from fba.codec import Decoder, decode
 
     on_error: Literal["raise", "salvage"] = "salvage" if reading.salvage else "raise"
@@ -270,8 +261,8 @@ def _read(
         return animation, []
     decoder = Decoder(bap_steps=table, on_error=on_error, limits=reading.limit)
     settings: list[PlaneSettings] = []
-    for start in range(0, len(data), _CHUNK):
-        frames = decoder.push(data[start : start + _CHUNK])
+    for start in range(0, len(data), _CHUNK_BYTES):
+        frames = decoder.push(data[start : start + _CHUNK_BYTES])
         settings += [frame.plane.settings for frame in frames if frame.plane is not None]
         reading.limit.check_bytes(len(settings) * _SETTINGS_BYTES, "the list of planes", source=len(data))
     settings += [frame.plane.settings for frame in decoder.finish() if frame.plane is not None]

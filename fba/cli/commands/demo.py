@@ -1,4 +1,4 @@
-"""`fba demo`: goes from BVH, FAP and C3D files to streams and a picture, with the samples that come with fba.
+"""`fba demo`: from BVH, FAP and C3D files to streams and a picture, with the samples that come with fba.
 
 Scripts made the samples (tools/make_samples.py, make_face_capture.py); nobody was captured for them.
 """
@@ -15,11 +15,10 @@ import click
 
 from fba.animation import Animation
 from fba.cli import options
-from fba.cli.command import Command, examples
+from fba.cli.command import Command, as_typed, examples
 from fba.cli.option_fields import option, with_options
 from fba.cli.outputs import Output, Outputs
 from fba.cli.printing import Progress, rate_text, seconds_text
-from fba.cli.program import as_typed
 from fba.encoder_options import EncoderOptions
 from fba.errors import DisplayError
 from fba.parameters import BapTable
@@ -27,9 +26,9 @@ from fba.parameters import BapTable
 BAP_STEPS: BapTable = "visage"
 """The standard's own table moves the root in steps of 64 mm, which is visible."""
 SAMPLES = ("hello.bvh", "hello.fap")
-"""A body and a face, which come with fba."""
+"""A body and a face."""
 CAPTURE = "talk.c3d"
-"""Markers on somebody's face."""
+"""Markers on a face."""
 SECONDS_BEFORE_NOTICE = 4.0
 """Seconds after which a line explains the wait."""
 COMPILING = "compiling for this machine, on the first run only: about half a minute in all"
@@ -51,7 +50,6 @@ def command(
     another. Scripts made them; they are not motion capture. Without a display, a film and a picture are
     made instead. The sample files are copied into the folder.
     """
-    from fba import player
     from fba.codec import probe_stream
     from fba.formats import merge, read
     from fba.planning import encode
@@ -87,18 +85,18 @@ def command(
     decoded = read(stream)
     click.echo(f"decoded: {len(decoded)} frames at {rate_text(decoded.rate)} frames/s")
     _encode_capture(capture, talk, outputs)
-    shown = play is not False and _play(player, decoded, asked=play is True)
+    shown = play is not False and _play(decoded, asked=play is True)
     if not shown:
-        _render(player, decoded, video, picture)
+        _render(decoded, video, picture)
     quoted = shlex.quote(str(stream))
-    if shown or (play is False and _can_open_a_window(player)):
+    if shown or (play is False and _can_open_a_window()):
         click.echo(f"to see it again: {as_typed(f'fba play {quoted}')}")
     else:
         click.echo(f"other pictures: {as_typed(f'fba render {quoted} -o picture.png --time 1.5')}")
 
 
 def _encode_capture(capture: Path, stream: Path, outputs: Outputs) -> None:
-    """Encode markers on a face, with the path of the head, and print what became of them."""
+    """Encode markers on a face, with the path of the head, and print the sizes."""
     from fba.formats import read
     from fba.planning import encode
 
@@ -112,11 +110,13 @@ def _encode_capture(capture: Path, stream: Path, outputs: Outputs) -> None:
     )
 
 
-def _play(player: object, animation: Animation, *, asked: bool) -> bool:
+def _play(animation: Animation, *, asked: bool) -> bool:
+    from fba import player
+
     try:
-        player.check_display()  # type: ignore[attr-defined]
+        player.check_display()
         click.echo("opening a window; Esc closes it")
-        player.play(animation, loop=True, title="fba demo")  # type: ignore[attr-defined]
+        player.play(animation, loop=True, title="fba demo")
     except DisplayError as error:
         if asked:
             raise
@@ -125,19 +125,23 @@ def _play(player: object, animation: Animation, *, asked: bool) -> bool:
     return True
 
 
-def _can_open_a_window(player: object) -> bool:
+def _can_open_a_window() -> bool:
+    from fba import player
+
     try:
-        player.check_display()  # type: ignore[attr-defined]
+        player.check_display()
     except DisplayError:
         return False
     return True
 
 
-def _render(player: object, animation: Animation, video: Path, picture: Path) -> None:
-    player.render(animation, picture, time=float(animation.times[0]) + 2.0)  # type: ignore[attr-defined]
+def _render(animation: Animation, video: Path, picture: Path) -> None:
+    from fba import player
+
+    player.render(animation, picture, time=float(animation.times[0]) + 2.0)
     try:
         with Progress("rendering", None) as step:
-            player.render(animation, video, size=(640, 360), progress=step.show)  # type: ignore[attr-defined]
+            player.render(animation, video, size=(640, 360), progress=step.show)
     except DisplayError as error:  # films need more than pictures
         click.echo(f"rendered: {picture}; no film: {error}")
     else:

@@ -7,24 +7,17 @@ import math
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
 
 from fba.cli import options
-from fba.cli.command import Command, examples, usage_errors
-from fba.cli.emotions.pictures import OUTPUT_TEXT, draw, option_errors, picture_kind
+from fba.cli.command import Command, examples, option_errors, usage_errors
+from fba.cli.emotion_results import OUTPUT_TEXT, draw, picture_kind
 from fba.cli.inputs import Reading, read_input, read_model
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import (
-    TEXT_FORMATS,
-    Output,
-    Outputs,
-    display_name,
-    find_writer,
-    output_option,
-)
+from fba.cli.outputs import Output, Outputs, display_name, find_writer, output_option
 from fba.cli.printing import Progress, seconds_text
 from fba.errors import SAVE_AS_UTF8, FormatError
 
@@ -36,48 +29,32 @@ if TYPE_CHECKING:
 MOST_KEYS = 1_000_000
 KEY_HEADER = ("seconds", "emotion", "intensity")
 _Typed = tuple[str, float | None, float | None]
-"""Names with intensities, and when they begin and end."""
+"""A name with its intensity, as text, and its begin and end, in seconds."""
 
 
-class SecondsType(click.ParamType[float]):
-    """A time: 2, 2s, 500ms."""
-
-    name = "time"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        text = str(value).strip().lower()
-        scale = 0.001 if text.endswith("ms") else 1.0
-        try:
-            seconds = float(text.removesuffix("ms").removesuffix("s")) * scale
-        except ValueError:
-            seconds = math.nan
-        if not math.isfinite(seconds):
-            self.fail(f"{value!r} is no time; write e.g. 2s or 500ms", param, ctx)
-        return seconds
+def _parse_seconds(typed: str) -> float:
+    text = typed.strip().lower()
+    scale = 0.001 if text.endswith("ms") else 1.0
+    seconds = options.parse_number(text.removesuffix("ms").removesuffix("s")) * scale
+    if math.isnan(seconds):
+        raise ValueError(f"{typed!r} is no time; write e.g. 2s or 500ms")
+    return seconds
 
 
-class MoodType(click.ParamType[tuple[str, float | None, float | None]]):
-    """An emotion with its intensity, and perhaps its own times: angry=70, sad=50@2s-6s."""
+def _parse_mood(typed: str) -> _Typed:
+    text, at, span = typed.partition("@")
+    if not at:
+        return text, None, None
+    first, dash, last = span.partition("-")
+    if not dash or not (first or last):
+        raise ValueError(f"{typed!r}: write times as @2s-6s, @2s- or @-6s")
+    return text, _parse_seconds(first) if first else None, _parse_seconds(last) if last else None
 
-    name = "emotion"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, float | None, float | None]:
-        if isinstance(value, tuple):
-            return value
-        text, at, span = str(value).partition("@")
-        if not at:
-            return text, None, None
-        first, dash, last = span.partition("-")
-        if not dash or not (first or last):
-            self.fail(f"{value!r}: write times as @2s-6s, @2s- or @-6s", param, ctx)
-        times = SecondsType()
-        return (
-            text,
-            times.convert(first, param, ctx) if first else None,
-            times.convert(last, param, ctx) if last else None,
-        )
+SECONDS = options.TextType("time", _parse_seconds)
+"""A time: 2, 2s, 500ms."""
+MOOD = options.TextType("emotion", _parse_mood)
+"""An emotion with its intensity, with or without times: angry=70, sad=50@2s-6s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,21 +64,21 @@ class _Asked:
     moods: tuple[_Typed, ...] = option(
         "--emotion",
         default=(),
-        type=MoodType(),
+        type=MOOD,
         multiple=True,
         metavar="NAME=INTENSITY[@FROM-TO]",
         help="An expression and its intensity, 0 to 100; repeatable. `fba express --list` lists all.",
     )
     start: float | None = option(
-        type=SecondsType(), metavar="TIME", help="When it begins; default: with the performance."
+        type=SECONDS, metavar="TIME", help="When it begins; default: with the performance."
     )
     end: float | None = option(
-        type=SecondsType(), metavar="TIME", help="When it ends; default: with the performance."
+        type=SECONDS, metavar="TIME", help="When it ends; default: with the performance."
     )
     ease: float = option(
         default=0.5,
         typed="0.5s",
-        type=SecondsType(),
+        type=SECONDS,
         metavar="TIME",
         help="From none to full, and back. Not at either end of the performance.",
     )
@@ -112,7 +89,7 @@ class _Asked:
     )
 
     def parse(self, moods: tuple[_Typed, ...]) -> list[Mood]:
-        """Return some of the moods, with their times."""
+        """Return moods with their times."""
         from fba.emotion import Mood, parse_weights
 
         result = []
@@ -135,7 +112,7 @@ class _Target:
         "The face whose visemes and expressions IN means, and that is drawn; default: the built-in head."
     )
     size: tuple[int, int] | None = option(
-        type=options.SizeType(),
+        type=options.SIZE,
         metavar="WIDTHxHEIGHT",
         help="Pictures: default 1280x720; of each side by side, 320x320.",
     )
@@ -180,9 +157,9 @@ def command(
             raise click.UsageError(f"{flag} goes with a picture or a film")
     if side_by_side and (keys is not None or not moods):
         raise click.UsageError("--side-by-side draws one performance for each --emotion; leave --keys out")
-    format = None if kind else find_writer(output, target.to)
-    text = format is not None and format.name in TEXT_FORMATS
-    outputs = Outputs([Output("--output", output, text)], [source, keys, model], no_clobber=target.no_clobber)
+    writing = None if kind else find_writer(output, target.to)
+    out = Output("--output", output) if writing is None else Output.of_format("--output", output, writing)
+    outputs = Outputs([out], [source, keys, model], no_clobber=target.no_clobber)
     with option_errors():
         given: list[Mood | MoodCurve] = [*asked.parse(moods)]
         if keys is not None:
@@ -201,23 +178,16 @@ def command(
         return
     with option_errors():
         made = emote(animation, given, model=face)
-    if format is None:
+    if writing is None:
         draw(made, output, outputs, kind, model, target.size)
     else:
-        from fba.formats import write
-
-        with outputs.file(output) as file:
-            write(file, made, format=format.name)
+        outputs.write_animation(output, made, writing)
     names = ", ".join(dict.fromkeys(mood.name for mood in given))
     outputs.say(f"{display_name(output)}: {names}; {len(made)} frames, {seconds_text(made.duration)}")
 
 
 def _draw_side_by_side(
-    performances: dict[str, Animation],
-    target: _Target,
-    outputs: Outputs,
-    kind: str,
-    model: FaceModel | None,
+    performances: dict[str, Animation], target: _Target, outputs: Outputs, kind: str, model: FaceModel | None
 ) -> None:
     from fba_player.export.side_by_side import draw_side_by_side
     from fba_player.scene.scene import Scene

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import click
 
 from fba.choices import Baseline
+from fba.cli import emotion_results as results
 from fba.cli import options
 from fba.cli.command import Command, examples
-from fba.cli.emotions import tables
 from fba.cli.inputs import Reading, read_input, read_model
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import Output, Outputs, display_name, output_option
@@ -79,7 +79,7 @@ def command(
     readings = read_expressions(animation, read_model(model), baseline=baseline)
     if outputs is not None and output is not None:
         outputs.write(output, _csv(readings).encode())
-        outputs.say(f"{display_name(output)}: {len(readings)} frames; {tables.summary_text(readings)}")
+        outputs.say(f"{display_name(output)}: {len(readings)} frames; {results.summary_text(readings)}")
     elif target.as_json:
         print_json(
             {
@@ -90,14 +90,14 @@ def command(
             }
         )
     else:
-        click.echo(f"{file}: {len(readings)} frames; {tables.summary_text(readings)}")
-        for line in tables.reading_lines(readings, every=target.frames):
+        click.echo(f"{file}: {len(readings)} frames; {results.summary_text(readings)}")
+        for line in results.reading_lines(readings, every=target.frames):
             click.echo(line)
 
 
 def _rows(readings: Readings) -> list[dict[str, object]]:
     return [
-        tables.reading_record(time, one)
+        results.reading_record(time, one)
         for time, one in zip(readings.times.tolist(), readings.readings, strict=True)
     ]
 

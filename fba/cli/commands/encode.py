@@ -12,23 +12,17 @@ import click
 
 from fba.animation import Animation
 from fba.choices import Unsent
-from fba.cli import capture_report, joint_options, marker_options, options, step_tables
+from fba.cli import capture_report, map_options, options, step_tables
 from fba.cli.coding import capture_options, size_options
 from fba.cli.coding.clamped_values import bring_near, clamped_lines
 from fba.cli.coding.coded_streams import CodedStream, encode_as_epf, encode_stream
 from fba.cli.command import Command, examples
 from fba.cli.inputs import Reading, check_clip, has_markers, has_skeleton
 from fba.cli.option_fields import group, option, option_like, with_options
-from fba.cli.outputs import Output, Outputs, display_name, opening_for, output_option
+from fba.cli.outputs import Output, Outputs, display_name, output_option
 from fba.cli.printing import Progress
 from fba.cli.recordings import voice
-from fba.cli.recordings.inputs import (
-    Inputs,
-    SyncOptions,
-    read_inputs,
-    together_lines,
-    together_values,
-)
+from fba.cli.recordings.inputs import Inputs, SyncOptions, read_inputs, together_lines, together_values
 from fba.encoder_options import EncoderOptions
 from fba.parameters import BapTable
 
@@ -50,7 +44,7 @@ class _Planes:
     """How planes are coded: see `fba.EncoderOptions`. clamp: None for motion capture only."""
 
     intra_period: Fraction | None = option_like(
-        EncoderOptions, "intra_period", type=options.PeriodType(), metavar="SECONDS"
+        EncoderOptions, "intra_period", type=options.PERIOD, metavar="SECONDS"
     )
     start_codes: bool = option_like(EncoderOptions, "start_codes")
     time_codes: bool = option_like(EncoderOptions, "time_codes")
@@ -140,11 +134,10 @@ def command(request: _Request) -> None:
 
 @dataclass(frozen=True)
 class _Plan:
-    """What to read and to write, which no option contradicts.
+    """Checked inputs and outputs.
 
     sound: the WAV file to write. page: the file of `--report`. captures, marked: inputs with the motion of a
-    skeleton, and of markers on a face. capture: options of their readers,
-    with the places of `--map`.
+    skeleton, and of markers on a face. capture: options of their readers, with the places of `--map`.
     """
 
     request: _Request
@@ -163,9 +156,9 @@ class _Plan:
 
 @dataclass(frozen=True, eq=False)
 class _Encoded:
-    """What was read, coded and written.
+    """The content that was read, coded and written.
 
-    animation: that was coded, limited as `--limits` says. table: of BAP steps. limits: report of `--limits`.
+    animation: as coded, limited by `--limits`. table: of BAP steps. limits: report of `--limits`.
     """
 
     taken: Inputs
@@ -178,7 +171,7 @@ class _Encoded:
 
 
 def _plan(request: _Request) -> _Plan:
-    """Return what is to be done; click.UsageError for options that contradict each other or the inputs."""
+    """Return the plan; click.UsageError for options that contradict each other or the inputs."""
     inputs, reading, capture, size = request.inputs, request.reading, request.capture, request.size
     size_options.check_sizes()
     check_clip(reading, inputs)
@@ -187,7 +180,14 @@ def _plan(request: _Request) -> _Plan:
     written += [] if page is None else [Output("--report", page)]
     written += [] if capture.map_out is None else [Output("--map-out", capture.map_out, True)]
     sounds = request.sound.check(request.output)
-    read = [*inputs, request.epf, request.sound.audio, size.model, size.fit, *capture.map_files]
+    read = [
+        *inputs,
+        request.epf,
+        request.sound.audio,
+        size.model,
+        size.fit,
+        *map_options.files_of(capture.maps),
+    ]
     outputs = Outputs([*written, *sounds], read, no_clobber=request.no_clobber)
     captures = [path for path in inputs if has_skeleton(path, reading.format)]
     marked = [path for path in inputs if has_markers(path, reading.format)]
@@ -198,9 +198,9 @@ def _plan(request: _Request) -> _Plan:
         raise click.UsageError("--map and --map-out go with one capture; encode face and body by themselves")
     taken |= {"joints": None, "markers": None}
     if marked:
-        taken["markers"] = marker_options.read_places(capture.maps, marked, reading)
+        taken["markers"] = map_options.read_places(capture.maps, marked, reading)
     else:
-        taken["joints"] = joint_options.read_joints(capture.maps, captures, reading)
+        taken["joints"] = map_options.read_joints(capture.maps, captures, reading)
     sound = sounds[0].path if sounds else None
     return _Plan(request, outputs, sound, page, captures, marked, taken)
 
@@ -233,8 +233,7 @@ def _execute(plan: _Plan) -> _Encoded:
         animation = bring_near(animation, table, quantisers["bap_quant"])
     coded = _encode(request, animation, taken, table)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(plan.captures))
-    opening = opening_for(request.output, animation, table, coded.bap_quant, marked=request.marked)
-    outputs.write(request.output, opening + coded.data)
+    outputs.write_stream(request.output, coded.data, animation, table, coded.bap_quant, marked=request.marked)
     if spoken is not None:
         voice.write_voice(outputs, spoken)
     _write_map(plan, taken)
@@ -255,19 +254,19 @@ def _encode(request: _Request, animation: Animation, taken: Inputs, table: BapTa
 
 
 def _write_map(plan: _Plan, taken: Inputs) -> None:
-    """Write the joints or markers that were used, where `--map-out` asks for them."""
+    """Write the joints or markers that were used to the file of `--map-out`."""
     target, reading = plan.request.capture.map_out, plan.request.reading
     if target is None:
         return
     with plan.outputs.file(target) as file:
         if plan.marked:
             places = plan.capture["markers"]
-            mapped = marker_options.write_used_places(file, places, taken.capture_of(plan.marked[0]))
+            mapped = map_options.write_used_places(file, places, taken.capture_of(plan.marked[0]))
         else:
             motion = taken.capture_of(plan.captures[0])
-            if motion is None:  # of a face alone, or of a file with BAPs, whose skeleton was not needed
-                motion = joint_options.read_capture(plan.captures[0], reading)
-            mapped = joint_options.write_joints(file, plan.capture["joints"], motion)
+            if motion is None:  # the input has a face alone, or BAPs, which need no skeleton
+                motion = map_options.read_capture(plan.captures[0], reading)
+            mapped = map_options.write_used_joints(file, plan.capture["joints"], motion)
     what = f"markers of {plan.marked[0]}" if plan.marked else f"joints of {plan.captures[0]}"
     plan.outputs.say(f"{display_name(target)}: {mapped} {what}")
 
@@ -275,7 +274,7 @@ def _write_map(plan: _Plan, taken: Inputs) -> None:
 def _compare(
     plan: _Plan, taken: Inputs, animation: Animation, coded: CodedStream, table: BapTable
 ) -> list[capture_report.CaptureReport]:
-    """Return how captured bodies differ from what a decoder shows; write the page of `--report`."""
+    """Return comparisons of captured bodies with the decoded stream; write the page of `--report`."""
     from fba.codec import decode
 
     if not plan.captures or animation.body is None:
@@ -283,11 +282,11 @@ def _compare(
     with Progress("comparing", None):
         before, lead = taken.body_of(animation)
         shown = decode(coded.data, bap_steps=table)
-        if len(shown) < len(animation):  # players fill in the frames that were left out
+        if len(shown) < len(animation):  # players fill in missing frames
             shown = shown.resample(shown.rate)
         after, _ = taken.body_of(shown)
         body = capture_report.CodedBody(before, after, coded.clamped, lead)
-        files = [one for one in taken.files if one.path in plan.captures]
+        files = [file for file in taken.files if file.path in plan.captures]
         reports = capture_report.compare_captures(
             files, body, plan.capture, plan.request.reading, detailed=plan.detailed
         )
@@ -299,7 +298,7 @@ def _compare(
 
 
 def _report(plan: _Plan, made: _Encoded) -> None:
-    """Print what was encoded, for people or for programs."""
+    """Print the result, for people or for programs."""
     request, coded, animation = plan.request, made.coded, made.animation
     inputs, together, spoken = request.inputs, made.taken.together, made.spoken
     for report in made.reports:

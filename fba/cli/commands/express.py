@@ -10,19 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.choices import Sending
+from fba.cli import emotion_results as results
 from fba.cli import options
-from fba.cli.command import Command, examples
-from fba.cli.emotions import tables
-from fba.cli.emotions.pictures import OUTPUT_TEXT, PICTURES, draw, option_errors, picture_kind
+from fba.cli.command import Command, examples, option_errors
+from fba.cli.emotion_results import OUTPUT_TEXT, PICTURES, draw, picture_kind
 from fba.cli.option_fields import option, with_options
-from fba.cli.outputs import (
-    TEXT_FORMATS,
-    Output,
-    Outputs,
-    display_name,
-    find_writer,
-    output_option,
-)
+from fba.cli.outputs import Output, Outputs, display_name, find_writer, output_option
 from fba.cli.printing import seconds_text
 
 if TYPE_CHECKING:
@@ -30,33 +23,32 @@ if TYPE_CHECKING:
     from fba.emotion import Blend
 
 DEFAULT_RATE = Fraction(25)
-DEFAULT_SECONDS, DEFAULT_EASE = 3.0, 0.5
-"""Length of an animation, and how long it takes from neutral to the expression and back."""
+DEFAULT_SECONDS = 3.0
+"""Length of an animation."""
+DEFAULT_EASE = 0.5
+"""Seconds from neutral to the expression, and back."""
 
 
-class PointType(click.ParamType[tuple[float, float]]):
-    """A point of the plane: activation and evaluation, "4.0,1.1"."""
+def _parse_point(text: str) -> tuple[float, float]:
+    try:
+        activation, evaluation = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"{text!r} is no activation and evaluation; write e.g. 4.0,1.1") from None
+    return activation, evaluation
 
-    name = "point"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        try:
-            activation, evaluation = (float(part) for part in str(value).split(","))
-        except ValueError:
-            self.fail(f"{value!r} is no activation and evaluation; write e.g. 4.0,1.1", param, ctx)
-        return activation, evaluation
+POINT = options.TextType("point", _parse_point)
+"""A point of the plane: activation and evaluation, "4.0,1.1"."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Asked:
-    """Which expression: names with intensities, or a point of the plane; and the rules that mix them."""
+    """The expression, by names with intensities or by a point of the plane, and the rules that mix it."""
 
     weights: tuple[str, ...]
     point: tuple[float, float] | None = option(
         "--at",
-        type=PointType(),
+        type=POINT,
         metavar="A,E",
         help="Instead of names: activation and evaluation, 1 to 7 each; the named expressions around that "
         "point are mixed.",
@@ -92,11 +84,11 @@ class _Target:
     no_clobber: bool = options.no_clobber_option
     model: Path | None = options.model_option("Pictures: the face; default: the built-in head.")
     size: tuple[int, int] | None = option(
-        type=options.SizeType(), metavar="WIDTHxHEIGHT", help="Pictures: default 1280x720."
+        type=options.SIZE, metavar="WIDTHxHEIGHT", help="Pictures: default 1280x720."
     )
 
     def check(self, motion: _Motion) -> str:
-        """Return the kind of a picture or a film, else ""; click.UsageError for options that do not fit."""
+        """Return the kind of the picture or film, else ""; click.UsageError for options that do not fit."""
         kind = "" if self.output is None else picture_kind(self.output, self.to)
         drawn = {"--model": self.model, "--size": self.size}
         moving = {"--seconds": motion.seconds, "--ease": motion.ease, "--fps": motion.rate, "--to": self.to}
@@ -136,12 +128,12 @@ def command(
     if listed:
         if output is not None:
             raise click.UsageError("--list prints a table; -o goes with an expression")
-        tables.print_expressions(as_json)
+        results.print_expressions(as_json)
         return
     kind = target.check(motion)
     blend = _make_blend(asked)
     if output is None:
-        tables.print_blend(blend, as_json)
+        results.print_blend(blend, as_json)
         return
     if kind in PICTURES:
         if motion.seconds or motion.ease:
@@ -149,19 +141,16 @@ def command(
         motion = replace(motion, seconds=0.0)
     with option_errors():
         animation = _perform(blend, motion, motion.send)
-    report: dict[str, Any] = {"file": display_name(output), **tables.blend_record(blend)}
+    report: dict[str, Any] = {"file": display_name(output), **results.blend_record(blend)}
     text = f"{display_name(output)}: {blend}"
     if kind:
         outputs = Outputs([Output("--output", output)], [target.model], no_clobber=target.no_clobber)
         draw(animation, output, outputs, kind, target.model, target.size)
     else:
         writing = find_writer(output, target.to)
-        written = Output("--output", output, writing.name in TEXT_FORMATS)
+        written = Output.of_format("--output", output, writing)
         outputs = Outputs([written], no_clobber=target.no_clobber)
-        from fba.formats import write
-
-        with outputs.file(output) as file:
-            write(file, animation, format=writing.name)
+        outputs.write_animation(output, animation, writing)
         bits = _count_bits(blend, motion)
         report |= {"frames": len(animation), "sent": _sent(animation), "bits": bits}
         text += f", {len(animation)} frames, {seconds_text(animation.duration)}"
@@ -193,14 +182,14 @@ def _perform(blend: Blend, motion: _Motion, send: Sending) -> Animation:
 
 
 def _count_bits(blend: Blend, motion: _Motion) -> dict[str, int | None]:
-    """Return the bits of the stream for each way of sending; None where FAP 2 cannot say it."""
+    """Return the bits of the stream by how it is sent; None if FAP 2 cannot say it."""
     from fba.codec import EncoderOptions, encode_animation
 
     bare = EncoderOptions(mark=False)
-    ways: dict[Sending, bool] = {"expression": blend.fields is not None, "faps": True}
+    possible: dict[Sending, bool] = {"expression": blend.fields is not None, "faps": True}
     return {
-        way: 8 * len(encode_animation(_perform(blend, motion, way), bare)[0]) if possible else None
-        for way, possible in ways.items()
+        send: 8 * len(encode_animation(_perform(blend, motion, send), bare)[0]) if able else None
+        for send, able in possible.items()
     }
 
 

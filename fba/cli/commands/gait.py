@@ -14,18 +14,9 @@ from fba.cli import options, step_tables
 from fba.cli.command import Command, examples, usage_errors
 from fba.cli.inputs import Reading, read_input
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import (
-    TEXT_FORMATS,
-    Output,
-    Outputs,
-    display_name,
-    find_writer,
-    opening_for,
-    output_option,
-)
+from fba.cli.outputs import Output, Outputs, display_name, find_writer, output_option
 from fba.cli.printing import print_json, seconds_text
 from fba.encoder_options import EncoderOptions
-from fba.parameters import BapTable
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -87,7 +78,7 @@ def command(
     walk: _Walk,
     target: _Target,
     rate: Fraction = option(
-        "--fps", type=options.RateType(), default=DEFAULT_RATE, metavar="RATE", help="Frame rate of the walk."
+        "--fps", type=options.RATE, default=DEFAULT_RATE, metavar="RATE", help="Frame rate of the walk."
     ),
     listed: bool = option("--list", default=False, help="List the characters."),
     find: Path | None = option(
@@ -121,34 +112,23 @@ def _write_walk(
 ) -> None:
     """Make a walk, write it to the output and print a summary."""
     from fba.body import gait
-    from fba.formats import write
+    from fba.planning import encode
 
-    writing = find_writer(output, target.to)  # refuses what cannot be written before anything is made
-    out = Output("--output", output, writing.name in TEXT_FORMATS)
-    outputs = Outputs([out], no_clobber=target.no_clobber)
+    writing = find_writer(output, target.to)  # raises its errors before a walk is made
+    outputs = Outputs([Output.of_format("--output", output, writing)], no_clobber=target.no_clobber)
     with usage_errors("walk: "):
         animation = gait.walk(rate=rate, **asdict(walk))
     marked = target.mark is not False
     table = step_tables.table_to_write(bap_steps, made=True, marked=marked)
     if writing.name == "fba":
-        _write_stream(animation, output, outputs, table, marked=marked)
+        step_tables.warn_of_coarse_steps(animation, table)
+        data = encode(animation, EncoderOptions(bap_steps=table, mark=marked, clamp=True))
+        outputs.write_stream(output, data, animation, table, marked=marked)
     else:
-        with outputs.file(output) as file:
-            write(file, animation, format=writing.name)
+        outputs.write_animation(output, animation, writing)
     outputs.say(_summary(animation, output, walk.character, in_place=walk.in_place))
     if writing.name == "fba":
         step_tables.remind(output, animation, table, marked=marked)
-
-
-def _write_stream(
-    animation: Animation, output: Path, outputs: Outputs, table: BapTable, *, marked: bool
-) -> None:
-    from fba.planning import encode
-
-    step_tables.warn_of_coarse_steps(animation, table)
-    options = EncoderOptions(bap_steps=table, mark=marked, clamp=True)
-    opening = opening_for(output, animation, table, options.bap_quant, marked=marked)
-    outputs.write(output, opening + encode(animation, options))
 
 
 def _summary(animation: Animation, output: Path, character: str, *, in_place: bool) -> str:

@@ -1,4 +1,4 @@
-"""`fba info`: what a file holds."""
+"""`fba info`: the content of a file."""
 
 from __future__ import annotations
 
@@ -14,28 +14,20 @@ import click
 from fba.choices import BapTableOrAuto
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import (
-    Reading,
-    check_clip,
-    describe_person,
-    input_file,
-    list_clips,
-    probe_input,
-    read_face,
-)
+from fba.cli.inputs import Reading, check_clip, find_format, input_file, probe_input, taken_options
 from fba.cli.option_fields import option, with_options
 from fba.cli.printing import clock_text, print_json, rate_text, seconds_text
-from fba.codec import PartInfo, StreamInfo
 from fba.errors import FbaWarning, ModelError
 from fba.parameters import BAP_STEPS_AUTO
 
 if TYPE_CHECKING:
-    from fba.capture import FaceCapture
+    from fba.codec import PartInfo, StreamInfo
+    from fba.formats import Format
     from fba.formats.gltf.bodies import PersonInfo
     from fba.formats.gltf.clips import ClipInfo
 
-SHOWN = 8
-"""Names of markers in a line."""
+NAMED = 8
+"""Most names of markers in a line."""
 
 
 @click.command(
@@ -82,30 +74,22 @@ def command(
 
 
 def _report(path: Path, file: Path, reading: Reading, face: str | None, *, printed: bool) -> dict[str, Any]:
-    """Return what a file holds, for programs; print it for people as well if `printed`.
+    """Return the content of a file, for programs; print it for people as well if `printed`.
 
-    path: as it was typed; file: that to read. face: see `probe_input`.
+    path: as typed. file: to be read. face: the name of the captured face to read.
     """
-    if (person := describe_person(file, reading.format, reading.limit)) is not None:
+    reader, size = find_format(file, reading.format), file.stat().st_size
+    person = None if reader.describe_person is None else reader.describe_person(file, limits=reading.limit)
+    if person is not None:
         if reading.clip is not None:
             raise ModelError(f"there is no animation {reading.clip!r}; the file has none")
-        size = file.stat().st_size
         if printed:
             _print_person(path, size, person)
         return {"file": str(path), "format": "gltf", "size": size, "person": asdict(person)}
-    kind, captured = read_face(file, reading, {"face": face}) or ("", None)
-    if captured is not None and (markers := _summarise_markers(captured)) is not None:
-        size = file.stat().st_size
-        if printed:
-            click.echo(f"{path}: {kind.upper()}, {size} bytes")
-            _print_markers(markers)
-        return {"file": str(path), "format": kind, "size": size, "markers": markers}
-    capture = None if captured is None else captured.describe()
-    with warnings.catch_warnings():
-        if capture is not None:  # which lists what would be warned of
-            warnings.simplefilter("ignore", FbaWarning)
-        info = probe_input(file, reading, face=face)
-    clips = list_clips(file, info.format, reading.limit)
+    if reader.read_face is not None:
+        return _report_face(path, file, reader, reading, face, printed=printed)
+    info = probe_input(file, reading)
+    clips = () if reader.list_clips is None else reader.list_clips(file, limits=reading.limit)
     steps = ""
     if info.format == "fba" and info.body is not None:
         data = file.read_bytes()
@@ -114,10 +98,42 @@ def _report(path: Path, file: Path, reading: Reading, face: str | None, *, print
             step_tables.warn_of_doubtful_stream(path, data, reading.bap_steps)
     if printed:
         _print(path, info, clips, steps)
-        _print_capture(capture)
     report = {"file": str(path), **info.to_dict(), "bap_steps_choice": steps or None}
-    report |= {"clips": [asdict(clip) for clip in clips]} if clips else {}
-    return report | ({"capture": capture} if capture is not None else {})
+    return report | ({"clips": [asdict(clip) for clip in clips]} if clips else {})
+
+
+def _report_face(
+    path: Path, file: Path, reader: Format, reading: Reading, face: str | None, *, printed: bool
+) -> dict[str, Any]:
+    """Return the content of the capture of a face; see `_report`."""
+    from fba.capture import MarkerMotion, make_animation
+    from fba.capture.markers.summary import summarise
+    from fba.codec import StreamInfo
+
+    assert reader.read_face is not None  # or there were no face
+    size, limits = file.stat().st_size, reading.limit
+    given = {"source_rate": reading.source_rate, "face": face}
+    captured = reader.read_face(file, limits=limits, **taken_options(given, reader.face_options))
+    if isinstance(captured, MarkerMotion):
+        markers = summarise(captured)
+        if printed:
+            click.echo(f"{path}: {reader.name.upper()}, {size} bytes")
+            _print_markers(markers)
+        return {"file": str(path), "format": reader.name, "size": size, "markers": markers}
+    capture = captured.describe()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)  # the description has them
+        animation = make_animation(captured, path=file, limits=limits).animation
+    info = StreamInfo.of_animation(animation, reader.name, size)
+    if printed:
+        _print(path, info, (), "")
+        if capture["kind"] == "points":
+            _print_points(capture)
+        else:
+            _print_shapes(capture)
+        for finding in capture["findings"]:
+            click.echo(f"  found    {finding}")
+    return {"file": str(path), **info.to_dict(), "bap_steps_choice": None, "capture": capture}
 
 
 def _trace(path: Path, *, bap_steps: BapTableOrAuto, as_json: bool, values: bool) -> None:
@@ -145,23 +161,15 @@ def _print_person(path: Path, size: int, person: PersonInfo) -> None:
     click.echo(f"  motion   none; show one on it: fba play MOTION --body {path}")
 
 
-def _summarise_markers(face: FaceCapture) -> dict[str, Any] | None:
-    """Return what a capture of markers holds, which may be no face; None for other captures."""
-    from fba.capture import MarkerMotion
-    from fba.capture.markers.summary import summarise
-
-    return summarise(face) if isinstance(face, MarkerMotion) else None
-
-
 def _print_markers(capture: Mapping[str, Any]) -> None:
-    """Print what is in a capture of markers, as `fba.capture.markers.summary` says it."""
+    """Print the summary of a capture of markers, see `fba.capture.markers.summary`."""
     start = f" from {clock_text(capture['start'])}" if capture["start"] is not None else ""
     click.echo(
         f"  time     {capture['frames']} frames, {seconds_text(capture['seconds'])} at "
         f"{rate_text(Fraction(capture['rate']))} frames/s{start}"
     )
     markers = capture["markers"]
-    names = ", ".join(markers[:SHOWN]) + (", ..." if len(markers) > SHOWN else "")
+    names = ", ".join(markers[:NAMED]) + (", ..." if len(markers) > NAMED else "")
     unit = f", in {capture['unit']}" if capture["unit"] else ", unit not given"
     up = f", {capture['up']} up" if capture["up"] else ""
     click.echo(f"  markers  {len(markers)}{unit}{up}: {names}")
@@ -205,13 +213,8 @@ def _print(path: Path, info: StreamInfo, clips: tuple[ClipInfo, ...], steps: str
         click.echo(f"  damage   {damage}")
 
 
-def _print_capture(capture: Mapping[str, Any] | None) -> None:
-    """Print what is in the capture of a face, as its reader describes it."""
-    if capture is None:
-        return
-    if capture["kind"] == "points":
-        _print_points(capture)
-        return
+def _print_shapes(capture: Mapping[str, Any]) -> None:
+    """Print the description of a capture of blendshapes or action units."""
     count, still = len(capture["shapes"]), len(capture["still"])
     moving = f", {still} of which never move" if still else ""
     unseen = f", {capture['unseen']} of them without a face" if capture["unseen"] else ""
@@ -219,27 +222,20 @@ def _print_capture(capture: Mapping[str, Any] | None) -> None:
     turns = [what for what, turns in capture["angles"].items() if turns]
     click.echo(f"  capture  {capture['rows']} rows{unseen}, {capture['seconds']:.2f} s{start}")
     click.echo(f"  {capture['kind']:8} {count}{moving}; angles of {' and '.join(turns) or 'nothing'}")
-    for finding in capture["findings"]:
-        click.echo(f"  found    {finding}")
 
 
 def _print_points(capture: Mapping[str, Any]) -> None:
-    """Print what is in a capture of tracked points."""
+    """Print the description of a capture of tracked points."""
     unseen = f", {capture['unseen']} of them without a face" if capture["unseen"] else ""
     click.echo(f"  capture  {capture['rows']} rows{unseen}, {capture['seconds']:.2f} s")
     depth = {"none": "without depth", "relative": "with depth", "metres": "in three dimensions, in metres"}
     click.echo(f"  points   {capture['points']} {depth[capture['depth']]}")
-    for finding in capture["findings"]:
-        click.echo(f"  found    {finding}")
 
 
 def _part_text(part: PartInfo, kind: str, frames: int) -> str:
     count = len(part.parameters)
-    text = (
-        f"{count} {kind}{'s' if count != 1 else ''}: {_span_text(part.parameters)}"
-        if count
-        else f"no {kind}s"
-    )
+    plural = "" if count == 1 else "s"
+    text = f"{count} {kind}{plural}: {_span_text(part.parameters)}" if count else f"no {kind}s"
     if part.frames != frames:
         text += f"; in {part.frames} frames"
     if part.quants:

@@ -12,34 +12,27 @@ import click
 
 from fba.choices import Assignment, Gaze, Overlap, UpAxis
 from fba.cli import options
-from fba.cli.command import Command, examples, usage_errors
+from fba.cli.command import Command, examples, option_errors, usage_errors
 from fba.cli.inputs import Reading
-from fba.cli.joint_options import Maps, MapType
-from fba.cli.marker_options import Neutral, neutral_option
+from fba.cli.map_options import MAP, Maps, Neutral, files_of, neutral_option, split_maps
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import (
-    STANDARD,
-    Output,
-    Outputs,
-    display_name,
-    further_output_option,
-    output_option,
-)
+from fba.cli.outputs import STANDARD, Output, Outputs, display_name, further_output_option, output_option
 from fba.cli.printing import Progress
-from fba.errors import FbaWarning, ModelError, OptionError
+from fba.errors import FbaWarning, ModelError
 
 if TYPE_CHECKING:
     from fba.capture import MarkerMotion
     from fba.capture.virtual_markers import MarkedHead, MarkerMapping
     from fba_player.scene.marker_editing import MarkerEditing
-    from fba_player.scene.markers_scene import MarkersScene
 
-PICTURES, FILMS, OTHERS = (".png", ".jpg", ".jpeg"), (".mp4", ".gif"), (".glb", ".toml")
+PICTURES = (".png", ".jpg", ".jpeg")
+FILMS = (".mp4", ".gif")
+UNDRAWN = (".glb", ".toml")
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Tuning:
-    """What changes a mapping; None keeps what it says."""
+    """Changes of a mapping; None keeps a value."""
 
     assignment: Assignment | None = option(
         help="A vertex belongs to all markers in whose reach it is, or to the nearest alone. Default: as the "
@@ -72,15 +65,15 @@ class _Tuning:
 
 @dataclass(frozen=True, kw_only=True)
 class _Drawing:
-    """How a picture or a film is drawn."""
+    """Options of a picture or a film."""
 
     cloud: Literal["beside", "over", "none"] | None = option(
         help="Where a picture or film shows the markers themselves. Default: beside."
     )
     camera: Literal["front", "three-quarter", "profile"] = option(default="front")
-    time: float | None = option(type=options.MomentType(), metavar="SECONDS", help="For a picture: its time.")
-    start: float | None = option(type=options.MomentType(), metavar="SECONDS", help="For a film: start time.")
-    end: float | None = option(type=options.MomentType(), metavar="SECONDS", help="For a film: end time.")
+    time: float | None = option(type=options.MOMENT, metavar="SECONDS", help="For a picture: its time.")
+    start: float | None = option(type=options.MOMENT, metavar="SECONDS", help="For a film: start time.")
+    end: float | None = option(type=options.MOMENT, metavar="SECONDS", help="For a film: end time.")
     rate: Fraction | None = options.rate_option(
         "Frame rate of a film. Default: the capture's own, or a whole fraction of it."
     )
@@ -100,7 +93,7 @@ class _Request:
     maps: Maps = option(
         "--map",
         default=(),
-        type=MapType(),
+        type=MAP,
         multiple=True,
         metavar="FILE.toml|MARKER=PLACE",
         help="A saved mapping, in place of the proposed one. Or where a marker is: a feature point, "
@@ -123,11 +116,6 @@ class _Request:
     marker: str | None = option(metavar="NAME", help="Marker whose reach is shown in colours.")
     drawing: _Drawing
     reading: Reading = group("format", "limit")
-
-    @property
-    def saved(self) -> list[Path]:
-        """The mappings among the maps."""
-        return [each for each in self.maps if isinstance(each, Path)]
 
 
 @click.command(
@@ -176,9 +164,14 @@ def command(request: _Request) -> None:
             f"--marker {marker}: the capture has no such marker; it has {list_names(motion.names)}"
         )
     if output is None:
-        default = request.saved[0] if request.saved else Path(f"{capture.stem}.virtual.toml")
-        editing = _edit(motion, head, mapping, request, request.map_out or default)
-        _show(editing, capture.name, request.drawing.size)
+        from fba_player.window.map_markers import map_markers
+
+        saved, _ = split_maps(request.maps, "mapping")
+        path = request.map_out or saved or Path(f"{capture.stem}.virtual.toml")
+        editing = _edit(motion, head, mapping, request, path)
+        map_markers(editing, capture.name, size=request.drawing.size or (1280, 800))
+        if editing.written:
+            click.echo(f"{editing.path}: {_count(editing.mapping)}")
     elif output.suffix.lower() == ".toml":
         _write_mapping(mapping, head, output, outputs)
     else:
@@ -199,7 +192,7 @@ def _write_moved(
     from fba.capture.virtual_markers import move_head
 
     with Progress("preparing", None):
-        performance = move_head(motion, head, mapping, request.neutral)  # says what is wrong or odd
+        performance = move_head(motion, head, mapping, request.neutral)
     if output.suffix.lower() == ".glb":
         from fba.formats.gltf.moved_head import write_moved_head
 
@@ -212,7 +205,16 @@ def _write_moved(
     scene = MarkersScene(_edit(motion, head, mapping, request, None), request.capture.name)
     scene.place_cloud(request.drawing.cloud or "beside")
     scene.shows_current = request.marker is not None
-    _draw(scene, output, outputs, request.drawing)
+    drawing = request.drawing
+    from fba_player.export.render import picture_size, render
+
+    with outputs.file(output) as file, Progress("rendering", None) as step, usage_errors():
+        render(
+            scene, file, camera=drawing.camera, time=drawing.time, start=drawing.start, end=drawing.end,
+            rate=drawing.rate, size=drawing.size, progress=step.show,
+        )  # fmt: skip
+    wide, high = picture_size(drawing.size, output)
+    outputs.say(f"{display_name(output)}: {wide}x{high}")
 
 
 def _check_options(output: Path | None, drawing: _Drawing) -> None:
@@ -222,7 +224,7 @@ def _check_options(output: Path | None, drawing: _Drawing) -> None:
     suffix = "" if output is None else output.suffix.lower()
     if output == STANDARD:
         raise click.UsageError("--output -: give the name of a file")
-    if output is not None and suffix not in (*PICTURES, *FILMS, *OTHERS):
+    if output is not None and suffix not in (*PICTURES, *FILMS, *UNDRAWN):
         raise click.UsageError(
             f"--output {output}: name a picture ({', '.join(PICTURES)}), a film ({', '.join(FILMS)}), a head "
             "with its animation (.glb) or a mapping (.toml)"
@@ -232,7 +234,7 @@ def _check_options(output: Path | None, drawing: _Drawing) -> None:
             continue
         if output is None and name != "--size":
             raise click.UsageError(f"{name} is for a picture or a film: give -o FILE.png or .mp4")
-        if suffix in OTHERS:
+        if suffix in UNDRAWN:
             raise click.UsageError(f"{name} is for a picture or a film, not for {output}")
         if name in films and suffix in PICTURES:
             raise click.UsageError(f"{name} is for a film; a picture has a --time")
@@ -242,9 +244,8 @@ def _check_options(output: Path | None, drawing: _Drawing) -> None:
 
 def _outputs(request: _Request) -> Outputs:
     """Return the files to write; click.UsageError for names of other kinds, and for several mappings."""
-    output, map_out, saved = request.output, request.map_out, request.saved
-    if len(saved) > 1:
-        raise click.UsageError("--map: give one mapping at most; pairs change what it says")
+    output, map_out = request.output, request.map_out
+    split_maps(request.maps, "mapping")
     if map_out == STANDARD:
         raise click.UsageError("--map-out -: give the name of a file")
     if map_out is not None and map_out.suffix.lower() != ".toml":
@@ -254,7 +255,7 @@ def _outputs(request: _Request) -> Outputs:
     written = [Output("--output", output)] if output is not None else []
     if output is not None and map_out is not None:
         written.append(Output("--map-out", map_out, text=True))
-    inputs = [request.capture, request.head, request.points, *saved]
+    inputs = [request.capture, request.head, request.points, *files_of(request.maps)]
     return Outputs(written, inputs, no_clobber=request.no_clobber)
 
 
@@ -268,7 +269,7 @@ def _read_capture(path: Path, reading: Reading) -> MarkerMotion:
     if reader.has_markers and reader.read_face is not None:
         motion = reader.read_face(path, limits=reading.limit)
     if not isinstance(motion, MarkerMotion):
-        readers = ", ".join(one.name for one in formats() if one.has_markers)
+        readers = ", ".join(each.name for each in formats() if each.has_markers)
         raise click.UsageError(
             f"{path} is {reader.name.upper()}, which has no markers; these have: {readers}"
         )
@@ -278,15 +279,14 @@ def _read_capture(path: Path, reading: Reading) -> MarkerMotion:
 
 
 def _find_mapping(motion: MarkerMotion, head: MarkedHead, request: _Request) -> MarkerMapping:
-    """Return the mapping of `--map`, else the proposed one, changed by pairs.
+    """Return the mapping of `--map`, or else the proposed mapping, changed by pairs.
 
-    It is an error if none can be proposed, but for a window, which may begin without.
+    A mapping that cannot be proposed is an error for a file, and a warning for a window, where it is made.
     """
     from fba.capture.markers.marker_maps import change_map
     from fba.capture.virtual_markers import MarkerMapping, propose_mapping, read_mapping
 
-    saved = request.saved
-    pairs = dict(each for each in request.maps if not isinstance(each, Path))
+    saved, pairs = split_maps(request.maps, "mapping")
     places = {name: place for name, place in pairs.items() if place and not place.isdecimal()}
     missing = [name for name in pairs if name not in motion.names]
     if missing:
@@ -295,24 +295,23 @@ def _find_mapping(motion: MarkerMotion, head: MarkedHead, request: _Request) -> 
         raise click.UsageError(
             f"--map: the capture has no marker {list_names(missing)}; it has {list_names(motion.names)}"
         )
-    if saved and places:
+    if saved is not None and places:
         name, place = next(iter(places.items()))
         raise click.UsageError(f"--map {name}={place}: with a saved mapping, give a vertex: {name}=1234")
-    mapping = MarkerMapping()
-    if saved:
-        mapping = read_mapping(saved[0], limits=request.reading.limit)
+    if saved is not None:
+        mapping = read_mapping(saved, limits=request.reading.limit)
         mapping.check(head)
         mapping.check_names(motion.names)
-    try:
-        if not saved:
-            found = change_map(motion, None, places) if places else None
-            mapping = propose_mapping(motion, head, found)
-    except OptionError as error:
-        raise click.UsageError(f"--map: {error}") from error
-    except ModelError as error:
-        if request.output is not None:
-            raise
-        warnings.warn(str(error), FbaWarning, stacklevel=2)
+    else:
+        mapping = MarkerMapping()
+        try:
+            with option_errors("--map: "):
+                changed = change_map(motion, None, places) if places else None
+                mapping = propose_mapping(motion, head, changed)
+        except ModelError as error:
+            if request.output is not None:
+                raise
+            warnings.warn(str(error), FbaWarning, stacklevel=2)
     for name, vertex in pairs.items():
         if name not in places:
             mapping = _put(mapping, head, name, vertex)
@@ -320,7 +319,7 @@ def _find_mapping(motion: MarkerMotion, head: MarkedHead, request: _Request) -> 
 
 
 def _put(mapping: MarkerMapping, head: MarkedHead, name: str, vertex: str) -> MarkerMapping:
-    """Return a mapping with a marker on a vertex, "" to take it away."""
+    """Return a mapping with a marker on a vertex, or without the marker for ""."""
     from fba.capture.virtual_markers import VirtualMarker
     from fba.capture.virtual_markers.lids import lid_at
     from fba.capture.virtual_markers.proposal import usual_radius
@@ -350,13 +349,9 @@ def _count(mapping: MarkerMapping) -> str:
 
 
 def _edit(
-    motion: MarkerMotion,
-    head: MarkedHead,
-    mapping: MarkerMapping,
-    request: _Request,
-    path: Path | None,
+    motion: MarkerMotion, head: MarkedHead, mapping: MarkerMapping, request: _Request, path: Path | None
 ) -> MarkerEditing:
-    """Return the mapping to be edited. path: where it is saved; None for pictures."""
+    """Return a mapping for editing. path: where it is saved; None for pictures."""
     from fba_player.scene.marker_editing import MarkerEditing
 
     editing = MarkerEditing(motion, head, mapping, path, neutral=request.neutral)
@@ -365,35 +360,3 @@ def _edit(
     elif path is None:
         editing.shows_weights = False
     return editing
-
-
-def _show(editing: MarkerEditing, title: str, size: tuple[int, int] | None) -> None:
-    from fba_player.window.map_markers import map_markers
-
-    map_markers(editing, title, size=size or (1280, 800))
-    if editing.written:
-        click.echo(f"{editing.path}: {_count(editing.mapping)}")
-
-
-def _draw(
-    scene: MarkersScene,
-    output: Path,
-    outputs: Outputs,
-    drawing: _Drawing,
-) -> None:
-    from fba_player.export.render import picture_size, render
-
-    with outputs.file(output) as file, Progress("rendering", None) as step, usage_errors():
-        render(
-            scene,
-            file,
-            camera=drawing.camera,
-            time=drawing.time,
-            start=drawing.start,
-            end=drawing.end,
-            rate=drawing.rate,
-            size=drawing.size,
-            progress=step.show,
-        )
-    wide, high = picture_size(drawing.size, output)
-    outputs.say(f"{display_name(output)}: {wide}x{high}")

@@ -13,11 +13,13 @@ import click
 from fba.choices import Adaptation, UpAxis
 from fba.cli import options
 from fba.cli.command import Group, examples
+from fba.cli.inputs import read_model
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import (
     STANDARD,
     Output,
     Outputs,
+    check_glb,
     display_name,
     further_output_option,
     output_option,
@@ -69,7 +71,7 @@ class _Mesh:
     )
 
     def options(self) -> dict[str, Any]:
-        """Return arguments of `import_model`; click.UsageError for a kind that does not exist."""
+        """Return arguments of `import_model`; click.UsageError for an unknown kind."""
         from fba.face.model import PART_KINDS
 
         kinds = {}
@@ -111,19 +113,11 @@ command.add_command(model_learn_fit.command)
 
 
 def _read_or_default(file: Path | None, default: bool) -> FaceModel:
-    if (file is None) != default:
-        raise click.UsageError("give either the FILE of a face model, or --default for the built-in head")
-    return _read(file)
-
-
-def _read(file: Path | None) -> FaceModel:
     from fba.face import FaceModel
 
-    if file is None:
-        return FaceModel.default()
-    from fba.face.importers import import_model
-
-    return import_model(file)
+    if (file is None) != default:
+        raise click.UsageError("give either the FILE of a face model, or --default for the built-in head")
+    return read_model(file) or FaceModel.default()
 
 
 @command.command(
@@ -329,8 +323,7 @@ def fit(
     no_clobber: bool = options.no_clobber_option,
     base: Path | None = options.model_option("Face model to fit. Default: the built-in head.", "--model"),
     unit: str | None = option(
-        metavar="mm|cm|m|in",
-        help="Unit of POINTS, or metres for one unit. Default: estimated from the size.",
+        metavar="mm|cm|m|in", help="Unit of POINTS, or metres for one unit. Default: estimated from the size."
     ),
     tables: Adaptation = option(
         default="auto",
@@ -344,19 +337,20 @@ def fit(
     POINTS is an FDP, CSV or JSON file in any unit and pose. Missing points are mirrored from the other side,
     or follow the points around them. Of an Xface file without its mesh, the distances are used.
     """
+    from fba.face import FaceModel
     from fba.face.calibration import fit as fitted
 
     outputs = _outputs(output, [points, base], no_clobber=no_clobber)
     scale = _parse_unit(unit)
     with Progress("fitting", None):
-        model = _read(base)
+        model = read_model(base) or FaceModel.default()
         wanted = _read_points(points, model)
         face = fitted(model, wanted, unit=scale, tables=tables, name=name or points.stem)
     _write(face, output, outputs)
 
 
 def _read_points(path: Path, model: FaceModel) -> Float64:
-    """Return feature points of a file; for an Xface file without its mesh, those that its distances imply."""
+    """Return the feature points of a file; of an Xface file without its mesh, points with its distances."""
     from fba.face.importers.points.fdp import read_fdp
     from fba.face.importers.points.points_file import read_points
     from fba.face.importers.points.xface import xface_points
@@ -398,16 +392,14 @@ def _parse_unit(text: str | None) -> str | float | None:
 def _outputs(
     output: Path, inputs: list[Path | None], *, no_clobber: bool, sheet: Path | None = None
 ) -> Outputs:
-    """Return the outputs; click.UsageError also for a suffix other than .glb, or of no picture."""
+    """Return the outputs; click.UsageError also for suffixes other than .glb, and those of pictures."""
     written = [Output("--output", output)]
     if sheet is not None:
         if sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
             raise click.UsageError(f"--sheet {sheet}: a sheet is a picture, .png or .jpg")
         written.append(Output("--sheet", sheet))
     outputs = Outputs(written, inputs, no_clobber=no_clobber)
-    if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
-        name = output.with_suffix(".glb").name
-        raise click.UsageError(f"--output {output}: face models are written as glTF; name it {name}")
+    check_glb(output)
     return outputs
 
 

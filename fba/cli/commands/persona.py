@@ -13,17 +13,9 @@ from fba.choices import Means
 from fba.cli import options
 from fba.cli.command import Group, examples
 from fba.cli.inputs import input_file
-from fba.cli.marker_options import aspect_option
+from fba.cli.map_options import aspect_option
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import (
-    TEXT_FORMATS,
-    Output,
-    Outputs,
-    display_name,
-    find_writer,
-    further_output_option,
-    output_option,
-)
+from fba.cli.outputs import Output, Outputs, display_name, find_writer, further_output_option, output_option
 from fba.cli.printing import print_json
 from fba.limits import Limits
 
@@ -31,25 +23,20 @@ if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.persona import Persona, TrackedFace
 
-REPORTS = (".html",)
+
+def _parse_span(text: str) -> tuple[float, float]:
+    first, _, last = text.partition("-")
+    try:
+        span = float(first), float(last)
+    except ValueError:
+        raise ValueError(f"{text!r} is no span of seconds; expected for example 0.5-1.5") from None
+    if not 0 <= span[0] < span[1] < float("inf"):
+        raise ValueError(f"{text!r}: expected FROM-TO, and TO after FROM")
+    return span
 
 
-class SpanType(click.ParamType[tuple[float, float]]):
-    """A part of a recording, FROM-TO in seconds."""
-
-    name = "seconds"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        first, _, last = str(value).partition("-")
-        try:
-            span = float(first), float(last)
-        except ValueError:
-            self.fail(f"{value!r} is no span of seconds; expected for example 0.5-1.5", param, ctx)
-        if not 0 <= span[0] < span[1] < float("inf"):
-            self.fail(f"{value!r}: expected FROM-TO, and TO after FROM", param, ctx)
-        return span
+SPAN = options.TextType("seconds", _parse_span)
+"""A part of a recording, FROM-TO in seconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +44,7 @@ class _Tracking:
     """How recordings of tracked points are read."""
 
     neutral: tuple[float, float] | None = option(
-        type=SpanType(),
+        type=SPAN,
         metavar="FROM-TO",
         help="Seconds of each recording in which the face rests; default: the first second.",
     )
@@ -65,7 +52,7 @@ class _Tracking:
         "Width and height of the picture, 16:9 or 1920x1080; default: what makes the points a face."
     )
     source_rate: Fraction | None = option(
-        "--source-fps", type=options.RateType(), metavar="RATE",
+        "--source-fps", type=options.RATE, metavar="RATE",
         help="Frame rate of recordings that do not say theirs.",
     )  # fmt: skip
     face: str | None = options.face_option
@@ -77,17 +64,13 @@ class _Tracking:
 
         with input_file(path) as file:
             return read_recording(
-                file,
-                source_rate=self.source_rate,
-                face=self.face,
-                aspect=self.aspect,
-                limits=self.limit,
+                file, source_rate=self.source_rate, face=self.face, aspect=self.aspect, limits=self.limit
             )
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Performer:
-    """Whose Personas are used, and how."""
+    """The Personas of actor and user, and their use."""
 
     persona_file: Path | None = option(
         "--persona", type=options.EXISTING, metavar="FILE.persona", help="The actor's way."
@@ -131,8 +114,7 @@ def command() -> None:
 
 
 @command.command(
-    "learn",
-    epilog=examples("fba persona learn scene1.csv scene2.csv -o actor.persona --report actor.html"),
+    "learn", epilog=examples("fba persona learn scene1.csv scene2.csv -o actor.persona --report actor.html")
 )
 @click.argument("actors", metavar="ACTOR...", nargs=-1, required=True, type=options.EXISTING)
 @with_options
@@ -158,8 +140,8 @@ def learn_command(
     The face rests at the start of each film for a second, or where --neutral says, and looks into the camera:
     frames in which the head is turned by more than 30 degrees are left out.
     """
-    if report is not None and report.suffix.lower() not in REPORTS:
-        raise click.UsageError(f"--report writes {', '.join(REPORTS)} files, not {report.name}")
+    if report is not None and report.suffix.lower() != ".html":
+        raise click.UsageError(f"--report writes .html files, not {report.name}")
     written = [Output("--output", output)]
     if report is not None:
         written.append(Output("--report", report, text=True))
@@ -230,15 +212,10 @@ def play_command(
         raise click.UsageError("--user goes with --persona")
     writing = find_writer(output, to)
     inputs = (file, performer.persona_file, performer.user_file)
-    outputs = Outputs(
-        [Output("--output", output, writing.name in TEXT_FORMATS)], inputs, no_clobber=no_clobber
-    )
-    from fba.formats import write
-
+    outputs = Outputs([Output.of_format("--output", output, writing)], inputs, no_clobber=no_clobber)
     persona, animation = performer.play(file, tracking)
     extra: dict[str, Any] = {"clamp": True} if writing.name == "fba" else {}
-    with outputs.file(output) as target:
-        write(target, animation, format=writing.name, **extra)
+    outputs.write_animation(output, animation, writing, **extra)
     whose = "the user's own way" if persona is None else f"the way of {persona.name}"
     outputs.say(f"{display_name(output)}: {len(animation)} frames in {whose}")
 
@@ -251,7 +228,7 @@ def _load(path: Path, limits: Limits) -> Persona:
 
 
 def _describe(persona: Persona) -> dict[str, Any]:
-    """Return what a Persona holds, for programs."""
+    """Return the content of a Persona, for programs."""
     from fba.persona.motion import describe_motion
 
     missing = _missing(persona)
@@ -278,7 +255,7 @@ def _missing(persona: Persona) -> dict[str, list[str]]:
 
 
 def _lines(persona: Persona) -> list[str]:
-    """Return a line for each part: classes, masks, and what is missing; and lines for the motion."""
+    """Return lines about the parts (counts of classes and masks, missing classes) and about the motion."""
     from fba.persona.motion import describe_motion
 
     lines = []

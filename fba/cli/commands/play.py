@@ -1,4 +1,4 @@
-"""`fba play`: a window that shows files, or a stream while it arrives."""
+"""`fba play`: a window with files, or with a stream while it arrives."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fba.cli import options, scene_options
+from fba.cli import options, scenes
 from fba.cli.command import Command, examples
 from fba.cli.inputs import ReadFile
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.scene_options import MOST, SceneOptions, SoundOptions, check_files
+from fba.cli.scenes import MOST_FILES, SceneOptions, SoundOptions, check_files
 from fba.parameters import BAP_STEPS_DEFAULT
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class _Window:
         "fba play --model face.glb",
     ),
 )
-@scene_options.files_argument
+@scenes.files_argument
 @with_options
 def command(
     files: tuple[Path, ...],
@@ -55,7 +55,7 @@ def command(
         "differs.",
     ),
     start: float | None = option(
-        type=options.MomentType(), metavar="SECONDS", help="Start time, in the file's own times."
+        type=options.MOMENT, metavar="SECONDS", help="Start time, in the file's own times."
     ),
     paused: bool = option(default=False, help="Start paused; the space key plays."),
     how: SceneOptions = group(
@@ -71,8 +71,8 @@ def command(
     Without a display, use `fba render`.
     """
     if len(files) < 2 and compare:
-        one = f"; {files[0]} is one" if files else ""
-        raise click.UsageError(f"--compare needs two files or more{one}")
+        single = f"; {files[0]} is one" if files else ""
+        raise click.UsageError(f"--compare needs two files or more{single}")
     check_files(files, how, sound, "window")
     if [str(file) for file in files].count("-") > 1:
         raise click.UsageError("standard input (-) can be shown once")
@@ -82,14 +82,14 @@ def command(
         raise click.UsageError("give a file to play, or a --model or --body to move by hand")
     from fba import player
 
-    player.check_display()  # before anything that takes long
+    player.check_display()  # before work that takes long
     if not files:
         dropped = _puppet(how, window.size)
     else:
         dropped = _play(files, how, sound, window, compare=compare, start=start, paused=paused)
     while dropped:
         beside = SoundOptions(no_audio=sound.no_audio)
-        dropped = _play(dropped[:MOST], replace(how, arrange=None), beside, window)
+        dropped = _play(dropped[:MOST_FILES], replace(how, arrange=None), beside, window)
 
 
 def _play(
@@ -102,17 +102,16 @@ def _play(
     start: float | None = None,
     paused: bool = False,
 ) -> tuple[Path, ...]:
-    """Play files in a window; return those that were dropped onto it."""
+    """Play files in a window; return the files that were dropped onto it."""
     from fba import player
-    from fba.cli import scene_loading
 
-    audio = scene_loading.find_sound(files, sound, "played without sound")
+    audio = scenes.find_sound(files, sound, "played without sound")
     streams: list[LiveAnimation] = []
     whole: list[ReadFile] = []
     try:
         animations: list[Animation | LiveAnimation] = []
         for file in files:
-            opened = scene_loading.open_file(file, how)
+            opened = scenes.open_file(file, how)
             if isinstance(opened, ReadFile):
                 animations.append(opened.animation)
                 whole.append(opened)
@@ -121,15 +120,13 @@ def _play(
                 streams.append(opened)
         names = [
             animation.name if name == "-" else name
-            for name, animation in zip(scene_loading.display_names(files), animations, strict=True)
+            for name, animation in zip(scenes.display_names(files), animations, strict=True)
         ]
-        scene = scene_loading.build_scene(animations, names, how, over=compare)
-        tables = [one.table for one in whole if one.table is not None]
-        doubts = [one.doubt for one in whole if one.doubt is not None]
+        scene = scenes.build_scene(animations, names, how, over=compare)
+        tables = [read.table for read in whole if read.table is not None]
+        doubts = [read.doubt for read in whole if read.doubt is not None]
         _check_start(scene, start, growing=bool(streams))
-        single = (
-            len(files) == 1 and not streams and str(files[0]) != "-" and not scene_loading.is_pipe(files[0])
-        )
+        single = len(files) == 1 and not streams and str(files[0]) != "-" and not scenes.is_pipe(files[0])
         return player.play(
             scene,
             title=" | ".join(names),
@@ -155,13 +152,12 @@ def _play(
 
 
 def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:
-    """Open a window with a neutral figure and sliders that move it; return files dropped onto it."""
+    """Open a window with a neutral figure and sliders that move it; return the files dropped onto it."""
     from fba import player
-    from fba.cli import scene_loading
     from fba_player.session.performer import neutral
 
     title = " ".join(file.name for file in (how.model, how.body) if file is not None)
-    scene = scene_loading.build_scene([neutral(body=how.body is not None)], [title], how)
+    scene = scenes.build_scene([neutral(body=how.body is not None)], [title], how)
     return player.play(
         scene, title=title, size=size, camera=how.camera, loop=True, paused=True, panels=("puppet",)
     )

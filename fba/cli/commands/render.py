@@ -7,18 +7,18 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
-from fba.cli import options, scene_options
+from fba.cli import options, scenes
 from fba.cli.command import Command, examples, usage_errors
 from fba.cli.inputs import read_input, read_model
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
 from fba.cli.pose_options import Pose, still_animation
 from fba.cli.printing import Progress
-from fba.cli.scene_options import SceneOptions, SoundOptions, check_files
+from fba.cli.scenes import SceneOptions, SoundOptions, check_files
 
 if TYPE_CHECKING:
     from fba_player.export.image_files import Numbered
@@ -27,36 +27,35 @@ if TYPE_CHECKING:
 SHEETS = ("faps", "visemes", "expressions", "all")
 
 
-class SheetType(click.ParamType[str | int]):
-    """What is on a contact sheet: one of the kinds, or how many frames of a file."""
+def _parse_sheet(text: str) -> str | int:
+    if text in SHEETS:
+        return text
+    if not text.isdecimal() or not 0 < int(text[:9]) <= 10_000:
+        kinds = ", ".join(f"{kind!r}" for kind in SHEETS)
+        raise ValueError(f"{text!r} is neither a number of frames nor one of {kinds}")
+    return int(text)
 
-    name = "sheet"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str | int:
-        if value in SHEETS:
-            return str(value)
-        if not str(value).isdecimal() or not 0 < int(str(value)[:9]) <= 10_000:
-            kinds = ", ".join(f"{kind!r}" for kind in SHEETS)
-            self.fail(f"{value!r} is neither a number of frames nor one of {kinds}", param, ctx)
-        return int(value)
+SHEET = options.TextType("sheet", _parse_sheet)
+"""The content of a contact sheet: one of the kinds, or a count of frames of a file."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Moment:
-    """Which frames are drawn: of a picture, one by its number or time; of a film, a span."""
+    """The frames that are drawn: of a picture, a frame by number or time; of a film, a span."""
 
     frame: int | None = option(help="For a picture: number of the frame; -1 is the last.")
-    time: float | None = option(type=options.MomentType(), metavar="SECONDS", help="For a picture: its time.")
+    time: float | None = option(type=options.MOMENT, metavar="SECONDS", help="For a picture: its time.")
     start: float | None = option(
-        type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: start time."
+        type=options.MOMENT, metavar="SECONDS", help="For a film or a sheet: start time."
     )
     end: float | None = option(
-        type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: end time."
+        type=options.MOMENT, metavar="SECONDS", help="For a film or a sheet: end time."
     )
 
     @property
     def is_one(self) -> bool:
-        """Whether one frame is named."""
+        """Whether a single frame is named."""
         return self.frame is not None or self.time is not None
 
 
@@ -85,7 +84,7 @@ class _Request:
     pose: Pose
     sheet: str | int | None = option(
         "--contact-sheet",
-        type=SheetType(),
+        type=SHEET,
         metavar="N|" + "|".join(SHEETS),
         help="With a file: N of its frames, at even intervals, on one sheet. Without: all FAPs, visemes or "
         "expressions. --size is that of one picture.",
@@ -122,7 +121,7 @@ class _Request:
         "fba render talk.fba -o - --to gif > talk.gif",
     ),
 )
-@scene_options.files_argument
+@scenes.files_argument
 @with_options
 def command(request: _Request) -> None:
     """Render files, or a face in a given pose, to a picture, numbered pictures, or a film (MP4 or GIF).
@@ -131,7 +130,7 @@ def command(request: _Request) -> None:
     """
     target = _plan(request)
     if isinstance(request.sheet, str):
-        _draw_kinds(request, request.sheet, target)
+        _draw_kinds(request, target)
     else:
         _draw_scene(request, target)
 
@@ -168,7 +167,7 @@ def _plan(request: _Request) -> _Target:
 
 
 def _check_still(request: _Request, given: list[str]) -> None:
-    """Raise click.UsageError for options that need a file. given: those that say which face is shown."""
+    """Raise click.UsageError for options that need a file. given: the options that describe a face."""
     how, moment = request.how, request.moment
     if isinstance(request.sheet, int):
         raise click.UsageError(f"--contact-sheet {request.sheet} shows frames of a file: give one")
@@ -186,30 +185,27 @@ def _check_still(request: _Request, given: list[str]) -> None:
             raise click.UsageError(f"{name} goes with a file; {shown} makes a single picture")
 
 
-def _draw_kinds(request: _Request, sheet: str, target: _Target) -> None:
+def _draw_kinds(request: _Request, target: _Target) -> None:
     """Write a sheet of FAPs, visemes or expressions."""
-    model = request.how.model
-    outputs = target.outputs([model], request.writing)
+    outputs = target.outputs([request.how.model], request.writing)
     with target.file(outputs) as name:
-        made = _kinds_sheet(sheet, Path(name), model, request.size)
+        made = _sheet(request, Path(name))
     outputs.say(f"{display_name(target.path)}: {made}")
 
 
 def _draw_scene(request: _Request, target: _Target) -> None:
     """Write a picture, a film, or a sheet of frames, of the files or of a face in a pose."""
-    from fba.cli import scene_loading
-
     files, how, sound = request.files, request.how, request.sound
     mp4 = target.suffix == ".mp4"
-    audio = scene_loading.find_sound(files, sound, "the film has no sound") if mp4 else None
+    audio = scenes.find_sound(files, sound, "the film has no sound") if mp4 else None
     outputs = target.outputs([*files, how.model, how.body, audio], request.writing)
     with Progress("preparing", None):
         animations = [read_input(file, how) for file in files]
-        names = scene_loading.display_names(files) or [""]
-        scene = scene_loading.build_scene(animations or [still_animation(request.pose)], names, how)
+        names = scenes.display_names(files) or [""]
+        scene = scenes.build_scene(animations or [still_animation(request.pose)], names, how)
     with target.file(outputs) as name:
         if isinstance(request.sheet, int):
-            made = _frames_sheet(scene, request.sheet, Path(name), request)
+            made = _sheet(request, Path(name), scene)
         else:
             made = _picture(scene, name, request, audio, film=target.film)
     heard = f", with the sound of {audio}" if audio is not None else ""
@@ -217,18 +213,18 @@ def _draw_scene(request: _Request, target: _Target) -> None:
 
 
 def _picture(scene: Showable, output: str, request: _Request, audio: Path | None, *, film: bool) -> str:
-    """Write a picture or a film; return its size and, of a film with another rate than its file, that."""
-    from fba_player.export.render import render
+    """Write a picture or a film; return its size and, if a film has not the rate of its file, its rate."""
+    from fba_player.export.render import picture_size, render
 
-    how = request.how
-    made = _size(request.size, output) + (_rate_text(scene, output) if film and request.rate is None else "")
+    wide, high = picture_size(request.size, output)
+    made = f"{wide}x{high}{_rate_text(scene, output) if film and request.rate is None else ''}"
     with Progress("rendering", None) as step, usage_errors():
         render(
             scene,
             output,
             size=request.size,
             rate=request.rate if film else None,
-            camera=how.camera,
+            camera=request.how.camera,
             **asdict(request.moment),
             audio=audio,
             audio_offset=request.sound.audio_offset,
@@ -241,10 +237,10 @@ def _picture(scene: Showable, output: str, request: _Request, audio: Path | None
 
 @dataclass(frozen=True)
 class _Target:
-    """Where a picture, a film or numbered pictures go.
+    """The target of a picture, a film or numbered pictures.
 
-    given: on the command line. path: the file, or the folder of numbered pictures. suffix: in lower case, of
-    what is written; "" for numbered pictures, whose names say it themselves.
+    given: on the command line. path: the file, or the folder of numbered pictures. suffix: of the file, in
+    lower case; "" for numbered pictures, whose names have it.
     """
 
     given: str
@@ -275,7 +271,7 @@ class _Target:
         return self.pictures is not None or is_film(f"film{self.suffix}")
 
     def outputs(self, inputs: Iterable[Path | None], writing: _Writing) -> Outputs:
-        """Return the files to write; of numbered pictures, those that are replaced."""
+        """Return the files to write; of numbered pictures, the files that are replaced."""
         if self.pictures is None:
             return Outputs([Output("--output", self.path)], inputs, no_clobber=writing.no_clobber)
         numbers = self.pictures.existing() if writing.replace else []
@@ -291,50 +287,32 @@ class _Target:
             yield str(file)
 
 
-def _size(size: tuple[int, int] | None, output: str) -> str:
-    from fba_player.export.render import picture_size
-
-    width, height = picture_size(size, output)
-    return f"{width}x{height}"
-
-
 def _rate_text(scene: Showable, output: str) -> str:
-    """Return the frame rate of the film as text, where it is not that of the file; else nothing."""
+    """Return the frame rate of a film as text, if it is not that of the file; else ""."""
     from fba_player.export.render import film_rate
 
-    own, rate = scene.timeline.rate, film_rate(scene.timeline.rate, output)
-    if rate == own:
+    source, rate = scene.timeline.rate, film_rate(scene.timeline.rate, output)
+    if rate == source:
         return ""
-    return f", {float(rate):.5g} frames/s, {float(own):.5g} in the file (another rate: --fps)"
+    return f", {float(rate):.5g} frames/s, {float(source):.5g} in the file (another rate: --fps)"
 
 
-def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, int] | None) -> str:
-    """Write a sheet of FAPs, visemes or expressions; return its size as text."""
+def _sheet(request: _Request, output: Path, scene: Showable | None = None) -> str:
+    """Write a sheet of frames of a scene, or of FAPs, visemes or expressions; return its size as text."""
     from fba_player.export.contact_sheet import contact_sheet
-    from fba_player.export.image_files import check_picture, write_picture
-
-    check_picture(output, transparent=False)
-    with Progress("rendering", None), usage_errors():
-        pixels = contact_sheet(what, read_model(model), tile=size)
-    write_picture(output, pixels)
-    return f"{pixels.shape[1]}x{pixels.shape[0]}"
-
-
-def _frames_sheet(scene: Showable, count: int, output: Path, request: _Request) -> str:
-    """Write a sheet of frames; return its size as text."""
     from fba_player.export.film_sheet import film_sheet
     from fba_player.export.image_files import check_picture, write_picture
 
+    sheet, moment = request.sheet, request.moment
     check_picture(output, transparent=False)
     with Progress("rendering", None) as step, usage_errors():
-        pixels = film_sheet(
-            scene,
-            count,
-            tile=request.size,
-            camera=request.how.camera,
-            start=request.moment.start,
-            end=request.moment.end,
-            progress=step.show,
-        )
+        if isinstance(sheet, int):
+            assert scene is not None  # a count is that of its frames
+            camera, size = request.how.camera, request.size
+            pixels = film_sheet(
+                scene, sheet, tile=size, camera=camera, start=moment.start, end=moment.end, progress=step.show
+            )
+        else:
+            pixels = contact_sheet(str(sheet), read_model(request.how.model), tile=request.size)
     write_picture(output, pixels)
     return f"{pixels.shape[1]}x{pixels.shape[0]}"

@@ -15,10 +15,7 @@ from fba.cli.option_fields import group, option, with_options
 
 @click.command(
     cls=Command,
-    epilog=examples(
-        "fba send talk.fba 192.168.0.20",
-        "fba send talk.fba 127.0.0.1:11111 --name Anna --loop",
-    ),
+    epilog=examples("fba send talk.fba 192.168.0.20", "fba send talk.fba 127.0.0.1:11111 --name Anna --loop"),
 )
 @click.argument("file", type=options.EXISTING)
 @click.argument("address", metavar="ADDRESS[:PORT]")
@@ -29,7 +26,7 @@ def command(
     name: str = option(default="fba", help="Name of the subject, for the receiver."),
     loop: bool = option(default=False, help="Start again at the end."),
     seconds: Fraction | None = option(
-        type=options.PeriodType(), metavar="SECONDS", help="Stop after that; default: at the end."
+        type=options.PERIOD, metavar="SECONDS", help="Stop after that; default: at the end."
     ),
     reading: Reading = group("format", "source_rate", "clip", "limit"),
 ) -> None:

@@ -1,9 +1,9 @@
-"""`fba stats`: where the bits of FBA streams go."""
+"""`fba stats`: the bits of FBA streams."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -13,8 +13,14 @@ from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import Reading, input_file
 from fba.cli.option_fields import group, with_options
 from fba.cli.printing import print_json, print_table
-from fba.codec import StreamInfo
 from fba.parameters import BAP_STEPS_AUTO
+
+if TYPE_CHECKING:
+    from fba.codec import StreamInfo
+
+COLUMNS = (
+    "bytes", "frames", "seconds", "kbit/s", "peak kbit/s", "I planes", "bits/I", "bits/P", "P 95 %", "I share"
+)  # fmt: skip
 
 
 @click.command(cls=Command, epilog=examples("fba stats talk.fba", "fba stats --json *.fba"))
@@ -39,27 +45,9 @@ def command(
             rows.append({"file": str(path), **statistics(info)})
     if as_json:
         print_json(rows if len(files) > 1 else rows[0])
-        each.finish()
-        return
-    if rows:
-        _print(rows)
+    elif rows:
+        print_table(COLUMNS, [_cells(row) for row in rows])
     each.finish()
-
-
-def _print(rows: list[dict[str, Any]]) -> None:
-    columns = (
-        "bytes",
-        "frames",
-        "seconds",
-        "kbit/s",
-        "peak kbit/s",
-        "I planes",
-        "bits/I",
-        "bits/P",
-        "P 95 %",
-        "I share",
-    )
-    print_table(columns, [_cells(row) for row in rows])
 
 
 def _cells(row: dict[str, Any]) -> list[str]:
@@ -79,10 +67,10 @@ def _cells(row: dict[str, Any]) -> list[str]:
 
 
 def statistics(info: StreamInfo) -> dict[str, Any]:
-    """Return bits of a stream: size, bits_per_second, the busiest second, and how planes share them.
+    """Return the bits of a stream: in all, per second, in the busiest second, and those of its planes.
 
-    intra_bits_mean, predicted_bits_median, predicted_bits_95: bits a plane; 0 without planes of
-    that kind. intra_share: what part of the planes' bits the I planes take.
+    intra_bits_mean, predicted_bits_median, predicted_bits_95: bits per plane; 0 without such planes.
+    intra_share: share of the planes' bits that is in I planes.
     """
     assert info.plane_bits is not None
     assert info.plane_intra is not None
@@ -105,7 +93,7 @@ def statistics(info: StreamInfo) -> dict[str, Any]:
 
 
 def _peak(bits: np.ndarray, times: np.ndarray) -> int:
-    """Return the most bits within any one second that starts with a plane."""
+    """Return the most bits in a second that starts with a plane."""
     sums = np.concatenate([[0], np.cumsum(bits)])
     stops = np.searchsorted(times, times + 1.0 - 1e-9)
     return int((sums[stops] - sums[: len(bits)]).max())

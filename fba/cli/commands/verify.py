@@ -1,4 +1,4 @@
-"""`fba verify`: are streams complete and undamaged, and have they still the same values?"""
+"""`fba verify`: whether streams are complete and undamaged, and their values unchanged."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fba.cli.option_fields import group, option, with_options
 from fba.cli.printing import Progress, print_json, print_table
 from fba.errors import FormatError
 
-_SHOWN = 16
+_DIGITS = 16
 """Digits of a digest in the table; --json has all 64."""
 
 
@@ -46,7 +46,7 @@ def command(
     """
     from fba.codec import verify_stream
 
-    known = _known_digests(against) if against is not None else {}
+    digests = _read_digests(against) if against is not None else {}
     reports: list[dict[str, Any]] = []
     each = EachFile(files)
     with Progress("checking", len(files)) as step:
@@ -54,11 +54,11 @@ def command(
             with each.file(path), input_file(path) as file:
                 data = file.read_bytes()
                 table = step_tables.table_to_read(path, data, reading.bap_steps, reading.limit)
-                found = verify_stream(data, bap_steps=table, limits=reading.limit)
-                report = {"file": str(path), **found.to_dict()}
+                verification = verify_stream(data, bap_steps=table, limits=reading.limit)
+                report = {"file": str(path), **verification.to_dict()}
                 if against is not None:
-                    earlier = known.get(str(path))
-                    report["unchanged"] = None if earlier is None else earlier == found.digest
+                    earlier = digests.get(str(path))
+                    report["unchanged"] = None if earlier is None else earlier == verification.digest
                 reports.append(report)
             step.advance()
     if as_json:
@@ -76,8 +76,8 @@ def command(
         raise click.exceptions.Exit(1)
 
 
-def _known_digests(report: Path) -> dict[str, str]:
-    """Return the digests of an earlier report by file. FormatError for other files."""
+def _read_digests(report: Path) -> dict[str, str]:
+    """Return the digests of an earlier report by file; FormatError for other files."""
     with input_file(report) as file:
         try:
             entries = json.loads(file.read_bytes())
@@ -104,5 +104,5 @@ def _row(report: dict[str, Any]) -> list[str]:
         lost,
         str(report["doubtful"]),
         result,
-        report["digest"][:_SHOWN],
+        report["digest"][:_DIGITS],
     ]

@@ -13,11 +13,12 @@ import click
 
 from fba.animation import Animation
 from fba.choices import Sync
-from fba.cli.command import STANDARD_INPUT
+from fba.cli.command import STANDARD_INPUT, option_errors
 from fba.cli.inputs import ReadFile, Reading, read_file
 from fba.cli.option_fields import option
+from fba.cli.options import TextType, parse_number
 from fba.cli.printing import Progress, rate_text
-from fba.errors import FormatError, OptionError
+from fba.errors import FormatError
 from fba.formats import merge
 from fba.formats.synchronisation import Recording, Together, join
 from fba.formats.time_codes import parse_time_code, parse_time_of_day
@@ -28,51 +29,43 @@ if TYPE_CHECKING:
     from fba.formats import Format
 
 
-SLOWEST = 60
-"""Most rows in a second of captures whose rows are those that their time codes count."""
+MAX_COUNTED_RATE = 60
+"""Highest rate, in rows per second, of captures whose rows are the frames of their time codes."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """When the second of two recordings begins, as it was typed.
-
-    seconds: after the first one; None where a time of day says it.
-    """
+    """The begin of the second of two recordings, as typed. seconds: after the first; None for clock times."""
 
     text: str
     seconds: float | None
 
 
-class OffsetType(click.ParamType[Moment]):
-    """Seconds, or a time of day: 2.4, 18:48:59:39, 18:48:59.65."""
+def _parse_offset(text: str) -> Moment:
+    if ":" in text:
+        if parse_time_code(text) is None and parse_time_of_day(text) is None:
+            raise ValueError(f"{text!r} is no time of day; write 18:48:59:39, or 18:48:59.65")
+        return Moment(text, None)
+    seconds = parse_number(text)
+    if math.isnan(seconds):
+        raise ValueError(f"{text!r} is neither a number of seconds nor a time code HH:MM:SS:FF")
+    return Moment(text, seconds)
 
-    name = "offset"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Moment:
-        text = str(value)
-        if ":" in text:
-            if parse_time_code(text) is None and parse_time_of_day(text) is None:
-                self.fail(f"{text!r} is no time of day; write 18:48:59:39, or 18:48:59.65", param, ctx)
-            return Moment(text, None)
-        try:
-            seconds = float(text)
-        except ValueError:
-            seconds = math.nan
-        if not math.isfinite(seconds):
-            self.fail(f"{text!r} is neither a number of seconds nor a time code HH:MM:SS:FF", param, ctx)
-        return Moment(text, seconds)
+OFFSET = TextType("offset", _parse_offset)
+"""Seconds, or a time of day: 2.4, 18:48:59:39, 18:48:59.65."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SyncOptions:
-    """How two recordings go together."""
+    """How two recordings are put together."""
 
     sync: Sync | None = option(
         help="A face and a body: by the times of day at which they were recorded, or both from the start on; "
         "default: time codes where both have them."
     )
     offset: Moment | None = option(
-        type=OffsetType(),
+        type=OFFSET,
         metavar="SECONDS|HH:MM:SS:FF",
         help="When the second input begins: seconds after the first, or the time code of its first frame.",
     )
@@ -83,11 +76,10 @@ class SyncOptions:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What was read.
+    """The inputs of a stream.
 
-    animation: of all inputs. start: time of day at its index 0, in seconds; None where unknown. together: how
-    two inputs with a capture among them were put together; None for others. files: the inputs. is_resampled:
-    whether frames were interpolated.
+    animation: of all inputs. start: time of day at its index 0, in seconds; None if unknown. together: two
+    inputs with a capture among them, put together; else None. is_resampled: whether frames were interpolated.
     """
 
     animation: Animation
@@ -98,12 +90,12 @@ class Inputs:
 
     @property
     def tables(self) -> tuple[BapTable, ...]:
-        """Tables of BAP steps, of the streams among the inputs."""
-        return tuple(one.table for one in self.files if one.table is not None)
+        """Tables of BAP steps of the streams among the inputs."""
+        return tuple(file.table for file in self.files if file.table is not None)
 
     @property
     def formats(self) -> Mapping[str, Format]:
-        """The format that "face" and "body" come from, as far as they exist."""
+        """The formats of the files with "face" and "body"."""
         return {
             part: file.format
             for file in self.files
@@ -114,7 +106,7 @@ class Inputs:
     @property
     def is_captured(self) -> bool:
         """Whether a capture is among the inputs."""
-        return any(one.is_capture for one in self.formats.values())
+        return any(each.is_capture for each in self.formats.values())
 
     @property
     def has_captured_face(self) -> bool:
@@ -123,26 +115,28 @@ class Inputs:
 
     @property
     def text_parts(self) -> tuple[str, ...]:
-        """The parts, "face" and "body", of which FAP and BAP files have just these frames."""
+        """The parts, "face" and "body", whose frames are those of a FAP or BAP file."""
         if self.is_resampled:
             return ()
-        return tuple(part for part, one in self.formats.items() if one.name in ("fap", "bap"))
+        return tuple(part for part, each in self.formats.items() if each.name in ("fap", "bap"))
 
     @property
     def has_captured_body(self) -> bool:
-        """Whether the body is, or may be, from a capture: from a skeleton, or from where a head went."""
+        """Whether the body is, or may be, from a capture: of a skeleton, or of the path of a head."""
         return any(
-            one.read_motion is not None or "head_path" in one.read_options for one in self.formats.values()
+            each.read_motion is not None or "head_path" in each.read_options for each in self.formats.values()
         )
 
     def capture_of(self, path: Path) -> Any:
-        """Return the motion or the face that the animation of an input was made of; None of other files."""
-        return next((one.captured.capture for one in self.files if one.path == path and one.captured), None)
+        """Return the motion or the face of which the animation of an input was made; None for other files."""
+        return next(
+            (file.captured.capture for file in self.files if file.path == path and file.captured), None
+        )
 
     def body_of(self, animation: Animation) -> tuple[Animation, int]:
-        """Return the frames of an animation of the same rows that a captured body covers.
+        """Return the frames that a captured body covers, and the count of frames of the capture before them.
 
-        Also how many frames of the capture are before them.
+        animation: with the rows of that of the inputs.
         """
         if self.together is None:
             return animation, 0
@@ -160,7 +154,7 @@ def read_inputs(
 ) -> Inputs:
     """Return face and body of one or two files as one animation. capture, rate, name: see `read_file`.
 
-    Raises click.UsageError for two faces, two bodies, and rates that differ where nothing was captured.
+    Raises click.UsageError for two faces, two bodies, and different rates without a capture.
     """
     _check_sync(files, sync)
     read: list[ReadFile] = []
@@ -173,21 +167,21 @@ def read_inputs(
             step.advance()
             if not len(animation):
                 raise FormatError("the file holds no frames; there is nothing to encode", path=path)
-            _check_parts(path, animation, [one.animation for one in recordings])
+            _check_parts(path, animation, [earlier.animation for earlier in recordings])
             faces.append(_captured_face(read[-1]))
             shown = STANDARD_INPUT if str(path) == "-" else str(path)
             recordings.append(Recording(shown, animation, None if faces[-1] is None else faces[-1].start))
-    rates = [one.rate for one in read]
+    rates = [file.rate for file in read]
     if len(recordings) == 1:
         only = recordings[0]
         resampled = only.animation.rate != rates[0]
         return Inputs(only.animation, only.start, None, tuple(read), resampled)
     first, second = recordings
     offset = sync.offset
-    if sync.sync is None and offset is None and not any(one.format.is_capture for one in read):
-        resampled = [one.animation.rate for one in recordings] != rates
+    if sync.sync is None and offset is None and not any(file.format.is_capture for file in read):
+        resampled = [recording.animation.rate for recording in recordings] != rates
         return Inputs(_merge(first, second), None, None, tuple(read), resampled)
-    try:
+    with option_errors():
         together = join(
             first,
             second,
@@ -197,21 +191,19 @@ def read_inputs(
             trim=sync.trim,
             limits=reading.limit,
         )
-    except OptionError as error:
-        raise click.UsageError(str(error)) from error
-    resampled = any(one != together.animation.rate for one in rates)
+    resampled = any(each != together.animation.rate for each in rates)
     return Inputs(together.animation, together.start, together, tuple(read), resampled)
 
 
 def _captured_face(file: ReadFile) -> FaceCapture | None:
-    """Return the captured face that an animation was made of; None for other files."""
+    """Return the captured face of which an animation was made; None for other files."""
     if file.captured is None or file.format.read_face is None:
         return None
     return cast("FaceCapture", file.captured.capture)
 
 
 def together_lines(files: tuple[Path, ...], together: Together) -> list[str]:
-    """Return when each of two recordings begins and ends, and what was done to them."""
+    """Return the begin and end of two recordings, and the rates of resampled ones, as lines of text."""
     (first, _), (second, _) = together.spans
     how = "by their time codes" if together.how == "timecode" else "both from the start on"
     if together.how == "offset" and first != second:
@@ -229,7 +221,7 @@ def together_lines(files: tuple[Path, ...], together: Together) -> list[str]:
 
 
 def together_values(files: tuple[Path, ...], together: Together) -> dict[str, Any]:
-    """Return the same for programs."""
+    """Return the begin and end of two recordings, for programs."""
     parts = [
         {"file": str(path), "begins": round(begin, 6), "ends": round(end, 6)}
         for path, (begin, end) in zip(files, together.spans, strict=True)
@@ -238,9 +230,9 @@ def together_values(files: tuple[Path, ...], together: Together) -> dict[str, An
 
 
 def _time_of_day(offset: Moment, first: FaceCapture | None) -> float:
-    """Return a time of day in seconds. first: the capture beside which it counts frames."""
+    """Return a time of day in seconds. first: the capture whose rate its frames have."""
     seconds = parse_time_of_day(offset.text)
-    if seconds is None and first is not None and first.rate <= SLOWEST:
+    if seconds is None and first is not None and first.rate <= MAX_COUNTED_RATE:
         seconds = parse_time_code(offset.text, first.rate)
     if seconds is None:
         raise click.UsageError(
@@ -263,7 +255,7 @@ def _check_sync(files: tuple[Path, ...], given: SyncOptions) -> None:
 def _check_parts(path: Path, animation: Animation, before: list[Animation]) -> None:
     """Raise click.UsageError for a second face or a second body."""
     for part in ("face", "body"):
-        if getattr(animation, part) is not None and any(getattr(one, part) is not None for one in before):
+        if getattr(animation, part) is not None and any(getattr(each, part) is not None for each in before):
             raise click.UsageError(
                 f"{path} is a second {part} file; encode one face and one body file at most"
             )

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.animation import Animation
 from fba.cli import options
 from fba.cli.option_fields import option
 from fba.cli.outputs import STANDARD, Output, Outputs
@@ -25,7 +24,7 @@ class Voice:
     """A sound beside a stream.
 
     source: the sound. target: the file beside the stream. begins: seconds from the stream's first frame to
-    the beginning of the sound. seconds: length of the stream. how: what says so.
+    the begin of the sound. seconds: length of the stream. how: by which option or time codes, for messages.
     """
 
     source: Path
@@ -46,14 +45,14 @@ class VoiceOptions:
         "beside it, OUT.wav, where fba play and fba render find it.",
     )
     audio_offset: float | None = option(
-        type=options.MomentType(),
+        type=options.MOMENT,
         metavar="SECONDS",
         help="When the sound begins, after the first frame; default: by time codes where both have them, "
         "else 0.",
     )
 
     def check(self, output: Path) -> list[Output]:
-        """Return the WAV file that will be written, or nothing; click.UsageError where it cannot be."""
+        """Return the WAV file that will be written, if any; click.UsageError if it cannot be written."""
         if self.audio is None:
             if self.audio_offset is not None:
                 raise click.UsageError("--audio-offset needs a sound: give one with --audio")
@@ -70,10 +69,7 @@ class VoiceOptions:
 
 
 def place_voice(given: VoiceOptions, taken: Inputs, target: Path) -> Voice:
-    """Return where the given sound begins.
-
-    Raises FormatError for a file that is no sound, or of another moment.
-    """
+    """Return the given sound with its begin; FormatError for a file that is no sound, or of another time."""
     from fba.formats.time_codes import seconds_between
     from fba_player.sound.audio_file import SoundFile
     from fba_player.sound.sound_clip import read_time_of_day
@@ -81,7 +77,8 @@ def place_voice(given: VoiceOptions, taken: Inputs, target: Path) -> Voice:
     assert given.audio is not None  # the target is its copy
     audio, offset = given.audio, given.audio_offset
     animation = taken.animation
-    recorded, first = read_time_of_day(audio), _first_moment(taken.start, animation)
+    recorded, start = read_time_of_day(audio), taken.start
+    first = None if start is None else start + float(animation.index[0] / animation.rate)
     begins, how = 0.0, "both from the start on"
     if offset is not None:
         begins, how = offset, "by --audio-offset"
@@ -108,24 +105,19 @@ def write_voice(outputs: Outputs, voice: Voice) -> None:
 
 
 def voice_line(voice: Voice) -> str:
-    """Return what was written."""
+    """Return a line about the written sound."""
     silent = voice.begins > 0
     place = f"after {voice.begins:.2f} s of silence" if silent else f"from {abs(voice.begins):.2f} s on"
     return f"{voice.target}: {seconds_text(voice.seconds)} of {voice.source}, {place}, {voice.how}"
 
 
 def voice_values(voice: Voice) -> dict[str, Any]:
-    """Return the same for programs."""
+    """Return values about the written sound, for programs."""
     return {"sound": {"file": str(voice.target), "begins": round(voice.begins, 6), "by": voice.how}}
 
 
-def _first_moment(start: float | None, animation: Animation) -> float | None:
-    """Return the time of day of the first frame, in seconds. start: that of index 0."""
-    return None if start is None else start + float(animation.index[0] / animation.rate)
-
-
 def _span(begins: float, length: float | None, first: float | None, how: str) -> str:
-    """Return when something begins and ends: by the clock where time codes count."""
+    """Return begin and end as text, as times of day if `how` is by time codes. first: that of second 0."""
     shift = first if first is not None and how == "by time codes" else None
     texts = [
         seconds_text(moment) if shift is None else clock_text(shift + moment)

@@ -10,18 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options
-from fba.cli.coding.tolerance_options import LengthType
+from fba.cli.coding.tolerance_options import LENGTH
 from fba.cli.command import Command, examples
-from fba.cli.inputs import Reading, read_input
+from fba.cli.inputs import Reading, read_input, read_model
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import (
-    STANDARD,
-    Output,
-    Outputs,
-    display_name,
-    further_output_option,
-    output_option,
-)
+from fba.cli.outputs import Output, Outputs, check_glb, display_name, further_output_option, output_option
 from fba.cli.printing import Progress
 from fba.errors import FbaError
 
@@ -52,7 +45,7 @@ class _Goal:
         help="FAPs to send, those of the head's rotation among them. Default: 10.",
     )
     tolerance: float | None = option(
-        type=LengthType(),
+        type=LENGTH,
         metavar="1mm",
         help="Send as many FAPs as it takes to keep every vertex this near in 99 % of the frames held out.",
     )
@@ -93,15 +86,12 @@ def command(
     output, fit = target.output, target.fit
     written = [Output("--output", output), *([Output("--fit", fit)] if fit is not None else [])]
     outputs = Outputs(written, [*streams, model], no_clobber=target.no_clobber)
-    if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
-        name = output.with_suffix(".glb").name
-        raise click.UsageError(f"--output {output}: face models are written as glTF; name it {name}")
+    check_glb(output)
     from fba.face import FaceModel
-    from fba.face.importers import import_model
     from fba.face.learning import learn_fit
     from fba.face.learning.learn import FAPS
 
-    head = FaceModel.default() if model is None else import_model(model)
+    head = read_model(model) or FaceModel.default()
     animations = []
     with Progress("reading", len(streams)) as step:
         for path in streams:
@@ -135,20 +125,20 @@ def _face(animation: Animation, path: Path) -> Any:
 def _lines(learnt: LearntFit) -> list[str]:
     from fba.parameters import faps
 
-    names = [one.name for one in faps()]
+    names = [fap.name for fap in faps()]
     error = learnt.held_out
-    held = "the stream held out" if learnt.streams > 1 else "the fifth of the stream held out"
+    source = "the stream held out" if learnt.streams > 1 else "the fifth of the stream held out"
     lines = [
         f"{len(learnt.sent)} FAPs to send: {', '.join(f'{n} {names[n - 1]}' for n in learnt.sent)}",
-        f"{len(learnt.computed)} FAPs computed; errors on {held}:",
+        f"{len(learnt.computed)} FAPs computed; errors on {source}:",
         f"worst vertex of each frame {error.millimetres.text()}",
         f"{100 * error.explained:.1f} % of the motion of these FAPs explained",
     ]
-    for one in error.faps:
-        spread = one.steps
+    for computed in error.faps:
+        spread = computed.steps
         lines.append(
-            f"  {one.fap:2} {names[one.fap - 1]:22} {spread.mean:6.1f} {spread.percentile_99:7.1f} "
-            f"{spread.largest:7.1f} steps, at most {one.millimetres:.2f} mm"
+            f"  {computed.fap:2} {names[computed.fap - 1]:22} {spread.mean:6.1f} {spread.percentile_99:7.1f} "
+            f"{spread.largest:7.1f} steps, at most {computed.millimetres:.2f} mm"
         )
     return lines
 

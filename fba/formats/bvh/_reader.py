@@ -1,6 +1,6 @@
 """Read BVH (Biovision hierarchy) text: a skeleton with offsets and channels, then a line for each frame.
 
-Tolerates CR LF, tabs, any channel order, wrapped or truncated lines and a wrong frame count.
+Line ends, tabs and the order of channels may vary; lines may be wrapped or cut short, the frame count wrong.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
@@ -24,7 +25,8 @@ from fba.recognition import HEAD_BYTES, recognition_hint
 from fba.source import read_whole
 
 MAX_JOINTS = 4096
-MAX_RATE = 10_000
+MAX_FRAME_RATE = 10_000
+"""Highest rate, in frames per second."""
 MAX_LINES = 4 * MAX_FRAMES
 MAX_NUMBER = 1e12
 """Largest length or angle; more is damage."""
@@ -34,24 +36,58 @@ NOMINAL_RATES = tuple(
     sorted({Fraction(n) for n in range(1, 241)} | {Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120)}
            | {Fraction(n) for n in (250, 300, 480, 500, 1000)})
 )  # fmt: skip
-"""Frame rates, one of which a rounded frame time probably means."""
+"""Frame rates that a rounded frame time probably means."""
 MAX_LINE = 1 << 20
-"""Longest line, in characters: far more than 4096 joints have numbers."""
-MOST_OF_BODY = 0.75
-"""Share of all joints below one that carries the body's motion in place of the root."""
-STRETCH = 1e-3
+"""Longest line, in characters: 4096 joints have far fewer numbers."""
+MAX_STRETCH = 1e-3
 """Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
-CARRIED = 5.0
-"""How many times as far as the joints below it a joint moves that carries the body: in files of markers
-all joints move relative to their parents."""
-MIN_MOVING_JOINTS = 3
-"""Smallest number of joints below it that must move, too, for that comparison: faces and toys move by
-themselves."""
+
+
+@dataclass(frozen=True)
+class _CarrierRule:
+    """When a joint below the root carries the body, such as the hips below the root of a scene."""
+
+    min_joints: float = 0.75
+    """Share of all joints that must be below it."""
+    min_reach: float = 5.0
+    """How many times as far it must move as the joints below it: in files of markers all joints move."""
+    min_moving: int = 3
+    """Count of joints below it that must move for this comparison: faces and toys move by themselves."""
+
+
+CARRIER = _CarrierRule()
+
+
+@dataclass(frozen=True)
+class _Text:
+    """The lines of a file, and its name for errors. Lines are numbered from 0, in messages from 1."""
+
+    lines: list[str]
+    path: str | Path | None
+
+    def error(self, message: str, line: int | None = None, token: str | None = None) -> FormatError:
+        """Return the error about a line."""
+        return FormatError(message, path=self.path, line=None if line is None else line + 1, token=token)
+
+    def warn(self, message: str, line: int | None = None) -> None:
+        """Warn (FbaWarning) about the file, or about a line."""
+        place = "" if line is None else f":{line + 1}"
+        warnings.warn(f"{self.path or 'BVH'}{place}: {message}", FbaWarning, stacklevel=5)
+
+    def number(self, word: str, line: int, *, any_size: bool = False) -> float:
+        """Return a number; FormatError for other words. any_size: allow more than `MAX_NUMBER`."""
+        try:
+            value = float(word)
+        except ValueError:
+            value = math.nan
+        if not (any_size or abs(value) <= MAX_NUMBER) or math.isnan(value):
+            raise self.error("expected a number", line, word)
+        return value
 
 
 @dataclass
 class _Hierarchy:
-    """Joints in file order; channels: lower-case names. end_parents, end_offsets: of the End Sites."""
+    """Joints in file order. channels: lower-case names. end_parents, end_offsets: of the End Sites."""
 
     names: list[str] = field(default_factory=list)
     parents: list[int] = field(default_factory=list)
@@ -82,34 +118,34 @@ def read_motion(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> Skeleto
 def parse(
     text: str, *, name: str = "", path: str | Path | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> SkeletonMotion:
-    """Return the same as `read_motion`, from text. path: named in errors."""
+    """Return the motion in text, as `read_motion` does. path: the file, for messages."""
     if max(text.count("\n"), text.count("\r")) > MAX_LINES:
         raise FormatError(f"more than {MAX_LINES} lines; cut the motion into pieces", path=path)
-    lines = text.splitlines()
-    tree, after = _hierarchy(lines, path)
-    count, frame_time, first = _motion_header(lines, after, path)
+    source = _Text(text.splitlines(), path)
+    tree, after = _hierarchy(source)
+    count, frame_time, first = _motion_header(source, after)
     channels = sum(len(c) for c in tree.channels)
-    numbers = _numbers(lines, first, channels, count, path)
+    numbers = _numbers(source, first, channels, count)
     content = f"{len(tree.names)} joints, {channels} channels and {len(numbers)} frames"
     what = f"{path or 'BVH'}: a motion of {content}"
     check_memory(limits, len(numbers), len(tree.names), what, len(text))
-    return _motion(tree, numbers, _rate(frame_time), name, path)
+    return _motion(tree, numbers, _rate(frame_time), name, source)
 
 
-def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, int]:
-    """Return the joints, and the line number (0-based) of MOTION. Not recursive: files may nest deeply."""
+def _hierarchy(source: _Text) -> tuple[_Hierarchy, int]:
+    """Return the joints, and the line of MOTION. Not recursive: files may nest deeply."""
     tree = _Hierarchy()
     stack: list[int] = []  # open braces: number of the joint, -1 for an End Site
     pending: int | None = None  # joint of the last ROOT or JOINT, -1 for End Site, until its brace opens
     seen_header = False
-    for number, line in enumerate(lines):
+    for number, line in enumerate(source.lines):
         words = line.replace("{", " { ").replace("}", " } ").split()
         position = 0
         while position < len(words):
             word = words[position].upper()
 
             def fail(message: str, number: int = number, token: str = words[position]) -> FormatError:
-                return FormatError(message, path=path, line=number + 1, token=token)
+                return source.error(message, number, token)
 
             if not seen_header:
                 if word != "HIERARCHY":
@@ -149,7 +185,7 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
                 stack.pop()
                 position += 1
             elif word == "OFFSET":
-                values = [_number(w, path, number) for w in words[position + 1 : position + 4]]
+                values = [source.number(w, number) for w in words[position + 1 : position + 4]]
                 if not stack or len(values) != 3:
                     raise fail("OFFSET needs three numbers, inside a joint or End Site")
                 offset = (values[0], values[1], values[2])
@@ -159,7 +195,7 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
                     tree.offsets[stack[-1]] = offset
                 position += 4
             elif word == "CHANNELS":
-                position = _channels(tree, stack, words, position, path, number)
+                position = _channels(tree, stack, words, position, source, number)
             elif word == "MOTION":
                 if stack or pending is not None:
                     raise fail(f"MOTION begins, but {len(stack)} braces are still open; close them first")
@@ -168,78 +204,63 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
                 return tree, number
             else:
                 raise fail("expected ROOT, JOINT, End Site, OFFSET, CHANNELS, a brace or MOTION")
-    raise FormatError(
-        "the file ends before MOTION; it is cut short, or not a BVH file", path=path, line=len(lines)
+    raise source.error(
+        "the file ends before MOTION; it is cut short, or not a BVH file", len(source.lines) - 1
     )
 
 
 def _channels(
-    tree: _Hierarchy, stack: list[int], words: list[str], position: int, path: str | Path | None, line: int
+    tree: _Hierarchy, stack: list[int], words: list[str], position: int, source: _Text, line: int
 ) -> int:
-    """Read CHANNELS of a joint; return the position of the next word. line: 0-based."""
+    """Read CHANNELS of a joint; return the position of the next word."""
     text = words[position + 1] if position + 1 < len(words) else ""
     if not stack or stack[-1] < 0 or not re.fullmatch(r"[0-9]{1,2}", text):
-        raise FormatError(
-            "expected CHANNELS inside a joint, followed by the number of channels",
-            path=path,
-            line=line + 1,
-            token=text,
-        )
+        raise source.error("expected CHANNELS inside a joint, followed by the number of channels", line, text)
     names = [w.lower() for w in words[position + 2 : position + 2 + int(text)]]
     for channel in names:
         if not re.fullmatch(r"[xyz](rotation|position)", channel):
-            raise FormatError(
-                "expected a channel: Xposition, Yposition, Zposition, Xrotation, Yrotation or Zrotation",
-                path=path, line=line + 1, token=channel,
-            )  # fmt: skip
+            expected = "Xposition, Yposition, Zposition, Xrotation, Yrotation or Zrotation"
+            raise source.error(f"expected a channel: {expected}", line, channel)
     if len(names) != int(text) or tree.channels[stack[-1]]:
-        raise FormatError(
-            f"CHANNELS must stand once in each joint, with {text} names behind its number",
-            path=path,
-            line=line + 1,
+        raise source.error(
+            f"CHANNELS must stand once in each joint, with {text} names behind its number", line
         )
     tree.channels[stack[-1]] = names
     return position + 2 + int(text)
 
 
-def _motion_header(lines: list[str], start: int, path: str | Path | None) -> tuple[int | None, str, int]:
-    """Return the stated number of frames, the frame time as text, and the line (0-based) after it."""
+def _motion_header(source: _Text, start: int) -> tuple[int | None, str, int]:
+    """Return the stated number of frames, the frame time as text, and the line after it."""
     stated: int | None = None
-    for number in range(start, min(start + 50, len(lines))):
-        line = " ".join(lines[number].split())  # the patterns take time with the square of a row of spaces
+    for number, text in enumerate(source.lines[start : start + 50], start):
+        line = " ".join(text.split())  # the time that the patterns take grows with the square of the blanks
         frames = re.search(r"\bFrames ?:? ?([0-9]{1,18})\b", line, re.IGNORECASE)
         if frames:
             stated = int(frames[1])
         time = re.search(r"\bFrame Time ?:? ?(\S+)$", line, re.IGNORECASE)
         if time:
-            value = _number(time[1], path, number)
-            if not 1 / MAX_RATE <= value <= 3600:
-                raise FormatError(
-                    f"the frame time must lie between 1/{MAX_RATE} s and an hour",
-                    path=path, line=number + 1, token=time[1],
-                )  # fmt: skip
+            value = source.number(time[1], number)
+            if not 1 / MAX_FRAME_RATE <= value <= 3600:
+                raise source.error(
+                    f"the frame time must lie between 1/{MAX_FRAME_RATE} s and an hour", number, time[1]
+                )
             return stated, time[1], number + 1
-    raise FormatError("there is no 'Frame Time: <seconds>' after MOTION", path=path, line=start + 1)
+    raise source.error("there is no 'Frame Time: <seconds>' after MOTION", start)
 
 
-def _numbers(
-    lines: list[str], first: int, channels: int, stated: int | None, path: str | Path | None
-) -> Float64:
-    """Return float64 (T, channels). The stated number of frames allocates no memory."""
+def _numbers(source: _Text, first: int, channels: int, stated: int | None) -> Float64:
+    """Return float64 (T, channels). No memory is allocated for the stated number of frames."""
     if not channels:
-        raise FormatError("no joint has channels, so nothing can move", path=path)
+        raise source.error("no joint has channels, so nothing can move")
+    lines = source.lines
     blocks: list[Float64] = []
     row_lines: list[int] = []  # the line of each row
-    counts: list[int] = []  # how many numbers it has
+    counts: list[int] = []  # of the numbers in each row
     batch: list[str] = []
     total = 0
     for number in range(first, len(lines)):
         if len(lines[number]) > MAX_LINE:
-            raise FormatError(
-                f"a line of more than {MAX_LINE} characters; are its line ends lost?",
-                path=path,
-                line=number + 1,
-            )
+            raise source.error(f"a line of more than {MAX_LINE} characters; are its line ends lost?", number)
         words = lines[number].split()
         if not words:
             continue
@@ -248,99 +269,69 @@ def _numbers(
         total += len(words)
         batch += words
         if total // channels > MAX_FRAMES:
-            raise FormatError(
-                f"more than {MAX_FRAMES} frames; cut the motion into pieces", path=path, line=number + 1
-            )
+            raise source.error(f"more than {MAX_FRAMES} frames; cut the motion into pieces", number)
         if len(row_lines) % BATCH_LINES == 0:
-            blocks.append(_floats(batch, lines, row_lines, path))
+            blocks.append(_floats(batch, source, row_lines[-BATCH_LINES:]))
             batch = []
-    blocks.append(_floats(batch, lines, row_lines, path))
+    blocks.append(_floats(batch, source, row_lines[-BATCH_LINES:]))
     frames, lost = divmod(total, channels)
     if not frames:
-        raise FormatError("there is no frame of motion after 'Frame Time'", path=path, line=first + 1)
+        raise source.error("there is no frame of motion after 'Frame Time'", first)
     bad = next((row for row, count in enumerate(counts) if count != channels), None)
     if bad is not None:
         wrapped = stated is not None and total == stated * channels
         cut = bad == len(counts) - 1 and counts[bad] < channels
         if not (wrapped or cut):
-            raise FormatError(
-                f"expected {channels} numbers, one for each channel, found {counts[bad]}",
-                path=path, line=row_lines[bad] + 1,
-            )  # fmt: skip
+            raise source.error(
+                f"expected {channels} numbers, one for each channel, found {counts[bad]}", row_lines[bad]
+            )
         if cut and not wrapped:
-            warnings.warn(
-                f"{path or 'BVH'}:{row_lines[bad] + 1}: the last frame is cut short "
-                f"({lost} of {channels} numbers); left out",
-                FbaWarning,
-                stacklevel=4,
+            source.warn(
+                f"the last frame is cut short ({lost} of {channels} numbers); left out", row_lines[bad]
             )
     if stated is not None and stated != frames:
-        warnings.warn(
-            f"{path or 'BVH'}: the header says {stated} frames, but the file has {frames}; these are read",
-            FbaWarning,
-            stacklevel=4,
-        )
+        source.warn(f"the header says {stated} frames, but the file has {frames}; these are read")
     values = np.concatenate(blocks)[: frames * channels]
     wrong = np.flatnonzero(~(np.abs(values) <= MAX_NUMBER))
     if len(wrong):
         ends = np.cumsum(counts)
         row = int(np.searchsorted(ends, wrong[0], side="right"))
-        raise FormatError(
+        raise source.error(
             f"the values of channels must be finite numbers of at most {MAX_NUMBER:g}",
-            path=path,
-            line=row_lines[row] + 1,
-            token=lines[row_lines[row]].split()[int(wrong[0] - ends[row])],
+            row_lines[row],
+            lines[row_lines[row]].split()[int(wrong[0] - ends[row])],
         )
     return values.reshape(frames, channels)
 
 
-def _floats(batch: list[str], lines: list[str], row_lines: list[int], path: str | Path | None) -> Float64:
-    """Return the numbers of the last rows; FormatError with the line of a word that is no number."""
+def _floats(batch: list[str], source: _Text, rows: Sequence[int]) -> Float64:
+    """Return the numbers in words; FormatError for a word that is no number. rows: the lines of the words."""
     try:
         return np.array([float(word) for word in batch], dtype=np.float64)
     except ValueError:
-        for number in row_lines[-BATCH_LINES:]:
-            for word in lines[number].split():
-                _number(word, path, number, any_size=True)
+        for line in rows:
+            for word in source.lines[line].split():
+                source.number(word, line, any_size=True)
         raise
 
 
-def _number(word: str, path: str | Path | None, line: int, any_size: bool = False) -> float:
-    """Return a number; FormatError for other words. line: 0-based. any_size: allow more than `MAX_NUMBER`."""
-    try:
-        value = float(word)
-    except ValueError:
-        value = math.nan
-    if not (any_size or abs(value) <= MAX_NUMBER) or math.isnan(value):
-        raise FormatError("expected a number", path=path, line=line + 1, token=word)
-    return value
-
-
 def _rate(frame_time: str) -> Fraction:
-    """Return frames per second: the nearest nominal rate that the rounded frame time of a file can mean."""
+    """Return frames per second: the nominal rate nearest to the rounded frame time of a file."""
     value = float(frame_time)
     digits = -int(Decimal(frame_time).as_tuple().exponent)
     tolerance = max(0.5 * 10.0**-digits * 1.01, value * 2e-5)
     near = [r for r in NOMINAL_RATES if abs(1 / float(r) - value) <= tolerance]
     if near:
         # integral rates first: a coarse 0.033 is 30, not 29.97
-        return min(
-            near,
-            key=lambda r: (
-                abs(1 / float(r) - value) > tolerance / 5,
-                r.denominator > 1,
-                abs(1 / float(r) - value),
-            ),
-        )
+        off = {rate: abs(1 / float(rate) - value) for rate in near}
+        return min(near, key=lambda rate: (off[rate] > tolerance / 5, rate.denominator > 1, off[rate]))
     if value > 1:
         return 1 / Fraction(value).limit_denominator(1000)
     return Fraction(1 / value).limit_denominator(1000)
 
 
-def _motion(
-    tree: _Hierarchy, numbers: Float64, rate: Fraction, name: str, path: str | Path | None
-) -> SkeletonMotion:
-    """Return the motion in numbers (T, channels)."""
+def _motion(tree: _Hierarchy, numbers: Float64, rate: Fraction, name: str, source: _Text) -> SkeletonMotion:
+    """Return the motion that numbers (T, channels) describe."""
     from fba import rotations
 
     frames, joints = len(numbers), len(tree.names)
@@ -366,7 +357,7 @@ def _motion(
         if joint == 0:
             positions = translation
         elif any(c.endswith("position") for c in channels):
-            if np.abs(translation - translation[0]).max() > STRETCH * size:
+            if np.abs(translation - translation[0]).max() > MAX_STRETCH * size:
                 moved[joint] = translation
             offsets[joint] = np.median(translation, axis=0)
     turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
@@ -375,19 +366,16 @@ def _motion(
         above = hips
         turn, place = turned[:, hips], moved[hips]
         while (above := tree.parents[above]) >= 0:
-            shift = (
-                positions if above == 0 else moved.get(above, np.broadcast_to(offsets[above], place.shape))
-            )
+            fixed = np.broadcast_to(offsets[above], place.shape)
+            shift = positions if above == 0 else moved.get(above, fixed)
             place = shift + (rotations.matrices(turned[:, above]) @ place[:, :, None])[:, :, 0]
             turn = rotations.multiply(turned[:, above], turn)
         turned[:, hips], positions, offsets[hips] = turn, place, place[0]
     stretched = [tree.names[joint] for joint in moved if joint > hips]
     if stretched:
-        warnings.warn(
-            f"{path or 'BVH'}: joints whose offset from the parent varies keep the median of it: "
-            f"{', '.join(stretched[:5])}{', ...' if len(stretched) > 5 else ''}",
-            FbaWarning,
-            stacklevel=4,
+        source.warn(
+            "joints whose offset from the parent varies keep the median of it: "
+            f"{', '.join(stretched[:5])}{', ...' if len(stretched) > 5 else ''}"
         )
     kept = _subtree(tree.parents, hips)
     row_of = {joint: row for row, joint in enumerate(kept)}
@@ -406,9 +394,9 @@ def _motion(
 
 
 def _count_from_offset(tree: _Hierarchy, numbers: Float64) -> bool:
-    """Whether positions of joints below the root count from their OFFSET, as MakeHuman's do.
+    """Whether positions of joints below the root are relative to their OFFSET, as in MakeHuman's files.
 
-    Others contain it. numbers: (T, channels).
+    In other files they contain it. numbers: (T, channels).
     """
     away = from_offset = 0.0
     column = 0
@@ -423,9 +411,9 @@ def _count_from_offset(tree: _Hierarchy, numbers: Float64) -> bool:
 
 
 def _moving_body(parents: list[int], moved: dict[int, Float64]) -> int:
-    """Return the joint below the root that moves with most of the body, such as hips under a scene's root.
+    """Return the joint below the root that carries the body, see `_CarrierRule`; else 0, the root.
 
-    moved: joints whose positions vary relative to their parents. 0, the root, without one.
+    moved: positions (T, 3) of joints relative to their parents, where they vary.
     """
     reach = {joint: float(np.ptp(positions, axis=0).max()) for joint, positions in moved.items()}
     size = [1] * len(parents)
@@ -433,8 +421,8 @@ def _moving_body(parents: list[int], moved: dict[int, Float64]) -> int:
         size[parents[joint]] += size[joint]
     for joint in moved:
         below = [reach[other] for other in _subtree(parents, joint)[1:] if other in reach]
-        usual = float(np.median(below)) if len(below) >= MIN_MOVING_JOINTS else 0.0
-        if size[joint] >= MOST_OF_BODY * len(parents) and reach[joint] > CARRIED * usual:
+        usual = float(np.median(below)) if len(below) >= CARRIER.min_moving else 0.0
+        if size[joint] >= CARRIER.min_joints * len(parents) and reach[joint] > CARRIER.min_reach * usual:
             return joint
     return 0
 

@@ -1,7 +1,7 @@
 """Write BVH: the standard's joints in the default posture, with BAPs as the angles of their channels.
 
 A joint's channels are its degrees of freedom in the order in which BAPs turn it, so every number is a BAP, in
-degrees: no angle is computed anew, none flips, and they are rounded only to `DIGITS`.
+degrees: angles are not computed anew and do not flip; they are only rounded to `DIGITS`.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ if TYPE_CHECKING:
 CENTIMETRES = 100.0
 DIGITS = 9
 """Significant digits: 1e-5 rad are 6e-4 degrees."""
-END = 0.5
-"""Length of a last bone, as a share of the one before it."""
+END_LENGTH = 0.5
+"""Length of the bone to an End Site, as a share of the bone before it."""
 BATCH_FRAMES = 256
 """Frames that are formatted at once."""
 RATES = (1 / 3600, 10_000)
 """Smallest and largest rate, in frames per second, that the reader accepts."""
-ESSENTIAL = (
+NEEDED_JOINTS = (
     "sacroiliac",
     "skullbase",
     *(f"{side}_{joint}" for side in "lr" for joint in ("hip", "knee", "ankle", "metatarsal")),
     *(f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "elbow", "wrist")),
 )
-"""Joints that are written even if they do not move, so that the skeleton is a body."""
+"""Joints that are written even if they do not move, so that the skeleton is that of a body."""
 
 
 def write(
@@ -116,14 +116,14 @@ def _select_joints(solver: BapSolver, values: Int32, moving: bool) -> list[int]:
     return [
         number
         for number, name in enumerate(names)
-        if number == 0 or name in ESSENTIAL or moved[list(solver.convention.freedoms(name))].any()
+        if number == 0 or name in NEEDED_JOINTS or moved[list(solver.convention.freedoms(name))].any()
     ]
 
 
 def _hierarchy(solver: BapSolver, written: list[int], unit: float) -> tuple[Int64, Float64, Float64, str]:
-    """Return for every channel BAP column (-1: none), factor and summand; and the text of the hierarchy."""
+    """Return the BAP column (-1: none), the factor and the summand of each channel; text of the hierarchy."""
     skeleton, rules = solver.skeleton, solver.convention
-    parents, row_of = _parents(skeleton, written), {number: row for row, number in enumerate(written)}
+    parents = _parents(skeleton, written)
     children: list[list[int]] = [[] for _ in written]
     for row, parent in enumerate(parents):
         if parent >= 0:
@@ -149,31 +149,30 @@ def _hierarchy(solver: BapSolver, written: list[int], unit: float) -> tuple[Int6
             f"{pad}{{",
             f"{pad}  OFFSET {_format_vector(offset * unit)}",
         ]
-        own, axes, signs = _turns(solver, name)
+        turned, axes, signs = _turns(solver, name)
         letters = " ".join(f"{'XYZ'[axis]}rotation" for axis in axes)
         position_channels = "" if depth else "Xposition Yposition Zposition "
         lines.append(f"{pad}  CHANNELS {3 if depth else 6} {position_channels}{letters}")
-        columns += own
+        columns += turned
         factors += [sign * np.degrees(1e-5) for sign in signs]
         shifts += [0.0, 0.0, 0.0]
         stack.append((-1, depth))
         if children[row]:
             stack += [(child, depth + 1) for child in reversed(children[row])]
         else:
-            end = offset * END * unit if depth else np.zeros(3)
+            end = offset * END_LENGTH * unit if depth else np.zeros(3)
             lines += [
                 f"{pad}  End Site",
                 f"{pad}  {{",
                 f"{pad}    OFFSET {_format_vector(end)}",
                 f"{pad}  }}",
             ]
-    assert len(row_of) == len(written)
     text = "\n".join(lines) + "\n"
     return np.array(columns), np.array(factors), np.array(shifts), text
 
 
 def _parents(skeleton: Skeleton, written: list[int]) -> list[int]:
-    """Return for every written joint the row of the closest written joint above it, -1 for the root."""
+    """Return the row of the closest written joint above each written joint, -1 for the root."""
     row_of = {number: row for row, number in enumerate(written)}
     result = []
     for number in written:

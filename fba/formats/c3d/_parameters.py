@@ -1,7 +1,7 @@
-"""The parameter section of C3D files: groups of named arrays, in the byte order of three processors.
+"""The parameter section of C3D files: groups of named arrays.
 
 See "The C3D file format user guide", Motion Lab Systems. The first block of the section names the processor
-that wrote the file: its numbers, and those of header and data, are in that processor's order.
+that wrote the file. All numbers of the file, also of header and data, are in that processor's byte order.
 """
 
 from __future__ import annotations
@@ -14,12 +14,15 @@ from fba.arrays import Array, Float64, to_float64
 from fba.errors import FormatError
 from fba.source import Path
 
-BLOCK = 512
-"""Bytes of a block, in which C3D counts."""
+BLOCK_BYTES = 512
+"""Bytes of a block, the unit of positions in the file."""
 INTEL, DEC, MIPS = 84, 85, 86
+"""Codes of processors."""
 KEY = 0x50
+"""The second byte of every C3D file."""
 MOST_PARAMETERS = 4096
 TEXT, BYTE, INTEGER, FLOAT = -1, 1, 2, 4
+"""Codes of types of parameters."""
 _KINDS = {TEXT: "S1", BYTE: "i1", INTEGER: "i2", FLOAT: "f4"}
 
 
@@ -39,7 +42,7 @@ class Numbers:
         if not self.dec:
             return np.frombuffer(data, f"{self.order}f4", count, start)
         halves = np.frombuffer(data, "<u2", 2 * count, start).reshape(-1, 2)
-        # the word with sign and exponent comes first, and the exponent counts from 2 more
+        # the word with sign and exponent comes first, and the bias of the exponent is larger by 2
         floats: Array = np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel()
         with np.errstate(invalid="ignore"):  # as in `to_float64`
             return floats / np.float32(4)
@@ -47,7 +50,7 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Parameters:
-    """The parameters of a file, by "GROUP:NAME" in upper case: arrays, texts as lists."""
+    """The parameters of a file, by "GROUP:NAME" in upper case: arrays of numbers, and lists of texts."""
 
     numbers: Numbers
     arrays: dict[str, Array]
@@ -59,12 +62,12 @@ class Parameters:
         return float(array[0]) if array is not None and len(array) else default
 
     def unsigned(self, name: str) -> Float64:
-        """Return the numbers of a parameter; those of 16 bits without a sign: float64."""
+        """Return the numbers of a parameter as float64; 16-bit numbers are read without a sign."""
         array = self.arrays.get(name, np.zeros(0))
         return to_float64(array.view(np.uint16) if array.dtype == np.int16 else array)
 
     def numbered_texts(self, name: str) -> tuple[str, ...]:
-        """Return the texts of NAME, NAME2, NAME3 ..., in one: a parameter holds 255 at most."""
+        """Return the texts of NAME, NAME2, NAME3 ...: a parameter holds at most 255 of them."""
         result = list(self.texts.get(name, ()))
         number = 2
         while f"{name}{number}" in self.texts:
@@ -78,11 +81,11 @@ def read_parameters(data: bytes, path: Path) -> Parameters:
 
     Raises FormatError where the section is cut off or contradicts itself.
     """
-    start = (data[0] - 1) * BLOCK
-    if start < BLOCK or start + 4 > len(data):
+    start = (data[0] - 1) * BLOCK_BYTES
+    if start < BLOCK_BYTES or start + 4 > len(data):
         raise FormatError(
             f"its first byte says that parameters begin in block {data[0]}, but the file has "
-            f"{len(data) // BLOCK} blocks of {BLOCK} bytes; was it copied whole?", path=path,
+            f"{len(data) // BLOCK_BYTES} blocks of {BLOCK_BYTES} bytes; was it copied whole?", path=path,
         )  # fmt: skip
     processor = data[start + 3]
     if processor not in (INTEL, DEC, MIPS):

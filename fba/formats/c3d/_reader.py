@@ -7,7 +7,6 @@ MIPS processors, more markers than one list of labels holds, more frames than th
 from __future__ import annotations
 
 import warnings
-from fractions import Fraction
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -15,19 +14,20 @@ import numpy as np
 from fba.arrays import Array, Float64, to_float64
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import MAX_MARKERS, METRES, regular_times
-from fba.errors import FbaWarning, FormatError, ModelError
-from fba.formats.c3d._parameters import BLOCK, KEY, Parameters, read_parameters
-from fba.formats.markers._names import unique_names, without_subject
-from fba.formats.markers._options import file_rate
+from fba.errors import FbaWarning, FormatError
+from fba.formats.c3d._parameters import BLOCK_BYTES, KEY, Parameters, read_parameters
+from fba.formats.markers._rows import file_rate, unique_names, without_subject
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path, read_whole
+from fba.source import Path, naming_file, read_whole
 
 COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
-"""Lists, in group POINT, of labels that are no markers: what programs computed is stored beside these."""
+"""Lists, in group POINT, of labels that are no markers: programs store computed values beside markers."""
 LAST_IN_HEADER = 65535
 """The largest frame number that the header holds."""
-UNITS = {"millimeters": "mm", "millimetres": "mm", "meters": "m", "metres": "m", "centimeters": "cm",
+UNIT_NAMES = {"millimeters": "mm", "millimetres": "mm", "meters": "m", "metres": "m", "centimeters": "cm",
          "inches": "in", "inch": "in", "feet": "ft"}  # fmt: skip
+"""Short names of units that files write out."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -36,9 +36,9 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
-    """Return the markers of a C3D file, without what programs computed from them (angles, forces).
+    """Return the markers of a C3D file, without values computed from them (angles, forces).
 
     source_rate: the rate of a file that has none.
 
@@ -46,9 +46,9 @@ def read_markers(
     a file that is cut short.
     """
     data = read_whole(path)
-    if not sniff(data[:BLOCK], "") or len(data) < BLOCK:
+    if not sniff(data[:BLOCK_BYTES], "") or len(data) < BLOCK_BYTES:
         raise FormatError(
-            f"a C3D file has {KEY:#x} as its second byte, and a header of {BLOCK} bytes", path=path
+            f"a C3D file has {KEY:#x} as its second byte, and a header of {BLOCK_BYTES} bytes", path=path
         )
     parameters = read_parameters(data, path)
     numbers = parameters.numbers
@@ -64,10 +64,10 @@ def read_markers(
     frames = _count_frames(parameters, first, last)
     size = 4 if scale < 0 else 2
     row = (4 * points + analogue) * size
-    start = (block - 1) * BLOCK
+    start = (block - 1) * BLOCK_BYTES
     if block < 2 or start >= len(data):
         raise FormatError(
-            f"its header says that data begin in block {block}, but the file has {len(data) // BLOCK}",
+            f"its header says that data begin in block {block}, but the file has {len(data) // BLOCK_BYTES}",
             path=path,
         )
     there = (len(data) - start) // row
@@ -91,17 +91,15 @@ def read_markers(
         float(numbers.floats(data, 1, 20)[0]) or parameters.number("POINT:RATE"), source_rate, path
     )
     values *= factors[:, None]
-    try:
+    names, times = tuple(labels[n] for n in kept), regular_times(frames, rate)
+    with naming_file(path):
         return MarkerMotion(
-            tuple(labels[n] for n in kept), values[:, kept], regular_times(frames, rate), rate,
-            unit=unit, up=_up(parameters), name=FilePath(path).stem,
-        )  # fmt: skip
-    except ModelError as error:
-        raise FormatError(error.finding, path=path) from error
+            names, values[:, kept], times, rate, unit=unit, up=_up(parameters), name=FilePath(path).stem
+        )
 
 
 def _count_frames(parameters: Parameters, first: int, last: int) -> int:
-    """Return the number of frames: the header's, or where these do not fit 16 bits, that of parameters."""
+    """Return the number of frames: the header's, or where that does not fit 16 bits, the parameters'."""
     fields = [parameters.unsigned(f"TRIAL:ACTUAL_{end}_FIELD") for end in ("START", "END")]
     if all(len(field) == 2 for field in fields):
         begin, end = (int(field[0] + 65536 * field[1]) for field in fields)
@@ -142,7 +140,7 @@ def _labels(parameters: Parameters, points: int) -> list[str]:
 
 
 def _kept(parameters: Parameters, labels: list[str]) -> list[int]:
-    """Return the numbers of the markers, in order, without computed values."""
+    """Return the numbers of the labels that are markers."""
     computed = {
         text.rpartition(":")[2] for name in COMPUTED for text in parameters.numbered_texts(f"POINT:{name}")
     }
@@ -150,13 +148,13 @@ def _kept(parameters: Parameters, labels: list[str]) -> list[int]:
 
 
 def _units(parameters: Parameters, points: int) -> tuple[str, Float64]:
-    """Return the unit of length, and metres for it of each marker: float64 (M,)."""
+    """Return the unit of most markers, and metres per unit of each marker, float64 (M,)."""
     stored = [text.lower() for text in parameters.numbered_texts("POINT:UNITS")] or [""]
-    words = [UNITS.get(text, text) for text in stored]
+    words = [UNIT_NAMES.get(text, text) for text in stored]
     words = words[:points] + [words[-1] if len(words) == 1 else ""] * (points - len(words))
     known = [word for word in words if word in METRES]
     usual = max(set(known), key=known.count) if known else ""
-    # millimetres, the unit of nearly all files, where a file says nothing
+    # nearly all files that do not say it are in millimetres
     return usual, np.array([METRES.get(word, METRES.get(usual, 0.001)) for word in words])
 
 

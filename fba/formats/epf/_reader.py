@@ -1,8 +1,8 @@
 """Read EPF files as plane settings.
 
-Each line has one tag; `#` begins a comment. `FBM` opens the block of a plane. Masks, quantisers, limits,
-gender, coding type and ISI stay in force until changed; rate, time code, skip and the four list tags apply
-to the plane of their own block only. Only I planes carry masks, quantisers, lists, rates and time codes.
+Each line has a tag and its values; `#` begins a comment. `FBM` opens the block of a plane. Masks, quantisers,
+gender, coding type and ISI stay in force until they change. Rate, time code, skip and the four lists of
+limits apply to the plane of their block. Only I planes carry masks, quantisers, lists, rates and time codes.
 """
 
 from __future__ import annotations
@@ -27,8 +27,6 @@ from fba.source import Path, open_source
 
 SKIP_MAX = 1_000_000
 """Most frames that a plane may skip: 11 hours at 25 frames/s. More is a mistake in the file."""
-
-
 PLANE_BYTES = 600
 """Memory of a plane's settings."""
 
@@ -43,7 +41,7 @@ class _Tag:
 
 @dataclass
 class _State:
-    """Settings of a part that are in force, and those that its last I plane sent."""
+    """Settings of a part in force. sent: those of its last I plane."""
 
     types: tuple[int, ...] | None = None
     mask: Bool | None = None
@@ -53,7 +51,7 @@ class _State:
 
 @dataclass
 class _Reader:
-    """Turns blocks of tags into `planes`; the other fields are the settings in force."""
+    """Reader of blocks into `planes`. frames: count of planes and of the frames that they skip."""
 
     lines: Lines
     states: dict[int, _State] = field(default_factory=lambda: {part.bit: _State() for part in PARTS})
@@ -62,10 +60,9 @@ class _Reader:
     coding_type: int = 0
     planes: list[PlaneSettings] = field(default_factory=list)
     frames: int = 0
-    """Planes, and the frames that they skip."""
 
     def add_plane(self, block: dict[str, _Tag]) -> None:
-        """Append the plane that a block describes. FormatError where the block contradicts itself."""
+        """Append the plane that a block describes. FormatError if the block contradicts itself."""
         opened = block["FBM"].line
         parts_mask = self.number(block, "FBM", 1, 3)
         if "ISI" in block:
@@ -110,12 +107,12 @@ class _Reader:
         self.frames += 1 + self.planes[-1].skip
 
     def part(self, part: Part, block: dict[str, _Tag], opened: int) -> PartSettings:
-        """Return the settings of a part in this plane. opened: line on which its block begins."""
+        """Return the settings of a part in this plane. opened: the first line of its block."""
         state = self.states[part.bit]
         changed = [tag for tag in (part.mask, part.quant) if tag in block]
         if part.mask in block:
             types, mask = self.masks(block, part)
-            if state.types == types and np.array_equal(state.mask, mask):  # type: ignore[arg-type]
+            if state.mask is not None and state.types == types and np.array_equal(state.mask, mask):
                 changed.remove(part.mask)
             state.types, state.mask = types, mask
         if part.quant in block:
@@ -187,9 +184,8 @@ class _Reader:
                 bits = [next(values, None) for _ in group]
             if kind is None or None in bits:
                 raise self.lines.error(
-                    f"{part.mask} ends within group {number} of {len(part.groups())}: "
-                    "per group a type 0..3, and "
-                    "behind type 1 or 2 a mask bit for each member",
+                    f"{part.mask} ends within group {number} of {len(part.groups())}: per group a type 0..3, "
+                    "and behind type 1 or 2 a mask bit for each member",
                     line=tag.line,
                 )
             used += 1 + (len(group) if kind in (1, 2) else 0)
@@ -210,7 +206,7 @@ class _Reader:
         return tuple(types), mask
 
     def limits(self, block: dict[str, _Tag], part: Part, name: str, sign: int) -> UInt8 | None:
-        """Return the range codes of a list tag, uint8 (parameters,), or None if the block has no such tag.
+        """Return the range codes of a list tag, uint8 (parameters,); None if the block lacks the tag.
 
         sign: +1 for maxima, -1 for minima.
         """
@@ -239,7 +235,7 @@ class _Reader:
     def time_tag(self, block: dict[str, _Tag], names: list[str]) -> tuple[str, list[int]] | None:
         """Return name and numbers of the first of these tags that the block has, or None.
 
-        FormatError where two of them differ: face and body of a plane have one time.
+        FormatError if two of them differ: a plane has one time for face and body.
         """
         present = [(name, self.numbers(block[name], 0, SKIP_MAX)) for name in names if name in block]
         if not present:
@@ -280,9 +276,9 @@ class _Reader:
     def fields(
         self, block: dict[str, _Tag], tag: tuple[str, list[int]], *wanted: tuple[str, int]
     ) -> list[int]:
-        """Return the numbers of a tag; FormatError where they are not as many as `wanted`, or too large.
+        """Return the numbers of a tag. wanted: name and largest value of each.
 
-        wanted: name and largest value of each field.
+        FormatError for another count of numbers, and for larger ones.
         """
         name, values = tag
         line = block[name].line
@@ -322,10 +318,10 @@ class _Reader:
 def read_epf(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> list[PlaneSettings]:
     """Return the planes that an EPF file describes, in order.
 
-    `face` and `body` of a P plane are the objects of the I plane in force. Raises FormatError with line
-    and token for unknown tags, values that the syntax cannot carry, and contradictions; warns (FbaWarning)
-    of a mask or quantiser that changes in the block of a P plane. Planes and the frames that they skip are
-    limited: LimitError.
+    `face` and `body` of a P plane are the objects of the I plane in force. Raises FormatError with line and
+    token for unknown tags, values that the syntax cannot carry, and contradictions; LimitError for more
+    planes and skipped frames than allowed. Warns (FbaWarning) of a mask or quantiser in the block of a P
+    plane.
     """
     file, size = open_source(path)
     with file:
@@ -362,7 +358,7 @@ def read_epf(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> list[PlaneSettin
 
 
 def _check_limits(reader: _Reader, size: int, limits: Limits) -> None:
-    """Raise LimitError for more planes, or more frames skipped, than allowed. size: bytes of the file."""
+    """Raise LimitError for more planes, or more skipped frames, than allowed. size: bytes of the file."""
     where = f"{reader.lines.path}:{reader.lines.number}"
     limits.check_frames(reader.frames, f"{where}: what is to be coded, with the frames skipped,")
     limits.check_bytes(len(reader.planes) * PLANE_BYTES, f"{where}: {len(reader.planes)} planes", source=size)

@@ -14,8 +14,9 @@ FACE, BODY = 1, 2
 class Part:
     """Tags of the face or the body.
 
-    bit: that of fba_object_mask. word: for messages. lists: tags of the range lists in coding order (I max,
-    I min, P max, P min). groups: returns parameter numbers by group. count: of parameters.
+    bit: in fba_object_mask. word: for messages. lists: tags of the range lists in coding order (I max, I min,
+    P max, P min). groups: returns the numbers of parameters by group. count: of parameters. first: number of
+    the first parameter with limits.
     """
 
     bit: int
@@ -30,7 +31,6 @@ class Part:
     groups: Callable[[], tuple[tuple[int, ...], ...]]
     count: int
     first: int
-    """Number of the first parameter that has limits."""
 
     @property
     def tags(self) -> tuple[str, ...]:

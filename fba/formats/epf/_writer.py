@@ -20,7 +20,7 @@ def write_epf(path: Path, planes: Iterable[PlaneSettings]) -> None:
 
     `read_epf` returns equal settings, except for plane start codes, which no tag carries (FbaWarning).
     Raises FormatError for settings that contradict themselves or if writing fails, UnsupportedError if face
-    and body of a plane differ in gender or coding type, for which there is one tag.
+    and body of a plane differ in gender or coding type, which share a tag.
     """
     writer = _Writer(path)
     with atomic(path) as file:
@@ -38,8 +38,11 @@ def write_epf(path: Path, planes: Iterable[PlaneSettings]) -> None:
 
 
 class _Writer:
-    """Formats planes as blocks. planes, start_codes: numbers of those so far. in_force: part -> settings of
-    its last I plane. shared: values in force of the tags that face and body share."""
+    """Formats planes as blocks.
+
+    planes, start_codes: their counts so far. in_force: part -> settings of its last I plane. shared: values
+    in force of the tags that face and body share.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -90,7 +93,7 @@ class _Writer:
                 )
 
     def _shared(self, where: str, settings: list[PartSettings]) -> Iterator[str]:
-        """Yield the shared tags that change. where: names the plane in errors."""
+        """Yield the shared tags that change. where: the plane, for errors."""
         for tag, values in (
             ("GDR", {part.gender for part in settings}),
             ("CDM", {part.coding_type for part in settings}),
@@ -144,7 +147,7 @@ class _Writer:
 
 
 def _same(one: PartSettings, other: PartSettings) -> bool:
-    """Whether a P plane may have these settings: range lists apply only to the I plane that sends them."""
+    """Whether a P plane may have these settings; range lists belong to the I plane that sends them."""
     return one is other or (
         (one.mask_types, one.quant, one.gender, one.coding_type)
         == (other.mask_types, other.quant, other.gender, other.coding_type)

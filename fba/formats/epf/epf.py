@@ -1,7 +1,6 @@
-"""EPF, the encoder parameter file of the reference encoder: which frames to code, and how.
+"""EPF, the encoder parameter file of the reference encoder: the frames to code, and their coding.
 
-It contains no animation: `read_epf` and `write_epf` convert it to plane settings and back, for
-`fba encode --epf` and `fba decode --epf`.
+It contains no animation, but plane settings, for `fba encode --epf` and `fba decode --epf`.
 """
 
 from __future__ import annotations
@@ -24,10 +23,7 @@ def sniff_epf(head: bytes, suffix: str) -> bool:
 
 
 def read_animation(path: Path) -> Animation:
-    """Raise UnsupportedError, which says what an EPF file is for: it contains no animation.
-
-    FormatError for a file of another kind.
-    """
+    """Raise UnsupportedError, which explains the use of EPF files; FormatError for other files."""
     if not sniff_epf(read_head(path), ""):
         read_epf(path)  # raises an error that says what is wrong
     raise UnsupportedError(

@@ -1,4 +1,4 @@
-"""Tables and records of captured faces: a row or a record for each moment.
+"""Tables and records of captured faces, with a row or a record for each moment.
 
 May use: what formats share, and `fba.capture`.
 """

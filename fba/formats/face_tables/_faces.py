@@ -1,39 +1,72 @@
-"""What readers of tracked faces share: rows of one face, turns of head and eyes, times."""
+"""What readers of tracked faces share: rows of one face, times, action units, turns of head and eyes."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int64
 from fba.capture.sampling import find_gaps, find_rate
-from fba.errors import FormatError, ModelError, Remedy
-from fba.formats.face_tables._tables import Table, named
-from fba.formats.face_tables._times import check_order
+from fba.errors import FormatError, Remedy
+from fba.formats.face_tables._tables import Table, check_order, named
+from fba.formats.text.frame_rates import Rate
+from fba.source import naming_file
 
-CONFIDENT = 0.5
-"""Confidence below which numbers of a row mean nothing."""
-USUAL = 30
-"""Rate of a single picture."""
-FILMS = (24, 25, 30, 48, 50, 60, 120)
-"""Rates of films."""
+MIN_CONFIDENCE = 0.5
+"""Confidence below which a row has no face."""
+PICTURE_RATE = 30
+"""Rate, in frames per second, of a single picture, and of pictures whose rate is unknown."""
+FILM_RATES = (24, 25, 30, 48, 50, 60, 120)
+"""Rates of films, in frames per second."""
 MAX_TURN = 2.0
 """Angle, in radians, that heads and eyes of tracked faces do not reach."""
 TURN_PERCENTILE = 99
 """Percentile of the angles that is compared with it."""
-PICTURES = 500
-"""Rows a second above which a column does not hold times."""
+MAX_ROWS_A_SECOND = 500
+"""Rows per second above which a column does not hold times."""
 UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """From axes of a camera (x right, y down, z away) to those of a face that looks into it (left, up, ahead)."""
 
 
-def choose_rows(table: Table, ids: Sequence[str], face: str | None) -> Int64:
-    """Return numbers of the rows (R,) of one face. ids: of the face in each row, "" where none is known.
+@dataclass(frozen=True)
+class UnitLayout:
+    """How a program lays out a table of action units.
 
-    Raises FormatError where there are several and `face` names none of them.
+    face, seconds: names of the columns with the face and the time of a row. strongest: the highest intensity
+    of an action unit. largest: the largest valid number.
+    """
+
+    face: str
+    seconds: str
+    strongest: float
+    largest: float
+
+
+@dataclass(frozen=True, eq=False)
+class UnitRows:
+    """The rows of one face.
+
+    numbers: int64 (T,), of the table's rows. times: float64 (T,), seconds from the first on. rate: nominal.
+    units: N action units. intensities: float64 (T, N), 0 to 1, NaN in rows without a face. findings: oddities
+    of the times.
+    """
+
+    numbers: Int64
+    times: Float64
+    rate: Fraction
+    units: tuple[int, ...]
+    intensities: Float64
+    findings: list[str]
+
+
+def choose_rows(table: Table, ids: Sequence[str], face: str | None) -> Int64:
+    """Return the numbers of the rows (R,) of one face. ids: the face of each row, "" where it is unknown.
+
+    Raises FormatError if there are several and `face` names none of them.
     """
     counts = Counter(one for one in ids if one)
     if face is not None:
@@ -47,30 +80,27 @@ def choose_rows(table: Table, ids: Sequence[str], face: str | None) -> Int64:
     return np.flatnonzero([not one or face is None or one == face for one in ids])
 
 
-def tracked_rows(table: Table, column: dict[str, int]) -> Bool:
-    """Return whether each row (T,) has a face, and is sure of it. column: names -> numbers of columns."""
+def tracked_rows(table: Table) -> Bool:
+    """Return whether each row (T,) has a face, with enough confidence."""
+    column = table.columns
     seen = np.ones(len(table.rows), dtype=bool)
     if "success" in column:
         seen &= table.numbers([column["success"]])[:, 0] > 0
     if "confidence" in column:
-        seen &= table.numbers([column["confidence"]])[:, 0] >= CONFIDENT
+        seen &= table.numbers([column["confidence"]])[:, 0] >= MIN_CONFIDENCE
     return seen
 
 
 def row_times(
-    table: Table,
-    rows: Int64,
-    seconds: int | None,
-    frame: int | None,
-    source_rate: Fraction | int | str | None,
+    table: Table, rows: Int64, seconds: int | None, frame: int | None, source_rate: Rate | None
 ) -> tuple[Float64, Fraction, list[str]]:
-    """Return times (R,) of rows from the first on, the nominal rate, and what was odd about them.
+    """Return times (R,) of rows from the first on, the nominal rate, and oddities.
 
-    seconds, frame: numbers of columns. source_rate: frames in a second, where no column has seconds, or where
-    these are those of pictures. Raises FormatError.
+    seconds, frame: numbers of columns. source_rate: frames per second, if no column has seconds, or if these
+    are those of pictures. Raises FormatError.
     """
     if len(rows) == 1:
-        return np.zeros(1), Fraction(source_rate or USUAL), []
+        return np.zeros(1), Fraction(source_rate or PICTURE_RATE), []
     findings = []
     if seconds is not None and ":" in table.rows[rows[0]][seconds]:
         if source_rate is None and frame is not None:
@@ -83,9 +113,9 @@ def row_times(
     counted = seconds is not None or frame is not None
     if seconds is not None and _are_pictures(table, seconds):
         if source_rate is None:
-            source_rate = USUAL
+            source_rate = PICTURE_RATE
             findings.append(
-                f"the times are those of pictures whose rate nobody knew; taken as {USUAL} in a second"
+                f"the times are those of pictures whose rate nobody knew; taken as {PICTURE_RATE} in a second"
             )
         seconds = None
     if seconds is not None:
@@ -105,16 +135,14 @@ def row_times(
         raise FormatError("the row has no time", path=table.path, line=lines[row])
     times = times - times[0]
     check_order(times, lines, table.path)
-    try:
-        return times, (find_rate(times) if counted else Fraction(source_rate or USUAL)), findings
-    except ModelError as error:
-        raise FormatError(error.finding, path=table.path) from error
+    with naming_file(table.path):
+        return times, (find_rate(times) if counted else Fraction(source_rate or PICTURE_RATE)), findings
 
 
 def _film_rate(table: Table, rows: Int64, seconds: int, frame: int) -> Fraction | None:
-    """Return the rate of films that fits whole seconds "00:03" at numbers of frames; None where several do.
+    """Return the rate of films that fits whole seconds "00:03" and numbers of frames; None if several fit.
 
-    A rate a thousandth lower, as television has it, is taken where no whole one fits.
+    Where no whole rate fits, television's rates, a thousandth lower, are tried.
     """
     frames = table.numbers([frame])[rows, 0]
     try:
@@ -124,15 +152,49 @@ def _film_rate(table: Table, rows: Int64, seconds: int, frame: int) -> Fraction 
     except ValueError:
         return None
     for slower in (Fraction(1), Fraction(1000, 1001)):
-        rates = [rate * slower for rate in FILMS]
+        rates = [rate * slower for rate in FILM_RATES]
         fitting = [rate for rate in rates if (frames // float(rate) == 60 * minute + second).all()]
         if fitting:
             return fitting[0] if len(fitting) == 1 else None
     return None
 
 
+def read_unit_rows(
+    table: Table,
+    columns: Mapping[int, int],
+    layout: UnitLayout,
+    face: str | None,
+    source_rate: Rate | None,
+    ids: Sequence[str] | None = None,
+) -> UnitRows:
+    """Return the action units of one face. columns: action unit -> number of its column.
+
+    face: which, if there are several. source_rate: frames per second, for tables without times. ids: the face
+    of each row; None for those in the column of faces. Raises FormatError.
+    """
+    column = table.columns
+    if ids is None:
+        ids = table.column(column[layout.face]) if layout.face in column else [""] * len(table.rows)
+    rows = choose_rows(table, ids, face)
+    times, rate, findings = row_times(
+        table, rows, column.get(layout.seconds), column.get("frame"), source_rate
+    )
+    units = sorted(columns)
+    strengths = table.numbers([columns[unit] for unit in units])[rows]
+    if np.nanmax(np.abs(strengths), initial=0.0) > layout.largest:
+        row = int(np.argwhere(np.abs(strengths) > layout.largest)[0][0])
+        raise FormatError(
+            f"an action unit is stronger than {layout.largest:g}; here they go from 0 to "
+            f"{layout.strongest:g}",
+            path=table.path, line=table.lines[rows[row]],
+        )  # fmt: skip
+    seen = tracked_rows(table)[rows]
+    shares = np.where(seen[:, None], np.clip(strengths / layout.strongest, 0.0, 1.0), np.nan)
+    return UnitRows(rows, times, rate, tuple(units), shares, findings)
+
+
 def find_missing(intensities: Float64, times: Float64, rate: Fraction) -> list[str]:
-    """Return what is missing of action units (T, N) at times (T,), a sentence each."""
+    """Return what is missing of action units (T, N) at times (T,), a sentence for each."""
     seen = np.isnan(intensities).sum(axis=1) == 0
     findings = []
     if not seen.all():
@@ -144,15 +206,15 @@ def find_missing(intensities: Float64, times: Float64, rate: Fraction) -> list[s
 
 
 def _are_pictures(table: Table, seconds: int) -> bool:
-    """Whether times are those of pictures whose times are unknown: a thousand of them in a second."""
+    """Whether times are those of pictures whose times are unknown, a thousand of them in a second."""
     times = table.numbers([seconds])[:, 0]
-    return len(times) > 1 and bool(0 < np.median(np.diff(times)) * PICTURES <= 1)
+    return len(times) > 1 and bool(0 < np.median(np.diff(times)) * MAX_ROWS_A_SECOND <= 1)
 
 
 def angle_unit(angles: Float64) -> tuple[float, list[str]]:
-    """Return what angles (T, N) of heads and eyes must be multiplied by to be radians, and what is odd.
+    """Return the factor from angles (T, N) of heads and eyes to radians, and oddities.
 
-    Faces that are tracked do not look backwards: in radians, they turn less than `MAX_TURN`.
+    A tracked face does not look backwards: in radians, it turns by less than `MAX_TURN`.
     """
     known = np.abs(angles[~np.isnan(angles)])
     if not len(known) or np.percentile(known, TURN_PERCENTILE) <= MAX_TURN:
@@ -163,9 +225,9 @@ def angle_unit(angles: Float64) -> tuple[float, list[str]]:
 
 
 def head_angles(turns: Float64) -> Float64:
-    """Return pitch, yaw and roll (T, 3) of heads, as FAPs 48 to 50 turn them, of rotations (T, 3, 3).
+    """Return pitch, yaw and roll (T, 3) of heads, as FAPs 48 to 50 turn them.
 
-    Rotations are in a camera's axes; one that is the identity looks into the camera.
+    turns: rotations (T, 3, 3) in a camera's axes, of which the identity looks into the camera.
     """
     face = UPRIGHT @ turns @ UPRIGHT
     pitch = np.arctan2(-face[:, 1, 2], face[:, 1, 1])
@@ -175,9 +237,9 @@ def head_angles(turns: Float64) -> Float64:
 
 
 def eye_angles(left: Float64, right: Float64, turns: Float64 | None) -> Float64:
-    """Return yaw of the left and the right eye, then their pitch (T, 4), of directions (T, 3) of their gaze.
+    """Return the yaw of the left and the right eye, then their pitch (T, 4).
 
-    turns: (T, 3, 3), of the head, which eyes are turned in. Directions and turns are in a camera's axes.
+    left, right: directions (T, 3) of their gaze. turns: (T, 3, 3), of the head. All are in a camera's axes.
     """
     result = []
     for gaze in (left, right):

@@ -1,8 +1,8 @@
-"""Read tables (CSV) of blendshapes: those of Live Link Face, and any others with ARKit's names of shapes.
+"""Read tables (CSV) of blendshapes, of Live Link Face and others with ARKit's names of shapes; write them.
 
 Columns are found by their names, in any order and case. Times are in a column `Timecode`
 (HH:MM:SS:FF.fff), in seconds or milliseconds (`time`, `timestamp`), or numbers of frames (`frame`). Live Link
-Face counts 60 frames a second, while frames come every 1.0016 of these: the times count, never the rows.
+Face's codes count 60 frames a second, but its rows are 1.0016 frames apart: times count, never rows.
 """
 
 from __future__ import annotations
@@ -15,39 +15,54 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture import ShapeMotion
+from fba.atomic import atomic
+from fba.capture import ShapeMotion, to_blendshapes
 from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_rate
 from fba.choices import Swap
-from fba.errors import FormatError, ModelError, Remedy
+from fba.errors import FormatError, Remedy
 from fba.face.shape_names import arkit_names
 from fba.formats.face_tables._faces import angle_unit
-from fba.formats.face_tables._shape_rows import (
-    check_weights,
-    find_lacks,
-    find_swap,
-    shape_of,
+from fba.formats.face_tables._tables import (
+    Table,
+    check_order,
+    header_names,
+    named,
+    read_table,
+    regular_seconds,
 )
-from fba.formats.face_tables._tables import Table, header_names, named, read_table
-from fba.formats.face_tables._times import check_order, seconds_of
-from fba.formats.time_codes import read_time_codes
+from fba.formats.face_tables.livelink_udp import join_values
+from fba.formats.face_tables.shape_weights import check_weights, find_lacks, find_swap, shape_of
+from fba.formats.text.frame_rates import Rate
+from fba.formats.time_codes import DAY, read_time_codes
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path
+from fba.source import Path, naming_file
 
 MIN_SHAPES = 5
-"""Smallest number of shapes with ARKit's names or synonyms in a table of blendshapes; beside times, one is
-enough."""
+"""Smallest number of shapes with ARKit's names or synonyms in a table; beside times, one is enough."""
 TIME_CODE = ("timecode",)
 SECONDS = ("time", "timestamp", "seconds", "times", "timesec", "timeseconds", "timestampms", "timems", "t")
 FRAMES = ("frame", "framenumber", "frameid", "frameidx", "frameindex")
 COUNT = ("blendshapecount",)
-HEAD = ("headyaw", "headpitch", "headroll")
-EYES = ("lefteyeyaw", "righteyeyaw", "lefteyepitch", "righteyepitch")
+HEAD_ANGLES = ("headyaw", "headpitch", "headroll")
+EYE_ANGLES = ("lefteyeyaw", "righteyeyaw", "lefteyepitch", "righteyepitch")
 UNUSED = ("lefteyeroll", "righteyeroll", "neutral")
-"""Columns that no FAP stands for."""
-SPARSE = 1.2
-"""Counts of time codes between frames above which frames are fewer than these count."""
+"""Columns without a FAP."""
+MAX_CODE_STEP = 1.2
+"""Frames of the time codes from row to row above which the rate is found from the rows instead."""
+WRITTEN_ANGLES = (
+    "HeadYaw", "HeadPitch", "HeadRoll", "LeftEyeYaw", "LeftEyePitch", "LeftEyeRoll", "RightEyeYaw",
+    "RightEyePitch", "RightEyeRoll",
+)  # fmt: skip
+CODE_RATES = (24, 25, 30, 48, 50, 60, 120)
+"""Rates that written time codes count in; for others they count 60 frames a second, and parts of them."""
+MIN_RATE = 10
+"""Lowest rate, in frames per second, that is written: the time codes of slower animations are ambiguous."""
+DEFAULT_RATE = 30
+"""Rate, in frames per second, to which slower animations are resampled."""
+BATCH_FRAMES = 1024
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -58,18 +73,14 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_face(
-    path: Path,
-    *,
-    source_rate: Fraction | int | str | None = None,
-    swap: Swap = "auto",
-    limits: Limits = DEFAULT_LIMITS,
+    path: Path, *, source_rate: Rate | None = None, swap: Swap = "auto", limits: Limits = DEFAULT_LIMITS
 ) -> ShapeMotion:
     """Return weights, head and eyes as they are in a table.
 
-    source_rate: rows in a second, for a table without times. swap: whether MouthLeft and MouthRight, JawLeft
-    and JawRight change places, as Live Link Face writes them the wrong way round: "yes", "no", or "auto",
-    which looks at how they go with lop-sided smiles. `ShapeMotion.findings` say what was done. Raises
-    FormatError, LimitError, OptionError.
+    source_rate: rows per second, for a table without times. swap: whether MouthLeft and MouthRight, JawLeft
+    and JawRight change places, as Live Link Face exchanges them: "yes", "no", or "auto", which compares them
+    with lop-sided smiles. `ShapeMotion.findings` say what was done. Raises FormatError, LimitError,
+    OptionError.
     """
     table = read_table(path, limits)
     columns = _find_columns(table)
@@ -95,7 +106,7 @@ def read_face(
 
 
 class _Columns(NamedTuple):
-    """Numbers of columns: of shapes by name, of the angles of head and eyes; names that mean nothing here."""
+    """Numbers of columns: of shapes by name, of angles of head and eyes; strange: names without a meaning."""
 
     shapes: dict[str, int]
     head: list[int]
@@ -104,7 +115,7 @@ class _Columns(NamedTuple):
 
 
 class _Times(NamedTuple):
-    """Times (T,) in seconds from the first row, the nominal rate, the first row's time of day."""
+    """Times (T,) in seconds from the first row; start: time of day of that; coded: whether codes say it."""
 
     seconds: Float64
     rate: Fraction
@@ -113,7 +124,7 @@ class _Times(NamedTuple):
 
 
 def _are_enough(names: Sequence[str]) -> bool:
-    """Whether columns with these names are a table of blendshapes: several, or ARKit's own beside times."""
+    """Whether these are columns of blendshapes: several shapes, or one of ARKit's own names beside times."""
     if sum(shape_of(name) is not None for name in names) >= MIN_SHAPES:
         return True
     timed = any(key_of(name) in (*TIME_CODE, *SECONDS, *FRAMES, *COUNT) for name in names)
@@ -121,7 +132,7 @@ def _are_enough(names: Sequence[str]) -> bool:
 
 
 def _find_columns(table: Table) -> _Columns:
-    """Return which column is what. Raises FormatError for too few shapes, or a name that occurs twice."""
+    """Return the columns by meaning. Raises FormatError for too few shapes, or two columns of one shape."""
     by_key: dict[str, int] = {}
     shapes: dict[str, int] = {}
     strange = []
@@ -143,17 +154,15 @@ def _find_columns(table: Table) -> _Columns:
             f"ARKit's, such as EyeBlinkLeft and JawOpen; it has {named(list(table.names))}",
             path=table.path, line=1,
         )  # fmt: skip
-    known = {*TIME_CODE, *SECONDS, *FRAMES, *COUNT, *HEAD, *EYES, *UNUSED}
-    head, eyes = ([by_key[key] for key in keys if key in by_key] for keys in (HEAD, EYES))
-    return _Columns(
-        shapes,
-        head if len(head) == len(HEAD) else [],
-        eyes if len(eyes) == len(EYES) else [],
-        [name for name in strange if key_of(name) not in known],
+    known = {*TIME_CODE, *SECONDS, *FRAMES, *COUNT, *HEAD_ANGLES, *EYE_ANGLES, *UNUSED}
+    head, eyes = (
+        [by_key[key] for key in keys] if set(keys) <= set(by_key) else []
+        for keys in (HEAD_ANGLES, EYE_ANGLES)
     )
+    return _Columns(shapes, head, eyes, [name for name in strange if key_of(name) not in known])
 
 
-def _read_times(table: Table, source_rate: Fraction | int | str | None) -> _Times:
+def _read_times(table: Table, source_rate: Rate | None) -> _Times:
     keys = [key_of(name) for name in table.names]
 
     def column(names: tuple[str, ...]) -> int | None:
@@ -164,8 +173,8 @@ def _read_times(table: Table, source_rate: Fraction | int | str | None) -> _Time
         codes = read_time_codes(table.column(coded), table.lines, table.path)
         seconds, rate = codes.seconds, codes.rate
         check_order(seconds, table.lines, table.path)
-        if len(seconds) > 1 and float(np.median(np.diff(seconds))) * rate > SPARSE:
-            rate = find_rate(seconds)  # fewer frames than the time codes count
+        if len(seconds) > 1 and float(np.median(np.diff(seconds))) * rate > MAX_CODE_STEP:
+            rate = find_rate(seconds)
         return _Times(seconds, rate, codes.start, True)
     if timed is not None:
         read = table.numbers([timed])[:, 0]
@@ -175,12 +184,7 @@ def _read_times(table: Table, source_rate: Fraction | int | str | None) -> _Time
                 f"column {table.names[timed]!r} has no number; every row needs a time",
                 path=table.path, line=table.lines[row],
             )  # fmt: skip
-        seconds = seconds_of(read)
-        check_order(seconds, table.lines, table.path)
-        try:
-            return _Times(seconds, find_rate(seconds), None, False)
-        except ModelError as error:
-            raise FormatError(error.finding, path=table.path) from error
+        return _Times(*regular_seconds(read, table.lines, table.path), None, False)
     if source_rate is None:
         raise FormatError(
             "has no column of times: none is called Timecode, time or timestamp", path=table.path
@@ -194,7 +198,7 @@ def _read_times(table: Table, source_rate: Fraction | int | str | None) -> _Time
 
 
 def _is_of_the_app(names: tuple[str, ...]) -> bool:
-    """Whether columns have the order of the app's own tables, in which right comes before left there."""
+    """Whether columns have the order of the app's tables, where MouthRight and JawRight come before left."""
     keys = [key_of(name) for name in names]
     return all(
         {left, right} <= set(keys) and keys.index(left) == keys.index(right) + 1
@@ -203,7 +207,7 @@ def _is_of_the_app(names: tuple[str, ...]) -> bool:
 
 
 def _gather(names: list[str]) -> list[str]:
-    """Return names, of those that differ in their numbers alone the first with how many they are."""
+    """Return names; of names that differ only in their numbers, the first and the count of the others."""
     alike: dict[str, list[str]] = {}
     for name in names:
         alike.setdefault(re.sub(r"\d+", "#", name), []).append(name)
@@ -215,7 +219,7 @@ def _gather(names: list[str]) -> list[str]:
 def _findings(
     table: Table, columns: _Columns, weights: Float64, times: _Times, still: list[str]
 ) -> list[str]:
-    """Return what is odd about a table, a sentence each."""
+    """Return oddities of a table, a sentence for each."""
     findings = []
     if columns.strange:
         findings.append(f"columns that mean nothing here are left out: {named(_gather(columns.strange))}")
@@ -224,3 +228,37 @@ def _findings(
     if table.cut:
         findings.append("the last row is incomplete, as where a recording was cut off; it is left out")
     return findings + find_lacks(list(columns.shapes), weights, times.seconds, times.rate)
+
+
+def write(path: Path, animation: Animation) -> None:
+    """Write the face as a table of blendshapes, see `fba.capture.to_blendshapes`.
+
+    Columns are in ARKit's order; left is always the performer's left. Time 0 of the animation is midnight in
+    the time codes. Raises FormatError without a face.
+    """
+    if animation.rate < MIN_RATE:
+        animation = animation.resample(DEFAULT_RATE)
+    with naming_file(path):
+        motion = to_blendshapes(animation)
+    rows = join_values(motion)
+    names = [name[0].upper() + name[1:] for name in motion.names]
+    rate = int(animation.rate) if animation.rate in CODE_RATES else 60
+    codes = _time_codes(motion.times + (motion.start or 0.0), rate)
+    pattern = f",{rows.shape[1]}" + ",%.6f" * rows.shape[1] + "\n"
+    with atomic(path) as file:
+        file.write(("Timecode,BlendShapeCount," + ",".join([*names, *WRITTEN_ANGLES]) + "\n").encode())
+        for start in range(0, len(rows), BATCH_FRAMES):
+            part = rows[start : start + BATCH_FRAMES].tolist()
+            lines = [code + pattern % tuple(row) for code, row in zip(codes[start:], part, strict=False)]
+            file.write("".join(lines).encode())
+
+
+def _time_codes(times: Float64, rate: int) -> list[str]:
+    """Return times, in seconds, as HH:MM:SS:FF.fff. rate: the frames per second that they count."""
+    codes = []
+    for thousandths in np.rint((times % DAY) * rate * 1000).astype(np.int64).tolist():
+        frames, part = divmod(thousandths, 1000)
+        seconds, frame = divmod(frames, rate)
+        minutes, second = divmod(seconds, 60)
+        codes.append(f"{minutes // 60 % 24:02}:{minutes % 60:02}:{second:02}:{frame:02}.{part:03}")
+    return codes

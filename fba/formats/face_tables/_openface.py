@@ -1,14 +1,13 @@
 """Read tables (CSV) of OpenFace: action units, pose and gaze of a tracked face.
 
-Columns are found by their names, which begin with a blank in files of some builds; blocks may be missing.
-Rows in which tracking failed have no face. OpenFace 3 has eight columns of the same names that mean other
-action units; they are known by their exact set.
+Columns are found by their names, which begin with a blank in files of some builds. Blocks of columns may be
+missing. Rows in which tracking failed have no face. In OpenFace 3, eight columns with the same names mean
+other action units; their exact set tells them.
 """
 
 from __future__ import annotations
 
 import re
-from fractions import Fraction
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -18,14 +17,16 @@ from fba.arrays import Float64, Int64
 from fba.capture import ActionUnitMotion
 from fba.errors import FormatError
 from fba.formats.face_tables._faces import (
+    UnitLayout,
     angle_unit,
     eye_angles,
     find_missing,
     head_angles,
+    read_unit_rows,
     tracked_rows,
 )
 from fba.formats.face_tables._tables import Table, header_names, read_table
-from fba.formats.face_tables._unit_rows import UnitLayout, number_columns, read_unit_rows
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -36,7 +37,7 @@ VERSION_3 = {1: 1, 2: 6, 3: 12, 4: 15, 5: 17, 6: 2, 7: 9, 8: 10}
 """Action units that the eight columns of version 3 mean."""
 POSE = ("pose_Rx", "pose_Ry", "pose_Rz")
 GAZE = {side: tuple(f"gaze_{eye}_{axis}" for axis in "xyz") for side, eye in (("right", 0), ("left", 1))}
-"""Directions of the gaze: eye 0 is the leftmost in the picture, the subject's right one."""
+"""Directions of the gaze: eye 0 is the left one in the picture, the subject's right."""
 ANGLES = ("gaze_angle_x", "gaze_angle_y")
 
 
@@ -46,19 +47,15 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_face(
-    path: Path,
-    *,
-    source_rate: Fraction | int | str | None = None,
-    face: str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
+    path: Path, *, source_rate: Rate | None = None, face: str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> ActionUnitMotion:
     """Return action units, head and eyes as they are in a table.
 
-    source_rate: frames in a second, for tables without times. face: the `face_id` of the face to read, where
-    there are several. Raises FormatError, LimitError.
+    source_rate: frames per second, for tables without times. face: the `face_id` to read, if there are
+    several. Raises FormatError, LimitError.
     """
     table = read_table(path, limits)
-    column = number_columns(table)
+    column = table.columns
     columns = {int(found[1]): column[name] for name in column if (found := INTENSITY.fullmatch(name))}
     findings = []
     if not columns:
@@ -70,32 +67,33 @@ def read_face(
         columns = {VERSION_3[unit]: number for unit, number in columns.items()}
         findings.append("AU01_r to AU08_r are taken as OpenFace 3's: action units 1, 6, 12, 15, 17, 2, 9, 10")
     rows = read_unit_rows(table, columns, LAYOUT, face, source_rate)
-    turns, odd = _turns(table, column)
+    turns, odd = _turns(table)
     turns = None if turns is None else turns[rows.numbers]
-    findings += odd
-    findings += rows.findings + find_missing(rows.intensities, rows.times, rows.rate)
+    findings += odd + rows.findings + find_missing(rows.intensities, rows.times, rows.rate)
     return ActionUnitMotion(
         rows.units, rows.intensities, rows.times, rows.rate,
         head=None if turns is None else head_angles(turns),
-        eyes=_eyes(table, column, rows.numbers, turns),
+        eyes=_eyes(table, rows.numbers, turns),
         name=FilePath(path).stem, findings=tuple(findings),
     )  # fmt: skip
 
 
-def _turns(table: Table, column: dict[str, int]) -> tuple[Float64 | None, list[str]]:
-    """Return rotations (T, 3, 3) of the head in the camera's axes, None without a pose; what is odd."""
+def _turns(table: Table) -> tuple[Float64 | None, list[str]]:
+    """Return rotations (T, 3, 3) of the head in the camera's axes, None without a pose; and oddities."""
+    column = table.columns
     if not set(POSE) <= set(column):
         return None, []
     angles = np.nan_to_num(table.numbers([column[name] for name in POSE]))
-    unit, odd = angle_unit(angles[tracked_rows(table, column)])
+    unit, odd = angle_unit(angles[tracked_rows(table)])
     angles *= unit
     x, y, z = (rotations.axis_matrices(axis, angles[:, axis]) for axis in range(3))
     return np.asarray(x @ y @ z), odd
 
 
-def _eyes(table: Table, column: dict[str, int], rows: Int64, turns: Float64 | None) -> Float64 | None:
+def _eyes(table: Table, rows: Int64, turns: Float64 | None) -> Float64 | None:
     """Return turns (T, 4) of the eyes in the head; None without a gaze."""
-    if set(GAZE["left"]) | set(GAZE["right"]) <= set(column):
+    column = table.columns
+    if {*GAZE["left"], *GAZE["right"]} <= set(column):
         left, right = (
             np.nan_to_num(table.numbers([column[name] for name in GAZE[side]])[rows])
             for side in ("left", "right")

@@ -1,4 +1,4 @@
-"""What readers of tracked points share: what the numbers are."""
+"""What readers of tracked points share: the meaning of the numbers."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import PointMotion
-from fba.errors import FormatError, ModelError
-from fba.source import Path
+from fba.source import Path, naming_file
 
-FLATTEST = 0.08
-"""Least ratio of a face's depth to its width, or the other way round, whatever the shape of the picture."""
-SHARES = 2.0
-"""Coordinates up to this are shares of a picture: pixels of a face are more."""
+MIN_DEPTH = 0.08
+"""Smallest ratio of a face's depth to its width, and of its width to its depth."""
+MAX_SHARE = 2.0
+"""Largest median coordinate of shares of a picture; pixels of a face are more."""
 
 
 def build_points(
@@ -30,10 +29,9 @@ def build_points(
     eyes: Float64 | None = None,
     findings: Sequence[str] = (),
 ) -> PointMotion:
-    """Return points (T, N, 2 or 3) as a motion; whether they are shares of the picture is seen by their size.
+    """Return points (T, N, 2 or 3) as a motion. Their size tells whether they are shares of the picture.
 
-    Points that are all in one place, as the zeros that trackers write where they see no face, are missing.
-    Raises FormatError.
+    A frame whose points are all in one place has no face: trackers write zeros there. Raises FormatError.
     """
     positions = positions.copy()
     spread = np.ptp(np.nan_to_num(positions[..., :2]), axis=1)
@@ -45,22 +43,20 @@ def build_points(
         positions = positions[..., :2]
         findings.append("depth is in another unit than x and y, and left out")
     plane = np.abs(positions[..., :2])
-    share = not metric and bool(np.isfinite(plane).any()) and float(np.nanmedian(plane)) <= SHARES
+    share = not metric and bool(np.isfinite(plane).any()) and float(np.nanmedian(plane)) <= MAX_SHARE
     if share and float(np.nanmin(positions[..., :2])) < 0 and float(np.nanmedian(plane)) < 0.1:
-        share = False  # a face of its own, around 0
-    try:
+        share = False  # a face centred at 0
+    with naming_file(path):
         return PointMotion(
             positions, times, rate, metric=metric, share=share, aspect=aspect, eyes=eyes, name=name,
             findings=tuple(findings),
         )  # fmt: skip
-    except ModelError as error:
-        raise FormatError(error.finding, path=path) from error
 
 
 def _is_deep(positions: Float64) -> bool:
-    """Whether z of points (T, N, 3) goes about as far as x and y do, as a face's depth in one unit does."""
+    """Whether z of points (T, N, 3) varies about as much as x and y, as the depth of a face does."""
     seen = positions[~np.isnan(positions).any(axis=(1, 2))]
     if not len(seen):
         return True
     across, up, deep = np.median(seen.std(axis=1), axis=0).tolist()
-    return bool(FLATTEST < deep / max(across, up, 1e-300) < 1 / FLATTEST)
+    return bool(MIN_DEPTH < deep / max(across, up, 1e-300) < 1 / MIN_DEPTH)

@@ -1,8 +1,8 @@
 """Read tables (CSV) of points that a tracker found on a face: MediaPipe's, OpenFace's, dlib's, py-feat's.
 
 There is no standard. Wide tables have a column for each coordinate: `x_0, y_0, z_0, ...`, `landmark_0_x`,
-`0_x`, `x0`; long ones have a row for each point: `frame, landmark, x, y, z`. OpenFace writes pixels as
-`x_0, y_0` and millimetres as `X_0, Y_0, Z_0`: these are read, if they are there.
+`0_x`, `x0`. Long tables have a row for each point: `frame, landmark, x, y, z`. OpenFace writes pixels as
+`x_0, y_0` and millimetres as `X_0, Y_0, Z_0`, which are preferred.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -22,13 +21,14 @@ from fba.errors import FormatError, ModelError
 from fba.formats.face_tables._faces import choose_rows, row_times, tracked_rows
 from fba.formats.face_tables._points import build_points
 from fba.formats.face_tables._tables import Table, header_names, named, read_table
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
 AXIS_FIRST = re.compile(r"(?:(.*?)[ _.\-]*)??([xyzXYZ])[ _.\-\[(]*(\d{1,4})[\])]?")
 AXIS_LAST = re.compile(r"(.*?)[ _.\-\[(]*(\d{1,4})[\])]?[ _.\-]*([xyzXYZ])")
 MIN_POINTS = 5
-"""Smallest number of points in a table of points; fewer are markers."""
+"""Fewest points in a table of points; fewer are markers."""
 TIMES = ("timestamp", "time", "seconds", "time_s", "timestamp_s", "t")
 MILLISECONDS = ("timestamp_ms", "time_ms", "timestampms", "milliseconds", "ms")
 FRAMES = ("frame", "frame_id", "frame_number", "frame_idx", "frame_index", "framenum", "image_id")
@@ -52,11 +52,12 @@ SIZES = (
 )
 WORDS = ("", "landmark", "landmarks", "lm", "lmk", "face", "facelandmark", "point", "points", "p", "pt", "kp",
          "keypoint", "facepoint", "mesh", "facemesh")  # fmt: skip
-"""What may stand before the numbers of columns, in small letters."""
+"""Words that may stand before the numbers of columns, in lower case."""
 PLAIN = re.compile(r"-?\d{1,9}(?:\.\d{0,20})?(?:[eE][+-]?\d{1,3})?")
 PLAIN_COUNTS = {width * count for count in COUNTS for width in (2, 3)}
-"""Columns of tables that number them, or that have no header."""
+"""Counts of columns in tables whose columns are numbered or have no header."""
 MILLIMETRE = 0.001
+"""Metres."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -69,19 +70,15 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_points(
-    path: Path,
-    *,
-    source_rate: Fraction | int | str | None = None,
-    face: str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
+    path: Path, *, source_rate: Rate | None = None, face: str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> PointMotion:
     """Return the points as they are in a table.
 
-    source_rate: frames in a second, for tables without times. face: the name or number of the face to read,
-    where there are several. Raises FormatError, LimitError.
+    source_rate: frames per second, for tables without times. face: the name or number of the face to read, if
+    there are several. Raises FormatError, LimitError.
     """
     table = _with_header(read_table(path, limits))
-    column = {name: number for number, name in reversed(list(enumerate(table.names)))}
+    column = table.columns
     by_word = {name.lower(): number for name, number in column.items()}
     long = _long_columns(table.names)
     ids = next((table.column(column[name]) for name in FACES if name in column), [""] * len(table.rows))
@@ -94,7 +91,7 @@ def read_points(
     frame = next((by_word[name] for name in FRAMES if name in by_word), None)
     times, rate, odd = row_times(table, first, seconds, frame, source_rate)
     metric = long is None and _is_metric(table.names)
-    positions[~tracked_rows(table, column)[first]] = np.nan
+    positions[~tracked_rows(table)[first]] = np.nan
     return build_points(
         positions * (MILLIMETRE if metric else 1.0), times, rate, path=path, name=FilePath(path).stem,
         metric=metric, aspect=_read_aspect(table, by_word), findings=odd,
@@ -102,7 +99,7 @@ def read_points(
 
 
 def _find_sets(names: Sequence[str]) -> dict[str, dict[str, dict[int, int]]]:
-    """Return what is before the numbers -> axis -> number of the point -> column."""
+    """Return columns by the word before their number, then by axis, then by number of the point."""
     result: dict[str, dict[str, dict[int, int]]] = {}
     for column, name in enumerate(names):
         if match := AXIS_FIRST.fullmatch(name):
@@ -118,7 +115,7 @@ def _find_sets(names: Sequence[str]) -> dict[str, dict[str, dict[int, int]]]:
 
 
 def _plain_columns(names: Sequence[str]) -> list[int] | None:
-    """Return columns of coordinates, one after another, of a table that numbers columns or has no names."""
+    """Return the columns of coordinates, in order, of a table whose columns are numbered or have no names."""
     numbers = [column for column, name in enumerate(names) if PLAIN.fullmatch(name)]
     for columns in (numbers, numbers[1:]):
         if len(names) - len(columns) <= 3 and len(columns) in PLAIN_COUNTS:
@@ -127,7 +124,7 @@ def _plain_columns(names: Sequence[str]) -> list[int] | None:
 
 
 def _with_header(table: Table) -> Table:
-    """Return a table whose first line may be no header, but numbers, as one with a header."""
+    """Return the table; if its first line holds numbers instead of names, with a header made for it."""
     plain = _plain_columns(table.names)
     if plain is None or all(name.isdigit() for name in (table.names[column] for column in plain)):
         return table
@@ -140,8 +137,7 @@ def _with_header(table: Table) -> Table:
 
 def _is_metric(names: Sequence[str]) -> bool:
     """Whether columns are OpenFace's points in millimetres, X_0, Y_0, Z_0."""
-    sets = _find_sets(names)
-    return {"X", "Y", "Z"} <= set(sets.get("", {}))
+    return {"X", "Y", "Z"} <= set(_find_sets(names).get("", {}))
 
 
 def _read_wide(table: Table, rows: Int64) -> Float64:
@@ -185,7 +181,7 @@ def _check(count: int, table: Table) -> None:
 
 
 def _long_columns(names: Sequence[str]) -> tuple[int, int, int, int, int | None] | None:
-    """Return columns of frame or time, of the point, of x, y and z of a table with a row for each point."""
+    """Return the columns of frame or time, point, x, y and z of a long table; None for other tables."""
     words = [name.lower() for name in names]
     point = next((words.index(name) for name in POINTS if name in words), None)
     frame = next((words.index(name) for name in (*FRAMES, *TIMES, *MILLISECONDS) if name in words), None)
@@ -197,10 +193,10 @@ def _long_columns(names: Sequence[str]) -> tuple[int, int, int, int, int | None]
 def _read_long(
     table: Table, rows: Int64, columns: tuple[int, int, int, int, int | None]
 ) -> tuple[Float64, Int64]:
-    """Return points (T, N, 2 or 3) of a table with a row for each, and each frame's first row."""
+    """Return points (T, N, 2 or 3) of a table with a row for each, and the first row of each frame."""
     frame, point, *axes = (number for number in columns if number is not None)
     numbers = table.numbers([frame, point])[rows]
-    lost = ~(np.abs(numbers) < 2**53).all(axis=1)  # beyond, float64 has no room for every whole number
+    lost = ~(np.abs(numbers) < 2**53).all(axis=1)  # larger whole numbers are not exact in float64
     if lost.any():
         raise FormatError(
             "the row has no frame, or no number of a point",
@@ -208,14 +204,14 @@ def _read_long(
         )  # fmt: skip
     which = numbers[:, 1].astype(np.int64)
     which -= min(int(which.min()), 1)
-    starts = np.flatnonzero(np.concatenate([[True], np.diff(numbers[:, 0]) != 0]))
+    begins = np.concatenate([[True], np.diff(numbers[:, 0]) != 0])
+    starts = np.flatnonzero(begins)
     count = int(which.max()) + 1
     _check(count, table)
     if int(which.min()) < 0 or (which != numbers[:, 1] - (numbers[:, 1] - which)).any():
         raise FormatError("numbers of points begin with 0 or 1", path=table.path)
-    owner = np.cumsum(np.concatenate([[True], np.diff(numbers[:, 0]) != 0])) - 1
     positions = np.full((len(starts), count, len(axes)), np.nan)
-    positions[owner, which] = table.numbers(list(axes))[rows]
+    positions[np.cumsum(begins) - 1, which] = table.numbers(list(axes))[rows]
     return positions, rows[starts]
 
 

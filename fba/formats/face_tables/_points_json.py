@@ -1,7 +1,7 @@
-"""Read JSON with the points that a tracker found on a face: what programs save from MediaPipe and OpenPose.
+"""Read JSON with the points that a tracker found on a face, as programs save it from MediaPipe and OpenPose.
 
-A list of frames, or an object with one, or a frame on each line. A frame's points are a list of `{"x": , "y":
-, "z": }` or of `[x, y, z]`, or numbers one after another; OpenPose's have a confidence behind each x and y.
+A file is a list of frames, or an object with such a list, or a frame on each line. The points of a frame are
+a list of `{"x": , "y": , "z": }`, of `[x, y, z]`, or of numbers; OpenPose adds a confidence to each x and y.
 """
 
 from __future__ import annotations
@@ -17,20 +17,22 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture import PointMotion
 from fba.capture.points.motion import COUNTS, check_count
-from fba.errors import FormatError, ModelError, Remedy
+from fba.errors import FormatError, Remedy
 from fba.formats.face_tables._points import build_points
 from fba.formats.face_tables._shapes_json import frame_time, frame_times, read_json
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path, read_whole
+from fba.source import Path, naming_file, read_whole
 
 OPENPOSE = "face_keypoints_2d"
-"""OpenPose's x, y, confidence, one after another; all 0 where no face is."""
-WORDS = (b'"facelandmarks"', b'"face_landmarks"', b'"facelandmark"', b'"multi_face_landmarks"',
-b'"landmarks"',
-         b'"face_keypoints_2d"', b'"keypoints"', b'"points"', b'"landmark"', b'"scaledmesh"')  # fmt: skip
-"""Names that files with points have, in small letters."""
+"""OpenPose's x, y, confidence, x, ...; all 0 without a face."""
+WORDS = (
+    b'"facelandmarks"', b'"face_landmarks"', b'"facelandmark"', b'"multi_face_landmarks"', b'"landmarks"',
+    b'"face_keypoints_2d"', b'"keypoints"', b'"points"', b'"landmark"', b'"scaledmesh"',
+)  # fmt: skip
+"""Names in files with points, in lower case."""
 BEGINNINGS = (b"[[[", b'[[{"x"', b'[{"x"', b'{"0":[')
-"""How files without such names begin, apart from blanks."""
+"""Beginnings of files without such names, apart from blanks."""
 LISTS = ("frames", "results", "data", "records", "samples")
 MIN_POINTS = 5
 """Smallest number of points in a list of points."""
@@ -51,13 +53,9 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_points(
-    path: Path,
-    *,
-    source_rate: Fraction | int | str | None = None,
-    face: str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
+    path: Path, *, source_rate: Rate | None = None, face: str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> PointMotion:
-    """Return the points in a file; options and errors as for `points.read_points`."""
+    """Return the points in a file; options and errors as for `_tracked_points.read_points`."""
     document = _read(path, limits)
     frames = _frames(document)
     limits.check_frames(len(frames), f"{path}: the recording")
@@ -67,7 +65,8 @@ def read_points(
     if not known:
         raise FormatError("holds no frame with points of a face", path=path)
     shape = max((one.shape for one in known), key=lambda each: sum(one.shape == each for one in known))
-    _check(shape[0], path)
+    with naming_file(path):
+        check_count(shape[0])
     positions = np.full((len(frames), *shape), np.nan)
     for number, one in enumerate(sets):
         if one is None:
@@ -87,7 +86,7 @@ def read_points(
 
 
 def _read(path: Path, limits: Limits) -> Any:
-    """Return the document; of a file with one on each line, the list of them."""
+    """Return the document in a file; of a file with a document on each line, the list of documents."""
     data = read_whole(path)
     first, _, rest = data.lstrip().partition(b"\n")
     if rest.strip()[:1] in (b"{", b"[") and first.rstrip()[-1:] in (b"}", b"]"):
@@ -105,7 +104,7 @@ def _read(path: Path, limits: Limits) -> Any:
 
 
 def _frames(document: Any) -> list[Any]:
-    """Return the frames in a document: those of a list in it, or itself alone."""
+    """Return the frames in a document: those of a list in it, else the document as a single frame."""
     if isinstance(document, dict):
         for name in LISTS:
             if isinstance(document.get(name), list):
@@ -127,7 +126,7 @@ def _has_points(frame: Any) -> bool:
 
 
 def _point_sets(value: Any, levels: int) -> Iterator[Float64]:
-    """Yield points (N, 2 or 3) that a value contains, each set once."""
+    """Yield all sets of points (N, 2 or 3) in a value."""
     if levels < 0:
         return
     if isinstance(value, dict):
@@ -138,15 +137,14 @@ def _point_sets(value: Any, levels: int) -> Iterator[Float64]:
                 if (points[:, 2] > 0).any():
                     yield np.where(points[:, 2:] > 0, points[:, :2], np.nan)
             return
-        for part in value.values():
-            yield from _point_sets(part, levels - 1)
-    elif isinstance(value, list):
-        points = _as_points(value)
-        if points is not None:
-            yield points
-            return
-        for part in value:
-            yield from _point_sets(part, levels - 1)
+        parts = list(value.values())
+    elif (points := _as_points(value)) is not None:
+        yield points
+        return
+    else:
+        parts = value if isinstance(value, list) else []
+    for part in parts:
+        yield from _point_sets(part, levels - 1)
 
 
 def _as_points(value: Any) -> Any:
@@ -193,13 +191,6 @@ def _choose(found: list[Float64], number: int, face: str | None, path: Path) -> 
             Remedy("face", "choose one with {}", "'0'")
         )
     return known[0]
-
-
-def _check(count: int, path: Path) -> None:
-    try:
-        check_count(count)
-    except ModelError as error:
-        raise FormatError(error.finding, path=path) from error
 
 
 def _aspect(document: Any, frames: list[Any]) -> float | None:

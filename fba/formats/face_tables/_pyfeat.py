@@ -1,11 +1,11 @@
 """Read tables (CSV) of py-feat: blendshapes or action units of tracked faces.
 
-Version 2 and MPDetector write MediaPipe's blendshapes, which say how far a face moves, and which are read.
-Action units, all that older versions have, are probabilities, 0 to 1. Up to `MIN_PROBABILITY` nothing is
-shown; a unit that is certain is shown as strong as it usually is.
+Version 2 and MPDetector write MediaPipe's blendshapes, which say how far a face moves; they are read. Older
+versions write only action units, as probabilities from 0 to 1. Up to `MIN_PROBABILITY` a unit is not shown; a
+certain unit is shown with its usual strength.
 
-Versions differ in unit and signs of the head's pose. That of version 2's own model, which gives a mesh, too,
-is in radians; otherwise the pose is found from the face's points.
+Versions differ in the unit and the signs of the head's pose. Those of version 2's model, which also gives a
+mesh, are known. Otherwise the pose is found from the face's points.
 """
 
 from __future__ import annotations
@@ -24,11 +24,17 @@ from fba.capture import ActionUnitMotion, PointMotion, ShapeMotion
 from fba.capture.points import find_point_face
 from fba.errors import FbaWarning, ModelError
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW
-from fba.formats.face_tables import _shape_rows
-from fba.formats.face_tables._faces import choose_rows, find_missing, row_times
+from fba.formats.face_tables._faces import (
+    UnitLayout,
+    UnitRows,
+    choose_rows,
+    find_missing,
+    read_unit_rows,
+    row_times,
+)
 from fba.formats.face_tables._tables import Table, header_names, read_table
-from fba.formats.face_tables._unit_rows import UnitLayout, UnitRows, number_columns, read_unit_rows
-from fba.formats.face_tables.shape_weights import check_weights, shape_of
+from fba.formats.face_tables.shape_weights import check_weights, find_lacks, shape_of
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -36,18 +42,18 @@ UNIT = re.compile(r"AU(\d\d)")
 BOX = ("FaceRectX", "FaceRectY", "FaceRectWidth", "FaceRectHeight")
 SCORE = "FaceScore"
 POSE = ("Pitch", "Yaw", "Roll")
-OWN_POSE = ("mesh_x_0", "gaze_yaw", *POSE)
-"""Columns of version 2's own model, whose pose is in radians: down, to the right, to the right."""
+MESH_POSE = ("mesh_x_0", "gaze_yaw", *POSE)
+"""Columns of version 2's model, whose pose is in radians: down, to the right, to the right."""
 MIN_UNITS = 5
-"""Smallest number of action units in a table of action units."""
-POINTS = (68, 478)
+"""Fewest action units, or blendshapes, in a table of faces."""
+POINT_COUNTS = (68, 478)
 LAYOUT = UnitLayout("Identity", "approx_time", strongest=1.0, largest=5.0)
 MIN_PROBABILITY = 0.5
 """Probability above which an action unit is present."""
 USUAL_STRENGTH = 0.6
-"""Intensity of action units that are present: C, the middle of FACS's five, as a share of the strongest."""
+"""Intensity of a certain action unit: C, the middle of FACS's five grades, as a share of the strongest."""
 CLOSING_UNITS = (43, 45)
-"""Action units that have no intensity: eyes are closed or not."""
+"""Action units without intensities: eyes are closed or not."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -60,25 +66,21 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_face(
-    path: Path,
-    *,
-    source_rate: Fraction | int | str | None = None,
-    face: str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
+    path: Path, *, source_rate: Rate | None = None, face: str | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> ShapeMotion | ActionUnitMotion:
-    """Return blendshapes as they are in a table; of a table without them, action units.
+    """Return blendshapes as they are in a table, or action units if it has no blendshapes.
 
-    source_rate: frames in a second of the film; without it, the rate of films that fits the table's whole
-    seconds. face: the `Identity` of the face to read, where there are several; without identities, a number
-    from 1 on, in the order of their sizes. Raises FormatError, LimitError.
+    source_rate: frames per second of the film; None for the rate of films that fits the table's whole
+    seconds. face: the `Identity` to read, if there are several; without identities, a number from 1 on, in
+    the order of their sizes. Raises FormatError, LimitError.
     """
     table = read_table(path, limits)
-    column = number_columns(table)
+    column = table.columns
     shapes = {shape: column[name] for name in column if (shape := shape_of(name)) is not None}
     columns = {int(found[1]): column[name] for name in column if (found := UNIT.fullmatch(name))}
-    ids = _identities(table, column)
+    ids = _identities(table)
     if len(shapes) >= MIN_UNITS:
-        return _read_shapes(table, column, shapes, ids, face, source_rate)
+        return _read_shapes(table, shapes, ids, face, source_rate)
     rows = read_unit_rows(table, columns, LAYOUT, face, source_rate, ids)
     head, how = _find_head(table, rows.numbers, rows.times, rows.rate)
     findings = rows.findings + find_missing(rows.intensities, rows.times, rows.rate)
@@ -96,14 +98,10 @@ def read_face(
 
 
 def _read_shapes(
-    table: Table,
-    column: dict[str, int],
-    shapes: dict[str, int],
-    ids: Sequence[str],
-    face: str | None,
-    source_rate: Fraction | int | str | None,
+    table: Table, shapes: dict[str, int], ids: Sequence[str], face: str | None, source_rate: Rate | None
 ) -> ShapeMotion:
     """Return the blendshapes of one face. shapes: ARKit's name -> number of its column."""
+    column = table.columns
     rows = choose_rows(table, ids, face)
     times, rate, findings = row_times(
         table, rows, column.get(LAYOUT.seconds), column.get("frame"), source_rate
@@ -111,12 +109,12 @@ def _read_shapes(
     weights = table.numbers(list(shapes.values()))[rows]
     check_weights(weights, list(shapes), table.path, [table.lines[row] for row in rows.tolist()])
     head, how = _find_head(table, rows, times, rate)
-    findings += _shape_rows.find_lacks(list(shapes), weights, times, rate)
+    findings += find_lacks(list(shapes), weights, times, rate)
     if any(UNIT.fullmatch(name) for name in column):
         findings.append(
             "its blendshapes are read, not its action units, which are only how likely each is to be there"
         )
-    if POSE[0] in column and not set(OWN_POSE) <= set(column):
+    if POSE[0] in column and not set(MESH_POSE) <= set(column):
         findings.append(how)
     return ShapeMotion(
         tuple(shapes), weights, times, rate, head=head, name=FilePath(table.path).stem,
@@ -125,28 +123,29 @@ def _read_shapes(
 
 
 def _usual_strengths(rows: UnitRows) -> Float64:
-    """Return intensities (T, N) of action units, 0 to 1, of how likely each is to be there."""
+    """Return intensities (T, N) of action units, 0 to 1, that follow from their probabilities."""
     sure = np.where(np.isnan(rows.intensities), np.nan, np.maximum(rows.intensities - MIN_PROBABILITY, 0.0))
     strongest = [1.0 if unit in CLOSING_UNITS else USUAL_STRENGTH for unit in rows.units]
     return np.asarray(sure / (1 - MIN_PROBABILITY) * strongest)
 
 
-def _identities(table: Table, column: dict[str, int]) -> Sequence[str]:
-    """Return whose face each row (T,) is of, "" where there is but one and nobody says.
+def _identities(table: Table) -> Sequence[str]:
+    """Return the face of each row (T,), "" if there is one face and it has no name.
 
-    Where frames have several rows and nobody says whose they are, faces are followed: each goes on where the
-    nearest box of the frame before was. They are numbered from "1" on, those that are largest first.
+    If frames have several rows without names, faces are followed: each continues the nearest box of the frame
+    before. They are numbered from "1" on, the largest first.
     """
+    column = table.columns
     if LAYOUT.face in column:
         ids = table.column(column[LAYOUT.face])
         if any(ids):
             return ids
-    nobody = [""] * len(table.rows)
+    unnamed = [""] * len(table.rows)
     if "frame" not in column or not set(BOX) <= set(column):
-        return nobody
+        return unnamed
     frames = table.numbers([column["frame"]])[:, 0]
     if (np.diff(frames) != 0).all():
-        return nobody
+        return unnamed
     box = table.numbers([column[name] for name in BOX])
     owners = _follow(frames, box[:, :2] + box[:, 2:] / 2, box[:, 2:].max(axis=1))
     sizes = [np.nansum(box[owners == owner, 2:].prod(axis=1)) for owner in range(owners.max() + 1)]
@@ -157,8 +156,8 @@ def _identities(table: Table, column: dict[str, int]) -> Sequence[str]:
 def _follow(frames: Float64, middles: Float64, sizes: Float64) -> Int64:
     """Return numbers (T,) of the faces of rows; -1 for rows without a face.
 
-    frames: (T,), the frame of each row. middles: (T, 2), where its face is. sizes: (T,), how large; a face
-    that is further than that from all before is another one.
+    frames: (T,), the frame of each row. middles, sizes: (T, 2) and (T,), middle and size of its face. A face
+    that is farther than its size from all faces before is a new one.
     """
     owners = np.full(len(frames), -1)
     known: list[Float64] = []
@@ -183,18 +182,18 @@ def _follow(frames: Float64, middles: Float64, sizes: Float64) -> Int64:
 
 
 def _find_head(table: Table, rows: Int64, times: Float64, rate: Fraction) -> tuple[Float64 | None, str]:
-    """Return pitch, yaw and roll of the head (T, 3), radians, None without points, and how they were found.
+    """Return pitch, yaw and roll of the head (T, 3), radians, None without points; and a finding about them.
 
     rows: (T,), numbers of the table's rows. Rows without a face are NaN.
     """
-    column = number_columns(table)
-    if set(OWN_POSE) <= set(column):
+    column = table.columns
+    if set(MESH_POSE) <= set(column):
         return table.numbers([column[name] for name in POSE])[rows] * [1.0, -1.0, 1.0], ""
     doubt = "versions of py-feat differ in its unit and its signs"
     left_out = f"the head's pose is left out: {doubt}"
     names = [
         [[f"{axis}_{point}" for point in range(count)] for axis in "xy"]
-        for count in POINTS if f"x_{count - 1}" in column and f"x_{count}" not in column
+        for count in POINT_COUNTS if f"x_{count - 1}" in column and f"x_{count}" not in column
     ]  # fmt: skip
     if not names or not all(name in column for axis in names[0] for name in axis):
         return None, left_out

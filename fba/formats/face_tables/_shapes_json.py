@@ -1,8 +1,8 @@
 """Read blendshapes in JSON: recordings of BEAT, and scores that programs save from MediaPipe.
 
-BEAT: `{"names": [...], "frames": [{"weights": [...], "time": seconds}, ...]}`. MediaPipe's results are saved
-in many ways: a list of frames (or an object with one), each with a time and, somewhere in it, a list of
-`{"categoryName": "jawOpen", "score": 0.1}` or an object `{"jawOpen": 0.1, ...}`.
+BEAT writes `{"names": [...], "frames": [{"weights": [...], "time": seconds}, ...]}`. Programs save
+MediaPipe's results as a list of frames, or an object with such a list. A frame has a time and, anywhere in
+it, a list of `{"categoryName": "jawOpen", "score": 0.1}` or an object `{"jawOpen": 0.1, ...}`.
 """
 
 from __future__ import annotations
@@ -19,29 +19,28 @@ from fba.arrays import Float64
 from fba.capture import ShapeMotion
 from fba.capture.blendshapes.shape_table import key_of
 from fba.capture.sampling import find_rate
-from fba.errors import FormatError, ModelError, Remedy
+from fba.errors import FormatError, Remedy
 from fba.face.shape_names import arkit_names
-from fba.formats.face_tables._shape_rows import check_weights, find_lacks, shape_of
-from fba.formats.face_tables._tables import named
-from fba.formats.face_tables._times import seconds_of
+from fba.formats.face_tables._tables import named, seconds_of
+from fba.formats.face_tables.shape_weights import check_weights, find_lacks, shape_of
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path, read_whole
+from fba.source import Path, naming_file, read_whole
 
 MIN_SHAPES = 5
-"""Smallest number of synonyms of ARKit's names in an object or a list of blendshapes; of its own names,
-one is enough."""
+"""Fewest synonyms of ARKit's names in a set of blendshapes; one of ARKit's own names is enough."""
 CATEGORIES = ("categoryName", "category_name", "displayName", "name")
 SCORES = ("score", "value", "weight")
 TIMES = ("time", "timestamp", "timestampms", "timems", "timestampseconds", "seconds", "t", "ts")
-NONE = (*TIMES, "neutral", "frame", "index", "id")
-"""Names of numbers beside shapes that need not be mentioned, without case and other signs."""
+UNMENTIONED = (*TIMES, "neutral", "frame", "index", "id")
+"""Names of numbers beside shapes that no finding mentions, in lower case, without other signs."""
 LISTS = ("frames", "results", "data", "records", "samples", "blendshapes")
 MAX_DEPTH = 6
 """Levels of lists and objects in a frame that are searched."""
 VALUE_BYTES = 60
 """Memory of a value while it is read."""
 MAX_PARTS = 64
-"""Longest list in a frame that may be a face; longer ones are points and the like."""
+"""Longest list in a frame that may be a face; longer lists are points."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -52,13 +51,11 @@ def sniff(head: bytes, suffix: str) -> bool:
     return any(f'"{name.lower()}"'.encode() in small for name in arkit_names())
 
 
-def read_face(
-    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
-) -> ShapeMotion:
+def read_face(path: Path, *, source_rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS) -> ShapeMotion:
     """Return weights as they are in the file.
 
-    source_rate: frames in a second, for files without times. A frame without scores is one without a face.
-    Raises FormatError, LimitError.
+    source_rate: frames per second, for files without times. A frame without scores has no face. Raises
+    FormatError, LimitError.
     """
     document = read_json(path, limits)
     names, weights, stamps, strange = _beat(document, path) or _frames(document, path)
@@ -88,7 +85,7 @@ def read_json(path: Path, limits: Limits) -> Any:
 
 
 def _beat(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], list[str]] | None:
-    """Return names, weights (T, N) and times of BEAT's layout, and unknown names; None for other layouts."""
+    """Return names, weights (T, N), times and unknown names of BEAT's layout; None for other layouts."""
     if not (isinstance(document, dict) and isinstance(document.get("names"), list)):
         return None
     frames = document.get("frames")
@@ -113,13 +110,13 @@ def _beat(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], lis
 
 
 def _frames(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], list[str]]:
-    """Return names, weights (T, N) and times of a list of frames with scores in them, and unknown names."""
+    """Return names, weights (T, N), times and unknown names of a list of frames with scores."""
     frames = _list_of_frames(document)
     if frames is None:
         raise FormatError("holds no list of frames with scores of blendshapes", path=path)
     found, others = zip(*(next(_scores(frame, MAX_DEPTH), ({}, [])) for frame in frames), strict=True)
     names = list(dict.fromkeys(name for scores in found for name in scores))
-    strange = list(dict.fromkeys(name for each in others for name in each if key_of(name) not in NONE))
+    strange = list(dict.fromkeys(name for each in others for name in each if key_of(name) not in UNMENTIONED))
     _check_names(names, path)
     rows = [
         [_number(scores.get(name, np.nan), number, path) for name in names]
@@ -129,7 +126,7 @@ def _frames(document: Any, path: Path) -> tuple[list[str], Float64, list[Any], l
 
 
 def _list_of_frames(document: Any) -> list[Any] | None:
-    """Return the list of frames in a document: itself, or a member of it."""
+    """Return the list of frames that a document is, or that it has as a member; None without one."""
     candidates = [document]
     if isinstance(document, dict):
         candidates = [document[name] for name in LISTS if name in document]
@@ -141,7 +138,7 @@ def _list_of_frames(document: Any) -> list[Any] | None:
 
 
 def _scores(value: Any, levels: int) -> Iterator[tuple[dict[str, Any], list[str]]]:
-    """Yield objects of ARKit's name -> score that a value contains, and other names of numbers in them."""
+    """Yield all sets of scores in a value, by ARKit's names, with the names of other numbers beside them."""
     if levels < 0:
         return
     if isinstance(value, dict):
@@ -150,7 +147,14 @@ def _scores(value: Any, levels: int) -> Iterator[tuple[dict[str, Any], list[str]
             if not isinstance(score, dict | list | str) and (shape := shape_of(name)) is not None
         }  # fmt: skip
         if _are_enough(direct, value):
-            yield direct, [name for name, score in value.items() if _is_other(name, score)]
+            yield (
+                direct,
+                [
+                    name
+                    for name, score in value.items()
+                    if isinstance(score, int | float) and shape_of(name) is None
+                ],
+            )
             return
         parts = list(value.values())
     elif isinstance(value, list):
@@ -167,17 +171,12 @@ def _scores(value: Any, levels: int) -> Iterator[tuple[dict[str, Any], list[str]
 
 
 def _are_enough(shapes: Mapping[str, Any], names: Iterable[str]) -> bool:
-    """Whether shapes, found under these names, are those of a face: several, or one of ARKit's own names."""
+    """Whether shapes are those of a face: several, or one with ARKit's own name. names: as in the file."""
     return len(shapes) >= MIN_SHAPES or bool(shapes and set(arkit_names()).intersection(names))
 
 
-def _is_other(name: str, score: Any) -> bool:
-    """Whether something in an object of shapes is a number under another name."""
-    return isinstance(score, int | float) and shape_of(name) is None
-
-
 def _category(entry: Any) -> tuple[str, Any] | None:
-    """Return ARKit's name and the score of an entry such as {"categoryName": "jawOpen", "score": 0.1}."""
+    """Return ARKit's name and the score of an entry {"categoryName": "jawOpen", "score": 0.1}, or None."""
     if not isinstance(entry, dict):
         return None
     name = next((entry[key] for key in CATEGORIES if isinstance(entry.get(key), str) and entry[key]), None)
@@ -187,7 +186,7 @@ def _category(entry: Any) -> tuple[str, Any] | None:
 
 
 def _check_names(names: list[str], path: Path) -> None:
-    """Raise FormatError for too few shapes, or one that comes twice."""
+    """Raise FormatError if there is no shape, or a shape is there twice."""
     if not names:
         raise FormatError("no shape has one of ARKit's names, such as jawOpen or eyeBlinkLeft", path=path)
     twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
@@ -213,7 +212,7 @@ def frame_time(frame: Any) -> Any:
 
 
 def frame_times(
-    stamps: list[Any], count: int, source_rate: Fraction | int | str | None, path: Path
+    stamps: list[Any], count: int, source_rate: Rate | None, path: Path
 ) -> tuple[Float64, Fraction]:
     """Return times (T,) in seconds from the first frame, and the nominal rate."""
     if all(stamp is None for stamp in stamps):
@@ -229,7 +228,5 @@ def frame_times(
     early = np.flatnonzero(~(np.diff(seconds) > 0))
     if len(early):
         raise FormatError(f"frame {int(early[0]) + 1} is not later than the one before it", path=path)
-    try:
+    with naming_file(path):
         return seconds, find_rate(seconds)
-    except ModelError as error:
-        raise FormatError(error.finding, path=path) from error

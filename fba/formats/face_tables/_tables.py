@@ -1,34 +1,40 @@
-"""Tables of numbers in text: a header with names of columns, then a row for each moment."""
+"""Tables of numbers as text, a header with names of columns, then a row for each moment; times of rows."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
 from itertools import islice
 
 import numpy as np
 
 from fba.arrays import Float64
+from fba.capture.sampling import find_rate
 from fba.errors import FormatError
 from fba.limits import Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
-from fba.source import Path, read_whole
+from fba.source import Path, naming_file, read_whole
 
 MOST_COLUMNS = 20_000
-"""More than any tracker writes."""
+"""Most columns of a table; no tracker writes as many."""
 CELL_BYTES = 16
 """Memory of a number of a table while it is read."""
 SEPARATORS = ",;\t"
-UNKNOWN = ("", "nan", "na", "n/a", "null", "none", "-nan", "nan(ind)", "-nan(ind)")
-"""How programs write a number that they do not have, in small letters."""
+MISSING = ("", "nan", "na", "n/a", "null", "none", "-nan", "nan(ind)", "-nan(ind)")
+"""Words, in lower case, that stand for a missing number."""
 NAMED = 6
 """Most names in a message."""
+MOST_MILLISECONDS = 5.0
+"""Median step above which times are milliseconds: no capture is that slow in seconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table: names of columns, without surrounding blanks; rows of cells as text, and their lines.
+    """A table.
 
-    cut: whether an incomplete last row was left out.
+    names: of the columns, without surrounding blanks. rows: cells as text. lines: the line of each row. cut:
+    whether an incomplete last row was left out.
     """
 
     path: Path
@@ -37,12 +43,17 @@ class Table:
     lines: list[int]
     cut: bool = False
 
+    @cached_property
+    def columns(self) -> dict[str, int]:
+        """The number of each column by name; of two columns with one name, the first."""
+        return {name: number for number, name in reversed(list(enumerate(self.names)))}
+
     def column(self, number: int) -> list[str]:
         """Return the cells of a column, without surrounding blanks."""
         return [row[number].strip() for row in self.rows]
 
     def numbers(self, columns: list[int]) -> Float64:
-        """Return numbers (T, N) of columns; NaN for cells without one. Raises FormatError for other text."""
+        """Return numbers (T, N) of columns; NaN for missing ones. Raises FormatError for other text."""
         result = np.empty((len(self.rows), len(columns)))
         adjacent = columns == list(range(columns[0], columns[0] + len(columns))) if columns else False
         for number, row in enumerate(self.rows):
@@ -56,7 +67,7 @@ class Table:
 
     def _number(self, row: int, column: int) -> float:
         text = self.rows[row][column].strip()
-        if text.lower() in UNKNOWN:
+        if text.lower() in MISSING:
             return float("nan")
         try:
             return float(text)
@@ -70,17 +81,17 @@ class Table:
 
 
 def header_names(head: bytes) -> list[str]:
-    """Return the cells of the first line of a file that begins like this, without blanks and quotes."""
+    """Return the cells of the first line, without blanks and quotes. head: the beginning of a file."""
     line = head.removeprefix(b"\xef\xbb\xbf").lstrip().split(b"\n", 1)[0]
     text = line.decode("utf-8", errors="replace").strip()
     return _cells(text, _separator(text))
 
 
 def read_table(path: Path, limits: Limits) -> Table:
-    """Return a table of text: UTF-8 with or without a mark, cells between commas, semicolons or tabs.
+    """Return a table of UTF-8 text whose cells are separated by commas, semicolons or tabs.
 
-    Decimal commas are understood where cells are not separated by commas. An incomplete last row, as where a
-    recording was cut off, is left out. Raises FormatError for anything else, LimitError.
+    Decimal commas are read where cells are not separated by commas. An incomplete last row, which a recording
+    has that was cut off, is left out. Raises FormatError for other files, LimitError.
     """
     data = read_whole(path)
     if b"\0" in data:
@@ -125,9 +136,41 @@ def read_table(path: Path, limits: Limits) -> Table:
 
 
 def named(names: list[str]) -> str:
-    """Return names for a message: the first few."""
+    """Return the first names for a message, and the count of the others."""
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return ", ".join(names[:NAMED]) + more
+
+
+def check_order(times: Float64, lines: list[int], path: Path) -> None:
+    """Raise FormatError for a row that is not later than the row before."""
+    early = np.flatnonzero(~(np.diff(times) > 0))
+    if not len(early):
+        return
+    row = int(early[0]) + 1
+    back = float(times[row - 1] - times[row])
+    said = f"{back:.3f} s before" if back > 0 else "at the same time as"
+    count = f"; so are {len(early) - 1} others" if len(early) > 1 else ""
+    raise FormatError(
+        f"the row is {said} the one before it{count}: the file is damaged, or holds several recordings or "
+        "faces; cut it into pieces of one each",
+        path=path, line=lines[row],
+    )  # fmt: skip
+
+
+def seconds_of(times: Float64) -> Float64:
+    """Return seconds (T,) from the first row on. times: (T,), in seconds or milliseconds."""
+    start = times - times[0]
+    step = float(np.median(np.diff(start))) if len(start) > 1 else 0.0
+    result: Float64 = start / 1000 if step >= MOST_MILLISECONDS else start
+    return result
+
+
+def regular_seconds(times: Float64, lines: list[int], path: Path) -> tuple[Float64, Fraction]:
+    """Return seconds (T,) of rows, as `seconds_of`, and their nominal rate. Raises FormatError."""
+    seconds = seconds_of(times)
+    check_order(seconds, lines, path)
+    with naming_file(path):
+        return seconds, find_rate(seconds)
 
 
 def _separator(line: str) -> str:

@@ -1,8 +1,8 @@
 """Read records of iFacialMocap and Facemotion3d as text: `jawOpen-12|...|=head#rx,ry,rz,tx,ty,tz|...`.
 
-A record is what the app sends for a frame, in version 1 (name-number) or 2 (name&number). Records stand on
-lines of their own, before `___iFacialMocap`, or one after another: a name that comes again begins the next.
-Weights are percent. Angles are degrees about the face's own axes: x to its left, y up, z ahead.
+A record is what the app sends for a frame, in version 1 (name-number) or 2 (name&number). A record ends at
+the end of a line, at `___iFacialMocap`, or before a name that it has already. Weights are percent. Angles are
+degrees about the face's own axes: x to its left, y up, z ahead.
 """
 
 from __future__ import annotations
@@ -16,19 +16,21 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture import ShapeMotion
 from fba.errors import FormatError
-from fba.formats.face_tables._shape_rows import find_lacks, shape_of
 from fba.formats.face_tables._tables import named
+from fba.formats.face_tables.shape_weights import find_lacks, shape_of
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_whole
 
 RATE = 60
-"""Records that the app sends in a second; they hold no times."""
+"""Records that the app sends per second; they hold no times."""
 BREAK = re.compile(r"[\r\n\0]+|___iFacialMocap")
 PAIR = re.compile(r"([A-Za-z][A-Za-z0-9_]*?)[-&](-?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)")
 MIN_SHAPES = 5
 MAX_NUMBER = 400.0
+"""Largest weight, in percent."""
 TURNS = {"head": 6, "rightEye": 3, "leftEye": 3}
-"""Numbers of each part that turns."""
+"""Count of numbers of each part that turns."""
 STATUS = "trackingStatus"
 RECORD_BYTES = 100
 """Memory of a value while it is read."""
@@ -37,18 +39,16 @@ Record = dict[str, list[float]]
 
 
 def sniff(head: bytes, suffix: str) -> bool:
-    """Whether a file begins with a record: several of ARKit's names with numbers, between bars."""
+    """Whether a file begins with a record: several of ARKit's names, with numbers, between bars."""
     words = head[:4000].decode("utf-8", errors="replace").split("|")
     found = [PAIR.fullmatch(word.strip().lstrip("=")) for word in words]
     return sum(pair is not None and shape_of(pair[1]) is not None for pair in found) >= MIN_SHAPES
 
 
-def read_face(
-    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
-) -> ShapeMotion:
+def read_face(path: Path, *, source_rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS) -> ShapeMotion:
     """Return weights, head and eyes as they are in the records.
 
-    source_rate: records in a second; without it the app's 60, which is said. Raises FormatError, LimitError.
+    source_rate: records per second; None for the app's 60, with a finding. Raises FormatError, LimitError.
     """
     data = read_whole(path)
     text = data.decode("utf-8-sig", errors="replace")
@@ -57,20 +57,20 @@ def read_face(
     limits.check_frames(len(records), f"{path}: the recording")
     shapes = find_shapes(records, path)
     weights, head, eyes = convert_records(records, shapes)
-    times = np.arange(len(records)) / float(Fraction(source_rate or RATE))
+    rate = Fraction(source_rate or RATE)
+    times = np.arange(len(records)) / float(rate)
     findings = [] if source_rate is not None else [f"the records have no times; taken as {RATE} in a second"]
     if strange:
         findings.append(f"names that mean nothing here are left out: {named(sorted(strange))}")
-    findings += find_lacks(shapes, weights, times, Fraction(source_rate or RATE))
+    findings += find_lacks(shapes, weights, times, rate)
     return ShapeMotion(
-        tuple(shapes), weights, times, Fraction(source_rate or RATE),
-        head=head, eyes=eyes,
-        name=FilePath(path).stem, findings=tuple(findings),
+        tuple(shapes), weights, times, rate, head=head, eyes=eyes, name=FilePath(path).stem,
+        findings=tuple(findings),
     )  # fmt: skip
 
 
 def find_shapes(records: list[Record], path: Path) -> list[str]:
-    """Return the names of the shapes of which records have weights. Raises FormatError for too few."""
+    """Return the names of the shapes in records. Raises FormatError for too few."""
     names = dict.fromkeys(name for record in records for name in record if name not in TURNS)
     shapes = [name for name in names if name != STATUS]
     if len(shapes) < MIN_SHAPES:
@@ -85,7 +85,7 @@ def convert_records(
 ) -> tuple[Float64, Float64 | None, Float64 | None]:
     """Return weights (T, N) of shapes, angles of the head (T, 3) and of the eyes (T, 4), as in `ShapeMotion`.
 
-    Rows without a face, or without one of the shapes, are NaN; angles are None where no record has them.
+    Weights of rows without a face, and missing weights, are NaN. Angles are None if no record has them.
     """
     weights = np.array([[record.get(name, [np.nan])[0] for name in shapes] for record in records]) / 100
     lost = np.array([record.get(STATUS, [1.0])[0] == 0 for record in records])
@@ -94,7 +94,7 @@ def convert_records(
 
 
 def _eyes(records: list[Record]) -> Float64 | None:
-    """Return turns (T, 4) of both eyes: yaw of the left and the right one, then their pitch."""
+    """Return turns (T, 4) of both eyes: yaw of the left and the right eye, then their pitch."""
     left, right = _angles(records, "leftEye", [1, 0]), _angles(records, "rightEye", [1, 0])
     if left is None or right is None:
         return None
@@ -102,7 +102,7 @@ def _eyes(records: list[Record]) -> Float64 | None:
 
 
 def _angles(records: list[Record], part: str, columns: list[int]) -> Float64 | None:
-    """Return some of a part's angles (T, n) in radians; NaN in records without it, None if none has it."""
+    """Return angles (T, n) of a part in radians, NaN in records without it; None if no record has it."""
     if not any(part in record for record in records):
         return None
     rows = [record.get(part, [np.nan] * TURNS[part]) for record in records]
@@ -111,7 +111,7 @@ def _angles(records: list[Record], part: str, columns: list[int]) -> Float64 | N
 
 
 def read_records(text: str, path: Path) -> tuple[list[Record], set[str]]:
-    """Return all records, and names that mean nothing. Raises FormatError for other words."""
+    """Return all records, and names without a meaning. Raises FormatError for other words."""
     records: list[Record] = []
     strange: set[str] = set()
     line = 1
@@ -142,7 +142,7 @@ def read_records(text: str, path: Path) -> tuple[list[Record], set[str]]:
 
 
 def _read_word(word: str, line: int, path: Path) -> tuple[str, list[float]]:
-    """Return the name and the numbers of a word between bars; "" for an empty one."""
+    """Return the name and the numbers of a word between bars; "" for an empty word."""
     if not word:
         return "", []
     name, mark, rest = word.partition("#")

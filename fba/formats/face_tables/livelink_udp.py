@@ -1,8 +1,8 @@
 """Read recordings of what Live Link Face sends: datagrams of its version 6, one after another.
 
-A datagram has the device's id and the subject's name, each after its length, a frame's number and part, the
-rate as a fraction, and 61 numbers; those are left out where no face is seen. All numbers are big-endian. The
-ids, which name somebody's telephone, are not kept.
+A datagram has the device's id and the subject's name, each after its length, the number of the frame and its
+fraction, the rate as a fraction, and 61 values, which are left out if no face is seen. All numbers are
+big-endian. The ids, which name somebody's telephone, are not kept.
 """
 
 from __future__ import annotations
@@ -19,17 +19,19 @@ from fba.capture import ShapeMotion
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.choices import Swap
 from fba.errors import FormatError, Remedy, UnsupportedError
-from fba.formats.face_tables._shape_rows import check_weights, find_lacks, find_swap
 from fba.formats.face_tables._tables import named
+from fba.formats.face_tables.shape_weights import check_weights, find_lacks, find_swap
 from fba.formats.time_codes import DAY, NOON
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_whole
 
 VERSION = 6
 VALUES = 61
+"""Numbers of a face: 52 weights, and nine angles."""
 MOST_TEXT = 255
 TIME = struct.Struct(">ifii")
 LARGEST_RATE = 1000
+"""Frames per second."""
 PACKET_BYTES = 700
 """Memory of a datagram while it is read."""
 
@@ -37,8 +39,8 @@ PACKET_BYTES = 700
 class Packet(NamedTuple):
     """A datagram.
 
-    sender: the device's id and the subject's name. seconds: time of day. values: 61 numbers, NaN where no
-    face is seen.
+    sender: the device's id and the subject's name. seconds: time of day. values: 61 numbers, NaN without a
+    face.
     """
 
     sender: tuple[bytes, bytes]
@@ -57,9 +59,9 @@ def read_face(
 ) -> ShapeMotion:
     """Return weights, head and eyes as they were sent.
 
-    swap: as for tables, see `livelink_csv.read_face`. face: the name of the subject, where several telephones
-    sent. Datagrams out of order are put in order, doubled ones count once. Raises FormatError,
-    UnsupportedError for other versions, LimitError, OptionError.
+    swap: as for tables, see `_livelink_csv.read_face`. face: the name of the subject, if several telephones
+    sent. Datagrams are put in order, and repeated ones count once. Raises FormatError, UnsupportedError for
+    other versions, LimitError, OptionError.
     """
     data = read_whole(path)
     limits.check_bytes(len(data) // 60 * PACKET_BYTES, f"{path}: the recording", source=len(data))
@@ -75,15 +77,14 @@ def read_face(
     check_weights(weights, ARKIT_ORDER, path)
     findings += find_lacks(ARKIT_ORDER, weights, times - times[0], rate)
     motion = ShapeMotion(
-        ARKIT_ORDER, weights, times - times[0], rate,
-        head=head, eyes=eyes,
-        start=float(times[0]), name=FilePath(path).stem, findings=tuple(findings),
+        ARKIT_ORDER, weights, times - times[0], rate, head=head, eyes=eyes, start=float(times[0]),
+        name=FilePath(path).stem, findings=tuple(findings),
     )  # fmt: skip
     return find_swap(motion, swap, expected=False)
 
 
 def _read_packets(data: bytes, path: Path) -> tuple[list[Packet], list[str]]:
-    """Return all datagrams, and what was odd. Raises FormatError with the place of what is no datagram."""
+    """Return all datagrams, and oddities. Raises FormatError with the place of bytes that are no datagram."""
     packets: list[Packet] = []
     findings = []
     position = 0
@@ -99,9 +100,9 @@ def _read_packets(data: bytes, path: Path) -> tuple[list[Packet], list[str]]:
 
 
 def read_packet(data: bytes, start: int, path: Path) -> tuple[Packet | None, int]:
-    """Return the datagram that begins at byte `start`, and where the next one does; None if it is incomplete.
+    """Return the datagram that begins at byte `start`, None if it is incomplete, and where the next begins.
 
-    There is at least one byte. Raises FormatError for what is no datagram, UnsupportedError for one of
+    There is at least one byte. Raises FormatError for bytes that are no datagram, UnsupportedError for
     another version.
     """
     if data[start] != VERSION:
@@ -138,9 +139,9 @@ def read_packet(data: bytes, start: int, path: Path) -> tuple[Packet | None, int
 
 
 def divide_values(values: Float64) -> tuple[Float64, Float64, Float64]:
-    """Return weights (T, 52), angles of the head (T, 3) and of the eyes (T, 4) of values (T, 61).
+    """Return weights (T, 52), angles of the head (T, 3) and of the eyes (T, 4), as in `ShapeMotion`.
 
-    Angles are as in `ShapeMotion`.
+    values: (T, 61), as the app sends them.
     """
     yaw, pitch, roll, left_yaw, left_pitch, _, right_yaw, right_pitch, _ = values[:, len(ARKIT_ORDER) :].T
     head = np.stack([-pitch, yaw, roll], axis=1)  # up and left are positive there
@@ -163,7 +164,7 @@ def join_values(motion: ShapeMotion) -> Float64:
 
 
 def write_packet(subject: str, device: str, seconds: float, rate: Fraction, values: Float64) -> bytes:
-    """Return a datagram. seconds: time of day; values (61,), NaN where no face is seen."""
+    """Return a datagram. seconds: time of day. values: (61,), NaN without a face."""
     texts = b"".join(len(one.encode()).to_bytes(4, "big") + one.encode() for one in (device, subject))
     frame, part = divmod(seconds * float(rate), 1)
     time = TIME.pack(int(frame), part, rate.numerator, rate.denominator)
@@ -172,7 +173,7 @@ def write_packet(subject: str, device: str, seconds: float, rate: Fraction, valu
 
 
 def _refuse(data: bytes, position: int, path: Path) -> None:
-    """Raise the error for bytes that do not begin a datagram of version 6."""
+    """Raise the error about bytes at which no datagram of version 6 begins."""
     version = _version_of(data[position : position + 600])
     if version and version != str(VERSION):
         raise UnsupportedError(
@@ -188,7 +189,7 @@ def _refuse(data: bytes, position: int, path: Path) -> None:
 
 
 def _version_of(head: bytes) -> str:
-    """Return the version of the datagram that begins here; "" if none begins."""
+    """Return the version of the datagram that begins here; "" without a datagram."""
     for version, length, start in (
         (head[:1], head[1:5], 5),
         (head[:2], head[2:4], 4),  # the other mode of the app, for MetaHumans
@@ -205,7 +206,7 @@ def _version_of(head: bytes) -> str:
 
 
 def _choose(packets: list[Packet], face: str | None, path: Path) -> list[Packet]:
-    """Return the datagrams of one sender; FormatError where it is not clear which."""
+    """Return the datagrams of one sender; FormatError if it is not clear which."""
     subjects: dict[str, set[tuple[bytes, bytes]]] = {}
     for packet in packets:
         subjects.setdefault(packet.sender[1].decode("utf-8", errors="replace"), set()).add(packet.sender)

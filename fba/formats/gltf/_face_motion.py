@@ -1,6 +1,6 @@
 """The motion of a face in a glTF file as FAPs: weights of morph targets, expressions of VRMA, eyes and jaws.
 
-`fba.capture.blendshapes.shape_table` says what shapes mean.
+`fba.capture.blendshapes.shape_table` has the FAPs of shapes.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,55 +24,45 @@ from fba.gltf import Clip, Gltf, Value, optional_member
 from fba.parameters import FAP_COUNT, fap_numbers
 
 NO_EYE = re.compile("brow|lid|lash|end|target|look|aim")
-EYES = {
+"""Parts of names of bones near eyes."""
+BONES = {
     "l": re.compile("left_?eye|eye(ball)?_?left|(^|_)l_?(face)?_?eye(ball)?$|eye(ball)?[_.]?l$"),
     "r": re.compile("right_?eye|eye(ball)?_?right|(^|_)r_?(face)?_?eye(ball)?$|eye(ball)?[_.]?r$"),
+    "jaw": re.compile("(^|_)(lower)?jaw(bone|root|_?master)?$"),
 }
-"""What the names of bones of eyes contain, in small letters."""
-JAW = re.compile("(^|_)(lower)?jaw(bone|root|_?master)?$")
+"""Names, in lower case, of bones of the left and the right eye and the jaw."""
 LIMBS = {"leftUpperArm", "rightUpperArm", "leftUpperLeg", "rightUpperLeg"}
 MAX_NAMES = 6
-"""Largest number of names in a message."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Bone:
-    """A bone of the face: the FAPs that its turns stand for."""
-
-    node: int
-    kind: str
+"""Most names in a message."""
 
 
 def read_face_motion(gltf: Gltf, clip: Clip, times: Float64, *, head: bool = False) -> FaceTrack | None:
     """Return the FAPs of a clip at times (T,), seconds; None if it does not move a face.
 
-    head: FAPs 48 to 50 turn as a declared bone of a head, or a mesh with morph targets and no skin.
+    head: let FAPs 48 to 50 turn like the declared bone of a head, or a mesh with morph targets and no skin.
 
-    Warns (FbaWarning) of morph targets whose names mean nothing here.
+    Warns (FbaWarning) of morph targets with unknown names.
     """
     values = np.zeros((len(times), FAP_COUNT))
     sent = np.zeros(FAP_COUNT, dtype=bool)
     if head and (turns := _mesh_turns(gltf, clip, times)) is not None:
         _turn_head(turns, values, sent)
-
     turned = np.zeros(FAP_COUNT, dtype=bool)  # where eyes turn, shapes that look aside move their lids
     _turn_eyes(_gaze(gltf, clip, times), "lr", values, turned)
-    for bone in _face_bones(gltf, clip):
-        forward = _turns(gltf, clip, times, bone.node)[:, :, 2]
-        if bone.kind == "jaw":
+    for node, kind in _face_bones(gltf, clip):
+        forward = _turns(gltf, clip, times, node)[:, :, 2]
+        if kind == "jaw":
             opened = np.arctan2(-forward[:, 1], forward[:, 2]) / JAW_OPEN
             _add(combine({"jawOpen": opened}, len(times)), values, sent)
         else:
-            _turn_eyes(forward, bone.kind, values, turned)
+            _turn_eyes(forward, kind, values, turned)
     sent |= turned
     _add(combine(_weights(gltf, clip, times), len(times), but=turned), values, sent)
-    if not sent.any():
-        return None
-    return to_face_track(values, sent)
+    return to_face_track(values, sent) if sent.any() else None
 
 
 def _add(motion: tuple[Float64, Bool], values: Float64, sent: Bool) -> None:
-    """Add FAPs (T, 68) and the mask (68,) of those that are sent."""
+    """Add FAPs (T, 68) and their mask (68,)."""
     values += motion[0]
     sent |= motion[1]
 
@@ -80,8 +70,8 @@ def _add(motion: tuple[Float64, Bool], values: Float64, sent: Bool) -> None:
 def find_face_clip(gltf: Gltf, clip: str | int | None) -> Clip | None:
     """Return the clip of this name or number, or the first, that moves a face; None without one.
 
-    Blender writes an action for each object that a take moves, "head|Take 1" and "eyes|Take 1": they are put
-    together.
+    Blender writes an action for each object that a take moves, "head|Take 1" and "eyes|Take 1": they become
+    one clip.
     """
     clips = gltf.animations if clip is None else [choose_clip(gltf, clip, range(len(gltf.nodes)))]
     with warnings.catch_warnings():
@@ -92,8 +82,8 @@ def find_face_clip(gltf: Gltf, clip: str | int | None) -> Clip | None:
     channels = list(chosen.channels)
     for other in gltf.animations:
         taken = {(channel.node, channel.path) for channel in channels}
-        own = {(channel.node, channel.path) for channel in other.channels}
-        if other.name.partition("|")[2] == chosen.name.partition("|")[2] and not own & taken:
+        added = {(channel.node, channel.path) for channel in other.channels}
+        if other.name.partition("|")[2] == chosen.name.partition("|")[2] and not added & taken:
             channels += other.channels
     return replace(chosen, channels=tuple(channels))
 
@@ -111,7 +101,7 @@ def nodes_of_faces(gltf: Gltf) -> frozenset[int]:
 def _weights(gltf: Gltf, clip: Clip, times: Float64) -> dict[str, Float64]:
     """Return the weights (T,) of morph targets and of VRMA's expressions by name; warns of unknown targets.
 
-    Of several meshes with targets of one name, which share their weights, the first counts.
+    Meshes with targets of the same name share their weights: the first mesh counts.
     """
     result: dict[str, Float64] = {}
     unknown = []
@@ -155,7 +145,7 @@ def _expressions(gltf: Gltf) -> list[tuple[str, int]]:
 
 
 def _gaze(gltf: Gltf, clip: Clip, times: Float64) -> Float64 | None:
-    """Return the directions (T, 3) in which a VRMA file looks, +z ahead; None if it says nothing."""
+    """Return the directions (T, 3) of the gaze in a VRMA file, +z ahead; None without a gaze."""
     node = optional_member(optional_member(_animation_extension(gltf), "lookAt"), "node")
     if node is None:
         return None
@@ -181,8 +171,8 @@ def _turn_eyes(forward: Float64 | None, sides: str, values: Float64, sent: Bool)
 def _mesh_turns(gltf: Gltf, clip: Clip, times: Float64) -> Float64 | None:
     """Return turns (T, 3, 3) of a face from its place at rest, in the axes of the scene.
 
-    It is the declared bone of a head, else the first mesh without a skin whose morph targets move. None if
-    neither it nor a node above turns.
+    The face is the declared bone of a head, else the first mesh without a skin whose morph targets move. None
+    if neither the face nor a node above it turns.
     """
     humanoid = find_humanoid(gltf)
     declared = humanoid.bones.get("head") if humanoid is not None else None
@@ -217,8 +207,8 @@ def _turn_head(turns: Float64, values: Float64, sent: Bool) -> None:
         sent[fap_numbers()[name] - 1] = True
 
 
-def _face_bones(gltf: Gltf, clip: Clip) -> list[_Bone]:
-    """Return the bones of eyes and jaw that a clip turns: declared ones, else those with usual names."""
+def _face_bones(gltf: Gltf, clip: Clip) -> list[tuple[int, str]]:
+    """Return the declared or named bones of the face that a clip turns: node, and kind, a key of `BONES`."""
     turned = [channel.node for channel in clip.channels if channel.path == "rotation"]
     humanoid = find_humanoid(gltf)
     declared: Mapping[str, int] = {} if humanoid is None else humanoid.bones
@@ -227,28 +217,21 @@ def _face_bones(gltf: Gltf, clip: Clip) -> list[_Bone]:
         if humanoid is not None:
             nodes = [declared[bone]] if bone in declared else []
         else:
-            nodes = [node for node in turned if _is_named(gltf.nodes[node].name, kind)]
-        result += [_Bone(node, kind) for node in nodes[:1] if node in turned]
+            nodes = [node for node in turned if is_named(gltf.nodes[node].name, kind)]
+        result += [(node, kind) for node in nodes[:1] if node in turned]
     return result
 
 
-def is_eye(name: str, side: str) -> bool:
-    """Whether a bone's name says that it is the eye on side "l" or "r"."""
-    return _is_named(name, side)
-
-
-def _is_named(name: str, kind: str) -> bool:
-    """Whether a bone's name says that it is the jaw, or the eye on side "l" or "r"."""
+def is_named(name: str, kind: str) -> bool:
+    """Whether the name of a bone is usual for an eye or the jaw. kind: a key of `BONES`."""
     plain = name.rpartition(":")[2].lower()
-    if kind == "jaw":
-        return JAW.search(plain) is not None
-    return EYES[kind].search(plain) is not None and NO_EYE.search(plain) is None
+    return BONES[kind].search(plain) is not None and (kind == "jaw" or NO_EYE.search(plain) is None)
 
 
 def _turns(gltf: Gltf, clip: Clip, times: Float64, node: int) -> Float64:
     """Return turns (T, 3, 3) of a bone of the head from its rest pose, in the axes of the scene at rest.
 
-    People of VRM 0 face -z; they are turned round.
+    People of VRM 0 face -z, and are turned to +z.
     """
     parent = gltf.nodes[node].parent
     above = np.eye(3) if parent is None else nearest_rotation(gltf.nodes[parent].world[:3, :3])

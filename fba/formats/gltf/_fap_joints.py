@@ -1,4 +1,4 @@
-"""Joints that FAPs turn and shift, such as eyes and head; FAPs are computed back from their motion."""
+"""Joints that FAPs turn and shift, such as eyes and head; FAPs from their motion."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ MAX_COORDINATE = 1e6
 class FapJoint:
     """A node and the FAPs that move it, in the frame of its parent.
 
-    position (3,), rest (3, 3): position and rotation when all FAPs are 0. turns: each FAP with its axis (3,)
-    times radians per step, the outermost first; axes are perpendicular. shifts: each FAP with its metres per
+    position (3,), rest (3, 3): position and rotation when all FAPs are 0. turns: FAPs with their axes (3,)
+    times radians per step, the outermost first; axes are perpendicular. shifts: FAPs with their metres per
     step (3,), linearly independent. read_faps: the FAPs that a reader takes from the motion of this joint.
     """
 
@@ -145,14 +145,14 @@ def _read_steps(note: Value) -> Steps:
 
 
 def _angles(rotations: Float64, axes: Float64) -> Float64:
-    """Return angles (3, T), in radians, about up to three perpendicular axes.
+    """Return angles (3, T), in radians, about up to three perpendicular axes, the outermost first.
 
-    Outermost first; with fewer axes, the last angles are 0. In the frame of
-    the axes, each rotation is a product of turns about x, y and z.
+    With fewer axes, the last angles are 0. In the frame of the axes, each rotation is a product of turns
+    about x, y and z.
     """
     base = np.eye(3)
     base[: len(axes)] = axes
-    if len(axes) == 1:  # the coordinate axis in which it is smallest is never parallel to it
+    if len(axes) == 1:  # it is never parallel to the coordinate axis of its smallest component
         across = np.eye(3)[int(np.abs(axes[0]).argmin())]
         base[1] = np.cross(axes[0], across)
         base[1] /= np.linalg.norm(base[1])

@@ -1,7 +1,7 @@
 """FAPs in glTF files of this project: described in a note, and computed again from the animation.
 
-The note says which morph targets and joints show which FAP. FAPs that the motion does not determine (no face
-is in the file, the model has no table for them, an eye is turned by more than 180 degrees) are stored as
+The note names the morph targets and joints that show each FAP. FAPs that the motion does not determine (the
+file has no face, the model has no table for them, an eye turns by more than 180 degrees) are stored as
 numbers.
 """
 
@@ -24,9 +24,9 @@ from fba.gltf import Builder, Clip, Gltf, Value
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 MAX_ERROR = 0.25
-"""Largest error, in steps, of a FAP computed from motion: rounding then gives the exact value."""
+"""Largest error, in steps, of a FAP computed from motion, so that rounding gives the exact value."""
 MAX_FAP = 2.0**31
-"""Bound of FAP values."""
+"""FAP values are smaller."""
 MOST_TARGETS = 1 << 12
 LOW_LEVEL = slice(FIRST_LOW_LEVEL_FAP - 1, FAP_COUNT)
 
@@ -42,15 +42,15 @@ def face_note(
     """Return the note that `read_face` reads.
 
     shown: float32 (T, 68), FAPs as `resolve` returns them for track and model. targets: all in the file.
-    joints: those that FAPs move, with the FAPs (T,) that follow from their motion.
+    joints: that FAPs move, with the FAPs (T,) that follow from their motion.
     """
     covered: set[int] = set()
     names: dict[str, list[float]] = {}
-    for own in targets:
-        values = own.weights.astype(np.float64) @ np.array(own.values)
-        if _close(values, shown[:, own.fap - 1]):
-            covered.add(own.fap)
-            names |= {name: [own.fap, value] for name, value in zip(own.names, own.values, strict=True)}
+    for group in targets:
+        fap = group.fap
+        if _close(group.weights.astype(np.float64) @ np.array(group.values), shown[:, fap - 1]):
+            covered.add(fap)
+            names |= {name: [fap, value] for name, value in zip(group.names, group.values, strict=True)}
     joint_notes = []
     for joint, values_of in joints:
         right = {fap for fap, values in values_of.items() if _close(values, shown[:, fap - 1])}
@@ -67,12 +67,12 @@ def face_note(
 
 
 def _close(values: Float64, shown: Float32) -> bool:
-    """Whether values (T,) round to those shown (T,)."""
+    """Whether values (T,) round to the shown values (T,)."""
     return bool(np.abs(values - shown).max(initial=0) < MAX_ERROR)
 
 
 def _sent(track: FaceTrack, shown: Float32, model: FaceModel) -> Bool:
-    """Return bool (68,): FAPs that show the same when sent in every frame; all low-level ones if in doubt."""
+    """Return bool (68,): FAPs that show the same when sent in every frame; in doubt, all low-level FAPs."""
     sent: Bool = np.asarray(track.mask.any(axis=0) | shown.any(axis=0))
     sent[: FIRST_LOW_LEVEL_FAP - 1] = False
     values = np.rint(shown).astype(np.int64).clip(-(2**31), 2**31 - 1).astype(np.int32)
@@ -85,7 +85,7 @@ def _sent(track: FaceTrack, shown: Float32, model: FaceModel) -> Bool:
 def read_face(gltf: Gltf, clip: Clip, note: Value, times: Float64) -> FaceTrack:
     """Return the face track of an animation with such a note, at times (T,), seconds.
 
-    Raises ModelError if the note is wrong; warns (FbaWarning) if morph targets that it names are missing.
+    Raises ModelError if the note is wrong. Warns (FbaWarning) of missing morph targets.
     """
     values = np.zeros((len(times), FAP_COUNT))
     missing: list[str] = []
@@ -119,7 +119,7 @@ def _fap(value: Value) -> int:
 def _add_targets(
     gltf: Gltf, clip: Clip, note: Value, times: Float64, values: Float64, missing: list[str]
 ) -> None:
-    """Add to values (T, 68) what morph targets show; append names that the file lacks to missing."""
+    """Add the FAPs of morph targets to values (T, 68); append the names of missing targets to `missing`."""
     wanted: dict[str, tuple[int, float]] = {}
     for name, entry in note.members():
         pair = entry.elements(2)
@@ -131,7 +131,7 @@ def _add_targets(
     for number, node in enumerate(gltf.nodes):
         if node.mesh is None or node.mesh in seen:
             continue
-        seen.add(node.mesh)  # its names were taken by the first node that shows it
+        seen.add(node.mesh)  # the first node that shows a mesh counts
         mesh = gltf.meshes[node.mesh]
         columns = [column for column, name in enumerate(mesh.morph_names) if name in wanted]
         if not columns:
@@ -139,7 +139,7 @@ def _add_targets(
         weights = np.array(mesh.weights)[None] if number not in channels else sample(channels[number], times)
         for column in columns:
             fap, value = wanted.pop(mesh.morph_names[column], (0, 0.0))
-            if fap:  # else it has several targets of one name
+            if fap:  # the first of several targets with equal names counts
                 values[:, fap - 1] += weights[:, column] * value
     missing += wanted
 

@@ -26,12 +26,12 @@ BENDING_KINDS = ("skin", "mouth", "hair", "other")
 
 @dataclass(eq=False)
 class HeadParts:
-    """Writes a face into a document; `start_head` makes it.
+    """Writer of a face into a document, which `start_head` returns.
 
-    shown: float32 (T, 68), FAPs as `resolve` returns them. all_targets: of those FAPs. on: the face on a
-    body, or None for a face by itself, in its own frame. place: (4, 4), from the face's frame to the body's.
-    bound: nodes made here that carry vertices, and their matrices (4, 4) in the bind pose. fap_joints: nodes
-    made here that FAPs move, and the FAPs (T,) that follow from their motion.
+    shown: float32 (T, 68), FAPs as `resolve` returns them. all_targets: of these FAPs. on: the face on a
+    body; None for a face alone, in its own frame. place: (4, 4), from the face's frame to the body's. bound:
+    new nodes that carry vertices, and their matrices (4, 4) in the bind pose. fap_joints: new nodes that FAPs
+    move, and the FAPs (T,) that follow from their motion.
     """
 
     builder: Builder
@@ -48,10 +48,8 @@ class HeadParts:
 
     @property
     def targets(self) -> list[Targets]:
-        """Morph targets that `meshes` wrote, of FAPs of which all targets were written."""
-        return [
-            fap_targets for fap_targets in self.all_targets if self._written.issuperset(fap_targets.names)
-        ]
+        """Morph targets of the FAPs of which `add_meshes` wrote all targets."""
+        return [group for group in self.all_targets if self._written.issuperset(group.names)]
 
     @property
     def is_turned(self) -> bool:
@@ -62,8 +60,8 @@ class HeadParts:
     def add_head_node(self, parent: int | None, bind: Float64, always: bool = False) -> int:
         """Add the node that FAPs turn, animate it, and return it.
 
-        parent: its parent joint, and bind, (4, 4), the matrix of that in the bind pose. always: with channels
-        even if it does not move.
+        parent: its parent joint. bind: (4, 4), the parent in the bind pose. always: add channels even if the
+        node does not move.
         """
         node = self.builder.add("nodes", {"name": HEAD_NODE})
         if parent is not None:
@@ -79,8 +77,8 @@ class HeadParts:
     ) -> None:
         """Animate a node that FAPs move.
 
-        local: (T, 4, 4), its transforms. to_parent: (4, 4), from the body's frame to that of the node's
-        parent. rest: (4, 4), the node when all FAPs are 0.
+        local: (T, 4, 4), its transforms. to_parent: (4, 4), from the body's frame to its parent's. rest:
+        (4, 4), the node when all FAPs are 0.
         """
         turned = nearest_rotation(local[:, :3, :3])
         move(self.builder, self.clip, node, turned, local[:, :3, 3], always=always)
@@ -89,9 +87,9 @@ class HeadParts:
             self.fap_joints.append((joint, joint.values(turned, local[:, :3, 3])))
 
     def add_joints(self, parent: int, bind: Float64) -> dict[str, int]:
-        """Add a joint for each part with transforms of its own, such as an eye; return nodes by part name.
+        """Add a joint for each part with its own transforms, such as an eye; return nodes by part name.
 
-        parent: the node of the head, and bind, (4, 4), its matrix in the bind pose.
+        parent: the node of the head. bind: (4, 4), that node in the bind pose.
         """
         nodes: dict[str, int] = {}
         for part, matrices in zip(
@@ -114,10 +112,10 @@ class HeadParts:
     def add_meshes(
         self, slots: dict[str, int], materials: PartWriter, skin: bool, parents: dict[str, int]
     ) -> list[int]:
-        """Add a mesh for each part; return the nodes that have no parent.
+        """Add a mesh for each part; return the nodes without a parent.
 
-        slots: part name -> position in the skin's list of the part's own joint. skin: whether skin 0 moves
-        the parts; otherwise they are children of nodes. parents: part name -> that node, and "" for other
+        slots: part name -> position of its joint in the list of the skin. skin: whether skin 0 moves the
+        parts; otherwise they are children of nodes. parents: part name -> its node, "" -> that of other
         parts.
         """
         roots = []
@@ -149,7 +147,7 @@ class HeadParts:
         return roots
 
     def _transform(self, part: Part, rows: slice, skin: bool) -> Part | None:
-        """Return the part in the body's frame, or in that of its own joint; None if clothes hide it all."""
+        """Return the part in the frame of the body, or of its own joint; None if clothes hide all of it."""
         positions = part.vertices.astype(np.float64)
         triangles = part.triangles
         if skin and self.on is not None:
@@ -176,22 +174,22 @@ class HeadParts:
 
     def _add_morphs(self, primitive: dict[str, Any], mesh: dict[str, Any], rows: slice) -> Float32 | None:
         """Add the targets that move a part to its mesh; return their weights (T, K), or None."""
-        own: list[tuple[Targets, int]] = [
+        moving: list[tuple[Targets, int]] = [
             (group, k)
             for group in self.all_targets
             for k in range(len(group.names))
             if group.shifts[k, rows].any()
         ]
-        if not own:
+        if not moving:
             return None
         size = np.float32(self.place[0, 0])
         primitive["targets"] = [
-            {"POSITION": self.builder.displacements(group.shifts[k, rows] * size)} for group, k in own
+            {"POSITION": self.builder.displacements(group.shifts[k, rows] * size)} for group, k in moving
         ]
-        self._written |= {group.names[k] for group, k in own}
-        weights = np.stack([group.weights[:, k] for group, k in own], axis=1)
+        self._written |= {group.names[k] for group, k in moving}
+        weights = np.stack([group.weights[:, k] for group, k in moving], axis=1)
         mesh["weights"] = weights[0].tolist()
-        mesh["extras"] = {"targetNames": [group.names[k] for group, k in own]}
+        mesh["extras"] = {"targetNames": [group.names[k] for group, k in moving]}
         return weights
 
     def _centre(self, part: Part) -> Float64 | None:
@@ -211,7 +209,7 @@ class HeadParts:
 def start_head(
     builder: Builder, clip: Clip, model: FaceModel, shown: Float32, body: BodyModel | None
 ) -> HeadParts:
-    """Return the writer of a face. shown, body: see `HeadParts`; body None for a face by itself."""
+    """Return the writer of a face. shown: see `HeadParts`. body: that carries it; None for a face alone."""
     on = None
     if body is not None:
         skull = np.concatenate([np.full(len(p.vertices), p.kind not in BENDING_KINDS) for p in model.parts])

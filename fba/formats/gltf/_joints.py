@@ -14,12 +14,12 @@ from fba.rotations import quaternions
 from fba.source import Path
 
 MAX_STILL_CHANGE = 1e-7
-"""Largest change of numbers that count as still: 32-bit floats are not more exact."""
+"""Largest change of a number that counts as still: 32-bit floats are no more exact."""
 
 
 @dataclass(eq=False)
 class Clip:
-    """The animation of a file, whose channels share their key times; `start_clip` makes it.
+    """The animation of a file, whose channels share their key times; see `start_clip`.
 
     key_times: the accessor of these times.
     """
@@ -36,6 +36,11 @@ class Clip:
         self.samplers.append({"input": self.key_times, "output": output, "interpolation": "LINEAR"})
         target = {"node": node, "path": path}
         self.channels.append({"sampler": len(self.samplers) - 1, "target": target})
+
+    def add_to_file(self, name: str, **members: Any) -> None:
+        """Add the animation to the file. members: further members of its object."""
+        entry = {"name": name, "samplers": self.samplers, "channels": self.channels}
+        self.builder.add("animations", entry | members)
 
 
 def start_clip(builder: Builder, times: Float64, path: Path) -> Clip:
@@ -73,7 +78,7 @@ def move(
 
 
 def continuous(turned: Float64) -> Float64:
-    """Return quaternions (T, 4) x, y, z, w of w, x, y, z, each of the sign closer to the one before."""
+    """Return quaternions w, x, y, z (T, 4) as x, y, z, w, with the signs that bring neighbours close."""
     values = np.roll(turned, -1, axis=-1)
     flips = np.where((values[1:] * values[:-1]).sum(axis=-1) < 0, -1.0, 1.0)
     signs = np.concatenate([[1.0 if values[0, 3] >= 0 else -1.0], flips])

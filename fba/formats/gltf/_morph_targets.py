@@ -16,16 +16,16 @@ from fba.parameters import FAP_COUNT, faps
 TOLERANCE = 1e-4
 """Largest distance, in metres, of a vertex from its exact path, for a face of natural size."""
 NATURAL_HEIGHT = 0.25
-"""Height in metres of such a face with its hair."""
+"""Height, in metres, of a face of natural size with its hair."""
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
     """The morph targets of one FAP.
 
-    names: one for each target. shifts: float32 (K, V, 3), displacements of the whole face at weight 1, in the
-    model's unit. weights: float32 (T, K). values: K values of the FAP, those at weight 1; the FAP is the sum
-    of weights times these.
+    names: K, of the targets. shifts: float32 (K, V, 3), displacements of the whole face at weight 1, in the
+    model's unit. weights: float32 (T, K). values: K values of the FAP at weight 1; the FAP is the sum of
+    weights times these values.
     """
 
     fap: int
@@ -39,9 +39,9 @@ def make_targets(model: FaceModel, shown: Float32) -> Iterator[Targets]:
     """Yield the targets of each FAP that moves vertices in an animation.
 
     shown: float32 (T, 68), FAPs as `resolve` returns them. A FAP that moves vertices along straight lines has
-    one target, at its reference value. Any other has one at each value where a path bends by more than
-    `TOLERANCE`; between two values both targets have a share, so that the weighted sum follows the path.
-    Transforms (of eyes and head) are left out.
+    one target, at its reference value. Other FAPs have a target at each value where a path bends by more than
+    `TOLERANCE`; between two values both targets have weights, so that their sum follows the path. Transforms
+    (of eyes and head) are left out.
     """
     tables = tuple(FaceDefTables(table.fap, table.meshes) for table in model.tables if table.meshes)
     if not tables:
@@ -86,9 +86,9 @@ def _make_targets(
 
 
 def _find_bends(stops: Float64, shifts: Float32, tolerance: float) -> list[int]:
-    """Return the rows of stops between which straight lines come close to all others.
+    """Return the rows of stops whose connecting lines come close to all other rows.
 
-    stops: (S,), values of the FAP. shifts: (S, V, 3). The first, the last and that of 0 are among them.
+    stops: (S,), values of the FAP. shifts: (S, V, 3). The first row, the last row and that of 0 are included.
     """
     used = sorted({0, int(np.flatnonzero(stops == 0)[0]), len(stops) - 1})
     while True:

@@ -1,4 +1,4 @@
-"""Read glTF files of this project: their joints are those of BAPs, so that nothing is retargeted.
+"""Read glTF files of this project, whose joints are those of BAPs and need no retargeting.
 
 FAPs come from morph targets and joints (`fba.formats.gltf._fap_tracks`).
 """
@@ -25,8 +25,9 @@ from fba.formats.text.frame_rates import parse_rate
 from fba.gltf import Channel, Clip, Gltf, Value, optional_member
 
 VERSION = 1
+"""Version of the note."""
 MAX_INDEX = 1 << 62
-"""Bound of frame numbers."""
+"""Largest frame number."""
 
 
 def find_note(gltf: Gltf, clip: Clip) -> Value | None:
@@ -60,21 +61,15 @@ def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
         nodes = _find_joints(gltf, note.member("root").index(len(gltf.nodes), "node"), Skeleton.default())
         inside = set(nodes.values())
         channels = [channel for channel in clip.channels if channel.node in inside]
-    times = _times(channels, note)
+    times = key_times(channels)
+    if len(times) > MOST_FRAMES:
+        raise note.error(f"its animation has {len(times)} keys, more than the {MOST_FRAMES} that can be read")
     steps = np.rint(times * float(rate))
     if not (steps[-1] < MAX_INDEX and (len(steps) < 2 or (np.diff(steps) > 0).all())):
         raise text.error("some keys of the animation are less than a frame apart at this rate")
     body = _body(gltf, channels, note, nodes, times) if nodes else None
     face = read_face(gltf, clip, face_note, times) if (face_note := note.get("face")) is not None else None
     return Animation(rate, first + steps.astype(np.int64), face, body, clip.name)
-
-
-def _times(channels: Sequence[Channel], note: Value) -> Float64:
-    """Return the times of all keys (T,), seconds; ModelError if there are too many."""
-    times = key_times(channels)
-    if len(times) > MOST_FRAMES:
-        raise note.error(f"its animation has {len(times)} keys, more than the {MOST_FRAMES} that can be read")
-    return times
 
 
 def _body(

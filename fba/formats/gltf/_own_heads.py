@@ -12,21 +12,21 @@ from fba.body.model import BodyPart
 from fba.body.own_head import HeadShape, OwnEye, OwnHead
 from fba.capture.blendshapes.shape_table import amounts_of, largest_amounts
 from fba.face.shape_names import arkit_of
-from fba.formats.gltf._face_motion import is_eye
+from fba.formats.gltf._face_motion import is_named
 from fba.formats.gltf.humanoid import Humanoid
 from fba.gltf import Gltf, Primitive, Value, optional_member
 
 MOST_BINDS = 1 << 16
-LOCAL = 20
-"""From this many shapes of ARKit on, which each move one part of the face, others are not used."""
-HALF = 0.5
-"""An eye carries the vertices that have more than this share of its joint's weight."""
+ENOUGH_SHAPES = 20
+"""Fewest shapes of ARKit with which no others are used: each of ARKit's moves one part of the face."""
+MIN_EYE_WEIGHT = 0.5
+"""Share of a vertex's weight on the joint of an eye above which the vertex belongs to the eye."""
 OLD_PRESETS = {
     "a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed",
     "blink_l": "blinkLeft", "blink_r": "blinkRight", "lookup": "lookUp", "lookdown": "lookDown",
     "lookleft": "lookLeft", "lookright": "lookRight",
 }  # fmt: skip
-"""VRM 0's names of expressions that VRM 1 calls otherwise."""
+"""VRM 1's names of expressions, by VRM 0's names in lower case."""
 
 Binds = list[tuple[int, int, float]]
 """Mesh, number of the morph target, and its weight."""
@@ -36,7 +36,8 @@ Binds = list[tuple[int, int, float]]
 class PlacedMesh:
     """A primitive of a node as a part of a body.
 
-    linear: (V, 3, 3), from its own axes to the body's. bound: joints of skins in the scene, (4, 4).
+    linear: (V, 3, 3), from its axes to the body's. bound: matrices (4, 4) of the joints of skins in the
+    scene.
     """
 
     part: BodyPart
@@ -51,13 +52,12 @@ def read_head(
 ) -> OwnHead | None:
     """Return shapes and eyes of a person's head; None if it has neither.
 
-    meshes: all that is shown, in the order of the body's vertices. turn: (3, 3), from the scene's axes to the
-    body's. A head may have shapes with the names of ARKit, and others; most of ARKit's move one part of the
-    face alone, and are preferred.
+    meshes: all that are shown, in the order of the body's vertices. turn: (3, 3), from the scene's axes to
+    the body's. ARKit's shapes are preferred, as most of them move one part of the face alone.
     """
     listed = _expressions(gltf) or _named(gltf)
     local = {name: binds for name, binds in _named(gltf).items() if arkit_of(name) is not None}
-    if len(local) >= LOCAL:
+    if len(local) >= ENOUGH_SHAPES:
         listed = local
     budget = gltf.budget.copy()
     shapes = []
@@ -74,10 +74,10 @@ def read_head(
 
 
 def _named(gltf: Gltf) -> dict[str, Binds]:
-    """Return the morph targets whose names are known; equal names of several meshes go together.
+    """Return the morph targets with known names; targets of several meshes with equal names go together.
 
-    Of several targets of one mesh that mean the same shape, such as VRoid's and ARKit's blink, the one with
-    ARKit's own name counts, else the first.
+    If several targets of a mesh mean the same shape, such as VRoid's and ARKit's blink, the target with
+    ARKit's name counts, else the first.
     """
     result: dict[str, Binds] = {}
     for number, mesh in enumerate(gltf.meshes):
@@ -96,45 +96,40 @@ def _expressions(gltf: Gltf) -> dict[str, Binds]:
     extensions = gltf.document.get("extensions")
     result: dict[str, Binds] = {}
     groups = optional_member(optional_member(extensions, "VRM"), "blendShapeMaster")
-    listed = optional_member(groups, "blendShapeGroups")
-    for entry in listed.elements(MOST_BINDS) if listed is not None else ():
+    for entry in groups.elements(MOST_BINDS, "blendShapeGroups") if groups is not None else ():
         preset = entry.get("presetName")
         name = "" if preset is None else preset.text(200)
-        binds = entry.get("binds")
         result[OLD_PRESETS.get(name.lower(), name)] = [
             (bind.member("mesh").index(len(gltf.meshes), "mesh"), *_target(bind, 100.0))
-            for bind in (binds.elements(MOST_BINDS) if binds is not None else ())
+            for bind in entry.elements(MOST_BINDS, "binds")
         ]
     presets = optional_member(
         optional_member(optional_member(extensions, "VRMC_vrm"), "expressions"), "preset"
     )
     for name, entry in presets.members() if presets is not None else ():
-        binds = entry.get("morphTargetBinds")
-        found: Binds = []
-        for bind in binds.elements(MOST_BINDS) if binds is not None else ():
-            mesh = gltf.nodes[bind.member("node").index(len(gltf.nodes), "node")].mesh
-            if mesh is not None:
-                found.append((mesh, *_target(bind, 1.0)))
-        result[name] = found
+        result[name] = [
+            (mesh, *_target(bind, 1.0))
+            for bind in entry.elements(MOST_BINDS, "morphTargetBinds")
+            if (mesh := gltf.nodes[bind.member("node").index(len(gltf.nodes), "node")].mesh) is not None
+        ]
     return {name: binds for name, binds in result.items() if binds and amounts_of(name) is not None}
 
 
 def _target(bind: Value, whole: float) -> tuple[int, float]:
-    """Return number and weight of the morph target that an expression binds."""
+    """Return number and weight of the morph target that an expression binds. whole: the full weight there."""
     return bind.member("index").integer(0, 1 << 20), bind.member("weight").number(-1e6, 1e6) / whole
 
 
 def _moved(gltf: Gltf, meshes: Sequence[PlacedMesh], binds: Binds) -> tuple[Intp, Float32]:
-    """Return the body's vertices (N,) that morph targets move, and by how much, (N, 3), in its axes."""
+    """Return the body's vertices (N,) that morph targets move, and their displacements (N, 3) in its axes."""
     rows, shifts = [np.zeros(0, dtype=np.intp)], [np.zeros((0, 3), dtype=np.float32)]
     start = 0
     for mesh in meshes:
-        own = [(column, weight) for number, column, weight in binds if number == gltf.nodes[mesh.node].mesh]
         morphs = mesh.primitive.morphs
         moved: Float64 = np.zeros((0, 3))
-        for column, weight in own:
-            morph = morphs[column] if column < len(morphs) else None
-            if morph is not None:
+        for number, column, weight in binds:
+            mine = number == gltf.nodes[mesh.node].mesh and column < len(morphs)
+            if mine and (morph := morphs[column]) is not None:
                 moved = weight * morph.astype(np.float64) + (moved if len(moved) else 0.0)
         if len(moved):
             which = np.flatnonzero(moved.any(axis=1))
@@ -147,7 +142,7 @@ def _moved(gltf: Gltf, meshes: Sequence[PlacedMesh], binds: Binds) -> tuple[Intp
 def _eye(
     gltf: Gltf, humanoid: Humanoid | None, meshes: Sequence[PlacedMesh], turn: Float64, side: str
 ) -> OwnEye | None:
-    """Return an eyeball: what hangs on the bone that is declared or called an eye; None without."""
+    """Return an eyeball: the vertices of the bone that is declared or called an eye; None without a bone."""
     bone = {"l": "leftEye", "r": "rightEye"}[side]
     rows, centre, start = [np.zeros(0, dtype=np.intp)], None, 0
     for mesh in meshes:
@@ -157,13 +152,12 @@ def _eye(
             joints = gltf.skins[skin].joints
             for number, joint in enumerate(joints):
                 declared = humanoid is not None and humanoid.bones.get(bone) == joint
-                if not declared and (humanoid is not None or not is_eye(gltf.nodes[joint].name, side)):
+                if not declared and (humanoid is not None or not is_named(gltf.nodes[joint].name, side)):
                     continue
                 share = np.where(primitive.joints == number, primitive.weights, 0.0).sum(axis=1)
-                which = np.flatnonzero(share > HALF * primitive.weights.sum(axis=1))
+                which = np.flatnonzero(share > MIN_EYE_WEIGHT * primitive.weights.sum(axis=1))
                 if len(which):
                     rows.append(which + start)
                     centre = turn @ mesh.bound[joint][:3, 3]
         start += len(mesh.part.vertices)
-    found = np.concatenate(rows)
-    return None if centre is None else OwnEye(side, found, centre)
+    return None if centre is None else OwnEye(side, np.concatenate(rows), centre)

@@ -15,7 +15,7 @@ from fba.errors import ModelError
 from fba.gltf import Channel, Gltf
 
 MAX_DISAGREEMENT = 0.05
-"""Largest angle, in radians, by which joints disagree on how the bind pose is turned in the scene."""
+"""Largest median angle, in radians, between joints' turns of the bind pose in the scene."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +46,10 @@ class BindPose:
 def find_bind_pose(
     gltf: Gltf, nodes: Sequence[int], parents: Sequence[int], *, skins: bool = True
 ) -> BindPose:
-    """Return the bind pose of joints. A joint of no skin has its node's transform relative to its parent.
+    """Return the bind pose of joints. A joint without a skin keeps its node's transform under its parent.
 
-    nodes: those of the joints, parents first. parents: position of each joint's parent in nodes, -1 for a
-    root. skins: False for the pose of the nodes themselves.
+    nodes: of the joints, parents first. parents: position of each joint's parent in nodes, -1 for a root.
+    skins: False for the pose of the nodes themselves.
     """
     inverse: dict[int, Float64] = {}
     inside = set(nodes)
@@ -116,15 +116,15 @@ class Sampler:
 
     def linear(self, node: int) -> Float64:
         """Return a node's rotations times scales, float64 (T, 3, 3)."""
-        own = self._gltf.nodes[node]
+        posed = self._gltf.nodes[node]
         turn, scale = (self._channels.get((node, path)) for path in ("rotation", "scale"))
         if turn is None and scale is None:
-            return np.broadcast_to(own.local[:3, :3], (len(self._times), 3, 3))
-        if own.rotation is None or own.scale is None:  # given as a matrix, of which no part can be animated
-            lengths = np.linalg.norm(own.local[:3, :3], axis=0)
-            matrix = nearest_rotation(own.local[:3, :3])
+            return np.broadcast_to(posed.local[:3, :3], (len(self._times), 3, 3))
+        if posed.rotation is None or posed.scale is None:  # a matrix, of which no part can be animated
+            lengths = np.linalg.norm(posed.local[:3, :3], axis=0)
+            matrix = nearest_rotation(posed.local[:3, :3])
         else:
-            lengths, matrix = own.scale, rotations.matrices(np.roll(own.rotation, 1))
+            lengths, matrix = posed.scale, rotations.matrices(np.roll(posed.rotation, 1))
         if turn is None:
             matrices = np.broadcast_to(matrix, (len(self._times), 3, 3))
         else:
@@ -135,10 +135,10 @@ class Sampler:
 
 
 def _cut(channel: Channel, times: Float64) -> Channel:
-    """Return a channel with only the keys that matter at times (T,), and one or two more on each side."""
+    """Return a channel with the keys that matter at times (T,), and two more on each side."""
     if not len(times):
         return channel
-    # as float32, since NumPy would convert all keys otherwise
+    # as float32, so that NumPy does not convert all keys
     low, high = np.searchsorted(channel.times, np.array([times[0], times[-1]], dtype=np.float32)).tolist()
     rows = slice(max(low - 2, 0), high + 3)
     return replace(channel, times=channel.times[rows], values=channel.values[rows])
@@ -153,7 +153,7 @@ def key_times(channels: Sequence[Channel]) -> Float64:
 
 
 def sample(channel: Channel, times: Float64) -> Float64:
-    """Return values (T, width) of a channel at times (T,); constant outside of its keys."""
+    """Return values (T, width) of a channel at times (T,); constant before and after its keys."""
     keys = np.asarray(channel.times, dtype=np.float64)
     values = np.asarray(channel.values, dtype=np.float64)
     turns = channel.path == "rotation"
@@ -181,7 +181,7 @@ def sample(channel: Channel, times: Float64) -> Float64:
 
 
 def nearest_rotation(matrices: Float64) -> Float64:
-    """Return the rotations (..., 3, 3) closest to matrices that also scale; ModelError for singular ones."""
+    """Return the rotations (..., 3, 3) closest to matrices; ModelError for a singular matrix."""
     if (np.linalg.cond(matrices) >= 1e9).any():
         raise ModelError("a joint has a scale of 0, so its rotation is unknown")
     return geometry.nearest_rotation(matrices)
@@ -210,13 +210,12 @@ def _to_scene(gltf: Gltf, bound: dict[int, Float64]) -> tuple[Float64, float]:
     """Return rotation (3, 3) and scale from the frame in which the skin was bound to that of the scene.
 
     bound: joint -> its matrix (4, 4) in the bind pose. If the nodes are in the bind pose, the rotation is
-    exact. Otherwise it is assumed to be one of the 24 turns between axes, the one closest to that of the
-    first joint.
+    exact. Otherwise it is taken to be the turn between axes, of which there are 24, that is closest to the
+    first joint's.
     """
     if not bound:
         return np.eye(3), 1.0
-    turns = []
-    sizes = []
+    turns, sizes = [], []
     for joint, matrix in bound.items():
         both = gltf.nodes[joint].world[:3, :3] @ np.linalg.inv(matrix[:3, :3])
         turns.append(nearest_rotation(both))
@@ -226,8 +225,7 @@ def _to_scene(gltf: Gltf, bound: dict[int, Float64]) -> tuple[Float64, float]:
     differences = [np.arccos(np.clip((np.trace(first.T @ turn) - 1) / 2, -1, 1)) for turn in turns]
     if np.median(differences) < MAX_DISAGREEMENT:
         return first, size
-    best = max(_axis_turns(), key=lambda turn: float(np.trace(turn.T @ first)))
-    return best, size
+    return max(_axis_turns(), key=lambda turn: float(np.trace(turn.T @ first))), size
 
 
 def _axis_turns() -> list[Float64]:

@@ -1,7 +1,7 @@
 """Read glTF 2.0 skeletons: animated joints, such as those that exporters write from FBX, become BAPs.
 
-A glTF skeleton rests in its bind pose, in which joints may be turned; in a `SkeletonMotion` at rest all
-rotations are the identity. So rotations are taken relative to the bind pose, in the scene's frame.
+A glTF skeleton rests in its bind pose, in which joints may be turned; a `SkeletonMotion` rests without
+rotations. So rotations are relative to the bind pose, in the scene's frame.
 """
 
 from __future__ import annotations
@@ -25,23 +25,24 @@ from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, key_times
 from fba.formats.gltf._skeletons import find_joints
 from fba.formats.gltf.clips import choose_clip
+from fba.formats.text.frame_rates import Rate
 from fba.gltf import Clip, Gltf, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 
 SAMPLED_JOINTS = 200_000
-"""Number of joints times frames that are sampled at once, which bounds the memory."""
+"""Joints times frames that are sampled at once: a bound of memory."""
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 DEFAULT_RATE = Fraction(30)
 MAX_HEAD_JOINTS = 10
-"""Largest number of turning joints of a skin that is a head."""
+"""Most turning joints of a skin that is a head."""
 FACE_BYTES = 2500
 """Memory that a frame of a face takes."""
 HALF_TURN = (-1, 1, -1)
-"""What half a turn about +y multiplies vectors by, and the last three numbers of quaternions."""
+"""Factors by which half a turn about +y changes vectors, and the last three numbers of quaternions."""
 MAX_KEY_INTERVAL = 1.5
-"""Frames at the lowest usual rate between keys that were sampled, not set by hand."""
-STRETCH = 0.01
+"""Frames, at the lowest usual rate, between keys above which they were set by hand, not sampled."""
+MAX_STRETCH = 0.01
 """Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
 
 
@@ -57,12 +58,12 @@ def read_person(
     options: SkeletonOptions,
     *,
     clip: str | int | None = None,
-    rate: Fraction | int | str | None = None,
+    rate: Rate | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Captured:
     """Return the person in a glTF file: a skeleton as BAPs, and a face as FAPs, see `read_face_motion`.
 
-    clip, rate: see `read_motion`. BAPs and FAPs in files of this project are read as they are, with their own
+    clip, rate: see `read_motion`. BAPs and FAPs in files of this project are read as they are, with their
     frames, unless the options ask for retargeting.
 
     Raises FormatError for anything that is not glTF, or whose skeleton is not a body, LimitError for more
@@ -88,7 +89,7 @@ def read_person(
                 text = f"{gltf.file}: no body is read, the face alone: {error.finding}"
                 warnings.warn(FbaWarning(text).with_remedies(*error.remedies), stacklevel=2)
             return Captured(_read_face_alone(gltf, face_clip, rate, limits))
-        for each in said:  # not what concerns a skeleton that turned out to be none
+        for each in said:  # about a skeleton, only if it is that of a person
             warnings.warn(each.message, each.category, stacklevel=2)
         return made
 
@@ -97,17 +98,13 @@ def _read_stored(gltf: Gltf, clip: str | int | None) -> Animation | None:
     """Return the BAPs and FAPs in a file of this project; None for other files."""
     if not gltf.animations:
         return None
-    own = gltf.animations[0] if clip is None else choose_clip(gltf, clip, range(len(gltf.nodes)))
-    note = find_note(gltf, own)
-    return None if note is None else read_note(gltf, own, note)
+    chosen = gltf.animations[0] if clip is None else choose_clip(gltf, clip, range(len(gltf.nodes)))
+    note = find_note(gltf, chosen)
+    return None if note is None else read_note(gltf, chosen, note)
 
 
 def read_motion(
-    path: Path,
-    *,
-    clip: str | int | None = None,
-    rate: Fraction | int | str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
+    path: Path, *, clip: str | int | None = None, rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> SkeletonMotion:
     """Return the joints of a glTF file and one of its animations, sampled.
 
@@ -116,22 +113,12 @@ def read_motion(
     LimitError for more than the limits allow; warns (FbaWarning) if there are several animations or skeletons
     to choose from.
     """
-    return sample_motion(read_gltf(path, limits=limits), clip=clip, rate=rate, limits=limits)
-
-
-def sample_motion(
-    gltf: Gltf,
-    *,
-    clip: str | int | None = None,
-    rate: Fraction | int | str | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> SkeletonMotion:
-    """Do the same as `read_motion` for a file that has been read."""
+    gltf = read_gltf(path, limits=limits)
     try:
         return _sample(gltf, clip, rate, limits)
     except ModelError as error:
-        found = error.finding.removeprefix(f"{gltf.file}: ")
-        raise ModelError(f"{gltf.file}: {found}").with_remedies(*error.remedies) from error
+        finding = error.finding.removeprefix(f"{gltf.file}: ")
+        raise ModelError(f"{gltf.file}: {finding}").with_remedies(*error.remedies) from error
 
 
 def _has_limbs(motion: SkeletonMotion) -> bool:
@@ -144,7 +131,7 @@ def _has_limbs(motion: SkeletonMotion) -> bool:
 
 
 def _count_turning(clip: Clip, gltf: Gltf) -> int:
-    """Return how many joints of skins a clip turns."""
+    """Return the count of joints of skins that a clip turns."""
     joints = {joint for skin in gltf.skins for joint in skin.joints}
     return sum(
         channel.path == "rotation" and channel.node in joints and np.ptp(channel.values, axis=0).max() > 0
@@ -161,7 +148,7 @@ def _clip_of_face_alone(gltf: Gltf, clip: str | int | None) -> Clip | None:
     return find_face_clip(gltf, clip)
 
 
-def _read_face_alone(gltf: Gltf, clip: Clip, rate: Fraction | int | str | None, limits: Limits) -> Animation:
+def _read_face_alone(gltf: Gltf, clip: Clip, rate: Rate | None, limits: Limits) -> Animation:
     """Return a clip that moves a face alone."""
     times = key_times(clip.channels)
     frames, count = _count_frames(gltf, clip, times, rate, limits)
@@ -174,7 +161,7 @@ def _read_face_alone(gltf: Gltf, clip: Clip, rate: Fraction | int | str | None, 
 
 
 def _count_frames(
-    gltf: Gltf, clip: Clip, times: Float64, rate: Fraction | int | str | None, limits: Limits
+    gltf: Gltf, clip: Clip, times: Float64, rate: Rate | None, limits: Limits
 ) -> tuple[Fraction, int]:
     """Return the frame rate and the number of frames of a clip with keys at times (T,)."""
     frames = Fraction(rate) if rate is not None else _rate(times)
@@ -191,9 +178,7 @@ def _count_frames(
     return frames, count
 
 
-def _sample(
-    gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None, limits: Limits
-) -> SkeletonMotion:
+def _sample(gltf: Gltf, clip: str | int | None, rate: Rate | None, limits: Limits) -> SkeletonMotion:
     joints = find_joints(gltf)
     nodes, parents, bind, used = joints.nodes, joints.parents, joints.bind, joints.used
     place = {node: number for number, node in enumerate(nodes)}
@@ -232,7 +217,7 @@ def _sample(
 
 
 def _turn_round(motion: SkeletonMotion) -> SkeletonMotion:
-    """Return a motion half a turn about +y further: people of VRM 0 face -z."""
+    """Return a motion turned by half a turn about +y: people of VRM 0 face -z."""
     return replace(
         motion,
         offsets=motion.offsets * HALF_TURN,
@@ -246,7 +231,7 @@ def _world(
 ) -> tuple[Float64, Float64]:
     """Return rotations (T, J, 4) of nodes from the bind pose, and positions (T, J, 3), in the scene's frame.
 
-    nodes: parents first. parents: position of each one's parent in nodes, -1 for the root.
+    nodes: parents first. parents: position of each node's parent in nodes, -1 for the root.
     """
     turned = np.zeros((len(sampler), len(nodes), 4))
     positions = np.zeros((len(sampler), len(nodes), 3))
@@ -268,9 +253,9 @@ def _world(
 
 
 def _rate(times: Float64) -> Fraction:
-    """Return frames per second of regular keys: the usual rate that fits most of their intervals, else 30.
+    """Return the frame rate of keys: the usual rate that fits nearly all intervals between them, else 30.
 
-    Keys that are set by hand, far apart, fit several rates; 30 is tried first for them.
+    Keys that were set by hand, far apart, fit several rates: for them, 30 is tried first.
     """
     steps = np.diff(times)
     steps = steps[steps > 1e-4]
@@ -286,14 +271,14 @@ def _rate(times: Float64) -> Fraction:
 
 
 def _stretched(motion: SkeletonMotion, positions: Float64) -> Bool:
-    """Return bool (J,): joints that move relative to their parents. positions: (T, J, 3), as in the file."""
+    """Return bool (J,): whether joints move relative to their parents. positions: (T, J, 3), of the file."""
     size = float(np.ptp(motion.rest(), axis=0).max()) or 1.0
-    moved: Bool = np.abs(motion.world()[1] - positions).max(axis=(0, 2)) > STRETCH * size
+    moved: Bool = np.abs(motion.world()[1] - positions).max(axis=(0, 2)) > MAX_STRETCH * size
     return moved
 
 
 def _warn_of_stretching(name: str, joints: list[str]) -> None:
-    """Warn of joints that move relative to their parents, but are held as in the bind pose."""
+    """Warn of joints that move relative to their parents, but keep their place of the bind pose."""
     warnings.warn(
         f"{name}: joints whose offset from the parent varies, or differs from the bind pose, "
         f"keep that of the bind pose: {', '.join(joints[:5])}{', ...' if len(joints) > 5 else ''}",

@@ -1,4 +1,4 @@
-"""The skeleton of a person in a glTF file: the nodes that are its joints, and how they rest."""
+"""The skeleton of a person in a glTF file: the nodes that are its joints, and their rest pose."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from fba.gltf import Gltf
 from fba.mesh import UniqueNames
 
 MAX_JOINTS = 4096
-TURNED = 1e-3
+MIN_TURN = 1e-3
 """Change of a component of a quaternion above which a joint turns."""
 
 
 @dataclass(frozen=True, eq=False)
 class Joints:
-    """The joints of a person, as nodes of a file; `find_joints` makes it.
+    """The joints of a person, as nodes of a file; see `find_joints`.
 
-    nodes: those of the joints and of all above them, parents first. parents: position of each one's parent in
-    nodes, -1 for the root. bind: how they rest. used: positions in nodes of the hips and all below them.
-    humanoid: what the file declares, or None. posed: whether the rest pose is that of the nodes, which may be
-    any.
+    nodes: of the joints and of all above them, parents first. parents: position of each node's parent in
+    nodes, -1 for the root. bind: their rest pose. used: positions in nodes of the hips and all below them.
+    humanoid: the bones that the file declares, or None. posed: whether the rest pose is that of the nodes,
+    which may be any pose.
     """
 
     nodes: list[int]
@@ -67,9 +67,9 @@ class Joints:
 
 
 def find_joints(gltf: Gltf) -> Joints:
-    """Return the joints of the person in a file: those it declares, else of the best-known skeleton.
+    """Return the joints of the person in a file: declared ones, else the best-known skeleton's.
 
-    Raises ModelError if there is no skeleton, or one with too many joints; warns (FbaWarning) of other
+    Raises ModelError if there is no skeleton, or it has too many joints. Warns (FbaWarning) of other
     skeletons.
     """
     humanoid = find_humanoid(gltf)
@@ -93,9 +93,9 @@ def find_joints(gltf: Gltf) -> Joints:
 def _skeleton(gltf: Gltf) -> list[int]:
     """Return the nodes of the skeleton, parents first, with one root.
 
-    They are the joints of skins and the animated nodes that hang among them, as in a file of the head's skin
-    alone; without skins, all animated nodes and their children; and all nodes above. Of several skeletons,
-    the one with most known joints; warns (FbaWarning) of the others.
+    They are the joints of skins and the animated nodes among them, which a file with a skin of the head alone
+    has; without skins, all animated nodes and their children; and all nodes above. Of several skeletons, that
+    with most known joints is returned; warns (FbaWarning) of the others.
     """
     skinned = {joint for skin in gltf.skins for joint in skin.joints}
     moved = {channel.node for clip in gltf.animations for channel in clip.channels}
@@ -137,9 +137,9 @@ def _skeleton(gltf: Gltf) -> list[int]:
 
 
 def _turn_outside_skins(gltf: Gltf, nodes: list[int], parents: list[int]) -> bool:
-    """Whether joints of the body turn that no skin has, so that skins do not tell how the whole body rests.
+    """Whether joints of the body turn that no skin has, so that skins do not tell the rest pose.
 
-    The body begins where the nodes first fork; those above only move all of it.
+    The body begins where the nodes first fork; nodes above only move all of it.
     """
     skinned = {joint for skin in gltf.skins for joint in skin.joints}
     if skinned.isdisjoint(nodes):
@@ -148,7 +148,7 @@ def _turn_outside_skins(gltf: Gltf, nodes: list[int], parents: list[int]) -> boo
         channel.node
         for clip in gltf.animations
         for channel in clip.channels
-        if channel.path == "rotation" and np.ptp(channel.values, axis=0).max(initial=0) > TURNED
+        if channel.path == "rotation" and np.ptp(channel.values, axis=0).max(initial=0) > MIN_TURN
     }
     children = np.bincount([parent for parent in parents if parent >= 0], minlength=len(nodes))
     body = next((number for number in range(len(nodes)) if children[number] != 1), 0)
@@ -159,7 +159,7 @@ def _turn_outside_skins(gltf: Gltf, nodes: list[int], parents: list[int]) -> boo
 
 
 def _find_top(gltf: Gltf, node: int, among: Set[int]) -> int:
-    """Return the topmost node of some among one and all above it."""
+    """Return the topmost node that is in `among`, of a node and all above it; else the node itself."""
     top, above = node, gltf.nodes[node].parent
     while above is not None:
         top, above = (above if above in among else top), gltf.nodes[above].parent
@@ -189,8 +189,8 @@ def _declared_skeleton(gltf: Gltf, declared: Mapping[int, str]) -> list[int]:
 def _find_hips(motion: SkeletonMotion) -> int:
     """Return the joint of the hips that carry both legs, or 0.
 
-    Joints above them (an armature, a game's root) only move all. A name that one maker gives to the hips is
-    another's for the back.
+    Joints above them (an armature, a game's root) only move all of the body. Some makers use the name of
+    another maker's hips for the back.
     """
     try:
         mapped = find_bones(motion, None, Skeleton.default()).joints
@@ -211,7 +211,7 @@ def _descendants(parents: list[int], root: int) -> list[int]:
 
 
 def _fit(gltf: Gltf, tree: list[int]) -> int:
-    """Return the number of nodes whose names are known."""
+    """Return the count of nodes with known names."""
     try:
         return len(matching.match([gltf.nodes[number].name for number in tree])[1])
     except ModelError:

@@ -1,4 +1,4 @@
-"""Write VRM animations (.vrma): expressions that every avatar has, where eyes look, and how the head turns.
+"""Write VRM animations (.vrma): expressions that every avatar has, the gaze, and turns of the head.
 
 The layout is that of the extension VRMC_vrm_animation 1.0: the weight of an expression is the x of its node's
 translation, and bones rest in a T-pose without rotations of their own.
@@ -12,39 +12,36 @@ from scipy.spatial.transform import Rotation
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import to_blendshapes
-from fba.errors import FormatError, ModelError
 from fba.gltf import Builder
-from fba.source import Path
+from fba.source import Path, naming_file
 
 EXTENSION = "VRMC_vrm_animation"
 EXPRESSIONS = (
     "aa", "ih", "ou", "ee", "oh", "blinkLeft", "blinkRight", "happy", "angry", "sad", "surprised"
 )  # fmt: skip
 """VRM's presets whose FAPs differ from each other; "relaxed" is a faint "happy"."""
-BONES = {"hips": 0.95, "spine": 0.1, "chest": 0.15, "neck": 0.25, "head": 0.1}
-"""Bones from the root to the head, and how far each is above the one before, metres."""
+BONE_HEIGHTS = {"hips": 0.95, "spine": 0.1, "chest": 0.15, "neck": 0.25, "head": 0.1}
+"""Bones from the root to the head, and the height of each above the bone before, metres."""
 EYES_ABOVE_HEAD = 0.06
 """Metres from the joint of the head up to the eyes."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
-    """Whether a file is read by this module: none is, since VRM animations are glTF."""
+    """Return False: VRM animations are read as glTF."""
     return False
 
 
 def write(path: Path, animation: Animation) -> None:
     """Write the face as a VRM animation.
 
-    Weights are those whose FAPs come closest, see `fba.capture.to_blendshapes`; lips and brows thus follow as
-    far as vowels and moods can move them. Raises FormatError without a face.
+    Weights are those whose FAPs come closest, see `fba.capture.to_blendshapes`: lips and brows follow as far
+    as vowels and moods can move them. Raises FormatError without a face.
     """
-    try:
+    with naming_file(path):
         motion = to_blendshapes(animation, EXPRESSIONS)
-    except ModelError as error:
-        raise FormatError(error.finding, path=path) from error
     builder = Builder()
     bones: dict[str, int] = {}
-    for bone, above in BONES.items():
+    for bone, above in BONE_HEIGHTS.items():
         bones[bone] = builder.add("nodes", {"name": bone, "translation": [0.0, above, 0.0]})
         if len(bones) > 1:
             builder.root["nodes"][bones[bone] - 1]["children"] = [bones[bone]]

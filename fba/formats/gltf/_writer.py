@@ -1,8 +1,8 @@
 """Write glTF 2.0 (.glb): a skinned, animated person that Blender, three.js and game engines open.
 
-Nodes are the joints of the standard, by name, posed as in the first frame. Every joint that moves has LINEAR
-keys at the animation's own times, counted from the first frame. FAPs are weights of morph targets.
-docs/formats.md describes what is approximate.
+Nodes are the joints of the standard, by name, posed as in the first frame. Joints that move have LINEAR keys
+at the animation's own times, from the first frame on. FAPs are weights of morph targets. docs/formats.md
+describes what is approximate.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
 
 MOST_FRAMES = 100_000
-"""Near an hour at 30 frames/s; a frame of a body takes up to 1.4 kB."""
+"""Nearly an hour at 30 frames/s; a frame of a body takes up to 1.4 kB."""
 CHUNK = 2048
 """Frames that are posed at once."""
-LOWEST_LIFT = 1e-4
-"""Metres below which a person need not be raised to the ground."""
+MIN_LIFT = 1e-4
+"""Metres below which a person is not raised to the ground."""
 MARK = "fba"
 """Key of this project's note in the extras of the animation."""
 
@@ -79,15 +79,7 @@ def write(
     else:
         roots = _add_head(builder, clip, animation, note, model)
     builder.add("scenes", {"nodes": roots})
-    builder.add(
-        "animations",
-        {
-            "name": animation.name or "animation",
-            "samplers": clip.samplers,
-            "channels": clip.channels,
-            "extras": {MARK: note},
-        },
-    )
+    clip.add_to_file(animation.name or "animation", extras={MARK: note})
     builder.save(path)
 
 
@@ -164,15 +156,15 @@ def _add_person(
 def _stand_on_ground(
     builder: Builder, clip: Clip, skeleton: Skeleton, axes: Axes, baps: Int32, root: int
 ) -> int:
-    """Return the node at the top: one that raises the root to where feet stand, or the root itself.
+    """Return the top node: a node that raises the root so that feet stand on the ground, or the root itself.
 
-    The root's own translation stays what the BAPs say, so that they are read again as they were.
+    The root's own translation stays that of the BAPs, so that they are read back unchanged.
     """
     from fba.body.footing import GroundedPoser
 
     poser = GroundedPoser(skeleton, axes)
     lifts = np.concatenate([poser.lifts(baps[n : n + CHUNK]) for n in range(0, len(baps), CHUNK)])
-    if float(np.abs(lifts).max()) < LOWEST_LIFT:
+    if float(np.abs(lifts).max()) < MIN_LIFT:
         return root
     node = builder.add("nodes", {"name": "Ground", "children": [root]})
     turns = np.broadcast_to(np.eye(3), (len(lifts), 3, 3))
@@ -183,7 +175,7 @@ def _stand_on_ground(
 def _make_head(
     builder: Builder, clip: Clip, animation: Animation, person: BodyModel, model: FaceModel | None
 ) -> HeadParts | None:
-    """Return a person's head, without meshes yet; None with a warning if the body has no place for it."""
+    """Return a person's head, still without meshes; None, with a warning, if the body has no place for it."""
     from fba.face import FaceModel
     from fba.formats.gltf._head import start_head
 
@@ -202,7 +194,7 @@ def _make_head(
 def _add_head(
     builder: Builder, clip: Clip, animation: Animation, note: dict[str, Any], model: FaceModel | None
 ) -> list[int]:
-    """Add a face by itself, in its own frame, and complete the note; return the scene's root nodes."""
+    """Add a face alone, in its own frame, and complete the note; return the scene's root nodes."""
     from fba.face import FaceModel
     from fba.formats.gltf._head import start_head
     from fba.gltf import PartWriter
@@ -223,18 +215,15 @@ def _note_face(
     model: FaceModel | None,
     head: HeadParts | None,
 ) -> None:
-    """Add to the note which FAPs the head shows; without a head, their values."""
+    """Add the FAPs that the head shows to the note; without a head, their values."""
     from fba.face import FaceModel
     from fba.formats.gltf._fap_tracks import face_note
 
     if animation.face is None:
         return
     face = head.model if head is not None else model or FaceModel.default()
-    shown = _shown(animation, face)
-    if head is None:
-        note["face"] = face_note(builder, animation.face, shown, face)
-    else:
-        note["face"] = face_note(builder, animation.face, shown, face, head.targets, head.fap_joints)
+    targets, joints = ((), ()) if head is None else (head.targets, head.fap_joints)
+    note["face"] = face_note(builder, animation.face, _shown(animation, face), face, targets, joints)
 
 
 def _shown(animation: Animation, model: FaceModel) -> Float32:

@@ -1,9 +1,9 @@
 """Bodies of other makers for display: any skinned person in a glTF file becomes a body that BAPs move.
 
-The person's joints are matched with the standard's as those of a motion are (`fba.capture`). All joints of
-the standard are then placed on the person: those that it has, where it has them; others in between, as the
-default body has them. What a joint of the file carries follows the joint of the standard that turns as the
-file's would: a bone of the spine, for example, the vertebra in its middle (`fba.capture._spine`).
+The person's joints are matched with the standard's as those of a motion are (`fba.capture`). Then all joints
+of the standard are placed on the person: matched joints where the person has them, others between them as in
+the default body. The vertices of a joint of the file follow the joint of the standard that turns like it:
+those of a bone of the spine, for example, follow the vertebra in its middle (`fba.capture._spine`).
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from fba.source import Path
 CHUNK = 20_000
 """Vertices whose weights are reduced at once."""
 VERTEX_BYTES = 600
-"""Memory that a vertex takes, besides its morph targets, which are not read."""
-NEEDED = {
+"""Memory that a vertex takes without its morph targets, which are not read."""
+NEEDED_JOINTS = {
     "skullbase": "head",
     **{
         f"{side}_{joint}": f"{word} {name}"
@@ -58,21 +58,20 @@ NEEDED = {
 """Joints of the standard that a body must have, and the bones that begin there."""
 KINDS = {"hair": "hair", "skin": "skin", "body": "skin", "head": "skin", "face": "skin", "shoe": "shoe",
          "footwear": "shoe"}  # fmt: skip
-"""Kinds of parts by words in the names of meshes and materials; others are cloth."""
+"""Kinds of parts by words in the names of meshes and materials; other parts are cloth."""
 
 
 def import_body(
     path: Path, *, joints: Mapping[str, str] | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> BodyModel:
-    """Return the body in a glTF file: one that `BodyModel.save` wrote, or any skinned person.
+    """Return the body in a glTF file that `BodyModel.save` wrote, or any skinned person as a body.
 
-    joints: as for `fba.capture.from_skeleton`. The body gets the size at which its hips are as high as the
-    default body's, so that the steps of a stream fit it; `notes` says by how much. It has no place for a
-    face: its own head is shown, which FAPs move where it has shapes with known names (`shape_faps.csv`), or
-    expressions of VRM.
+    joints: as for `fba.capture.from_skeleton`. The body is scaled so that its hips are as high as the default
+    body's, and the steps of a stream fit it; `notes` has the factor. It has no place for a face: its own head
+    is shown, which FAPs move if it has shapes with known names (`shape_faps.csv`), or expressions of VRM.
 
-    Raises FormatError where the file cannot be read, ModelError for a file that shows no person, or one that
-    lacks a limb, LimitError where it takes more memory than the limits allow.
+    Raises FormatError if the file cannot be read, shows no person, or the person lacks a limb; LimitError if
+    it takes more memory than the limits allow.
     """
     try:
         gltf = read_gltf(path, limits=limits)
@@ -95,11 +94,11 @@ def read_skeleton(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> SkeletonMot
 
 @dataclass(frozen=True)
 class PersonInfo:
-    """What a file without an animation shows.
+    """A person in a file without an animation.
 
-    declared: "VRM 0" or "VRM 1" where the file says which bone is which, else "". joints: those from the hips
-    down; matched: how many are joints of the standard. meshes: all in the scene. shapes: morph targets whose
-    names are known.
+    declared: "VRM 0" or "VRM 1" if the file declares its bones, else "". joints: count from the hips down.
+    matched: count of those that are joints of the standard. meshes: count in the scene. shapes: count of
+    morph targets with known names.
     """
 
     declared: str
@@ -110,7 +109,7 @@ class PersonInfo:
 
 
 def describe_person(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> PersonInfo | None:
-    """Return what a glTF file without an animation shows; None with an animation, or without a person.
+    """Return the person in a glTF file without an animation; None with an animation, or without a person.
 
     Raises FormatError, ModelError, and LimitError for more than the limits allow.
     """
@@ -162,7 +161,7 @@ def _import_person(gltf: Gltf, path: Path, joints: Mapping[str, str] | None) -> 
     skeleton = Skeleton.default()
     standing = find_rest(found.resting(gltf), skeleton, joints)
     mapped = standing.mapped
-    lacking = [bone for joint, bone in NEEDED.items() if joint not in mapped]
+    lacking = [bone for joint, bone in NEEDED_JOINTS.items() if joint not in mapped]
     if lacking:
         raise ModelError(
             f"{gltf.file}: its skeleton has no {', no '.join(lacking[:6])}{', ...' if lacking[6:] else ''}; "
@@ -187,8 +186,8 @@ def _fit(rest: Rest, skeleton: Skeleton) -> _Fit:
     parents = skeleton.parents.tolist()
     for joint, number in numbers.items():
         above = turns[parents[number]] if parents[number] >= 0 else np.eye(3)
-        own = rest.corrections.get(joint) if joint in mapped or joint == "sacroiliac" else None
-        turns[number] = above if own is None else own
+        turned = rest.corrections.get(joint) if joint in mapped or joint == "sacroiliac" else None
+        turns[number] = above if turned is None else turned
         if joint in mapped:
             places[number] = positions[mapped[joint]]
             continue
@@ -233,19 +232,19 @@ def _bound(fit: _Fit, places: Float64) -> tuple[Skeleton, Float64]:
 
 def _stand(body: BodyModel, name: str) -> BodyModel:
     """Return a body scaled to the default body's legs, with its soles at height 0."""
-    default, own = Skeleton.default(), body.skeleton
-    matrices = np.tile(np.eye(4), (len(own), 1, 1))
-    matrices[:, :3, 3] = own.centres
+    default, skeleton = Skeleton.default(), body.skeleton
+    matrices = np.tile(np.eye(4), (len(skeleton), 1, 1))
+    matrices[:, :3, 3] = skeleton.centres
     standing = body.skin(matrices)
-    feet = [own.number(f"{side}_{joint}") for side in "lr" for joint in ("midtarsal", "metatarsal")]
+    feet = [skeleton.number(f"{side}_{joint}") for side in "lr" for joint in ("midtarsal", "metatarsal")]
     on_feet = np.isin(body.joints[:, 0], feet)
     sole = float(standing[on_feet, 1].min() if on_feet.any() else standing[:, 1].min())
-    hips = [own.number("l_hip"), own.number("r_hip")]
-    height = float(own.centres[hips, 1].mean()) - sole
+    hips = [skeleton.number("l_hip"), skeleton.number("r_hip")]
+    height = float(skeleton.centres[hips, 1].mean()) - sole
     if not height > 0:
         raise ModelError(f"the hips of {name!r} are not above its feet; it cannot stand")
     size = float(default.centres[hips, 1].mean()) / height
-    shift = default.centres[hips].mean(axis=0) - size * own.centres[hips].mean(axis=0)
+    shift = default.centres[hips].mean(axis=0) - size * skeleton.centres[hips].mean(axis=0)
     shift[1] = -size * sole
     bind = np.array(body.bind)
     bind[:, :3, 3] = bind[:, :3, 3] * size + shift
@@ -254,7 +253,7 @@ def _stand(body: BodyModel, name: str) -> BodyModel:
         tuple(
             replace(part, vertices=(part.vertices * size + shift).astype(np.float32)) for part in body.parts
         ),
-        replace(own, centres=own.centres * size + shift),
+        replace(skeleton, centres=skeleton.centres * size + shift),
         bind,
         name=name,
         notes={"size": f"{size:.3f} times the file's, so that its hips are as high as the default body's"},
@@ -270,7 +269,7 @@ def _resize_head(head: OwnHead, size: float, shift: Float64) -> OwnHead:
 
 
 def _carriers(gltf: Gltf, found: Joints, mapped: Mapping[str, int], skeleton: Skeleton) -> dict[int, int]:
-    """Return the joint of the skeleton that carries what each node does, for the hips and all nodes below."""
+    """Return the joint of the skeleton that carries the vertices of each node, for the hips and all below."""
     followers = _followers(mapped, skeleton)
     joint_of = {found.nodes[found.used[row]]: joint for joint, row in mapped.items()}
     result: dict[int, int] = {}
@@ -284,10 +283,10 @@ def _carriers(gltf: Gltf, found: Joints, mapped: Mapping[str, int], skeleton: Sk
 
 
 def _followers(mapped: Mapping[str, int], skeleton: Skeleton) -> dict[str, str]:
-    """Return the joint that what hangs on a joint of the person follows, where it is another one.
+    """Return the joint that vertices of a joint of the person follow, where it is another joint.
 
-    The parts of a foot, a clavicle and a bone of the spine share the turns of one joint of the person: all of
-    them are reached at the last, or in the spine in the middle.
+    The parts of a foot, a clavicle and a bone of the spine share the turns of one joint of the person. The
+    last part has all of these turns, and in the spine the part in the middle.
     """
     result = {}
     for side in "lr":
@@ -310,7 +309,7 @@ def _followers(mapped: Mapping[str, int], skeleton: Skeleton) -> dict[str, str]:
 
 
 def _read_parts(gltf: Gltf, found: Joints, carriers: dict[int, int], fit: _Fit) -> list[PlacedMesh]:
-    """Return the meshes that hang on the person's joints, in the body's axes; warns of others."""
+    """Return the meshes that hang on the person's joints, in the body's axes; warns of other meshes."""
     bound = bind_matrices(gltf, skins=found.humanoid is None)
     budget = gltf.budget.copy()
     names, left_out = UniqueNames(), []
@@ -381,7 +380,7 @@ def _carried(
     moves = np.stack(
         [bound[joint] @ inverse for joint, inverse in zip(skin.joints, skin.inverse_bind, strict=True)]
     )
-    pelvis = Skeleton.default().number("sacroiliac")  # it carries what hangs on joints above the hips
+    pelvis = Skeleton.default().number("sacroiliac")  # carries the vertices of joints above the hips
     standard = np.array([carriers.get(joint, pelvis) for joint in skin.joints])
     total = primitive.weights.sum(axis=1, dtype=np.float64)
     matrices = np.zeros((count, 4, 4))
@@ -403,10 +402,8 @@ def _unit(linear: Float64, normals: Float32) -> Float32:
     """Return normals turned by (V, 3, 3), of length 1."""
     turned = np.einsum("vij,vj->vi", linear, normals)
     length = np.linalg.norm(turned, axis=1, keepdims=True)
-    unit: Float32 = np.where(length > 0, turned / np.where(length > 0, length, 1.0), (0.0, 0.0, 1.0)).astype(
-        np.float32
-    )
-    return unit
+    unit = np.where(length > 0, turned / np.where(length > 0, length, 1.0), (0.0, 0.0, 1.0))
+    return np.asarray(unit, dtype=np.float32)
 
 
 def _look(

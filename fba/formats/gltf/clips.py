@@ -1,4 +1,4 @@
-"""The clips (animations) of a glTF file: which there are, and which is read."""
+"""The clips (animations) of a glTF file: descriptions of all, and the choice of one."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ NAMED = 8
 class ClipInfo:
     """A clip of a file.
 
-    name: as in the file; "animation 2" where it has none there. seconds: from the first key to the last.
-    channels: how many properties of nodes it animates.
+    name: as in the file, or "animation 2". seconds: from the first key to the last. channels: count of the
+    properties of nodes that it animates.
     """
 
     name: str
@@ -33,14 +33,20 @@ def list_clips(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[ClipInfo
 
     Raises FormatError, ModelError, and LimitError for more than the limits allow.
     """
-    return tuple(_describe(clip) for clip in read_gltf(path, limits=limits).animations)
+    clips = []
+    for clip in read_gltf(path, limits=limits).animations:
+        begins = [float(channel.times[0]) for channel in clip.channels if len(channel.times)]
+        ends = [float(channel.times[-1]) for channel in clip.channels if len(channel.times)]
+        seconds = max(ends, default=0.0) - min(begins, default=0.0)
+        clips.append(ClipInfo(clip.name, seconds, len(clip.channels)))
+    return tuple(clips)
 
 
 def choose_clip(gltf: Gltf, clip: str | int | None, nodes: Collection[int]) -> Clip:
     """Return the clip with this name or number (from 0), or the first that turns one of the nodes.
 
-    A name counts whatever its capitals, if only one clip has it; a text that is no clip's name counts as
-    a number. ModelError if it does not exist; warns (FbaWarning) if there are several and clip is None.
+    Capitals of a name do not matter if only one clip has it; a text that is no clip's name is a number.
+    Raises ModelError if the clip does not exist. Warns (FbaWarning) if clip is None and there are several.
     """
     inside = set(nodes)
     if clip is None:
@@ -77,7 +83,7 @@ def choose_clip(gltf: Gltf, clip: str | int | None, nodes: Collection[int]) -> C
 
 
 def _find_clip(gltf: Gltf, clip: str | int) -> Clip | None:
-    """Return the clip with this name, or else this number; None if it does not exist."""
+    """Return the clip with this name, else with this number; None if it does not exist."""
     clips = gltf.animations
     if isinstance(clip, str):
         for same in (
@@ -101,9 +107,3 @@ def _list_names(gltf: Gltf) -> str:
     names = [repr(a.name) for a in gltf.animations]
     more = f", and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return ", ".join(names[:NAMED]) + more
-
-
-def _describe(clip: Clip) -> ClipInfo:
-    ends = [(float(c.times[0]), float(c.times[-1])) for c in clip.channels if len(c.times)]
-    seconds = max((end for _, end in ends), default=0.0) - min((start for start, _ in ends), default=0.0)
-    return ClipInfo(clip.name, seconds, len(clip.channels))

@@ -17,7 +17,7 @@ from fba.gltf import Gltf, Value, optional_member
 EXTENSIONS = {"VRM": "VRM 0", "VRMC_vrm": "VRM 1", "VRMC_vrm_animation": "VRMA"}
 MOST_BONES = 200
 OLD_THUMB = {"ThumbIntermediate": "ThumbProximal", "ThumbProximal": "ThumbMetacarpal"}
-"""VRM 0's names of bones that mean another bone in VRM 1, without the side."""
+"""VRM 1's names of bones by VRM 0's, without the side, where a name means another bone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def joints_of_bones() -> dict[str, str]:
 def find_humanoid(gltf: Gltf) -> Humanoid | None:
     """Return the bones that a file declares; None if it has none of the extensions.
 
-    ModelError if the extension names nodes that are not there, or two bones at one node.
+    ModelError if the extension names nodes that do not exist, or two bones at one node.
     """
     for name, kind in EXTENSIONS.items():
         content = optional_member(gltf.document.get("extensions"), name)
@@ -64,7 +64,7 @@ def find_humanoid(gltf: Gltf) -> Humanoid | None:
         bones: dict[str, int] = {}
         for bone, reference in _pairs(listed, kind):
             node = reference.integer(-1, 1 << 30)
-            if node < 0:  # UniVRM's mark of a bone that is not there
+            if node < 0:  # UniVRM's mark of a missing bone
                 continue
             node = reference.index(len(gltf.nodes), "node")
             if node in bones.values():
@@ -84,5 +84,6 @@ def _pairs(listed: Value, kind: str) -> list[tuple[str, Value]]:
         name = entry.member("bone").text(100)
         side = re.match(r"left|right", name)
         start = side[0] if side else ""
-        result.append((start + OLD_THUMB.get(name.removeprefix(start), name.removeprefix(start)), entry))
-    return [(bone, entry.member("node")) for bone, entry in result]
+        bone = name.removeprefix(start)
+        result.append((start + OLD_THUMB.get(bone, bone), entry.member("node")))
+    return result

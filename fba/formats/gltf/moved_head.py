@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture.virtual_markers import MarkerPerformance
 from fba.errors import FormatError
-from fba.formats.gltf._joints import Clip, adopt, move, start_clip
+from fba.formats.gltf._joints import adopt, move, start_clip
 from fba.formats.gltf._writer import MOST_FRAMES
 from fba.gltf import Builder, PartWriter
 from fba.source import Path
@@ -23,9 +23,9 @@ AXES = "xyz"
 def write_moved_head(path: Path, performance: MarkerPerformance, name: str = "") -> None:
     """Write a head that captured markers move.
 
-    Each virtual marker is three morph targets, called after it and an axis, that move the vertices in its
-    reach by 10 mm at weight 1; displacements add up, so that nothing is lost. The head's motion is that of
-    the node "head". Keys are at the capture's own times, from its first frame. name: of the animation.
+    Each virtual marker has three morph targets, named after it and an axis, that move the vertices in its
+    reach by 10 mm at weight 1; their displacements add up exactly. The node "head" moves as the head does.
+    Keys are at the capture's own times, from its first frame. name: of the animation.
 
     Raises FormatError for no frame, or more than 100,000; ModelError where glTF cannot hold the head.
     """
@@ -61,7 +61,7 @@ def write_moved_head(path: Path, performance: MarkerPerformance, name: str = "")
     builder.root["scene"] = 0
     builder.add("scenes", {"nodes": [node]})
     if clip.channels:
-        _add_animation(builder, clip, name or "markers")
+        clip.add_to_file(name or "markers")
     builder.save(path)
 
 
@@ -72,13 +72,13 @@ def _add_targets(
     primitive: dict[str, Any],
     mesh: dict[str, Any],
 ) -> Float64 | None:
-    """Add the morph targets that move a part to its mesh; return their weights (T, K), None without any."""
+    """Add the morph targets that move a part to its mesh; return the weights (T, K), or None."""
     head = performance.head
     shares = performance.weights.shares[head.rows[number]].tocsc()
     targets, names, weights = [], [], []
     for marker, marker_name in enumerate(performance.names):
-        own = slice(shares.indptr[marker], shares.indptr[marker + 1])
-        rows, values = shares.indices[own], shares.data[own]
+        reach = slice(shares.indptr[marker], shares.indptr[marker + 1])
+        rows, values = shares.indices[reach], shares.data[reach]
         if not values.any():
             continue
         for axis in range(3):
@@ -97,7 +97,3 @@ def _add_targets(
     mesh["weights"] = stacked[0].tolist()
     mesh["extras"] = {"targetNames": names}
     return stacked
-
-
-def _add_animation(builder: Builder, clip: Clip, name: str) -> None:
-    builder.add("animations", {"name": name, "samplers": clip.samplers, "channels": clip.channels})

@@ -1,6 +1,6 @@
 """Read the CSV export of OptiTrack Motive, versions 1.2 to 1.25: markers by name, y up.
 
-Columns that come first vary (a frame, a time, a time code), so rows and columns are found by their labels.
+The first columns vary (a frame, a time, a time code), so rows and columns are found by their labels.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import csv
 import re
 import warnings
 from contextlib import suppress
-from fractions import Fraction
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -18,17 +17,25 @@ from fba.arrays import Float64
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import METRES
 from fba.errors import FbaWarning, FormatError
-from fba.formats.markers._names import without_subject
-from fba.formats.markers._options import file_rate, rate_of_times
-from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines
+from fba.formats.markers._rows import (
+    build_motion,
+    file_rate,
+    frame_times,
+    parse_rows,
+    rate_of_times,
+    read_lines,
+    without_subject,
+)
+from fba.formats.text.frame_rates import Rate
 from fba.formats.time_codes import parse_time_of_day, read_time_codes
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
-UNITS = {"meters": "m", "centimeters": "cm", "millimeters": "mm", "inches": "in", "feet": "ft"}
+UNIT_NAMES = {"meters": "m", "centimeters": "cm", "millimeters": "mm", "inches": "in", "feet": "ft"}
 KINDS = (("marker",), ("rigid body marker", "bone marker"))
-"""Types of columns with markers; the second only without the first, which were measured."""
+"""Types of columns with markers, measured ones first: the others are read only without these."""
 HEADER_LINES = 12
+"""Most lines before the data."""
 TYPES = {"marker", "rigid body", "rigid body marker", "bone", "bone marker", "skeleton", "trained markerset"}
 
 
@@ -38,9 +45,9 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
-    """Return the markers of a CSV export of Motive; those without a label only if none has one.
+    """Return the markers of a CSV export of Motive; unlabelled ones only where no marker has a label.
 
     source_rate: the rate of a file that has none. Raises FormatError, LimitError; warns (FbaWarning) of
     markers that are left out.
@@ -52,7 +59,7 @@ def read_markers(
         head = list(csv.reader(lines[:HEADER_LINES]))
     except csv.Error as error:
         raise FormatError(f"its header is no table: {error}", path=path) from error
-    # the reader of CSV passes over no empty lines, so rows are lines
+    # csv.reader keeps empty lines, so the number of a row is that of its line
     row = next((n for n, cells in enumerate(head) if cells and cells[0].strip().lower() == "frame"), None)
     if row is None:
         raise FormatError("has no line of columns that begins with Frame", path=path)
@@ -73,9 +80,9 @@ def read_markers(
     stored: str | float = settings.get("export frame rate", "") or settings.get("capture frame rate", "")
     rate = file_rate(stored or rate_of_times(times[np.isfinite(times)].tolist()), source_rate, path)
     places = np.array([start for _, start in chosen])[:, None] + np.arange(3)
-    unit = UNITS.get(settings.get("length units", "meters").lower(), "")
+    unit = UNIT_NAMES.get(settings.get("length units", "meters").lower(), "")
     return build_motion(
-        without_subject([label for label, _ in chosen]), rows[:, places], own_times(times, rate), rate,
+        without_subject([label for label, _ in chosen]), rows[:, places], frame_times(times, rate), rate,
         metres=METRES.get(unit, 1.0), unit=unit, up="+y",
         name=settings.get("take name", "") or FilePath(path).stem, path=path, lines=numbers,
         start=_find_start(settings, columns, lines, numbers, times, path),
@@ -90,10 +97,10 @@ def _find_start(
     times: Float64,
     path: Path,
 ) -> float | None:
-    """Return the time of day of the first frame, in seconds; None where the file does not say.
+    """Return the time of day of the first frame, in seconds; None if the file does not say it.
 
-    That is its time code, else the start of the take and the frame's time in it. numbers: of the lines of
-    frames, from 1 on.
+    It is the frame's time code; without time codes, the start of the take plus the frame's time. numbers: the
+    line of each frame, 1-based.
     """
     place = _code_column(columns)
     if place is not None:
@@ -111,7 +118,7 @@ def _code_column(columns: list[str]) -> int | None:
 
 
 def _find_markers(rows: list[list[str]], columns: list[str], path: Path) -> list[tuple[str, int]]:
-    """Return name and first column of each marker. rows: those between the first and that of the columns."""
+    """Return the name and the first column of each marker. rows: the header's, without its first."""
     cells = [[cell.strip() for cell in row] + [""] * (len(columns) - len(row)) for row in rows if any(row)]
     types = next((row for row in cells if any(cell.lower() in TYPES for cell in row[2:])), None)
     kinds = next((row for row in cells if any(cell.lower() == "position" for cell in row)), None)
@@ -141,7 +148,7 @@ def _find_markers(rows: list[list[str]], columns: list[str], path: Path) -> list
 
 
 def _without_codes(lines: list[str], first: int, columns: list[str]) -> list[str]:
-    """Return lines whose time code, which is no number, is emptied."""
+    """Return lines without time codes, which are no numbers."""
     place = _code_column(columns)
     if place is None:
         return lines

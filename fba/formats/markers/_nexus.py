@@ -1,13 +1,12 @@
-"""Read the CSV export of Vicon Nexus: the section Trajectories, among others; z up.
+"""Read the section Trajectories of a CSV export of Vicon Nexus; z up.
 
-A section is its name, the rate alone, a row of names over every third column, a row of axes, one of units,
-the data, and an empty line.
+A section has a line with its name, a line with the rate, a row of names over every third column, a row of
+axes, a row of units, the data, and an empty line.
 """
 
 from __future__ import annotations
 
 import re
-from fractions import Fraction
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -15,9 +14,8 @@ import numpy as np
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import METRES
 from fba.errors import FormatError
-from fba.formats.markers._names import without_subject
-from fba.formats.markers._options import file_rate
-from fba.formats.markers._rows import build_motion, parse_rows, read_lines
+from fba.formats.markers._rows import build_motion, file_rate, parse_rows, read_lines, without_subject
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -33,7 +31,7 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
     """Return the trajectories of a CSV export of Nexus. source_rate: the rate of a file that has none.
 

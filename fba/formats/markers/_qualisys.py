@@ -1,12 +1,11 @@
 """Read the TSV export of Qualisys Track Manager: lines of settings, then columns X, Y, Z; millimetres, z up.
 
-A marker that was not seen is three zeros, or three empty cells. Columns for frame and time are optional.
+An unseen marker has three zeros or three empty cells. Columns for frame and time are optional.
 """
 
 from __future__ import annotations
 
 import re
-from fractions import Fraction
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -14,13 +13,21 @@ import numpy as np
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import regular_times
 from fba.errors import FormatError
-from fba.formats.markers._options import file_rate
-from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines, warn_if_cut
+from fba.formats.markers._rows import (
+    build_motion,
+    file_rate,
+    frame_times,
+    parse_rows,
+    read_lines,
+    warn_if_cut,
+)
+from fba.formats.text.frame_rates import Rate
 from fba.formats.time_codes import parse_time_of_day
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
-HEADER_LINES = 30
+MAX_SETTINGS = 30
+"""Most lines of settings that are read."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -29,7 +36,7 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
     """Return the markers of a TSV export of Qualisys Track Manager.
 
@@ -41,18 +48,19 @@ def read_markers(
         raise FormatError("a TSV export of Qualisys begins with NO_OF_FRAMES", path=path, line=1)
     settings: dict[str, list[str]] = {}
     first = 0
-    while first < min(len(lines), HEADER_LINES) and re.match(r"\s*[A-Z][A-Z_]{3,}(\t|\s*$)", lines[first]):
+    while first < min(len(lines), MAX_SETTINGS) and re.match(r"\s*[A-Z][A-Z_]{3,}(\t|\s*$)", lines[first]):
         key, *values = lines[first].strip().split("\t")
-        settings.setdefault(key.strip(), [value.strip() for value in values])  # a second time is of an export
+        # a second line of a key describes the export
+        settings.setdefault(key.strip(), [value.strip() for value in values])
         first += 1
     labels = [label for label in settings.get("MARKER_NAMES", ()) if label]
     if not labels:
         raise FormatError(
             "has no line MARKER_NAMES; six-dimensional exports hold bodies, not markers", path=path
         )
-    told = _first_number(settings, "NO_OF_MARKERS")
-    if np.isfinite(told) and told != len(labels):
-        raise FormatError(f"says that it has {told:g} markers, but names {len(labels)}", path=path)
+    stated = _first_number(settings, "NO_OF_MARKERS")
+    if np.isfinite(stated) and stated != len(labels):
+        raise FormatError(f"says that it has {stated:g} markers, but names {len(labels)}", path=path)
     leading = 0
     if first < len(lines) and re.match(r"\s*[A-Za-z]", lines[first]):  # a row of columns
         cells = [cell.strip().lower() for cell in lines[first].split("\t")]
@@ -68,7 +76,7 @@ def read_markers(
     rate = file_rate((settings.get("FREQUENCY") or [""])[0], source_rate, path)
     positions = rows[:, leading:].reshape(len(rows), -1, 3)
     positions[(positions == 0).all(axis=2)] = np.nan
-    times = own_times(rows[:, 1], rate) if leading == 2 else regular_times(len(rows), rate)
+    times = frame_times(rows[:, 1], rate) if leading == 2 else regular_times(len(rows), rate)
     begun = parse_time_of_day(" ".join(settings.get("TIME_STAMP", ())[:1]))
     return build_motion(
         labels, positions, times, rate, metres=0.001, unit="mm", up="+z", name=FilePath(path).stem, path=path,

@@ -1,8 +1,9 @@
-"""Text files of numbers in columns: lines, and rows of numbers with gaps."""
+"""What readers of markers share: lines and rows of numbers, names of markers, and the frame rate."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -10,21 +11,25 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import MAX_MARKERS, regular_times
-from fba.errors import FbaWarning, FormatError, ModelError
-from fba.formats.markers._names import unique_names
+from fba.errors import FbaWarning, FormatError, Remedy
+from fba.formats.text.frame_rates import Rate, parse_rate
 from fba.limits import Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
-from fba.source import Path, read_whole
+from fba.source import Path, naming_file, read_whole
 
 MISSING = ("", "nan", "null", "none", "-", "na", "n/a")
 """Words, in lower case, that stand for a number that is not there."""
-REGULAR = 0.1
-"""Times that are off those of a constant rate by less than this share of a frame were rounded."""
+ROUNDING = 0.1
+"""Share of a frame by which rounded times may differ from those of a constant rate."""
 MOST_COLUMNS = 20 * MAX_MARKERS
+MIN_FRAME_RATE = 0.001
+"""Lowest rate, in frames per second; a lower one is damage."""
+MAX_FRAME_RATE = 100_000
+"""Highest rate, in frames per second; a higher one is damage."""
 
 
 def read_lines(path: Path, what: str) -> list[str]:
-    """Return the lines of a text file. what: "a TRC file", for the error if it is no text."""
+    """Return the lines of a text file. what: its kind, "a TRC file", for the error about binary data."""
     data = read_whole(path)
     kind = recognition_hint(data[:HEAD_BYTES])
     if b"\0" in data[:HEAD_BYTES]:
@@ -46,10 +51,10 @@ def parse_rows(
     *,
     last: int | None = None,
 ) -> tuple[Float64, list[int]]:
-    """Return rows of numbers, float64 (T, columns), NaN for gaps, and each one's line (1-based).
+    """Return rows of numbers, float64 (T, columns), NaN for gaps, and the line of each row (1-based).
 
-    first, last: the lines from and before which to read; empty ones are passed over. Cells that a row lacks
-    at its end are gaps. Raises FormatError for a cell that is no number, and for more cells than columns.
+    first, last: the first line to read, and the line at which to stop. Empty lines are skipped. Missing cells
+    at the end of a row are gaps. Raises FormatError for a cell that is no number, and for too many cells.
     """
     if columns > MOST_COLUMNS:
         raise FormatError(f"has {columns} columns, more than the {MOST_COLUMNS} that are read", path=path)
@@ -88,13 +93,13 @@ def _number(cell: str, delimiter: str, path: Path, line: int) -> float:
         ) from None
 
 
-def own_times(times: Float64, rate: Fraction) -> Float64:
-    """Return times of frames, those of a constant rate where they were rounded to a few digits."""
+def frame_times(times: Float64, rate: Fraction) -> Float64:
+    """Return times of frames; times that were rounded to a few digits become those of a constant rate."""
     if not np.isfinite(times).all():
         return regular_times(len(times), rate)
     regular = regular_times(len(times), rate, float(times[0]) if len(times) else 0.0)
     off = float(np.abs(times - regular).max(initial=0.0))
-    return regular if off < REGULAR / float(rate) else times
+    return regular if off < ROUNDING / float(rate) else times
 
 
 def build_motion(
@@ -111,9 +116,10 @@ def build_motion(
     lines: list[int],
     start: float | None = None,
 ) -> MarkerMotion:
-    """Return the motion; metres: of the file's unit. lines: of each frame, for errors. FormatError.
+    """Return the motion. Raises FormatError.
 
-    start: time of day of the first frame, in seconds.
+    metres: length of the file's unit. lines: the line of each frame, for errors. start: time of day of the
+    first frame, in seconds.
     """
     back = np.flatnonzero(np.diff(times) <= 0)
     if len(back):
@@ -123,26 +129,76 @@ def build_motion(
             path=path,
             line=lines[frame],
         )
-    try:
-        return MarkerMotion(
-            tuple(unique_names(labels, len(labels))),
-            positions * metres,
-            times,
-            rate,
-            unit=unit,
-            up=up,
-            name=name,
-            start=start,
-        )
-    except ModelError as error:
-        raise FormatError(error.finding, path=path) from error
+    names = tuple(unique_names(labels, len(labels)))
+    with naming_file(path):
+        return MarkerMotion(names, positions * metres, times, rate, unit=unit, up=up, name=name, start=start)
 
 
-def warn_if_cut(path: Path, told: float, there: int) -> None:
-    """Warn (FbaWarning) if a file holds another number of frames than it says."""
-    if np.isfinite(told) and told != there:
+def warn_if_cut(path: Path, stated: float, count: int) -> None:
+    """Warn (FbaWarning) if a file does not hold as many frames as it states; NaN where it states nothing."""
+    if np.isfinite(stated) and stated != count:
         warnings.warn(
-            f"{path}: says that it has {told:g} frames, but holds {there}; these are read",
+            f"{path}: says that it has {stated:g} frames, but holds {count}; these are read",
             FbaWarning,
             stacklevel=3,
         )
+
+
+def file_rate(stored: float | str, source_rate: Rate | None, path: Path) -> Fraction:
+    """Return the frame rate of a file: the stored rate, or `source_rate` if that is 0 or missing.
+
+    Raises FormatError for a stored rate that is no positive number.
+    """
+    try:
+        number = float(stored) if stored != "" else 0.0
+    except ValueError:
+        number = float("nan")
+    if number == 0:
+        if source_rate is None:
+            raise FormatError("has no frame rate", path=path).with_remedies(
+                Remedy("source_rate", "give one with {}", "100")
+            )
+        return Fraction(source_rate)
+    if not MIN_FRAME_RATE <= number <= MAX_FRAME_RATE:
+        raise FormatError(
+            f"its frame rate must be {MIN_FRAME_RATE} to {MAX_FRAME_RATE}", path=path, token=str(stored)
+        )
+    return parse_rate(f"{number:.6f}".rstrip("0").rstrip("."))
+
+
+def rate_of_times(times: Sequence[float]) -> float:
+    """Return the rate of frames at these times, rounded if nearly whole; 0 for fewer than two."""
+    if len(times) < 2:
+        return 0.0
+    steps = np.diff(np.asarray(times, dtype=np.float64))
+    usual = float(np.median(steps))
+    if not usual > 0:
+        return 0.0
+    rate = 1 / usual
+    return float(round(rate)) if abs(rate - round(rate)) < 0.005 * rate and round(rate) else rate
+
+
+def unique_names(labels: Sequence[str], count: int) -> list[str]:
+    """Return `count` names: labels; "marker 7" where a label is missing, "name (2)" where it is repeated."""
+    result: list[str] = []
+    taken: dict[str, int] = {}
+    used = set(labels)
+    for number in range(count):
+        label = (labels[number].strip() if number < len(labels) else "") or f"marker {number + 1}"
+        taken[label] = taken.get(label, 0) + 1
+        name = label
+        while taken[label] > 1 and (name := f"{label} ({taken[label]})") in used:
+            taken[label] += 1
+        used.add(name)
+        result.append(name)
+    return result
+
+
+def without_subject(labels: list[str]) -> list[str]:
+    """Return names without the subject that all of them share: "Anna:Chin" -> "Chin"."""
+    subjects = {
+        label.partition(":")[0] if ":" in label else "" for label in labels if label[:1] not in ("", "*")
+    }
+    if len(subjects) != 1 or "" in subjects:
+        return labels
+    return [label.partition(":")[2] or label for label in labels]

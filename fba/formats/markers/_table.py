@@ -1,7 +1,7 @@
 """Read plain tables of markers: wide, columns "Chin_x", "Chin_y", "Chin_z"; or long, a row for each marker.
 
-Separated by commas, semicolons or tabs; a column "time" or "frame" is optional. The unit of length is found
-by the size of the face, unless a header says it: "Chin_x (mm)".
+Cells are separated by commas, semicolons or tabs. A column "time" or "frame" is optional. The unit of length
+follows from the size of the face, unless a header names it: "Chin_x (mm)".
 """
 
 from __future__ import annotations
@@ -17,8 +17,15 @@ from fba.arrays import Float64
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import MAX_MARKERS, METRES, regular_times
 from fba.errors import FormatError
-from fba.formats.markers._options import file_rate, rate_of_times
-from fba.formats.markers._rows import build_motion, own_times, parse_rows, read_lines
+from fba.formats.markers._rows import (
+    build_motion,
+    file_rate,
+    frame_times,
+    parse_rows,
+    rate_of_times,
+    read_lines,
+)
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -27,7 +34,7 @@ FRAMES = ("frame", "frames", "frame#", "index", "")
 NAMES = ("marker", "name", "label", "marker_name")
 AXIS = re.compile(r"(.+?)[ _.:\-]?([xyz])(?:\s*[\[(](m|cm|mm)[\])])?", re.IGNORECASE)
 MIN_SHARE = 0.5
-"""Smallest share of the columns that are markers'; tables of something else have columns x, y, z, too."""
+"""Smallest share of the columns that belong to markers: other tables have columns x, y, z, too."""
 MIN_MARKERS = 3
 """Smallest number of markers in a wide table."""
 
@@ -44,7 +51,7 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
     """Return the markers of a table. source_rate: the rate of a file without times.
 
@@ -77,7 +84,7 @@ def read_markers(
         rate = file_rate(
             rate_of_times(times.tolist()) if not len(back) else 0, source_rate or Fraction(1), path
         )
-        times = own_times(times, rate)
+        times = frame_times(times, rate)
     else:
         rate = file_rate("", source_rate, path)
         times = regular_times(len(positions), rate)

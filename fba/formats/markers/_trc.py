@@ -1,13 +1,12 @@
 """Read TRC (track row column), the marker format of Motion Analysis and OpenSim: a table with tabs.
 
-In the wild: no empty line before the data, names without the two empty cells after each, columns "name_x",
-tabs at the end of lines, frames counted from 0, missing markers as empty cells.
+Programs differ: some write no empty line before the data, no two empty cells after each name, columns
+"name_x", tabs at the end of lines, frames counted from 0, or empty cells for missing markers.
 """
 
 from __future__ import annotations
 
 import re
-from fractions import Fraction
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -15,20 +14,22 @@ import numpy as np
 from fba.capture import MarkerMotion
 from fba.capture.markers.motion import METRES
 from fba.errors import FormatError
-from fba.formats.markers._names import without_subject
-from fba.formats.markers._options import file_rate, rate_of_times
 from fba.formats.markers._rows import (
     build_motion,
-    own_times,
+    file_rate,
+    frame_times,
     parse_rows,
+    rate_of_times,
     read_lines,
     warn_if_cut,
+    without_subject,
 )
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
 HEADER_LINES = 12
-"""Lines within which data begin."""
+"""Most lines before the data."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -37,7 +38,7 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_markers(
-    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> MarkerMotion:
     """Return the markers of a TRC file. source_rate: the rate of a file that has none.
 
@@ -68,7 +69,7 @@ def read_markers(
     rate = file_rate(stored, source_rate, path)
     unit = header.get("units", "").lower()
     return build_motion(
-        without_subject(labels), rows[:, 2:].reshape(len(rows), -1, 3), own_times(times, rate), rate,
+        without_subject(labels), rows[:, 2:].reshape(len(rows), -1, 3), frame_times(times, rate), rate,
         metres=METRES.get(unit, 0.001), unit=unit if unit in METRES else "", up="", name=FilePath(path).stem,
         path=path, lines=numbers,
     )  # fmt: skip
@@ -79,7 +80,7 @@ def _is_names(line: str) -> bool:
 
 
 def _header(keys: str, values: str, delimiter: str) -> dict[str, str]:
-    """Return the header: what it says by lower-case key."""
+    """Return the values of the header by lower-case key."""
     words = [word.strip() for word in values.split(delimiter) if word.strip()]
     names = [key.strip().lower() for key in keys.split(delimiter) if key.strip()]
     if len(words) != len(names):

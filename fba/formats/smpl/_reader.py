@@ -1,8 +1,8 @@
 """Read motion of SMPL's family of body models as AMASS saves it (.npz): SMPL, SMPL-H, SMPL-X.
 
 Poses are turns of joints as rotation vectors. The places of the joints depend on a body model that may not
-be passed on, so the skeleton is one of average proportions (`joints.csv`); turns are what counts. AMASS has
-z up, other makers y: the way in which people stand tells.
+be passed on, so a skeleton of average proportions stands in for it (`joints.csv`). In AMASS z points up, in
+other files y: upright people tell.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from fba.capture.sampling import find_rate, interpolate
 from fba.capture.skeleton import check_memory
 from fba.errors import FormatError, Remedy
 from fba.formats.numpy_archives import ZIP, read_arrays
+from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 
@@ -36,12 +37,13 @@ NAMES = (*PARTS, "mocap_framerate", "mocap_frame_rate", "surface_model_type")
 BODY = 22
 """Joints of the body itself, which come first."""
 FINGERS = 30
+"""Joints of the fingers."""
 SMPL, SMPL_H, SMPL_X = 72, 156, 165
 """Numbers of a pose: 24 joints, 52 with fingers, 55 with jaw and eyes as well."""
-MIN_RATE = 0.1
-"""Lowest rate, in frames per second; a lower one is damage."""
-MAX_RATE = 10_000
-"""Highest rate, in frames per second; a higher one is damage."""
+MIN_FRAME_RATE = 0.1
+"""Lowest rate, in frames per second; a lower rate is damage."""
+MAX_FRAME_RATE = 10_000
+"""Highest rate, in frames per second; a higher rate is damage."""
 MAX_TURN = 1000.0
 """Largest number of a rotation vector, radians; more is damage."""
 MAX_COORDINATE = 1e6
@@ -51,7 +53,7 @@ MIN_UPRIGHT = 0.6
 
 
 class _Motion(NamedTuple):
-    """Turns of joints (T, J, 3), path (T, 3), turns of the jaw (T, 3) and the eyes (T, 2, 3); the rate."""
+    """Turns of joints (T, J, 3), path (T, 3), turns of the jaw (T, 3) and of the eyes (T, 2, 3); the rate."""
 
     turns: Float64
     path: Float64
@@ -61,22 +63,22 @@ class _Motion(NamedTuple):
 
 
 def sniff(head: bytes, suffix: str) -> bool:
-    """Whether a file that begins like this is an archive with arrays as AMASS names them."""
+    """Whether a file with this beginning is an archive with arrays as AMASS names them."""
     return head.startswith(ZIP) and any(f"{name}.npy".encode() in head for name in NAMES)
 
 
 def read_motion(
-    path: Path, *, source_rate: Fraction | int | str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path, *, source_rate: Rate | None = None, limits: Limits = DEFAULT_LIMITS
 ) -> SkeletonMotion:
-    """Return the joints as they turn in the file, y up, and jaw and eyes, where they move, as a face.
+    """Return the joints as they turn in the file, y up, and jaw and eyes as a face if they move.
 
-    source_rate: of a file that has no rate. Raises FormatError, LimitError.
+    source_rate: of a file without a rate. Raises FormatError, LimitError.
     """
     with naming_file(path):
         return _skeleton(_read(path, source_rate, limits), path, limits)
 
 
-def _read(path: Path, source_rate: Fraction | int | str | None, limits: Limits) -> _Motion:
+def _read(path: Path, source_rate: Rate | None, limits: Limits) -> _Motion:
     arrays = read_arrays(path, limits, single="poses", objects=True)
     poses, jaw, eyes = _poses(arrays, path)
     count = len(poses)
@@ -102,7 +104,7 @@ def _check_sizes(path: Path, most: float, unit: str, arrays: Mapping[str, Float6
             )  # fmt: skip
 
 
-def _rate(arrays: dict[str, Any], source_rate: Fraction | int | str | None, path: Path) -> Fraction:
+def _rate(arrays: dict[str, Any], source_rate: Rate | None, path: Path) -> Fraction:
     """Return the frame rate of a file, or `source_rate` if it has none."""
     stored = next((arrays[name] for name in RATES if name in arrays and arrays[name].size == 1), None)
     if stored is None:
@@ -111,8 +113,9 @@ def _rate(arrays: dict[str, Any], source_rate: Fraction | int | str | None, path
                 Remedy("source_rate", "give one with {}", "120")
             )
         return Fraction(source_rate)
-    if not MIN_RATE <= (rate := float(stored.ravel()[0])) <= MAX_RATE:
-        raise FormatError(f"its frame rate must be {MIN_RATE} to {MAX_RATE:g}", path=path, token=f"{rate:g}")
+    if not MIN_FRAME_RATE <= (rate := float(stored.ravel()[0])) <= MAX_FRAME_RATE:
+        what = f"its frame rate must be {MIN_FRAME_RATE} to {MAX_FRAME_RATE:g}"
+        raise FormatError(what, path=path, token=f"{rate:g}")
     return find_rate(np.array([0.0, 1.0 / rate]))
 
 
@@ -162,7 +165,7 @@ def _skeleton(read_in: _Motion, path: Path, limits: Limits) -> SkeletonMotion:
 
 
 def _to_y_up(root: Float64) -> Rotation:
-    """Return what brings up to +y. root: quaternions (T, 4) of the pelvis, whose own y points to the head."""
+    """Return the rotation that brings up to +y. root: quaternions (T, 4) of the pelvis, whose y points up."""
     heads = Rotation.from_quat(np.roll(root, -1, axis=1)).apply([0.0, 1.0, 0.0]).mean(axis=0)
     axis = int(np.abs(heads).argmax())
     if axis == 1 and heads[1] > MIN_UPRIGHT:
@@ -173,7 +176,7 @@ def _to_y_up(root: Float64) -> Rotation:
 
 
 def _face(read_in: _Motion, at: Float64, limits: Limits) -> FaceTrack | None:
-    """Return FAPs of jaw and eyes at times (F,), seconds; None where they do not move."""
+    """Return the FAPs of jaw and eyes at times (F,), seconds; None if they do not move."""
     jaw = read_in.jaw if read_in.jaw is not None and read_in.jaw.any() else None
     eyes = read_in.eyes if read_in.eyes is not None and read_in.eyes.any() else None
     if jaw is None and eyes is None:

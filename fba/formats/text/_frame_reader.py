@@ -1,7 +1,7 @@
 """Read the frames of FAP and BAP files: pairs of lines, a mask and `<frame number> <values>`.
 
-NumPy parses the numbers of many lines at once. If it fails on a batch, the lines of that batch are parsed
-one by one, so that the error names the line and the token.
+NumPy parses the numbers of many lines at once. If that fails, the lines are parsed one by one, so that the
+error names the line and the token.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ BATCH_LINES = 2048
 BATCH_BYTES = 1 << 20
 """Most bytes that are parsed at once."""
 CACHED_MASKS = 4096
-"""Most mask lines that are cached, so that a file in which each is spelt differently does not fill memory."""
+"""Most mask lines that are cached: a file whose masks are all spelt differently must not fill the memory."""
+SALVAGE = Remedy("salvage", "{} reads the frames before it", "True")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +85,7 @@ def read_frames(
 def _read_header(
     lines: Lines, layout: Layout, rate: Fraction | None, name: str | None
 ) -> tuple[Header, bytes | None]:
-    """Return the header and None; without a header in the file, one made from the options and the first mask
-    line."""
+    """Return the header and None; without a header, one made from the options, and the first mask line."""
     for line in lines:
         body = content(line)
         if not body:
@@ -116,7 +116,7 @@ def _read_header(
 
 
 class _Reader:
-    """Collects the frames of a file, batch by batch. count: frames parsed so far."""
+    """Reader of a file, batch by batch. count: of the frames parsed so far."""
 
     def __init__(self, lines: Lines, layout: Layout, angle_scale: float) -> None:
         self.lines = lines
@@ -125,10 +125,9 @@ class _Reader:
         self.count = 0
         self._masks: dict[bytes, int] = {}
         self._bits: list[Bool] = []  # distinct masks, each (columns,)
-        self._present: list[
-            Bool
-        ] = []  # numbers on a frame line under each mask, (1 + slots,), frame number first
-        self._tokens: list[int] = []  # how many numbers that is
+        # for each mask, bool (1 + slots,): the numbers on its frame lines, the frame number first
+        self._present: list[Bool] = []
+        self._tokens: list[int] = []  # their count
         self._extra: list[bool] = []  # whether the superfluous column of the mask is 1
         self._pending: list[Row] = []
         self._blocks: list[tuple[Int64, Int32, Int64, Int64]] = []  # numbers, slots, masks, lines
@@ -160,7 +159,7 @@ class _Reader:
             raise self.lines.error("the last frame is cut: a mask without values").with_remedies(SALVAGE)
 
     def flush(self, salvage: bool = False) -> None:
-        """Parse the pending lines. salvage: stop at the first damaged one instead of raising."""
+        """Parse the pending lines. salvage: stop at the first damaged line instead of raising."""
         rows, self._pending = self._pending, []
         if not rows or self._parse(rows):
             return
@@ -173,7 +172,7 @@ class _Reader:
             raise self.lines.error(message, token, row.number)
 
     def frames(self, header: Header) -> Frames:
-        """Return the frames parsed, with increasing numbers; warns of rounded values and a wrong count."""
+        """Return the parsed frames, with increasing numbers; warns of rounded values and a wrong count."""
         layout, path = self.layout, self.lines.path
         if not self._blocks:
             if header.frames:
@@ -213,7 +212,7 @@ class _Reader:
             if is_header(tokens):
                 what += "; this looks like a second header: split joined files into one each"
             raise self.lines.error(what, token=wrong)
-        # one program writes one column too many, at the end
+        # a known program adds a column at the end
         width = len(tokens) - 1 if len(tokens) - 1 in layout.widths else len(tokens)
         if width not in layout.widths:
             if len(tokens) < max(layout.widths) and self._at_end():
@@ -233,8 +232,7 @@ class _Reader:
         return number
 
     def _drop_extra_value(self, body: bytes, mask: int) -> bytes:
-        """Return the line without the value of a superfluous mask column; FormatError if that is not its
-        fault."""
+        """Return the line without the value of a superfluous mask column; FormatError for another fault."""
         tokens, wanted = body.split(), self._tokens[mask]
         if self._extra[mask] and len(tokens) == wanted + 1:
             return b" ".join(tokens[:-1])
@@ -272,13 +270,10 @@ class _Reader:
         return True
 
 
-SALVAGE = Remedy("salvage", "{} reads the frames before it", "True")
-
-
 def _renumber(index: Int64, lines: Int64, path: Path) -> Int64:
-    """Return frame numbers that increase: a frame whose number does not is put one after the frame before.
+    """Return frame numbers that increase: where a number does not, the frame follows the frame before.
 
-    Such files are joined from others, or written by programs that always write 0. Warns with FbaWarning.
+    Such files are joined from others, or their program writes 0 for every frame. Warns with FbaWarning.
     """
     steps = np.diff(index)
     repeated = steps <= 0

@@ -20,8 +20,8 @@ from fba.tracks import Track
 
 BATCH_FRAMES = 2048
 """Frames that are formatted at once."""
-_MASKS_KEPT = 64
-"""Masks whose text is kept: they change seldom, or between a few."""
+_CACHED_MASKS = 64
+"""Most masks whose text is cached: masks change seldom, or between a few."""
 
 
 def write_frames(
@@ -29,9 +29,8 @@ def write_frames(
 ) -> None:
     """Write a file that `read_frames` reads back unchanged. slots_of: returns int32 (T, slots) for a track.
 
-    The track is taken in batches, so that one that is compact stays so.
-
-    Raises FormatError if the file cannot be written or the text form cannot carry the times.
+    The track is taken in batches, so that a compact track stays compact. Raises FormatError if the file
+    cannot be written, or the format cannot hold the times.
     """
     index = animation.index
     if len(index) and max(-int(index[0]), int(index[-1])) > FRAME_NUMBER_MAX:
@@ -64,7 +63,7 @@ def write_frames(
             for row, bits in enumerate(batch.mask):
                 key = bits.tobytes()
                 if key not in mask_texts:
-                    if len(mask_texts) >= _MASKS_KEPT:
+                    if len(mask_texts) >= _CACHED_MASKS:
                         mask_texts.clear()
                     mask_texts[key] = " ".join(map(str, bits.astype(np.int8).tolist())).encode()
                 lines.append(mask_texts[key])

@@ -1,4 +1,4 @@
-"""Layout of a frame in FAP and BAP files: which values belong to which mask column."""
+"""Layout of a frame in FAP and BAP files: the values of each mask column."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from fba.parameters import (
 class Layout:
     """Layout of one kind of file.
 
-    kind: "FAP" or "BAP". version: the one that is written. versions: those that are read. columns:
-    parameters of a frame. widths: mask widths that occur in files; the last one is written. names, low,
-    high, parameter, angle: for each slot (a slot is one number of a frame line) its name, its limits, its
-    mask column (0-based), and whether it is an angle in 1e-5 rad.
+    kind: "FAP" or "BAP". version: that is written. versions: that are read. columns: count of parameters.
+    widths: mask widths that occur in files; the last is written. names, low, high, parameter, angle: for each
+    slot (a number of a frame line) its name, its limits, its mask column (0-based), and whether it is an
+    angle in 1e-5 rad.
     """
 
     kind: str

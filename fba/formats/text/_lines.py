@@ -1,8 +1,8 @@
 """Lines, comments and the one-line header of ASCII FAP, BAP and EPF files.
 
-Such files come from many programs and machines: with line ends of all kinds, tabs, byte order marks,
-Latin-1 names and comments anywhere. They are read block by block, and a line that is longer than any of
-these formats needs is an error, so that a file without line ends does not fill the memory.
+Such files come from many programs and machines, with line ends of all kinds, tabs, byte order marks,
+Latin-1 names and comments anywhere. They are read block by block. A line that is longer than these formats
+need is an error, so that a file without line ends does not fill the memory.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ UTF8_MARK = b"\xef\xbb\xbf"
 _VERSION = re.compile(rb"\d{1,3}(\.\d{1,3})?")
 _MASK_BITS = frozenset((b"0", b"1"))
 BODY_COLUMNS = 100
-"""Masks of BAPs have more columns than this, those of FAPs fewer, also in files of odd widths."""
-_MASK_LIKE = 60
-"""A line of at least this many 0s and 1s is a mask, not a header."""
+"""Masks of BAPs have more columns than this, those of FAPs fewer, in files of odd widths too."""
+_MIN_MASK_BITS = 60
+"""Fewest 0s and 1s in a line that make it a mask, not a header."""
 
 GIVE_RATE = Remedy("source_rate", "give one with {}", "25")
 
 
 class Lines:
-    """Iterates over the lines of a text file, without line ends; `number` is that of the last one (1-based).
+    """Iterator over the lines of a text file, without line ends. `number` is that of the last line, 1-based.
 
-    Raises FormatError for anything but text: NUL bytes, UTF-16, lines beyond `MAX_LINE_BYTES`.
+    Raises FormatError for NUL bytes, UTF-16, and lines beyond `MAX_LINE_BYTES`.
     """
 
     def __init__(self, file: BinaryIO, size: int, path: Path) -> None:
@@ -103,7 +103,7 @@ class Lines:
             yield rest.removesuffix(b"\r")
 
     def _check(self, line: bytes, ahead: int = 0) -> None:
-        """Raise FormatError for a line that is too long. ahead: lines between the current one and it."""
+        """Raise FormatError for a line that is too long. ahead: its number minus the current line's."""
         if len(line) > MAX_LINE_BYTES + 1:
             raise self.error(
                 f"a line of more than {MAX_LINE_BYTES} bytes: not a text file of this kind, "
@@ -113,12 +113,12 @@ class Lines:
 
 
 def content(line: bytes) -> bytes:
-    """Return the line without comment and surrounding blanks; empty if nothing is left."""
+    """Return the line without comment and surrounding blanks."""
     return line.partition(b"#")[0].strip()
 
 
 def decoded(text: bytes) -> str:
-    """Return text decoded as UTF-8, or else as Latin-1, in which any bytes are valid."""
+    """Return text decoded as UTF-8, else as Latin-1, in which any bytes are valid."""
     try:
         return text.decode()
     except UnicodeDecodeError:
@@ -127,12 +127,12 @@ def decoded(text: bytes) -> str:
 
 def is_mask(tokens: list[bytes]) -> bool:
     """Whether these are the bits of a mask line, of any width."""
-    return len(tokens) >= _MASK_LIKE and _MASK_BITS.issuperset(tokens)
+    return len(tokens) >= _MIN_MASK_BITS and _MASK_BITS.issuperset(tokens)
 
 
 @dataclass(frozen=True)
 class Header:
-    """Header line of a FAP or BAP file. rate: frames per second. frames: the number stated, or None."""
+    """Header line of a FAP or BAP file. rate: frames per second. frames: the stated number, or None."""
 
     version: str
     name: str
@@ -146,10 +146,7 @@ def is_header(tokens: list[bytes]) -> bool:
 
 
 def parse_header(line: bytes, lines: Lines, rate: Fraction | None = None) -> Header:
-    """Return the header in a line: the version first, rate and frames last, and the name between them.
-
-    rate: replaces that of the header. Raises FormatError.
-    """
+    """Return the header in a line. rate: replaces that of the header. Raises FormatError."""
     tokens = line.split()
     if not is_header(tokens):
         what = "expected a header `<version> <name> <frame rate> <number of frames>`"

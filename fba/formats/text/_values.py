@@ -1,4 +1,4 @@
-"""Parse value lines of FAP and BAP files: many at once, or one to name its fault."""
+"""Parse value lines of FAP and BAP files, many at once; find the fault of a single line."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 class Row:
     """Value line of a frame, without comment, with as many numbers as its mask asks for.
 
-    number: that of the line, 1-based. mask: that of the mask. present: bool (1 + slots,), which numbers
-    are on the line, the frame number first.
+    number: of the line, 1-based. mask: number of the mask. present: bool (1 + slots,), the numbers that are
+    on the line, the frame number first.
     """
 
     line: bytes
@@ -31,9 +31,9 @@ class Row:
 
 
 class ValueParser:
-    """Turns rows into frame numbers and slots.
+    """Parser of rows into frame numbers and slots.
 
-    rounded: how many values so far were no integers. rounded_line: the first line with one.
+    rounded: count of values so far that were no integers. rounded_line: the first line with such a value.
     """
 
     def __init__(self, layout: Layout, angle_scale: float) -> None:
@@ -68,7 +68,7 @@ class ValueParser:
         return index.astype(np.int64), slots.astype(np.int32)
 
     def find_fault(self, row: Row) -> tuple[str, bytes] | None:
-        """Return what is wrong with a row and the wrong token; None if nothing is."""
+        """Return the fault of a row and its token; None for a row without a fault."""
         slots = np.flatnonzero(row.present) - 1
         for slot, token in zip(slots.tolist(), row.line.split(), strict=True):
             what = "the frame number" if slot < 0 else self.layout.names[slot]
@@ -92,7 +92,7 @@ class ValueParser:
 
 
 def _numbers(text: bytes) -> Float64 | None:
-    """Return all numbers of a text, or None if anything in it is no number."""
+    """Return all numbers of a text; None if a word in it is no number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         try:

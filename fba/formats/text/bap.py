@@ -30,27 +30,19 @@ def read_bap(
 ) -> Animation:
     """Read a BAP file; its frame numbers become the animation's index.
 
-    source_rate, name: replace those of the header, or a missing header. salvage: keep the frames before
-    damage or a cut instead of raising. angle_scale: factor on all angles (BAPs 1..186 but the three
-    translations), for the old files whose unit is not 1e-5 rad. Raises FormatError with line and token;
-    FbaWarning as `fba.formats.text.fap.read_fap`.
+    The arguments are those of `fba.formats.text.fap.read_fap`; angle_scale is a factor on all angles (BAPs
+    1..186 but the three translations). Raises and warns as it does.
     """
     frames = read_frames(
-        path,
-        bap_layout(),
-        source_rate=source_rate,
-        name=name,
-        salvage=salvage,
-        angle_scale=angle_scale,
+        path, bap_layout(), source_rate=source_rate, name=name, salvage=salvage, angle_scale=angle_scale,
         limits=limits,
-    )
+    )  # fmt: skip
     body = BodyTrack(frames.slots, frames.mask)
     return Animation(frames.header.rate, frames.index, None, body, frames.header.name)
 
 
 def write_bap(path: Path, animation: Animation) -> None:
-    """Write the body track as BAP version 3.2, 296 columns. FormatError without a body track, or if writing
-    fails."""
+    """Write the body track as BAP version 3.2. FormatError without a body track, or if writing fails."""
     body = animation.body
     if body is None:
         raise FormatError(

@@ -38,20 +38,15 @@ def read_fap(
     """Read a FAP file; its frame numbers become the animation's index.
 
     source_rate, name: replace those of the header, or a missing header. salvage: keep the frames before
-    damage or a cut instead of raising. angle_scale: factor on the eight FAPs in angle units, for files whose
-    unit is not 1e-5 rad (50 for one that took it as 5e-4). Raises FormatError with line and token, LimitError
-    for more frames than `limits` allow; FbaWarning for values that had to be rounded, a wrong frame count,
-    frame numbers that do not increase, an unknown version.
+    damage instead of raising. angle_scale: factor on the eight FAPs in angle units, for files in another unit
+    than 1e-5 rad (50 for 5e-4). Raises FormatError with line and token, LimitError for more frames than
+    `limits` allow. Warns (FbaWarning) of rounded values, a wrong frame count, frame numbers that do not
+    increase, and an unknown version.
     """
     frames = read_frames(
-        path,
-        fap_layout(),
-        source_rate=source_rate,
-        name=name,
-        salvage=salvage,
-        angle_scale=angle_scale,
+        path, fap_layout(), source_rate=source_rate, name=name, salvage=salvage, angle_scale=angle_scale,
         limits=limits,
-    )
+    )  # fmt: skip
     values = np.zeros((len(frames.index), FAP_COUNT), dtype=np.int32)
     values[:, 2:] = frames.slots[:, _FIELDS:]
     face = FaceTrack(

@@ -7,6 +7,8 @@ from fractions import Fraction
 
 from fba.errors import FormatError
 
+Rate = Fraction | int | str
+"""A frame rate as callers give it."""
 NTSC = {
     text: Fraction(base * 1000, 1001)
     for base, texts in {
@@ -24,9 +26,9 @@ _NUMBER = re.compile(r"\+?([0-9]{1,40}(\.[0-9]{0,40})?|\.[0-9]{1,40})(/[0-9]{1,4
 
 
 def parse_rate(text: str | float | Fraction) -> Fraction:
-    """Return frames per second: of "25", "12.5", "30000/1001", and NTSC rates such as "29.97" (= 30000/1001).
+    """Return the frames per second of "25", "12.5", "30000/1001", or an NTSC rate: "29.97" is 30000/1001.
 
-    Raises FormatError for anything but a positive number (no exponents, at most 40 digits).
+    Raises FormatError for text that is no positive number, or has an exponent or more than 40 digits.
     """
     if isinstance(text, Fraction | int):
         rate = Fraction(text)
@@ -47,7 +49,7 @@ def parse_rate(text: str | float | Fraction) -> Fraction:
 
 
 def format_rate(rate: Fraction) -> str:
-    """Return text that `parse_rate` turns back exactly: an integer, else a decimal, else "p/q"."""
+    """Return text that `parse_rate` reads back exactly: an integer, else a decimal, else "p/q"."""
     if rate.denominator == 1:
         return str(rate.numerator)
     for text, ntsc in NTSC.items():

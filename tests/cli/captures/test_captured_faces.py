@@ -51,7 +51,7 @@ def test_encode(run: Callable[..., Any], tmp_path: Path) -> None:
     assert (fba.read(target).rate, len(fba.read(target))) == (25, 38)
 
 
-def test_one_of_several_faces(run: Callable[..., Any], tmp_path: Path) -> None:
+def test_the_choice_of_one_of_several_faces(run: Callable[..., Any], tmp_path: Path) -> None:
     units = {unit: np.full(4, 2.0) for unit in (1, 6, 12, 15, 26)}
     still, ahead = np.zeros((4, 3)), np.tile([0.0, 0.0, -1.0], (4, 2))
     header, *rows = openface_csv(units, still, ahead).splitlines()

@@ -59,7 +59,7 @@ def test_each_command_reads_the_clip_that_it_is_given(run: Run, people: Path, tm
     assert "10 frames beside the source" in out
 
 
-def test_a_clip_that_is_not_there(run: Run, people: Path, bvh: Path, tmp_path: Path) -> None:
+def test_a_missing_clip(run: Run, people: Path, bvh: Path, tmp_path: Path) -> None:
     code, _, err = run("convert", people, tmp_path / "out.bap", "--clip", "Wafe")
     assert code == 1
     assert "no animation 'Wafe'" in err

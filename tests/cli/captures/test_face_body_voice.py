@@ -78,7 +78,7 @@ def test_the_body_begins_at_a_time_code(run: Run, table: Path, bap: Path, tmp_pa
         (("--sync", "offset", "--offset", "18:49:00:00"), "contradict each other"),
     ],
 )
-def test_what_cannot_be(
+def test_impossible_options_are_refused(
     run: Run, table: Path, bap: Path, tmp_path: Path, options: tuple[str, ...], message: str
 ) -> None:
     done = run("encode", table, bap, "-o", tmp_path / "a.fba", *options)

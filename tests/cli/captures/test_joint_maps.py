@@ -63,7 +63,7 @@ def test_a_unit_that_limbs_do_not_tell(run: Run, tmp_path: Path) -> None:
     assert np.ptp(body.values[:, bap_numbers()["HumanoidRoot_tr_lateral"] - 1]) == pytest.approx(1000, abs=3)
 
 
-def test_what_was_found_is_saved_and_read_again(run: Run, tmp_path: Path) -> None:
+def test_matched_joints_are_saved_and_read_again(run: Run, tmp_path: Path) -> None:
     source, saved = person(tmp_path / "p.glb"), tmp_path / "map.toml"
     code, out, _ = run("encode", source, "-o", tmp_path / "one.fba", *STEPS, "--map-out", saved)
     assert code == 0
@@ -161,7 +161,7 @@ def test_joints_of_a_body_that_is_shown(run: Run, tmp_path: Path) -> None:
         assert (code, message in err) == (2, True), err
 
 
-def test_hands_are_found(run: Run, tmp_path: Path) -> None:
+def test_joints_of_hands_are_matched(run: Run, tmp_path: Path) -> None:
     saved = tmp_path / "map.toml"
     source = person(tmp_path / "p.glb")
     assert run("encode", source, "-o", tmp_path / "out.fba", *STEPS, "--map-out", saved)[0] == 0

@@ -148,7 +148,7 @@ def test_signals_end_it_with_the_file_complete(
     assert "60 frames" in said.out
 
 
-def test_what_comes_too_fast_is_said(
+def test_lost_datagrams_are_reported(
     run: Run, arriving: Arriving, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(fba.live.receiver, "BUFFER", 1)  # the system takes its smallest
@@ -165,7 +165,7 @@ def test_what_comes_too_fast_is_said(
     assert f"lost because they came faster than they could be used: {values['dropped']} dropped" in said.out
 
 
-def test_what_sends_is_received(run: Run, arriving: Arriving, face: fba.Animation, tmp_path: Path) -> None:
+def test_sent_faces_are_received(run: Run, arriving: Arriving, face: fba.Animation, tmp_path: Path) -> None:
     source, path, port = tmp_path / "face.fba", tmp_path / "a.fba", free_port()
     fba.write(source, face)
     from fba.live.sending import make_datagrams
@@ -220,7 +220,7 @@ def test_a_telephone_is_asked(run: Callable[..., Any], tmp_path: Path) -> None:
         (["nothing", "-o", "a.fba"], 2, "is not one of"),
     ],
 )
-def test_what_is_refused(
+def test_contradictory_options_are_refused(
     run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], code: int,
     text: str,
 ) -> None:  # fmt: skip

@@ -125,7 +125,7 @@ def test_wrong_usage_is_said(
     assert re.search(words, " ".join(err.split())), err
 
 
-def test_what_fits_neither_head_nor_capture_is_refused(
+def test_mappings_of_another_head_or_capture_are_refused(
     run: Run, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
     mapping = tmp_path / "m.toml"

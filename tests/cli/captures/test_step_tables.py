@@ -44,7 +44,9 @@ def files_with_a_body(folder: Path) -> dict[str, Path]:
     return paths
 
 
-def test_what_is_written_is_read_rightly(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_written_streams_are_read_with_the_right_table(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With the mark nothing has to be given; without it, the reminder is a command that works."""
     shown = []
     monkeypatch.setattr(player, "play", lambda scene, **_: shown.append(scene.animation) or ())
@@ -197,7 +199,7 @@ def test_a_stream_with_a_mark_is_not_doubted(run: Run, tmp_path: Path, table: st
         assert "implausible" not in err
 
 
-def test_the_other_way_round(run: Run, tmp_path: Path) -> None:
+def test_a_stream_of_iso_steps_read_as_visage(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "iso.fba"
     fba.write(path, gait.walk(), clamp=True, mark=False)
     err = run("decode", path, "--bap", tmp_path / "out.bap", "--bap-steps", "visage").err

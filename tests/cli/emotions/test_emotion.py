@@ -47,7 +47,7 @@ def test_json_and_csv_say_the_same(run: Run, angry: Path, tmp_path: Path) -> Non
     assert rows[25]["nearest"].startswith("rage=")
 
 
-def test_the_stream_of_an_expression_reads_as_it(run: Run, tmp_path: Path) -> None:
+def test_the_stream_of_an_expression_is_read_as_that_expression(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "a.fba"
     for name in ("joy", "surprise=70", "contempt"):
         run("express", name, "-o", path)

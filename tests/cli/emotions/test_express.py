@@ -56,7 +56,7 @@ def test_a_variant_is_sent_as_low_level_faps(run: Run, tmp_path: Path) -> None:
     assert run("express", "terror", "-o", path, "--send", "expression").code == 2
 
 
-def test_what_is_sent_shows_the_mixture_on_any_face(tmp_path: Path, run: Run) -> None:
+def test_sent_faps_show_the_mixture_on_any_face(tmp_path: Path, run: Run) -> None:
     """FAPs that are not sent copy no mate, though one-sided expressions move one side alone."""
     from fba.face import resolve
 

@@ -64,11 +64,11 @@ def test_types_and_defaults_are_those_of_the_fields() -> None:
         (("x", "-o", "y", "--width", "wide"), "'wide' is not a valid integer"),
     ],
 )
-def test_what_does_not_fit_is_said(words: tuple[str, ...], said: str) -> None:
+def test_invalid_values_are_bad_usage(words: tuple[str, ...], said: str) -> None:
     assert said in run(*words)
 
 
-def test_help_shows_own_options_before_inherited_ones() -> None:
+def test_help_shows_inherited_options_last() -> None:
     text = run("--help")
     assert text.index("--output") < text.index("--width")
     assert "[default: 4]" in text

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from fba.cli.command import program_words, with_program
 from fba.cli.main import _COMMANDS
-from fba.cli.program import program_words, with_program
 
 HINT = "use it with `fba encode IN.fap -o OUT.fba --epf FILE`"
 EPF = "FFR 0\n"

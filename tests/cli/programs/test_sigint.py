@@ -125,7 +125,7 @@ def test_ctrl_c_while_the_program_ends_leaves_no_traceback() -> None:
     assert (code, err) == (130, "fba: interrupted\n")
 
 
-def test_what_must_not_be_left_halfway_is_finished_first() -> None:
+def test_fragile_work_is_finished_before_the_end() -> None:
     command = [sys.executable, "-c", LOADING]
     result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert (result.returncode, result.stdout.strip(), result.stderr.strip()) == (

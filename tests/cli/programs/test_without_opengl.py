@@ -51,7 +51,7 @@ def stream(tmp_path: Path, face: Animation) -> Path:
         "render --help",
     ],
 )
-def test_what_does_not_draw_works(line: str, stream: Path, programs: Path) -> None:
+def test_commands_without_pictures_work(line: str, stream: Path, programs: Path) -> None:
     done = bare(programs, stream.parent, *line.split())
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout or line.startswith(("decode", "convert"))
@@ -67,7 +67,7 @@ def test_what_does_not_draw_works(line: str, stream: Path, programs: Path) -> No
         "render --contact-sheet faps -o a.png",
     ],
 )
-def test_what_draws_says_what_is_missing(line: str, stream: Path, programs: Path) -> None:
+def test_commands_with_pictures_name_the_missing_package(line: str, stream: Path, programs: Path) -> None:
     head = fba.__path__[0] + "/face/builtin/head.glb"
     done = bare(programs, stream.parent, *line.replace("NONE", head).split())
     assert done.returncode == 1
@@ -86,7 +86,7 @@ def test_what_draws_says_what_is_missing(line: str, stream: Path, programs: Path
         ("render face.fba -o face.gif --size 64x48", "films"),
     ],
 )
-def test_what_needs_an_extra_names_it(line: str, extra: str, stream: Path, programs: Path) -> None:
+def test_errors_name_a_missing_extra(line: str, extra: str, stream: Path, programs: Path) -> None:
     shutil.copy(Path(fba.__path__[0]) / "samples" / "talk.c3d", stream.parent)
     done = bare(programs, stream.parent, *line.split(), code=PLAIN)
     assert done.returncode == 1

@@ -162,7 +162,7 @@ def test_a_file_of_another_pose_is_still_retargeted(tmp_path: Path) -> None:
     assert arm[0] / np.linalg.norm(arm) > 0.99  # still out to the left
 
 
-def test_what_cannot_be_written(tmp_path: Path) -> None:
+def test_animations_that_cannot_be_written(tmp_path: Path) -> None:
     path = tmp_path / "a.bvh"
     still = body(np.zeros((1, BAP_COUNT)))
     with pytest.raises(FormatError, match="only a face"):

@@ -187,7 +187,7 @@ def test_contradicting_settings_are_not_written(
     assert [entry.name for entry in tmp_path.iterdir()] == ["old.epf"]
 
 
-def test_what_no_tag_says(tmp_path: Path) -> None:
+def test_settings_without_a_tag(tmp_path: Path) -> None:
     body = PartSettings((0,) * 24, np.zeros(296, bool), gender=1)
     both = PlaneSettings(True, 0, 0, part(), body)
     with pytest.raises(UnsupportedError, match="suggested_gender"):
@@ -199,12 +199,12 @@ def test_what_no_tag_says(tmp_path: Path) -> None:
     assert plane.face.gender == 1
 
 
-def test_reading_one_as_an_animation_says_what_it_is(tmp_path: Path) -> None:
+def test_reading_an_epf_file_as_an_animation_explains_its_use(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedError, match=r"encoder parameter file.*--epf"):
         fba.read(file(tmp_path, "a.txt", *FIRST))
 
 
-def test_a_file_of_another_kind_has_its_own_error(tmp_path: Path) -> None:
+def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"a\.epf:1: unknown tag; an EPF line begins with FBM"):
         read_animation(file(tmp_path, "a.epf", "2.1 a 25 1", "0 " * 68, "0"))
 

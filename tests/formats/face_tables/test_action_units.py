@@ -131,7 +131,7 @@ def test_times_vary_or_are_those_of_pictures(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*rows have no face")
-def test_what_is_refused(tmp_path: Path) -> None:
+def test_damaged_tables_are_refused(tmp_path: Path) -> None:
     strong = {12: np.full(ROWS, 99.0), 1: WAVE}
     backwards, never = {"timestamp": -np.arange(ROWS)}, {"success": np.zeros(ROWS)}
     for wrong, said in (

@@ -92,7 +92,7 @@ def test_another_rate_keeps_the_times(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("counted", "rate"), [(60, 60), (30, 30), (25, 25), (24, 24)])
-def test_what_time_codes_count(tmp_path: Path, counted: int, rate: int) -> None:
+def test_the_rate_that_time_codes_count(tmp_path: Path, counted: int, rate: int) -> None:
     motion = read_face(saved(tmp_path, livelink_csv(WEIGHTS, rate=counted, step=1 / counted)))
     assert motion.rate == rate
     np.testing.assert_allclose(motion.times, np.arange(ROWS) / counted, atol=1e-6)
@@ -264,7 +264,7 @@ def broken(line: int, old: str, new: str) -> str:
         ("a,b\n1,2\n3,4\n", r"is in no format known here"),
     ],
 )
-def test_what_is_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_damaged_tables_are_refused(tmp_path: Path, text: str, said: str) -> None:
     with pytest.raises(FormatError, match=said):
         fba.read(saved(tmp_path, text))
 

@@ -99,7 +99,7 @@ def test_points_of_other_trackers_are_refused_by_name(count: int, tmp_path: Path
             read_points(path, source_rate=30)
 
 
-def test_what_is_wrong_is_named(tmp_path: Path) -> None:
+def test_errors_name_the_fault_of_a_table(tmp_path: Path) -> None:
     table = wide(flat()).decode()
     with pytest.raises(FormatError, match=r"columns are missing: y_7"):
         read_points(saved(tmp_path, "a.csv", table.replace("y_7,", "gap,")))

@@ -141,7 +141,7 @@ def test_documents_without_a_face(change: Any, message: str, tmp_path: Path) -> 
         read_points(document(tmp_path, change(frames)), source_rate=30)
 
 
-def test_what_is_no_number_is_not_seen(tmp_path: Path) -> None:
+def test_points_without_numbers_are_missing(tmp_path: Path) -> None:
     frames: list[Any] = points().tolist()
     frames[2] = [["?", None], *frames[2][1:]]
     frames[3][5] = [1e301, True]

@@ -89,7 +89,7 @@ def test_a_skeleton_carries_the_faps_as_numbers(tmp_path: Path) -> None:
     assert fba.read(tmp_path / "b.glb").face == written.face
 
 
-def test_a_body_without_a_face_gets_none(tmp_path: Path) -> None:
+def test_a_body_without_a_face_is_read_without_a_face(tmp_path: Path) -> None:
     written = animation(everything(), True)
     fba.write(tmp_path / "a.glb", replace(written, face=None))
     assert fba.read(tmp_path / "a.glb").face is None

@@ -240,7 +240,7 @@ def test_only_what_moves_has_keys(tmp_path: Path) -> None:
     assert gltf.animations[0].channels[0].times.tolist() == pytest.approx([0, 1 / 30, 2 / 30, 0.1])
 
 
-def test_what_cannot_be_written(tmp_path: Path) -> None:
+def test_animations_that_cannot_be_written(tmp_path: Path) -> None:
     animation = person()
     with pytest.raises(FormatError, match=r"name it \.glb"):
         fba.write(tmp_path / "a.gltf", animation)

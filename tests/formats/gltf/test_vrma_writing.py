@@ -40,7 +40,7 @@ def document(path: Path) -> dict[str, object]:
     return content
 
 
-def test_what_is_written_comes_back(tmp_path: Path) -> None:
+def test_a_written_face_is_read_back(tmp_path: Path) -> None:
     turns = {"head_yaw": 0.4, "head_pitch": -0.3, "head_roll": 0.2}
     turns |= {
         f"{way}_{side}_eyeball": angle for side in "lr" for way, angle in (("yaw", 0.3), ("pitch", 0.2))

@@ -131,7 +131,7 @@ def test_rates(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_files_that_are_none(tmp_path: Path, arrays: dict[str, Any], message: str) -> None:
+def test_damaged_files_are_refused(tmp_path: Path, arrays: dict[str, Any], message: str) -> None:
     path = saved(tmp_path, **arrays)
     assert format_of(path).name == "smpl"
     with pytest.raises(FormatError, match=message):

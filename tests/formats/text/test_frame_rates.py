@@ -55,7 +55,7 @@ def test_parse(text: str | float | Fraction, rate: Fraction) -> None:
         "9" * 5000,
     ],
 )
-def test_what_is_no_rate(text: str | float) -> None:
+def test_invalid_rates_are_refused(text: str | float) -> None:
     with pytest.raises(FormatError):
         parse_rate(text)
 

@@ -1,17 +1,55 @@
-"""Tables and records of expressions, which `fba express` and `fba emotion` print."""
+"""Results of `fba emote`, `fba emotion` and `fba express`: pictures, films, tables and records."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.cli.printing import print_json
+from fba.cli.command import usage_errors
+from fba.cli.inputs import read_model
+from fba.cli.outputs import STANDARD, Outputs
+from fba.cli.printing import Progress, print_json
 from fba.parameters import FAP_COUNT, faps
 
 if TYPE_CHECKING:
+    from fba.animation import Animation
     from fba.emotion import Blend, Reading, Readings
+
+OUTPUT_TEXT = (
+    "File to write: .fba, .fap or another format of animations, .png, .jpg, .mp4, .gif. - for standard "
+    "output."
+)
+"""Help of --output."""
+PICTURES = ("png", "jpg", "jpeg")
+FILMS = ("mp4", "gif")
+
+
+def picture_kind(output: Path, to: str | None) -> str:
+    """Return the kind of the picture or film, "" for a format of animations."""
+    kind = to.lower() if to is not None else output.suffix.lower().removeprefix(".")
+    if output == STANDARD and to is None:
+        return ""
+    return kind if kind in PICTURES + FILMS else ""
+
+
+def draw(
+    animation: Animation,
+    output: Path,
+    outputs: Outputs,
+    kind: str,
+    model: Path | None,
+    size: tuple[int, int] | None,
+) -> None:
+    """Draw a picture or a film of an animation into one of the outputs."""
+    from fba_player.export.render import render
+    from fba_player.scene.scene import Scene
+
+    scene = Scene(animation, read_model(model))
+    with outputs.file(output, f".{kind}") as file, Progress("rendering", None) as step, usage_errors():
+        render(scene, file, size=size, progress=step.show)
 
 
 def print_expressions(as_json: bool) -> None:
@@ -44,7 +82,7 @@ def print_expressions(as_json: bool) -> None:
 
 
 def print_blend(blend: Blend, as_json: bool) -> None:
-    """Print the parts of a mixture, its point, and the FAPs that it moves."""
+    """Print a mixture: its parts, its point, and the FAPs that it moves."""
     if as_json:
         print_json(blend_record(blend))
         return
@@ -95,7 +133,7 @@ def summary_text(readings: Readings) -> str:
 
 
 def reading_lines(readings: Readings, *, every: bool) -> Iterator[str]:
-    """Yield a table of every frame, or of those at which the label changes."""
+    """Yield the lines of a table of every frame, or of the frames at which the label changes."""
     yield f"{'time':>8}  {'shown':11}  {'int.':>4}  {'act.':>4}  {'eval.':>5}  nearest expressions"
     before = ""
     for time, one in zip(readings.times.tolist(), readings.readings, strict=True):

@@ -1,0 +1,259 @@
+"""The scenes of `fba play` and `fba render`: options, and loading from files and from streams that arrive."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import sys
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal, cast
+
+import click
+
+from fba.animation import Animation
+from fba.cli import inputs, options
+from fba.cli.inputs import Reading
+from fba.cli.map_options import MAP, Maps, read_body_joints
+from fba.cli.option_fields import option
+from fba.errors import FbaWarning, FormatError
+
+if TYPE_CHECKING:
+    from io import BufferedReader
+
+    from fba.body import BodyModel
+    from fba.face import FaceModel
+    from fba_player.playback.live import LiveAnimation
+    from fba_player.scene.scene import Scene
+
+MOST_FILES = 8
+"""Files that are shown at once."""
+STREAM_STARTS = (b"\0\0\1\xba", b"\0\0\1\x01", b"\0\0\1\xb0", b"\0\0\1\xb5")
+"""Beginnings of an FBA stream: the object, or the layers around it."""
+
+
+def _parse_show(text: str) -> tuple[str, Any]:
+    from fba_player.view.switches import parse_switch
+
+    return parse_switch(text)
+
+
+SHOW = options.TextType("switch", _parse_show)
+"""A switch of the player: wireframe, influence=open_jaw, shadows=off."""
+files_argument = click.argument("files", type=options.EXISTING, nargs=-1, metavar="[FILE...]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneOptions(Reading):
+    """How files are read and shown."""
+
+    model: Path | None = options.model_option(
+        "The face: a .glb of this project, or another that can be imported. Default: the built-in head."
+    )
+    body: Path | None = option(
+        type=options.FILE,
+        metavar="FILE",
+        help="The body: one of this project, or any skinned person (.glb, .vrm) with its own head. Default: "
+        "the built-in person.",
+    )
+    maps: Maps = option(
+        "--map",
+        default=(),
+        type=MAP,
+        multiple=True,
+        metavar="JOINT=JOINT|FILE",
+        help="With --body: which joint of the standard a joint of its skeleton is, Pelvis=HumanoidRoot; "
+        "none: Hat=. Repeatable. Or a TOML file of such pairs.",
+    )
+    arrange: Literal["side", "over"] | None = option(
+        help="Several files: side by side (default), or the others as drawings over the first."
+    )
+    camera: Literal["front", "three-quarter", "profile", "body"] | None = option(
+        help="Default: one that suits the content."
+    )
+    view: Literal["figure", "points"] = option(
+        default="figure", help="A person, or the face as its feature points and the body as its bones."
+    )
+    shows: tuple[tuple[str, object], ...] = option(
+        "--show",
+        default=(),
+        type=SHOW,
+        multiple=True,
+        metavar="SWITCH[=VALUE]",
+        help="What else is shown; repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, "
+        "normals; shadows, wrinkles, eyes, teeth, hair=off; background=grey or transparent.",
+    )
+    axes: Literal["iso", "vreng"] = option(
+        default="iso", help="Which way BAPs turn: as the standard says, or as in some old files."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoundOptions:
+    """Which sound is played, and when."""
+
+    audio: Path | None = option(
+        type=options.FILE,
+        metavar="FILE",
+        help="Sound, from the first frame. Default: the WAV file of the same name beside the input.",
+    )
+    no_audio: bool = option(default=False, help="No sound.")
+    audio_offset: float = option(
+        default=0.0,
+        type=options.MOMENT,
+        metavar="SECONDS",
+        help="Delay of the sound; negative: it begins earlier.",
+    )
+
+
+def check_files(files: tuple[Path, ...], how: SceneOptions, sound: SoundOptions, what: str) -> None:
+    """Raise click.UsageError for options that contradict each other or the files.
+
+    what: "window" or "picture", for messages.
+    """
+    if sound.audio is not None and sound.no_audio:
+        raise click.UsageError("--audio and --no-audio contradict each other")
+    if sound.audio_offset and sound.no_audio:
+        raise click.UsageError("--audio-offset and --no-audio contradict each other")
+    inputs.check_clip(how, files)
+    if len(files) > MOST_FILES:
+        raise click.UsageError(f"{len(files)} files are too many for one {what}; at most {MOST_FILES}")
+    if len(files) < 2 and how.arrange is not None:
+        single = f"; {files[0]} is one" if files else ""
+        raise click.UsageError(f"--arrange needs two files or more{single}")
+
+
+def open_file(file: Path, how: SceneOptions) -> inputs.ReadFile | LiveAnimation:
+    """Return the content of a file, or a growing animation of an FBA stream on standard input or in a FIFO.
+
+    Other formats are read to their end first. Raises click.UsageError if standard input is a terminal, and
+    what `inputs.read_file` and `LiveAnimation.wait` raise.
+    """
+    name = "standard input" if str(file) == "-" else file.name
+    if str(file) == "-" and sys.stdin.isatty():
+        raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
+    if str(file) != "-" and not is_pipe(file):
+        return inputs.read_file(file, how)
+    with contextlib.ExitStack() as stack:
+        piped = sys.stdin.buffer if str(file) == "-" else stack.enter_context(_fifo(file))
+        source = cast("BufferedReader", piped)
+        head = b""
+        while len(head) < 4 and (more := source.read1(1 << 16)):
+            head += more
+        if not head:
+            raise FormatError("is empty", path=name)
+        if not head.startswith(STREAM_STARTS):
+            return _read_other(head, source, name, how)
+        from fba_player.playback.live import LiveAnimation, wait_for
+
+        close = stack.pop_all().close
+        live = LiveAnimation(source, head=head, name=name, bap_steps=how.bap_steps, at_end=close)
+    wait_for(live, lambda text: click.echo(f"fba: {text}", err=True))
+    if live.steps_explanation:
+        click.echo(f"fba: {name}: BAP steps {live.steps_explanation}", err=True)
+    return live
+
+
+def is_pipe(file: Path) -> bool:
+    """Whether a file is a FIFO, or a device that can be read only once, such as /dev/stdin."""
+    try:
+        mode = os.stat(file).st_mode
+    except OSError:
+        return False
+    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
+
+
+def build_scene(
+    animations: Sequence[Animation | LiveAnimation],
+    names: list[str],
+    how: SceneOptions,
+    *,
+    over: bool = False,
+) -> Any:
+    """Return one scene of animations. over: draw them over each other, without `--arrange`."""
+    joints = read_body_joints(how.maps, how.body, how.limit)
+    face, figure = inputs.read_model(how.model), inputs.read_body(how.body, joints)
+    scenes = [_build_one(animation, face, figure, how) for animation in animations]
+    result: Any = scenes[0]
+    if len(scenes) > 1:
+        from fba_player.scene.compare import CompareScene
+
+        result = CompareScene(scenes, arrangement=how.arrange or ("over" if over else "side"), names=names)
+    for switch, state in how.shows:
+        result.show(switch, state)
+    return result
+
+
+def display_names(files: tuple[Path, ...]) -> list[str]:
+    """Return the names of files that are shown together, with their folders where names are equal."""
+    given = [file.name for file in files]
+    return [
+        f"{file.absolute().parent.name}/{name}" if given.count(name) > 1 and name != "-" else name
+        for file, name in zip(files, given, strict=True)
+    ]
+
+
+def find_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
+    """Return the given sound, else the first readable sound beside a file, else None.
+
+    without: begins the warning about an unreadable sound. Raises FormatError if the given sound cannot be
+    read, click.UsageError for an offset without a sound.
+    """
+    path = _choose_sound(files, sound, without)
+    if path is None and sound.audio_offset:
+        raise click.UsageError("--audio-offset needs a sound: give one with --audio")
+    return path
+
+
+def _choose_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
+    from fba_player.sound.soundtrack import check_sound, find_sound_beside
+
+    if sound.audio is not None:
+        check_sound(sound.audio)
+        return sound.audio
+    if sound.no_audio:
+        return None
+    for file in files:
+        path = None if str(file) == "-" or is_pipe(file) else find_sound_beside(file)
+        if path is None:
+            continue
+        try:
+            check_sound(path)
+        except FormatError as error:
+            warnings.warn(f"{without}: {error}", FbaWarning, stacklevel=3)
+            continue
+        return path
+    return None
+
+
+def _build_one(
+    animation: Animation | LiveAnimation, model: FaceModel | None, body: BodyModel | None, how: SceneOptions
+) -> Scene:
+    from fba_player.scene.scene import Scene
+
+    given: dict[str, Any] = {"body": body, "axes": how.axes, "view": how.view}
+    if isinstance(animation, Animation):
+        return Scene(animation, model, **given)
+    from fba.face import FaceModel
+    from fba_player.playback.live import LiveTimeline
+
+    face = model or FaceModel.default()
+    timeline = LiveTimeline(animation, face)
+    return Scene(animation, face, timeline=timeline, **given)  # type: ignore[arg-type]
+
+
+def _fifo(file: Path) -> BinaryIO:
+    click.echo(f"fba: waiting for a sender to open {file}", err=True)
+    return open(file, "rb")
+
+
+def _read_other(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> inputs.ReadFile:
+    """Return the content of a pipe without an FBA stream. head: the bytes that were read before."""
+    with inputs.spooled(source, name, head) as path:
+        read = inputs.read_file(path, how, name=name)
+    if read.animation.name != path.name:
+        return read
+    return replace(read, animation=replace(read.animation, name=name))
