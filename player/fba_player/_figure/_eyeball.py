@@ -20,9 +20,12 @@ MIN_BALL_VERTICES = 12
 """A part with fewer vertices is not an eyeball; with fewer behind the pupil, all give its rotation."""
 SAMPLED_VERTICES = 96
 """Vertices from which an eyeball's rotation is computed."""
-DILATE = (29, 30)
-LIDS = (("3.1", "3.3", "3.7", "3.11"), ("3.2", "3.4", "3.12", "3.8"))
+PUPIL_FAPS = (29, 30)
+"""FAPs that dilate the left and the right pupil."""
+LID_POINTS = (("3.1", "3.3", "3.7", "3.11"), ("3.2", "3.4", "3.12", "3.8"))
 """Feature points of the left and right eye: middles of upper and lower lid, outer and inner corner."""
+OPEN_LIDS = np.array([[0.0, 0.5, 0.86], [0.0, -0.5, 0.86], [1.0, 0.0, 0.3], [-1.0, 0.0, 0.3]])
+"""These points of an open eye, relative to its centre, in radii."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +33,8 @@ class Eyeball:
     """One eyeball in the neutral face. side: 0 left, 1 right. centre: (3,), and radius, metres.
 
     rows: sampled vertices of the part, away from the pupil. neutral: their positions. lids: the model's
-    vertices at `LIDS`, -1 for missing ones. iris, pupil: diameters (m). step: change of the pupil's diameter
-    for one unit of FAP 29 or 30.
+    vertices at `LID_POINTS`, -1 for missing ones. iris, pupil: diameters (m). step: change of the pupil's
+    diameter for one unit of FAP 29 or 30.
     """
 
     side: int
@@ -45,15 +48,14 @@ class Eyeball:
     step: float
 
     def pose(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
-        """Return the eye for moved vertices (V, 3) of its part and of the face; matrix: (4, 4), into the
-        world."""
+        """Return the eye for moved vertices (V, 3) of its part and of the face, put into the world."""
         moved = part.take(self.rows, axis=0).astype(np.float64)
         fitted = fit_similarity(self.neutral, moved)
         turn, centre = fitted.rotation, fitted.target + fitted.rotation @ (self.centre - fitted.centre)
         frame = np.eye(4)
         frame[:3, :3] = turn * self.radius
         frame[:3, 3] = centre
-        pupil = self.pupil + self.step * float(faps[DILATE[self.side] - 1])
+        pupil = self.pupil + self.step * float(faps[PUPIL_FAPS[self.side] - 1])
         iris = self.iris / 2 / self.radius
         return Eye(
             matrix @ frame,
@@ -64,16 +66,9 @@ class Eyeball:
         )
 
     def _lid_positions(self, face: Float32, centre: Float64) -> Float64:
-        """Return middles and corners of the lids (4, 3) relative to the centre, in radii; missing ones as of
-        an open eye."""
-        if min(self.lids) >= 0:
-            known: Float64 = (face.take(self.lids, axis=0) - centre) / self.radius
-            return known
-        open_ = np.array([[0.0, 0.5, 0.86], [0.0, -0.5, 0.86], [1.0, 0.0, 0.3], [-1.0, 0.0, 0.3]])
-        for row, vertex in enumerate(self.lids):
-            if vertex >= 0:
-                open_[row] = (face[vertex] - centre) / self.radius
-        return open_
+        """Return the lid points (4, 3) from the centre, in radii; for missing ones, those of an open eye."""
+        lids = np.array(self.lids)
+        return np.where(lids[:, None] >= 0, (face.take(lids, axis=0) - centre) / self.radius, OPEN_LIDS)
 
 
 def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
@@ -96,5 +91,5 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
         behind = np.arange(len(vertices))
     rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED_VERTICES).astype(int))]
     unit = model.fapu.IRISD
-    lids = tuple(int(model.bound[point_row(name)]) for name in LIDS[side])
+    lids = tuple(int(model.bound[point_row(name)]) for name in LID_POINTS[side])
     return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit)

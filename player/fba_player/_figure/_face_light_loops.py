@@ -35,16 +35,16 @@ class Table(NamedTuple):
 
 
 @compiled
-def light_vertices(table: Table, basis: Float32, share: float, more: float, light: Float32) -> None:
+def light_vertices(table: Table, basis: Float32, wide: float, added: float, light: Float32) -> None:
     """Write light (N, 4): key light, sky, through, rim light.
 
-    basis: (2, 16), weights of the harmonics for key and rim light. share: how far the mouth is wide open.
-    more: the share of the missing light that is added.
+    basis: (2, 16), weights of the harmonics for key and rim light. wide: how far the mouth is wide open.
+    added: the share of the missing light that is added.
     """
     count = len(table.open)
     if len(light) < count:
         raise IndexError("light for fewer vertices than the table's")
-    share, more = np.float32(share), np.float32(more)  # type: ignore[assignment]
+    share, more = np.float32(wide), np.float32(added)
     key, rim, back = _products(table.light, table.through, basis, count)
     for i in range(count):
         light[i, 0], light[i, 1], light[i, 2], light[i, 3] = key[i], table.open[i], back[i], rim[i]

@@ -22,8 +22,9 @@ from fba_player._figure._face_parts import (
     with_triangles,
 )
 from fba_player._figure.face_light import MOUTH_OPEN, FaceLight
+from fba_player._figure.model_units import EYES_APART
 from fba_player._figure.wrinkles import place_wrinkles, wrinkle_strengths
-from fba_player.view._geometry import rotation_vector
+from fba_player.view._geometry import rotation_vector, transform
 from fba_player.view._view import Eye, FaceMesh, FaceShape
 from fba_player.view.camera import Subject
 
@@ -33,14 +34,11 @@ MIN_SWAY_ON_BODY = 0.45
 GRIMACE = {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300,
            6: 200, 7: 200, 53: 200, 54: 200}  # fmt: skip
 """FAPs that close the eyes, raise the brows and widen the mouth: a pose that levels of detail preserve."""
-EYES_APART = 0.062
-"""Distance between an adult's pupils, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """The face for one set of FAPs (68,): positions and normals, float32 (V, 3), without the head's turn
-    (4, 4)."""
+    """The face for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4)."""
 
     faps: Float32
     positions: Float32
@@ -73,9 +71,7 @@ class FaceFigure:
     @cached_property
     def between_eyes(self) -> Float64:
         """(3,) the point between the pupils, metres, in the frame of the model."""
-        eyes = [self.model.points[point_row(name)] for name in ("3.5", "3.6")]
-        middle: Float64 = np.mean(eyes, axis=0)
-        return middle
+        return np.asarray(self.model.points[[point_row("3.5"), point_row("3.6")]].mean(axis=0))
 
     @cached_property
     def subject(self) -> Subject:
@@ -119,15 +115,12 @@ class FaceFigure:
             if self.model.part(name).kind in without or not len(shape.triangles):
                 continue
             rows = self.rows(name)
-            positions, normals = pose.positions[rows], pose.normals[rows]
-            meshes.append(
-                FaceMesh(shape, positions, normals, light[rows], matrix, axis, self.centre, wrinkles=wrinkles)
-            )
+            part = pose.positions[rows], pose.normals[rows], light[rows]
+            meshes.append(FaceMesh(shape, *part, matrix, axis, self.centre, wrinkles=wrinkles))
         return meshes
 
     def rows(self, name: str) -> slice:
-        """Return the slice of a part's vertices in the arrays of the model. Raises KeyError for an unknown
-        name."""
+        """Return the slice of a part's vertices in the arrays of the model; KeyError for an unknown name."""
         return part_rows(self.model, name)
 
     def shade(self, faps: Float32, frame: Float64) -> Float32:
@@ -150,11 +143,8 @@ class FaceFigure:
         ]
 
     def points(self, faps: Float32, matrix: Float64) -> Float64:
-        """Return float64 (84, 3): feature points in the world for FAPs (68,); NaN for those that the face
-        lacks."""
-        points = self.deformer.feature_points(faps)
-        moved: Float64 = points @ matrix[:3, :3].T + matrix[:3, 3]
-        return moved
+        """Return float64 (84, 3): feature points in the world for FAPs (68,); NaN for missing ones."""
+        return transform(self.deformer.feature_points(faps), matrix)
 
     @cached_property
     def _shapes_on_body(self) -> dict[str, FaceShape]:
@@ -196,9 +186,8 @@ def _extreme_positions(deformer: Deformer, faps: dict[int, int]) -> Float32:
 
 def _head_centre(model: FaceModel) -> Float64:
     """Return (3,): the centre of the head's rotation in its tables; the origin if they do not turn it."""
-    for number in (48, 49, 50):
-        table = model.table_of.get(number)
-        for transform in table.transforms if table is not None else ():
-            if transform.kind == "rotation":
-                return np.array(transform.centre)
+    tables = [model.table_of[number] for number in (48, 49, 50) if number in model.table_of]
+    for part in (one for table in tables for one in table.transforms):
+        if part.kind == "rotation":
+            return np.array(part.centre)
     return np.zeros(3)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
-from fba.cache import load_or_make
+from fba.cache import load_or_make, make_key
 from fba.compiled import is_compiled
 from fba.face import Deformer, FaceModel
 from fba.face.model import point_row
@@ -37,8 +36,10 @@ MIN_SWAY = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Baked:
-    """Visibility with the mouth shut and wide open; near: bool (V,), where these differ; gaps: distances of
-    the lips in both, metres."""
+    """Visibility with the mouth shut and wide open.
+
+    near: bool (V,), where these differ. gaps: distances of the lips in both, metres.
+    """
 
     shut: Visibility
     wide: Visibility
@@ -83,9 +84,8 @@ class FaceLight:
         light = np.empty((len(self._sway), 4), dtype=np.float32)
         for part, baked in zip(self._model.parts, self._part_lights, strict=True):
             # Teeth get more light than falls in, as a photographer would have it.
-            baked.shade(
-                share, lights, TEETH_FILL_SHARE * share if part.kind == "teeth" else 0.0, light[baked.rows]
-            )
+            added = TEETH_FILL_SHARE * share if part.kind == "teeth" else 0.0
+            baked.shade(share, lights, added, light[baked.rows])
         for rows, outside in zip(self._tongues, out, strict=True):
             if outside.any():
                 light[rows] += (np.array(FREE_LIGHT, dtype=np.float32) - light[rows]) * outside[:, None]
@@ -93,10 +93,8 @@ class FaceLight:
 
     @cached_property
     def _part_lights(self) -> list[_PartLight]:
-        return [
-            _part_light(self.baked, part_rows(self._model, part.name), self._sway)
-            for part in self._model.parts
-        ]
+        parts = self._model.parts
+        return [_part_light(self.baked, part_rows(self._model, part.name), self._sway) for part in parts]
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:
@@ -106,20 +104,16 @@ class FaceLight:
 
     def _gap(self, positions: Float32) -> float:
         assert self._lips is not None
-        way = positions[self._lips[0]] - positions[self._lips[1]]
-        return math.sqrt(float(way @ way))
+        between = positions[self._lips[0]] - positions[self._lips[1]]
+        return math.sqrt(float(between @ between))
 
     def _out_of_mouth(self, depths: Float32, positions: Float32) -> Float32:
-        """Return float32 (N,), 0..1: how far vertices of a tongue at these depths (z) are out between the
-        lips."""
-        if self._lips is None:
+        """Return float32 (N,), 0..1: how far vertices of a tongue at depths (z) are out between the lips."""
+        lips = math.inf if self._lips is None else float(positions[self._lips, 2].min())
+        if depths.max(initial=-math.inf) <= lips:  # the usual case
             return np.zeros(len(depths), dtype=np.float32)
         reach = 0.12 * self._model.fapu.ENS * 1024
-        lips = min(positions[self._lips[0], 2], positions[self._lips[1], 2])
-        if depths.max(initial=lips) <= lips:  # the usual case
-            return np.zeros(len(depths), dtype=np.float32)
-        share: Float32 = np.clip((depths - lips) / reach, 0.0, 1.0)
-        return share.astype(np.float32)
+        return np.asarray(np.clip((depths - lips) / reach, 0.0, 1.0), dtype=np.float32)
 
     @cached_property
     def baked(self) -> Baked:
@@ -155,18 +149,15 @@ class FaceLight:
 
 
 def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
-    """Return what `bake` returns, stored in the disk cache: computing it takes half a second of every
-    start."""
+    """Return what `bake` returns, stored in the disk cache: it takes half a second of every start."""
 
     def make() -> list[Float16]:
         return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
 
-    digest = hashlib.sha256(CACHE_VERSION.encode())
-    for array in (positions, normals, triangles, within):
-        digest.update(np.ascontiguousarray(array).data)
     count = len(within)
     shapes = ((count, HARMONICS), (count, HARMONICS), (count,))
-    arrays = load_or_make(f"light-{digest.hexdigest()[:32]}", shapes, make) if is_compiled() else make()
+    key = make_key("light", CACHE_VERSION, positions, normals, triangles, within)
+    arrays = load_or_make(key, shapes, make) if is_compiled() else make()
     return Visibility(*(array.astype(np.float32) for array in arrays))
 
 
@@ -184,17 +175,17 @@ class _PartLight:
     still: Table
     sway: Float32
 
-    def shade(self, share: float, lights: Float32, on_teeth: float, light: Float32) -> None:
+    def shade(self, share: float, lights: Float32, added: float, light: Float32) -> None:
         """Write light (N, 4): key light, sky, through, rim light.
 
         share: how far the mouth is wide open. lights: (2, 16), weights of the harmonics for key and rim light
         at vertices that move with the head; where the head has turned, two more rows for vertices at rest.
-        on_teeth: the share of the missing light that is added.
+        added: the share of the missing light that is added.
         """
-        light_vertices(self.table, lights[:2], share, on_teeth, light)
+        light_vertices(self.table, lights[:2], share, added, light)
         if len(lights) > 2 and len(self.swaying):
             still = np.empty((len(self.swaying), 4), dtype=np.float32)
-            light_vertices(self.still, lights[2:], share, on_teeth, still)
+            light_vertices(self.still, lights[2:], share, added, still)
             blend_swaying(light, still, self.swaying, self.sway)
 
 

@@ -61,10 +61,9 @@ class Docks:
             self._arranged = ((), {})
 
     def arrange(self, requests: list[DockRequest], wide: float, top: float, high: float) -> dict[str, Dock]:
-        """Return the positions of panels by name, in a display `wide` points wide with `high` free points
-        from `top` on.
+        """Return the positions of panels by name; panels whose title has no room are left out.
 
-        Panels whose title has no room are left out.
+        wide: of the display. high: height that is free from `top` on.
         """
         key = (tuple(requests), wide, top, high)
         if self._arranged[0] == key:
@@ -76,10 +75,8 @@ class Docks:
         middle = max(MIN_MIDDLE_SHARE * wide, MIN_MIDDLE)
         both = room - middle >= 2 * MIN_COLUMN
         columns: dict[str, list[DockRequest]] = {"left": [], "right": []}
-        known = [name for name in self._sides if name in names]  # in the order in which they opened
-        for request in sorted(
-            requests, key=lambda one: known.index(one.name) if one.name in known else len(known)
-        ):
+        opened = list(self._sides)  # in this order; new ones come last
+        for request in sorted(requests, key=lambda one: [*opened, one.name].index(one.name)):
             if request.name not in self._sides:
                 self._sides[request.name] = _side(request, columns, high)
                 self._used.append(request.name)
@@ -105,9 +102,9 @@ class Docks:
                 break
             if any(request.name == name for request in column):
                 folded.add(name)
-        heights = _share_height([TITLE if one.name in folded else one.least for one in column],
-                          [TITLE if one.name in folded else one.height for one in column],
-                          high - _gaps(column, folded))  # fmt: skip
+        least = [TITLE if one.name in folded else one.least for one in column]
+        liked = [TITLE if one.name in folded else one.height for one in column]
+        heights = _share_height(least, liked, high - _gaps(column, folded))
         docks, y = {}, top
         for request, height in zip(column, heights, strict=True):
             left_over = top + high - y
@@ -156,8 +153,7 @@ def _gaps(column: list[DockRequest], folded: set[str]) -> float:
 
 
 def _share_height(least: list[float], most: list[float], room: float) -> list[float]:
-    """Return the heights from `least` to `most`; the room beyond the least is shared in proportion to the
-    difference."""
+    """Return heights from `least` to `most`; room beyond the least is shared in proportion to the rest."""
     least = [min(low, high) for low, high in zip(least, most, strict=True)]
     missing = sum(most) - sum(least)
     spare = min(max(room - sum(least), 0.0), missing)

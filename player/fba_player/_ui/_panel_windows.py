@@ -11,7 +11,6 @@ from fba_player.session._session import Session
 TOP = 56.0
 """Top of the columns, below the buttons, in points."""
 
-
 _FLAGS = imgui.WindowFlags_
 FREE = int(_FLAGS.no_saved_settings | _FLAGS.no_collapse)
 DOCKED = int(FREE | _FLAGS.no_resize | _FLAGS.no_bring_to_front_on_focus)
@@ -56,9 +55,7 @@ class PanelWindows:
         self._moved -= names
 
     def _request(self, panel: Panel) -> DockRequest:
-        height = panel.height
-        if panel.fitted:
-            height = self._needed.get(panel.name, height)
+        height = self._needed.get(panel.name, panel.height) if panel.fitted else panel.height
         return DockRequest(panel.name, panel.side, panel.width, height, panel.least)
 
     def _draw_docked(self, panel: Panel, session: Session, dock: Dock) -> None:
@@ -88,9 +85,8 @@ class PanelWindows:
             panel.draw(session)
             if panel.fitted:
                 style = imgui.get_style()
-                self._needed[panel.name] = (
-                    imgui.get_cursor_pos_y() - style.item_spacing.y + style.window_padding.y
-                )
+                end = imgui.get_cursor_pos_y() - style.item_spacing.y
+                self._needed[panel.name] = end + style.window_padding.y
         self._handle_title(panel, folded=folded)
         imgui.end()
         return bool(stays_open)

@@ -110,8 +110,7 @@ class Gif:
         return frame
 
     def _graph(self, description: str, inputs: int) -> tuple[Any, list[Any], Any]:
-        """Return (graph, inputs, output) of a filter for pictures of the film's size; input 2 is a
-        palette."""
+        """Return (graph, inputs, output) of a filter for pictures of the film; input 2 is a palette."""
         name, _, options = description.partition("=")
         graph = self._av.filter.Graph()
         width, height = self._size

@@ -53,20 +53,17 @@ class Mp4:
         self._container: Any = None
         with contextlib.ExitStack() as undo:
             undo.callback(self.abort)
-            soundtrack: FilmedSound | None
-            if audio is None or not isinstance(audio, str | os.PathLike):
-                soundtrack = audio
-            else:
-                soundtrack = Soundtrack(audio, Fraction(audio_start))
-            if soundtrack is not None:
-                self._cleanup.callback(soundtrack.close)
+            if isinstance(audio, str | os.PathLike):
+                audio = Soundtrack(audio, Fraction(audio_start))
+            if audio is not None:
+                self._cleanup.callback(audio.close)
             name = _choose_encoder(self._av)
             temporary = self._cleanup.enter_context(atomic_path(path))
             with self._convert_errors():
                 options = {"movflags": "+faststart"}  # so that it plays while it is still loading
                 self._container = self._av.open(str(temporary), "w", format="mp4", options=options)
                 self._stream = _video_stream(self._container, name, rate, self._size)
-                self._audio = None if soundtrack is None else _AudioTrack(self._container, soundtrack)
+                self._audio = None if audio is None else _AudioTrack(self._container, audio)
             self._reformatter = self._av.video.reformatter.VideoReformatter()
             version, frames = av_version(self._av), self._av.VideoFrame
             # Versions before 14 have to copy the pixels.
@@ -146,8 +143,7 @@ class _AudioTrack:
         if stop <= self._done:
             return
         for frame in self._soundtrack.frames(stop - self._done):
-            frame.pts = self._done
-            frame.time_base = Fraction(1, self._soundtrack.rate)
+            frame.pts, frame.time_base = self._done, Fraction(1, self._soundtrack.rate)
             self._done += frame.samples
             self._container.mux(self._stream.encode(frame))
 
@@ -156,9 +152,9 @@ class _AudioTrack:
 
 
 def _choose_encoder(av: Any) -> str:
-    for name in ENCODERS:
-        if name in av.codec.codecs_available:
-            return name
+    name = next((name for name in ENCODERS if name in av.codec.codecs_available), None)
+    if name is not None:
+        return name
     raise DisplayError(
         "this build of PyAV has no H.264 encoder; install the wheel of av from the package index"
     )

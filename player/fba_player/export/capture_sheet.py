@@ -17,6 +17,7 @@ from fba.arrays import Float64, UInt8
 from fba.capture.comparison import Stick
 from fba_player.export._sheet_layout import lay_out
 from fba_player.scene.scene import Scene
+from fba_player.view._geometry import transform
 from fba_player.view._view import View
 from fba_player.view.camera import Camera, Subject
 
@@ -24,6 +25,8 @@ TILE = (400, 480)
 """Width and height of one of the two pictures of a frame, in pixels."""
 SUPERSAMPLING = 2
 """Everything is painted this many times larger, and then reduced, which smooths edges."""
+SKIN_COLOUR = np.array([0.62, 0.34, 0.23])
+"""Linear colour of skin that has a texture: about its mean."""
 HIDDEN_KINDS = ("teeth", "tongue", "lash", "mouth")
 """Parts of a face that are too small to see, or behind the lips."""
 COLOURS = {"l": "#1f77b4", "r": "#d1495b", "": "#4a4e57"}
@@ -41,7 +44,7 @@ FILL_SHARE = 0.45
 YAW = 32.0
 PITCH = 7.0
 """Degrees by which the camera looks from the side, and from above."""
-MARGIN = 0.16
+FIGURE_MARGIN = 0.16
 """Metres around the figures."""
 
 
@@ -115,7 +118,7 @@ def _camera(corners: Float64, triangles: Float64, sight: Sight) -> Camera:
     low, high = np.percentile(corners, [0.5, 99.5], axis=0)
     low[1] = min(low[1], 0.0)
     centre = (low + high) / 2
-    half = (high - low) / 2 + MARGIN
+    half = (high - low) / 2 + FIGURE_MARGIN
     left = _left(sight.stick)
     facing = np.degrees(np.arctan2(-left[2], left[0]))
     across = float(np.hypot(half[0], half[2]))
@@ -127,21 +130,19 @@ def _camera(corners: Float64, triangles: Float64, sight: Sight) -> Camera:
 def _left(stick: Stick) -> Float64:
     """Return the horizontal vector from the middle of the right parts to that of the left parts."""
     sides = np.array(stick.sides)
-    places = stick.lines.mean(axis=1)
     if not (sides == "l").any() or not (sides == "r").any():
         return np.array([1.0, 0.0, 0.0])
     # the first bones of each side end at the hips: the clearest ends
     begin = [stick.lines[sides == side][0].mean(axis=0) for side in "lr"]
     vector = begin[0] - begin[1]
     if np.hypot(vector[0], vector[2]) < 1e-3:
-        vector = places[sides == "l"].mean(axis=0) - places[sides == "r"].mean(axis=0)
+        vector = stick.lines[sides == "l"].mean(axis=(0, 1)) - stick.lines[sides == "r"].mean(axis=(0, 1))
     return np.array([vector[0], 0.0, vector[2]])
 
 
 def _project(points: Float64, camera: Camera, size: tuple[int, int]) -> tuple[Float64, Float64]:
     """Return pixels (..., 2) and distances (...) of points (..., 3)."""
-    matrix = camera.view_matrix()
-    seen = points @ matrix[:3, :3].T + matrix[:3, 3]
+    seen = transform(points, camera.view_matrix())
     away = np.maximum(-seen[..., 2], 1e-3)
     scale = size[1] / 2 / np.tan(np.radians(camera.field_of_view) / 2)
     pixels = seen[..., :2] / away[..., None] * scale * [1.0, -1.0] + np.array(size) / 2
@@ -154,17 +155,13 @@ def _person(view: View) -> tuple[Float64, Float64]:
     for mesh in view.faces:
         if mesh.shape.kind in HIDDEN_KINDS or mesh.shape.across is not None:
             continue
-        points = mesh.positions.astype(np.float64) @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]
+        points = transform(mesh.positions.astype(np.float64), mesh.matrix)
         colour = mesh.shape.colours[:, :3].astype(np.float64)
         if mesh.shape.kind == "skin" and mesh.shape.picture is not None:
-            colour = colour * SKIN
+            colour = colour * SKIN_COLOUR
         triangles.append(points[mesh.shape.triangles])
         colours.append(colour[mesh.shape.triangles].mean(axis=1))
     return np.concatenate(triangles), np.concatenate(colours)
-
-
-SKIN = np.array([0.62, 0.34, 0.23])
-"""Linear colour of skin that has a texture: about its mean."""
 
 
 def _draw_triangles(
@@ -218,15 +215,8 @@ def _draw_lines(
         draw.line(pixels[number].ravel().tolist(), colour, width, joint="curve")
         if not thin:
             x, y = pixels[number, 1].tolist()
-            draw.ellipse(
-                (
-                    x - 2.5 * SUPERSAMPLING,
-                    y - 2.5 * SUPERSAMPLING,
-                    x + 2.5 * SUPERSAMPLING,
-                    y + 2.5 * SUPERSAMPLING,
-                ),
-                colour,
-            )
+            reach = 2.5 * SUPERSAMPLING
+            draw.ellipse((x - reach, y - reach, x + reach, y + reach), colour)
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:

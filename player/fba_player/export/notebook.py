@@ -117,11 +117,8 @@ class Preview:
             )  # fmt: skip
             data = path.read_bytes()
         if len(data) > MAX_FILM_BYTES:
-            size = f"{len(data) / 2**20:.1f} MB"
-            text = (
-                f"A still picture only: the film would add {size} to the page; show less of it, or smaller."
-            )
-            return self._still(scene), text
+            added = f"the film would add {len(data) / 2**20:.1f} MB to the page"
+            return self._still(scene), f"A still picture only: {added}; show less of it, or smaller."
         width, height = self._size
         sound = "muted " if self._audio is None else ""
         return (
@@ -149,11 +146,8 @@ def show_animations(shell: Any) -> None:
 
 
 def describe(animation: Animation) -> str:
-    """Return one line about an animation: its name, frames, duration, rate, and whether it has a face and a
-    body."""
-    parts = [
-        name for name, track in (("face", animation.face), ("body", animation.body)) if track is not None
-    ]
+    """Return one line about an animation: its name, frames, duration, rate, and parts."""
+    parts = [name for name in ("face", "body") if getattr(animation, name) is not None]
     frames = len(animation)
     rate = f"{float(animation.rate):.3f}".rstrip("0").rstrip(".")
     name = f"{animation.name}: " if animation.name else ""

@@ -58,9 +58,7 @@ class Offscreen:
         self._multisampled: Target | None = None
         self._samples = samples
         try:
-            with (
-                self._gl
-            ):  # current only while it is used, so that other contexts of this thread keep working
+            with self._gl:  # current only while it is used: other contexts of this thread keep working
                 self._target = Target(self._gl, self.size, samples)
                 self._renderer = Renderer(self._gl)
         except Exception:
@@ -102,8 +100,7 @@ class Offscreen:
         return self._read(view, camera, self._target)
 
     def _draw_over_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
-        """Return both pictures, multisampled: the pass that smooths edges would miss dark ones before
-        black."""
+        """Return both pictures, multisampled: smoothing would miss dark edges before black."""
         with self._gl:
             if self._multisampled is None:
                 self._multisampled = Target(self._gl, self.size, max(self._samples, TRANSPARENT_SAMPLES))
@@ -142,8 +139,7 @@ class Offscreen:
 
 
 def cut_out(black: UInt8, white: UInt8) -> UInt8:
-    """Return the foreground with alpha, uint8 (H, W, 4), from the same picture before black and before
-    white."""
+    """Return the foreground with alpha, uint8 (H, W, 4), of the same picture before black and white."""
     dark, light = (picture[..., :3].astype(np.float32) for picture in (black, white))
     opaque = np.clip(1 - (light - dark).mean(axis=2) / 255, 0.0, 1.0)
     foreground = np.empty_like(black)

@@ -21,8 +21,7 @@ GAP = 2.0
 
 
 def legend_picture(legend: Legend, scale: float) -> UInt8:
-    """Return uint8 (H, W, 4): a colour bar with numbers below and a title above. scale: 1 in a picture 720
-    high."""
+    """Return uint8 (H, W, 4): a colour bar with a title and numbers. scale: 1 in a picture 720 high."""
     from PIL import Image, ImageDraw
 
     title, small = label_font(round(17 * scale)), label_font(round(14 * scale))
@@ -43,13 +42,15 @@ def legend_picture(legend: Legend, scale: float) -> UInt8:
         draw.line((pad + column, top, pad + column, top + bar), fill=(*fill, 255))
     for share, anchor in ((0.0, "la"), (0.5, "ma"), (1.0, "ra")):
         below = (pad + share * (columns - 1), top + bar + 4 * scale)
-        draw.text(below, _number(legend.most * share), font=small, fill=TEXT, anchor=anchor)
+        draw.text(below, f"{legend.most * share:.3g}", font=small, fill=TEXT, anchor=anchor)
     return np.asarray(picture)
 
 
 def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
-    """Return uint8 (H, W, 4): all names below each other; and int64 (N, 4): left, top, width and height of
-    each."""
+    """Return all names below each other, uint8 (H, W, 4), and their boxes, int64 (N, 4).
+
+    A box is left, top, width and height.
+    """
     from PIL import Image, ImageDraw
 
     font = label_font(pixels)
@@ -66,8 +67,7 @@ def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
 
 
 def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int]) -> tuple[Intp, Float64]:
-    """Return the indices (M,) of the names for which there is room, and their upper left corners (M, 2),
-    pixels.
+    """Return the indices (M,) of names for which there is room, and their upper left corners (M, 2), pixels.
 
     dots: (N, 2), pixels from the upper left, NaN for hidden ones. sizes: (N, 2), of the names. Each name is
     beside its dot, or above its point if radius is 0, and none overlaps another. Nothing is drawn if the
@@ -82,13 +82,9 @@ def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int
     for number in np.flatnonzero(inside):
         (x, y), (wide, high) = dots[number], sizes[number]
         above = [(min(max(x - wide / 2, 0.0), size[0] - wide), y - high)] if radius == 0 else []
-        for left, top in (
-            *above,
-            (x + reach, y - high / 2),
-            (x - reach - wide, y - high / 2),
-            (x - wide / 2, y - reach - high),
-            (x - wide / 2, y + reach),
-        ):
+        beside = [(x + reach, y - high / 2), (x - reach - wide, y - high / 2)]
+        beyond = [(x - wide / 2, y - reach - high), (x - wide / 2, y + reach)]
+        for left, top in (*above, *beside, *beyond):
             box = (left, top, left + wide, top + high)
             within = left >= 0 and top >= 0 and box[2] <= size[0] and box[3] <= size[1]
             if within and not any(_meet(box, other) for other in taken):
@@ -101,7 +97,3 @@ def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int
 
 def _meet(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
-
-
-def _number(value: float) -> str:
-    return "0" if value == 0 else f"{value:.3g}"

@@ -14,6 +14,7 @@ from fba_player.gl._lod import distance, share_memory
 from fba_player.gl._resources import (
     RecentlyUsed,
     load_program,
+    make_buffer,
     make_texture,
     matrix_bytes,
     set_uniform,
@@ -46,8 +47,7 @@ class FaceRenderer:
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
 
     def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
-        """Set the camera: its position (3,), the matrix (4, 4) from world to clip space, and the size of a
-        pixel at a distance of 1."""
+        """Set the camera: its position (3,), the matrix (4, 4) to clip space, a pixel's size."""
         before = self._camera
         self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
         if self._camera[1:] != before[1:] or not np.array_equal(self._camera[0], before[0]):
@@ -61,7 +61,9 @@ class FaceRenderer:
             if not mesh.shape.see_through:
                 self._draw(mesh)
         transparent = [mesh for mesh in meshes if mesh.shape.see_through]
-        self._draw_cores(transparent)
+        for mesh in transparent:  # pixels that are nearly opaque hide what is behind them, in any order
+            if mesh.shape.alpha == "blend":
+                self._draw(mesh, core=True)
         if transparent:
             gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
             gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
@@ -70,13 +72,6 @@ class FaceRenderer:
                 self._draw(mesh)
             gl.fbo.depth_mask = True
             gl.enable_only(gl.DEPTH_TEST)
-
-    def _draw_cores(self, meshes: list[FaceMesh]) -> None:
-        """Draw the nearly opaque pixels of blended parts, which then hide what is behind them, in any
-        order."""
-        for mesh in meshes:
-            if mesh.shape.alpha == "blend":
-                self._draw(mesh, core=True)
 
     def close(self) -> None:
         """Free all OpenGL objects."""
@@ -168,24 +163,22 @@ class FaceRenderer:
         gl, shape, count = self._gl, mesh.shape, len(mesh.positions)
         texcoords = shape.texcoords if shape.texcoords is not None else np.zeros((count, 2))
         still = np.concatenate([shape.colours, texcoords, shape.sway[:, None]], axis=1)
-        parts: dict[str, Any] = {
+        texel = 0.0
+        if shape.wrinkle_places is not None:
+            texel = texture_breadth(*_in_map(shape, mesh.positions)) / TEXELS
+        return {
             "positions": gl.buffer(reserve=max(count, 1) * 12, dynamic=True),
             "normals": gl.buffer(reserve=max(count, 1) * 12, dynamic=True),
             "light": gl.buffer(reserve=max(count, 1) * 16, dynamic=True),
-            "still": gl.buffer(np.ascontiguousarray(still, dtype="f4").tobytes()),
-            "triangles": gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes()),
+            "still": make_buffer(gl, still),
+            "triangles": make_buffer(gl, shape.triangles, "i4"),
+            "across": None if shape.across is None else make_buffer(gl, shape.across),
+            "wrinkles": None if shape.wrinkle_places is None else make_buffer(gl, shape.wrinkle_places),
+            "wrinkle_texel": texel,
+            "arrays": {},
+            "pictures": Pictures(gl, shape, mesh.positions),
+            "lit": None,
         }
-        parts["across"] = None
-        if shape.across is not None:
-            parts["across"] = gl.buffer(np.ascontiguousarray(shape.across, dtype="f4").tobytes())
-        parts["wrinkles"], parts["wrinkle_texel"] = None, 0.0
-        if shape.wrinkle_places is not None:
-            parts["wrinkles"] = gl.buffer(np.ascontiguousarray(shape.wrinkle_places, dtype="f4").tobytes())
-            parts["wrinkle_texel"] = texture_breadth(*_in_map(shape, mesh.positions)) / TEXELS
-        parts["arrays"] = {}
-        parts["pictures"] = Pictures(gl, shape, mesh.positions)
-        parts["lit"] = None
-        return parts
 
     def _wrinkle_map(self, mesh: FaceMesh, parts: dict[str, Any], wide: float) -> Any:
         """Return the map of wrinkles for pixels of this width (m), or None where there is nothing to see."""
@@ -195,15 +188,8 @@ class FaceRenderer:
         if halvings not in self._wrinkles:
             from PIL import Image
 
-            pixels = wrinkle_map()
-            smaller = np.stack(
-                [
-                    np.asarray(Image.fromarray(channel).reduce(2**halvings))
-                    for channel in np.moveaxis(pixels, 2, 0)
-                ],
-                axis=2,
-            )
-            texture = make_texture(self._gl, smaller)
+            channels = [Image.fromarray(one).reduce(2**halvings) for one in np.moveaxis(wrinkle_map(), 2, 0)]
+            texture = make_texture(self._gl, np.stack([np.asarray(one) for one in channels], axis=2))
             texture.repeat_x = texture.repeat_y = False
             self._wrinkles[halvings] = texture
         return self._wrinkles[halvings]

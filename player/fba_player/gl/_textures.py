@@ -38,8 +38,7 @@ class Pictures:
             self._breadth = texture_breadth(positions, shape.texcoords, shape.triangles)
 
     def choose(self, pixel: float) -> Any:
-        """Return the texture for pixels of this width (m) at the distance of the part; None if it has no
-        picture."""
+        """Return the texture for pixels of this width (m) on the part; None if it has no picture."""
         if self._picture is None:
             return None
         halvings = count_halvings(self._breadth / max(self._picture.size), pixel, max(self._picture.size))
@@ -66,8 +65,10 @@ def _weigh_by_alpha(pixels: UInt8) -> UInt8:
 
 
 def count_halvings(texel: float, pixel: float, size: int) -> int:
-    """Return how often to halve a picture of `size` texels, `texel` metres wide, to make them about a pixel
-    wide."""
+    """Return how often to halve a picture of `size` texels, so that texels are about a pixel wide.
+
+    texel, pixel: their widths in metres.
+    """
     if not texel > 0 or not pixel > 0:
         return 0
     ratio = MIN_TEXEL * pixel / texel

@@ -33,8 +33,6 @@ CHECK_BAP_STEPS_AFTER = 4
 CHOOSE_BAP_STEPS_AFTER = 1.25
 """Seconds of a body after which the BAP steps are chosen by how it moves; nothing is shown before. A file in
 a pipe arrives faster: its end, with the mark, comes within `PATIENCE_SECONDS`."""
-
-
 MARK_BYTES = 64
 """More than a mark and its start code take."""
 
@@ -134,25 +132,16 @@ class LiveAnimation:
         return self._now.animation(self.name)
 
     def info(self) -> StreamInfo:
-        """Return the planes that have arrived, their bits and the bit rate; without the list of
-        parameters."""
+        """Return the planes that have arrived, their bits and the bit rate, but no parameters."""
         now, size = self._now, self.received
         first, last = (int(now.index[0]), int(now.index[-1])) if len(now.index) else (0, -1)
         return StreamInfo(
-            format="fba",
-            size=size,
-            rate=now.rate,
-            frames=len(now.index),
-            duration=Fraction(last - first + 1) / now.rate,
-            start=first / now.rate,
-            skipped=last - first + 1 - len(now.index),
-            face=None,
-            body=None,
-            intra_planes=int(now.plane_intra.sum()),
-            plane_bits=now.plane_bits,
-            plane_intra=now.plane_intra,
+            format="fba", size=size, rate=now.rate, frames=len(now.index),
+            duration=Fraction(last - first + 1) / now.rate, start=first / now.rate,
+            skipped=last - first + 1 - len(now.index), face=None, body=None,
+            intra_planes=int(now.plane_intra.sum()), plane_bits=now.plane_bits, plane_intra=now.plane_intra,
             frame_index=now.index,
-        )
+        )  # fmt: skip
 
     @property
     def arrived(self) -> int:
@@ -236,8 +225,7 @@ class LiveAnimation:
             self._changed.notify_all()
 
     def _is_marked(self, new: int) -> bool:
-        """Return whether the withheld bytes contain a mark. new: number of bytes at their end not searched
-        yet."""
+        """Return whether the withheld bytes contain a mark. new: bytes at their end not searched yet."""
         assert self._held is not None
         begin = max(len(self._held) - new - MARK_BYTES, 0)
         return b"bap_steps=" in self._held[begin:] and marked_table(self._held) is not None
@@ -293,12 +281,8 @@ class LiveAnimation:
         )
 
     def _check_bap_steps(self, *, at_end: bool = False) -> None:
-        now = self._now
-        if (
-            self._checked_bap_steps
-            or now.body is None
-            or (self.duration < CHECK_BAP_STEPS_AFTER and not at_end)
-        ):
+        now, due = self._now, at_end or self.duration >= CHECK_BAP_STEPS_AFTER
+        if self._checked_bap_steps or now.body is None or not due:
             return
         from fba.body.plausibility import find_doubt
 

@@ -25,7 +25,7 @@ TURN = 2 * math.pi / 1e-5
 """A full turn in units of a BAP."""
 SHIFTS = slice(180, 183)
 """Columns of the BAPs that are millimetres, not angles."""
-BLOCK = 2048
+BLOCK_FRAMES = 2048
 CACHED_BLOCKS = 4
 """Blocks of frames in memory."""
 FRAME_ROUNDING = 1e-6
@@ -44,7 +44,7 @@ class Timeline:
 
     growing = False
     arrived = 0
-    block = BLOCK
+    block = BLOCK_FRAMES
     """Frames resolved at once."""
 
     def __init__(self, animation: Animation, model: FaceSettings | None = None) -> None:
@@ -81,33 +81,27 @@ class Timeline:
         return self.start + self.duration
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """Return (frame, next frame, weight of the next) at a time in seconds, frames as positions in the
-        animation.
+        """Return (frame, next frame, weight of the next) at a time in seconds, frames as positions.
 
         Raises ValueError for a time that is not finite, or an animation without frames.
         """
-        if not math.isfinite(time):
-            raise ValueError(f"the time must be a finite number of seconds, not {time}")
-        index = self.animation.index
-        if not len(index):
+        if not self.frames:
             raise ValueError("the animation has no frames")
-        return frame_position(index, self.rate, time)
+        return frame_position(self.animation.index, self.rate, time)
 
     def time_of(self, frame: int) -> Fraction:
         """Return the time of a frame, by its position in the animation: seconds, exact."""
         return Fraction(int(self.animation.index[frame])) / self.rate
 
     def faps(self, time: float) -> Float32:
-        """Return the FAPs shown at a time in seconds, float32 (68,); zeros where the animation has no
-        face."""
+        """Return the FAPs shown at a time in seconds, float32 (68,); zeros without a face."""
         if self.animation.face is None:
             return np.zeros(68, dtype=np.float32)
         before, after, share = self.position(time)
         first = self._face(before)
         if share == 0.0 or not self.interpolate:
             return first
-        shown: Float32 = first + (self._face(after) - first) * np.float32(share)
-        return shown
+        return np.asarray(first + (self._face(after) - first) * np.float32(share))
 
     def baps(self, time: float) -> Float64:
         """Return the BAPs shown at a time in seconds, float64 (296,); zeros where the animation has no body.
@@ -122,8 +116,7 @@ class Timeline:
         first = self._body(before).astype(np.float64)
         if share == 0.0 or not self.interpolate:
             return first
-        shown: Float64 = first + _shorten_turns(self._body(after) - first) * share
-        return shown
+        return np.asarray(first + _shorten_turns(self._body(after) - first) * share)
 
     def many(self, times: npt.ArrayLike) -> tuple[Float32, Float64]:
         """Return the FAPs, float32 (T, 68), and BAPs, float64 (T, 296), at times (T,) in seconds.
@@ -143,8 +136,8 @@ class Timeline:
         faces, bodies = np.zeros((len(at), FAP_COUNT), np.float32), np.zeros((len(at), BAP_COUNT))
         if self.animation.face is not None:
             first = self._gather_rows(before, self._face, self._faces_shown)
-            way = self._gather_rows(after, self._face, self._faces_shown) - first
-            faces = first + way * share.astype(np.float32)[:, None]
+            change = self._gather_rows(after, self._face, self._faces_shown) - first
+            faces = first + change * share.astype(np.float32)[:, None]
         if self.animation.body is not None:
             start = self._gather_rows(before, self._body, self._bodies_shown).astype(np.float64)
             turn = self._gather_rows(after, self._body, self._bodies_shown) - start
@@ -152,13 +145,9 @@ class Timeline:
         return faces, bodies
 
     def _gather_rows(
-        self,
-        frames: Intp,
-        resolve_frame: Callable[[int], Array],
-        shown: OrderedDict[int, Array],
+        self, frames: Intp, resolve_frame: Callable[[int], Array], shown: OrderedDict[int, Array]
     ) -> Array:
-        """Return the rows of many frames. resolve_frame: resolves a frame with its block, which is then in
-        `shown`."""
+        """Return the rows of many frames. resolve_frame: brings a frame's block into `shown`."""
         blocks = frames // self.block
         parts = []
         for block in np.unique(blocks).tolist():
@@ -183,8 +172,7 @@ class Timeline:
                 self._resolvers.append(resolver)
             shown = self._resolvers[block].copy().push(track[self._rows(block)])
             _cache_block(self._faces_shown, block, shown)
-        face: Float32 = shown[row]
-        return face
+        return np.asarray(shown[row])
 
     def _body(self, frame: int) -> Int32:
         block, row = divmod(frame, self.block)
@@ -194,8 +182,7 @@ class Timeline:
                 self._bodies.append(self._held_body(len(self._bodies) - 1)[-1].copy())
             shown = self._held_body(block)
             _cache_block(self._bodies_shown, block, shown)
-        body: Int32 = shown[row]
-        return body
+        return np.asarray(shown[row])
 
     def _held_body(self, block: int) -> Int32:
         track = self.animation.body
@@ -203,8 +190,7 @@ class Timeline:
         part = track[self._rows(block)]
         if part.mask.all():
             return part.values
-        held: Int32 = hold(part.values, part.mask, self._bodies[block])
-        return held
+        return np.asarray(hold(part.values, part.mask, self._bodies[block]))
 
     def _rows(self, block: int) -> slice:
         return slice(block * self.block, (block + 1) * self.block)
@@ -221,47 +207,21 @@ class CaptureTimes:
 
     def __init__(self, times: Float64, rate: Fraction) -> None:
         self._times = times
-        self._rate = rate
         self.interpolate = True
-
-    @property
-    def frames(self) -> int:
-        """Number of frames."""
-        return len(self._times)
-
-    @property
-    def rate(self) -> Fraction:
-        """Frames a second, as the capture says."""
-        return self._rate
-
-    @property
-    def start(self) -> Fraction:
-        """Time of the first frame, seconds."""
-        return self.time_of(0)
-
-    @property
-    def end(self) -> Fraction:
-        """Time one frame period after the last frame, seconds."""
-        return self.time_of(len(self._times) - 1) + 1 / self._rate
-
-    @property
-    def duration(self) -> Fraction:
-        """Seconds from start to end."""
-        return self.end - self.start
+        self.frames, self.rate = len(times), rate
+        self.start, self.end = self.time_of(0), self.time_of(len(times) - 1) + 1 / rate
+        self.duration = self.end - self.start
 
     def time_of(self, frame: int) -> Fraction:
         """Return the time of a frame, seconds, to a microsecond."""
         return Fraction(float(self._times[frame])).limit_denominator(1_000_000)
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """Return (frame, next frame, weight of the next) at a time in seconds; ValueError if it is not
-        finite."""
-        if not math.isfinite(time):
-            raise ValueError(f"the time must be a finite number of seconds, not {time}")
+        """Return (frame, next frame, weight of the next) at a time; ValueError if it is not finite."""
+        _check_finite(time)
         last = len(self._times) - 1
         # a frame's own time shows that frame, whatever the rounding
-        before = int(np.searchsorted(self._times, time + 1e-6, side="right")) - 1
-        before = min(max(before, 0), last)
+        before = min(max(int(np.searchsorted(self._times, time + 1e-6, side="right")) - 1, 0), last)
         after = min(before + 1, last)
         gap = float(self._times[after] - self._times[before])
         share = (time - float(self._times[before])) / gap if gap > 0 else 0.0
@@ -271,11 +231,12 @@ class CaptureTimes:
 def frame_position(
     index: Int64, rate: Fraction, time: float, rounding: float = FRAME_ROUNDING
 ) -> tuple[int, int, float]:
-    """Return (frame, next frame, weight of the next) at a time in seconds, as `Timeline.position`.
+    """Return (frame, next frame, weight of the next) at a time; ValueError if it is not finite.
 
     index: (T,), ascending numbers of frames at this rate. rounding: frame periods within which a time
     counts as that of a frame.
     """
+    _check_finite(time)
     at = time * rate.numerator / rate.denominator
     if abs(at - round(at)) < rounding:
         at = float(round(at))  # a frame's own time shows that frame, whatever the rounding
@@ -286,12 +247,17 @@ def frame_position(
     return before, after, min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
 
 
-def _shorten_turns(way: Float64) -> Float64:
+def _check_finite(time: float) -> None:
+    if not math.isfinite(time):
+        raise ValueError(f"the time must be a finite number of seconds, not {time}")
+
+
+def _shorten_turns(changes: Float64) -> Float64:
     """Return the changes of BAPs (..., 296), each angle the shorter way round."""
-    if not way.size or max(way.max(), -way.min()) <= TURN / 2:
-        return way
-    shorter: Float64 = way - TURN * np.rint(way / TURN)
-    shorter[..., SHIFTS] = way[..., SHIFTS]
+    if not changes.size or max(changes.max(), -changes.min()) <= TURN / 2:
+        return changes
+    shorter: Float64 = changes - TURN * np.rint(changes / TURN)
+    shorter[..., SHIFTS] = changes[..., SHIFTS]
     return shorter
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from fba.arrays import Float64, Int64
 from fba_player.playback.timeline import FRAME_ROUNDING, Timeline, frame_position
 
-MAX_RATE = 1_000_000
+MAX_COMMON_RATE = 1_000_000
 """Largest common rate, in frames per second, of performances with different rates."""
 
 
@@ -86,8 +86,6 @@ class CompareTimeline:
 
     def position(self, time: float) -> tuple[int, int, float]:
         """Return (frame, next frame, weight of the next) at a time; ValueError if it is not finite."""
-        if not math.isfinite(time):
-            raise ValueError(f"the time must be a finite number of seconds, not {time}")
         rate, index = self._frames()
         return frame_position(index, rate, time, FRAME_ROUNDING * float(rate / self.rate))
 
@@ -104,12 +102,9 @@ class CompareTimeline:
         arrived = self.arrived
         if self._merged is None or self._merged[0] != arrived:
             parts = [one.rate for one in self.timelines] + [1 / later for later in self.later if later]
-            rate = Fraction(
-                math.lcm(*(abs(part).numerator for part in parts)),
-                math.gcd(*(abs(part).denominator for part in parts)),
-            )
-            if rate > MAX_RATE:
-                rate = Fraction(MAX_RATE)
+            common = math.lcm(*(abs(part).numerator for part in parts))
+            rate = Fraction(common, math.gcd(*(part.denominator for part in parts)))
+            rate = min(rate, Fraction(MAX_COMMON_RATE))
             indices = []
             for one, later in self._shown():
                 step, first = rate / one.rate, later * rate
@@ -121,8 +116,7 @@ class CompareTimeline:
 
 def _later(timelines: tuple[Timeline, ...]) -> tuple[Fraction, ...]:
     first = timelines[0]
-    together = [one.start < first.end and first.start < one.end for one in timelines]
     return tuple(
-        Fraction(0) if meets else first.start - one.start
-        for one, meets in zip(timelines, together, strict=True)
+        Fraction(0) if one.start < first.end and first.start < one.end else first.start - one.start
+        for one in timelines
     )

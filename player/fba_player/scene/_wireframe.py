@@ -9,11 +9,12 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Intp
 from fba_player._mesh.primitives import sphere_mesh
-from fba_player.view._geometry import world_normals, world_positions
+from fba_player.view._geometry import transform, world_normals, world_positions
 from fba_player.view._view import Colour, Eye, FaceMesh, FaceShape, Lines, Mesh, MeshShape
 
 WIRE: Colour = (0.03, 0.05, 0.08, 0.8)
 WIRE_LIFT = 0.0012
+"""Depth (m) of skin through which lines show, on an adult's face."""
 NORMAL_LENGTH = 0.007
 """Metres, on an adult's face."""
 NORMAL_CELL = 0.0045
@@ -33,11 +34,11 @@ class Wireframe:
 
     def edges(self, faces: list[FaceMesh], meshes: list[Mesh], eyes: list[Eye], scale: float) -> Lines:
         """Return all edges, each once. scale: size of the face, 1 for an adult's."""
-        ends = [np.zeros((0, 2, 3), dtype=np.float32)]
+        ends: list[Float32 | Float64] = [np.zeros((0, 2, 3), dtype=np.float32)]
         ends += [world_positions(mesh)[self._unique_edges(mesh.shape)] for mesh in faces]
-        ends += [_moved(mesh.positions, mesh.matrix)[self._unique_edges(mesh.shape)] for mesh in meshes]
-        ends += [_moved(_eyeball_edges(), eye.matrix) for eye in eyes]
-        return Lines(np.concatenate(ends), WIRE, 1.0, WIRE_LIFT * scale)
+        ends += [transform(mesh.positions, mesh.matrix)[self._unique_edges(mesh.shape)] for mesh in meshes]
+        ends += [transform(_eyeball_edges(), eye.matrix) for eye in eyes]
+        return Lines(np.concatenate(ends).astype(np.float32), WIRE, 1.0, WIRE_LIFT * scale)
 
     def normals(self, faces: list[FaceMesh], scale: float) -> Lines:
         """Return a line at each vertex, or at some of many; red, green and blue stand for x, y and z."""
@@ -63,8 +64,7 @@ class Wireframe:
 def unique_edges(triangles: Int32) -> Int32:
     """Return int32 (E, 2): the edges of triangles (F, 3), each once, the smaller index first."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    unique: Int32 = np.unique(edges, axis=0).astype(np.int32)
-    return unique
+    return np.unique(edges, axis=0).astype(np.int32)
 
 
 @cache
@@ -80,8 +80,3 @@ def _thinned(mesh: FaceMesh, cell: float) -> Intp:
     cells = np.floor(mesh.positions[used] / max(cell, 1e-9)).astype(np.int64)
     first: Intp = np.unique(cells, axis=0, return_index=True)[1]
     return used[np.sort(first)].astype(np.intp)
-
-
-def _moved(positions: Float32, matrix: Float64) -> Float32:
-    moved: Float32 = (positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
-    return moved

@@ -14,10 +14,9 @@ from fba_player.scene._compare_timeline import CompareTimeline
 from fba_player.scene._differences import Differences, differences
 from fba_player.scene._layout import Drawing, join_views, make_caption, move_view
 from fba_player.scene.scene import Scene
-from fba_player.view._view import Extras, View, srgb
+from fba_player.view._view import Extras, View
 from fba_player.view.camera import PRESETS, Camera, Subject
 from fba_player.view.protocols import Timed
-from fba_player.view.switches import Switches
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -56,11 +55,12 @@ class CompareScene(Timed[CompareTimeline]):
         self.names = tuple(names) if names is not None else tuple(scene.title for scene in scenes)
         if len(self.names) != len(self.scenes):
             raise ValueError(f"{len(self.scenes)} scenes, but {len(self.names)} names")
+        self.switches = scenes[0].switches  # `show` sets those of all
         self.timeline = CompareTimeline([scene.timeline for scene in scenes])
         self.arrangement = arrangement
         self._yaw = 0.0
         self._stands = [np.array(scene.subject.centre) for scene in scenes]
-        self._drawings = [_drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
+        self._drawings = [Drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
         self._apart: float | None = None
         self._differences: dict[tuple[int, int], Differences] = {}
 
@@ -94,11 +94,6 @@ class CompareScene(Timed[CompareTimeline]):
     def title(self) -> str:
         """The scenes' names."""
         return " | ".join(name for name in self.names if name)
-
-    @property
-    def switches(self) -> Switches:
-        """The switches of all scenes; set by `show`."""
-        return self.scenes[0].switches
 
     def show(self, name: str, on: object = True) -> None:
         """Set a switch of all scenes; ValueError for an unknown name or value."""
@@ -184,18 +179,17 @@ class CompareScene(Timed[CompareTimeline]):
         return self._differences[key]
 
     def _over(self, times: list[float]) -> View:
-        base = self.scenes[0].view_at(times[0])
+        views = [self.scenes[0].view_at(times[0])]
         travelled = np.array(self.scenes[0].travel(times[0]))
-        views = [base]
-        for number, (scene, own_time) in enumerate(list(zip(self.scenes, times, strict=True))[1:], 1):
+        for number in range(1, len(self.scenes)):
+            scene, own_time = self.scenes[number], times[number]
             before, scene.view = scene.view, "points"
             try:
                 drawn = self._drawings[number - 1](scene.view_at(own_time), len(scene.figure.eyeballs))
             finally:
                 scene.view = before
-            views.append(
-                move_view(drawn, self._height(number) + travelled - np.array(scene.travel(own_time)))
-            )
+            shift = self._height(number) + travelled - np.array(scene.travel(own_time))
+            views.append(move_view(drawn, shift))
         return join_views(views)
 
     def _right(self) -> Float64:
@@ -254,11 +248,6 @@ class CompareScene(Timed[CompareTimeline]):
         middle = middle + right * ((low + high) / 2 - float(middle @ right))
         centre = (float(middle[0]), (bottom + top) / 2, float(middle[2]))
         return Subject(centre, (top - bottom) / 2, (high - low) / 2)
-
-
-def _drawing(colour: str) -> Drawing:
-    red, green, blue = (int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5))
-    return Drawing(srgb(colour), (red, green, blue))
 
 
 def _add_caption(view: View, text: str, position: Float64) -> View:

@@ -95,13 +95,6 @@ class Scene(Timed[Timeline]):
             raise ValueError(f"no view {name!r}; there are {', '.join(LOOKS)}")
         self._view = name
 
-    def show(self, name: str, on: object = True) -> None:
-        """Set a switch: True or False, a choice's word, or a FAP by name or number; see `SWITCHES`.
-
-        Raises ValueError for a switch that does not exist or a value that it cannot have.
-        """
-        self.switches.show(name, on)
-
     @property
     def title(self) -> str:
         """The animation's name."""
@@ -154,8 +147,8 @@ class Scene(Timed[Timeline]):
             return face
         faps, joints = self._pose_at(time)
         matrix = self._face_matrix(joints) @ self.figure.pose(faps).turn
-        x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3]
-        return Subject((float(x), float(y), float(z)), face.half_height, face.half_width)
+        x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3].tolist()
+        return Subject((x, y, z), face.half_height, face.half_width)
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
         """Return a camera that has everything in view, for the named preset or for what the content suggests.
@@ -169,11 +162,7 @@ class Scene(Timed[Timeline]):
         return Camera.preset(preset, subject, aspect)
 
     def view_for(self, faps: Float32, baps: Float64) -> View:
-        """Return the view for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), not the
-        animation's.
-
-        baps are ignored if the animation has no body.
-        """
+        """Return the view for FAPs (68,), as `fba.face.resolve` gives them, and BAPs (296,), if any."""
         return self._make_view(faps, self._poser.pose(baps) if self.has_body else None)
 
     def still(self, faps: Float32) -> View:
@@ -229,8 +218,7 @@ class Scene(Timed[Timeline]):
         return replace(view, capsules=capsules, blobs=self._bones.shadows(joints), ground=True)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """Return the offset (x, y, z) of a following camera at a time, metres; zeros if it does not
-        follow."""
+        """Return the offset (x, y, z) of a following camera, metres; zeros if it does not follow."""
         if not self.has_body or not self._sampled_extent().follows:
             return (0.0, 0.0, 0.0)
         joints = self._pose_at(time)[1]
@@ -239,8 +227,7 @@ class Scene(Timed[Timeline]):
         return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Return the displacement (x, y, z) of the head from the start to a time, metres; zeros without a
-        body."""
+        """Return the displacement (x, y, z) of the head from the start, metres; zeros without a body."""
         x, y, z = np.subtract(self._face_at(time).centre, self.face_subject.centre).tolist()
         return (x, y, z)
 

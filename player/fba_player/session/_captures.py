@@ -121,8 +121,7 @@ class Captures:
             self.session.say(f"Recording stopped: {error}", "error", 8.0)
 
     def _open_sound(self) -> FilmSound | None:
-        """Return the sound for a new film; None without sound, or, with a notice, if the file cannot be
-        used."""
+        """Return the sound for a new film; None without sound, or, with a notice, if it cannot be used."""
         session = self.session
         if session.sound is None:
             return None

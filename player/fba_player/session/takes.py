@@ -118,8 +118,7 @@ class Takes:
         return self._takes.pop() if self._takes else None
 
     def path(self, name: str) -> Path:
-        """Return the path for a name: in the folder, with the suffix .fba. Raises FormatError for an empty
-        name."""
+        """Return the path for a name: in the folder, with the suffix .fba; FormatError for an empty name."""
         name = name.strip()
         if not name or name.endswith(("/", os.sep)) or name in (".", ".."):
             raise FormatError("is not a file name; give one, such as take.fba", path=name or "take")
@@ -144,11 +143,9 @@ class Takes:
         if self.last is None:
             raise FormatError("nothing was recorded that could be saved", path=path)
         if path.exists():
-            raise FormatError(
-                "exists already, and is not overwritten; choose another name, such as "
-                f"{self.free_name(path.stem)}",
-                path=path,
-            )
+            free = self.free_name(path.stem)
+            text = f"exists already, and is not overwritten; choose another name, such as {free}"
+            raise FormatError(text, path=path)
         import fba
 
         try:

@@ -16,7 +16,7 @@ from fba_player.playback.transport import Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound._pyav import import_av
 from fba_player.sound.audio_file import CHANNELS, SoundFile
-from fba_player.sound.soundtrack import AAC_RATES, BLOCK, make_frame
+from fba_player.sound.soundtrack import AAC_FRAME, AAC_RATES, make_frame
 
 PIECE_SECONDS = 1.0
 """Most seconds mixed at once."""
@@ -71,19 +71,18 @@ class FilmSound:
         self._ended = True
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """Yield the next samples, at most as many as are mixed, as `av.AudioFrame`s ("fltp") without
-        times."""
+        """Yield the next samples as far as they are mixed, as `av.AudioFrame`s ("fltp") without times."""
         while samples > 0:
+            most = min(samples, AAC_FRAME)
             with self._lock:
                 part = self._mixed.popleft() if self._mixed else None
+                if part is not None and len(part) > most:
+                    self._mixed.appendleft(part[most:])
             if part is None:
                 if not self._ended:
                     return
-                part = np.zeros((min(samples, BLOCK), CHANNELS), dtype=np.int16)
-            if len(part) > min(samples, BLOCK):
-                with self._lock:
-                    self._mixed.appendleft(part[min(samples, BLOCK) :])
-                part = part[: min(samples, BLOCK)]
+                part = np.zeros((most, CHANNELS), dtype=np.int16)
+            part = part[:most]
             samples -= len(part)
             block = np.ascontiguousarray(part.T, dtype=np.float32) / np.float32(32768)
             yield make_frame(self._av, block, self.layout, self.rate)

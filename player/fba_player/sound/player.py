@@ -220,7 +220,6 @@ def _open_device(rate: int, backend: str | None) -> Any:
             f"it needs the Python package miniaudio, which cannot be imported: {error}. "
             + cure(error, "mpeg4-fba[player]")
         ) from error
-    silent = miniaudio.Backend.NULL
     with _silence_stderr():
         device = miniaudio.PlaybackDevice(
             output_format=miniaudio.SampleFormat.SIGNED16,
@@ -228,7 +227,7 @@ def _open_device(rate: int, backend: str | None) -> Any:
             sample_rate=rate,
             buffersize_msec=round(PERIOD * 1000),
             callback_periods=PERIODS,
-            backends=[silent] if backend == "null" else None,
+            backends=[miniaudio.Backend.NULL] if backend == "null" else None,
             app_name="fba",
         )
     if backend != "null" and str(device.backend).lower() == "null":

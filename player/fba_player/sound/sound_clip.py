@@ -14,7 +14,7 @@ from fba.atomic import PathLike
 from fba.formats.time_codes import parse_time_code
 from fba_player.sound._pyav import import_av
 from fba_player.sound.audio_file import open_sound
-from fba_player.sound.soundtrack import BLOCK, Soundtrack
+from fba_player.sound.soundtrack import AAC_FRAME, Soundtrack
 
 FULL = 32767
 """The largest sample of 16 bits."""
@@ -57,7 +57,7 @@ def write_clip(file: BinaryIO, path: PathLike, start: Fraction, seconds: Fractio
             missing = round(seconds * source.rate)
             target.setnframes(missing)
             while missing > 0:
-                count = min(missing, BLOCK)
+                count = min(missing, AAC_FRAME)
                 target.writeframes(_samples(source.take(count)).tobytes())
                 missing -= count
     finally:
@@ -66,8 +66,7 @@ def write_clip(file: BinaryIO, path: PathLike, start: Fraction, seconds: Fractio
 
 def _samples(block: Any) -> Int16:
     """Return samples of 16 bits (N, channels) of float ones (channels, N), -1..1."""
-    result: Int16 = np.rint(np.clip(block.T, -1.0, 1.0) * FULL).astype("<i2")
-    return result
+    return np.asarray(np.rint(np.clip(block.T, -1.0, 1.0) * FULL).astype("<i2"))
 
 
 def _film_rate(streams: list[Any]) -> Fraction | None:

@@ -16,7 +16,7 @@ from fba_player.sound._pyav import import_av
 from fba_player.sound.audio_file import open_sound
 
 AAC_RATES = (96000, 88200, 64000, 48000, 44100, 32000, 24000, 22050, 16000, 12000, 11025, 8000)
-BLOCK = 1024
+AAC_FRAME = 1024
 """Samples of an AAC frame."""
 
 
@@ -28,8 +28,7 @@ class FilmedSound(Protocol):
     layout: str
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """Return the next samples, or those of them that are ready, as `av.AudioFrame`s ("fltp") without
-        times."""
+        """Return the next samples that are ready, as `av.AudioFrame`s ("fltp") without times."""
 
     def close(self) -> None:
         """Release its resources; safe to call twice."""
@@ -73,9 +72,9 @@ class Soundtrack:
         self._container.close()
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """Yield the next samples as `av.AudioFrame`s ("fltp") of at most `BLOCK` samples, without times."""
-        for start in range(0, samples, BLOCK):
-            yield make_frame(self._av, self.take(min(BLOCK, samples - start)), self.layout, self.rate)
+        """Yield the next samples as `av.AudioFrame`s ("fltp") of at most `AAC_FRAME`, without times."""
+        for start in range(0, samples, AAC_FRAME):
+            yield make_frame(self._av, self.take(min(AAC_FRAME, samples - start)), self.layout, self.rate)
 
     def take(self, samples: int) -> Float32:
         """Return the next samples, float32 (channels, samples), -1..1; zeros after the end of the file."""
@@ -90,7 +89,7 @@ class Soundtrack:
 
     def _decode_samples(self) -> Any:
         while self._silence > 0:
-            count = min(self._silence, BLOCK)
+            count = min(self._silence, AAC_FRAME)
             self._silence -= count
             yield np.zeros((self.channels, count), dtype=np.float32)
         resampler = self._av.AudioResampler(format="fltp", layout=self.layout, rate=self.rate)

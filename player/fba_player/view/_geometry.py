@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Floating
-from fba.rotations import quaternions
+from fba.rotations import quaternions, unit
 from fba_player.view._view import FaceMesh
 from fba_player.view.camera import Camera
 
@@ -16,27 +16,25 @@ from fba_player.view.camera import Camera
 def world_positions(mesh: FaceMesh) -> Float32:
     """Return float32 (V, 3): the mesh's positions in the world."""
     turned = turn_partly(mesh.positions, mesh.shape.sway, mesh.turn, mesh.centre)
-    world: Float32 = (turned @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]).astype(np.float32)
-    return world
+    return transform(turned, mesh.matrix).astype(np.float32)
 
 
 def world_normals(mesh: FaceMesh) -> Float32:
     """Return float32 (V, 3): the mesh's unit normals in the world."""
     turned = turn_partly(mesh.normals, mesh.shape.sway, mesh.turn, np.zeros(3)) @ mesh.matrix[:3, :3].T
-    return unit_rows(turned).astype(np.float32)
+    return unit(turned).astype(np.float32)
 
 
-def unit_rows(vectors: Float64) -> Float64:
-    """Return float64 (N, 3): vectors scaled to length 1; those of length 0 stay."""
-    unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)
-    return unit
+def transform(points: Floating, matrix: Float64) -> Float64:
+    """Return points (..., 3), moved by a matrix (4, 4)."""
+    moved: Float64 = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return moved
 
 
 def turn_partly(positions: Floating, sway: Floating, turn: Float64, centre: Float64) -> Float64:
-    """Return float64 (V, 3): positions turned about `centre` (3,), each by its share `sway` (V,) of a
-    rotation.
+    """Return float64 (V, 3): positions turned about `centre` (3,), each by its share `sway` (V,) of `turn`.
 
-    turn: (3,), the rotation's axis times its angle.
+    turn: (3,), the axis of a rotation times its angle.
     """
     start = positions.astype(np.float64)
     angle = float(np.linalg.norm(turn))
@@ -67,6 +65,17 @@ def translation(offset: npt.ArrayLike) -> Float64:
     matrix = np.eye(4)
     matrix[:3, 3] = offset
     return matrix
+
+
+def project(points: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Float64, Float64]:
+    """Return pixels (N, 2) from the upper left, and depths (N,), 0..1, of points (N, 3).
+
+    Points behind the camera get NaN. matrix: (4, 4), world to clip space. size: of the picture in pixels.
+    """
+    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    clip[clip[:, 3] < 1e-6] = np.nan
+    flat = clip[:, :3] / clip[:, 3:]
+    return (flat[:, :2] * (0.5, -0.5) + 0.5) * size, flat[:, 2] * 0.5 + 0.5
 
 
 def ray_through(camera: Camera, x: float, y: float, size: tuple[int, int]) -> tuple[Float64, Float64]:

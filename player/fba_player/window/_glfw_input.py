@@ -159,8 +159,7 @@ class GlfwInput:
         glfw.set_cursor(self._window, self._cursors.get(shape))
 
     def name(self, key: int, code: int, modifiers: int) -> str | None:
-        """Return the name of a key as in the table of keys: "space", "l", "shift+left", "ctrl+s"; None
-        without one."""
+        """Return a key's name in the table of keys, "space", "shift+left", "ctrl+s"; None without one."""
         glfw = self._glfw
         word = self._key_names.get(key)
         if word is None:
@@ -189,13 +188,9 @@ class GlfwInput:
         glfw, io = self._glfw, self._gui.io
         if action == glfw.REPEAT:
             return
-        for mask, word in (
-            (glfw.MOD_CONTROL, imgui.Key.mod_ctrl),
-            (glfw.MOD_SHIFT, imgui.Key.mod_shift),
-            (glfw.MOD_ALT, imgui.Key.mod_alt),
-            (glfw.MOD_SUPER, imgui.Key.mod_super),
-        ):
-            io.add_key_event(word, bool(modifiers & mask))
+        for ours, name in (("CONTROL", "ctrl"), ("SHIFT", "shift"), ("ALT", "alt"), ("SUPER", "super")):
+            pressed = bool(modifiers & getattr(glfw, f"MOD_{ours}"))
+            io.add_key_event(getattr(imgui.Key, f"mod_{name}"), pressed)
         if key in self._imgui_keys:
             io.add_key_event(self._imgui_keys[key], action == glfw.PRESS)
 

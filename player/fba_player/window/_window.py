@@ -35,7 +35,6 @@ from fba_player.window.display import HOW_WITHOUT, FullScreen, start_glfw
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
 
-
 LOST = (
     "OpenGL stopped working ({reason}): the graphics driver was reset, or has no memory left. Start the "
     "player again; a smaller window, or LIBGL_ALWAYS_SOFTWARE=1 (drawing without the graphics card), may help"
@@ -225,11 +224,8 @@ class Window:
                 self._gui = Gui(self._gl, session)
             except (ImportError, RuntimeError) as error:
                 remedy = cure(error, "mpeg4-fba[player]")
-                warnings.warn(
-                    f"the window has no panels, as imgui cannot be used: {error}. {remedy}",
-                    FbaWarning,
-                    stacklevel=4,
-                )
+                text = f"the window has no panels, as imgui cannot be used: {error}. {remedy}"
+                warnings.warn(text, FbaWarning, stacklevel=4)
         if self._gui is None:
             self.controls = Controls(session, plain=True)
             self._overlay = Overlay(self._gl)

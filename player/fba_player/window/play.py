@@ -108,9 +108,8 @@ def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
     session.sound, session.sound_offset = path, offset
     if session.audio is None:
         name = os.path.basename(os.fspath(path))
-        session.say(
-            f"There is no sound device: {name} is not heard, but recorded films have it", "warning", 8.0
-        )
+        text = f"There is no sound device: {name} is not heard, but recorded films have it"
+        session.say(text, "warning", 8.0)
     return session.audio
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from fba.animation import Animation
 from fba.codec import StreamInfo
-from fba_player._ui.panels._bit_rates import bars_of_planes, measure_rates, probe_encoded
+from fba_player._ui.panels._rate_panel import bars_of_planes, measure_rates, probe_encoded
 
 
 def info(bits: list[int], intra: list[int], index: list[int] | None = None, size: int = 0) -> StreamInfo:
@@ -65,5 +65,5 @@ def test_what_a_performance_would_be_as_a_stream(talking: Animation) -> None:
 
 
 def test_long_ones_are_not_encoded_only_to_see(talking: Animation, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fba_player._ui.panels._bit_rates.MAX_VALUES", 29)  # it has thirty
+    monkeypatch.setattr("fba_player._ui.panels._rate_panel.MAX_VALUES", 29)  # it has thirty
     assert probe_encoded(talking) is None

@@ -158,7 +158,7 @@ def test_keys_work_through_the_points(on_display: str, surface: HeadSurface, tmp
 
 
 def test_an_unwritable_file_is_said_in_the_window(surface: HeadSurface, tmp_path: Path) -> None:
-    from fba_player.session._placing import PLACING
+    from fba_player.session._pages import PLACING
 
     placement = PointPlacement(surface, tmp_path / "nowhere" / "points.csv")
     session = Session(PlacementScene(placement), size=SIZE)

@@ -10,16 +10,16 @@ from imgui_bundle import imgui, implot
 
 from fba.arrays import Float64
 from fba_player._ui import theme
-from fba_player._ui.panels.panel import Panel, choose_name, heading, tooltip
+from fba_player._ui.panels.panel import Panel, choose_by_button, choose_name, heading, tooltip
 from fba_player.scene._differences import Differences, Largest
-from fba_player.scene.compare import ARRANGEMENTS, CompareScene
+from fba_player.scene.compare import CompareScene
 from fba_player.session._session import Session
 
-ROWS = 9
+LISTED_PARAMETERS = 9
 """Number of parameters listed: those that differ most."""
-POINTS = 1500
+MAX_CURVE_POINTS = 1500
 """Most points of a curve; longer ones are thinned to the largest value of each part."""
-ARRANGEMENT_LABELS = {"side": "side by side", "over": "over each other"}
+ARRANGEMENTS = {"side": "side by side", "over": "over each other"}
 DEGREES = 180 / np.pi * 1e-5
 
 
@@ -40,7 +40,6 @@ class DifferencesPanel(Panel):
         return isinstance(session.scene, CompareScene) and len(session.scene.scenes) > 1
 
     def draw(self, session: Session) -> None:
-        """Draw the content."""
         scene: Any = session.scene
         self._arrangement(session, scene)
         self._second = min(self._second, len(scene.scenes) - 1)
@@ -48,7 +47,7 @@ class DifferencesPanel(Panel):
             self._second = 1 + choose_name("##second", scene.names[1:], self._second - 1)
         differences = scene.differences(self._second)
         if self._known is None or self._known[0] is not differences:
-            self._known = (differences, differences.largest(ROWS))
+            self._known = (differences, differences.largest(LISTED_PARAMETERS))
         largest = self._known[1]
         heading(f"{_short(scene.names[self._second])} minus {_short(scene.names[0])}", exact=True)
         if not largest:
@@ -61,12 +60,10 @@ class DifferencesPanel(Panel):
         self._plot(session, differences, chosen)
 
     def _arrangement(self, session: Session, scene: Any) -> None:
-        for number, name in enumerate(ARRANGEMENTS):
-            if number:
-                imgui.same_line()
-            if imgui.radio_button(ARRANGEMENT_LABELS[name], scene.arrangement == name):
-                scene.arrangement = name
-                session.viewpoint.reset()
+        arrangement = choose_by_button(ARRANGEMENTS, scene.arrangement)
+        if arrangement is not None:
+            scene.arrangement = arrangement
+            session.viewpoint.reset()
 
     def _table(self, session: Session, largest: list[Largest]) -> None:
         flags = imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.row_bg | imgui.TableFlags_.pad_outer_x
@@ -80,9 +77,8 @@ class DifferencesPanel(Panel):
             imgui.table_next_row()
             imgui.table_next_column()
             chosen = (one.kind, one.number) == self._chosen
-            if imgui.selectable(
-                f"{one.number} {one.name}##{one.kind}", chosen, imgui.SelectableFlags_.span_all_columns
-            )[0]:
+            title, whole_row = f"{one.number} {one.name}##{one.kind}", imgui.SelectableFlags_.span_all_columns
+            if imgui.selectable(title, chosen, whole_row)[0]:
                 self._chosen = (one.kind, one.number)
                 session.transport.seek(one.time)
             tooltip(f"{one.kind.upper()} {one.number}: shows its course, and goes to where it differs most")
@@ -94,11 +90,9 @@ class DifferencesPanel(Panel):
     def _plot(self, session: Session, differences: Differences, chosen: Largest) -> None:
         key = (differences, self._chosen)
         if self._curve is None or self._curve[0] != key:
-            values = differences.faps if chosen.kind == "fap" else differences.baps
-            self._curve = (
-                key,
-                *thin_curve(differences.times, values[:, chosen.number - 1].astype(np.float64), POINTS),
-            )
+            table = differences.faps if chosen.kind == "fap" else differences.baps
+            values = table[:, chosen.number - 1].astype(np.float64)
+            self._curve = (key, *thin_curve(differences.times, values, MAX_CURVE_POINTS))
         _, times, values = self._curve
         imgui.dummy((0, 2))
         implot.push_style_color(implot.Col_.frame_bg, (0, 0, 0, 0))
@@ -138,10 +132,8 @@ def thin_curve(times: Float64, values: Float64, most: int) -> tuple[Float64, Flo
     """Return a curve of at most `most` points: of each part, the value furthest from 0 at its time."""
     if len(times) <= most:
         return times, values
-    borders = np.linspace(0, len(times), most + 1).astype(int)
-    rows = np.array(
-        [low + int(np.abs(values[low:high]).argmax()) for low, high in pairwise(borders.tolist())]
-    )
+    borders = np.linspace(0, len(times), most + 1).astype(int).tolist()
+    rows = [low + int(np.abs(values[low:high]).argmax()) for low, high in pairwise(borders)]
     return times[rows], values[rows]
 
 

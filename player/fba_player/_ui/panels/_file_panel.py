@@ -6,11 +6,10 @@ import os
 from typing import Any
 
 import numpy as np
-from imgui_bundle import imgui
 
 from fba.codec import PartInfo, StreamInfo
 from fba_player._ui import theme
-from fba_player._ui.panels.panel import Panel, facts, heading
+from fba_player._ui.panels.panel import Panel, facts, heading, wrapped
 from fba_player.playback.timeline import clock_text
 from fba_player.scene.compare import CompareScene
 from fba_player.session._session import Session
@@ -27,7 +26,6 @@ class FilePanel(Panel):
         self._shown: tuple[StreamInfo, list[tuple[str, list[tuple[str, str]]]]] | None = None
 
     def draw(self, session: Session) -> None:
-        """Draw the content."""
         source, info = session.source, session.source.info
         if self._shown is None or self._shown[0] is not info:
             self._shown = (info, _sections(session, info))
@@ -38,14 +36,10 @@ class FilePanel(Panel):
         troubles = [*source.warnings, *(str(one.error) for one in info.damage)]
         if troubles:
             heading("Warnings")
-            imgui.push_style_color(imgui.Col_.text, theme.WARM)
-            imgui.push_text_wrap_pos(0.0)
             for text in troubles[:20]:
-                imgui.text_unformatted(text)
+                wrapped(text, theme.WARM)
             if len(troubles) > 20:
-                imgui.text_unformatted(f"and {len(troubles) - 20} more")
-            imgui.pop_text_wrap_pos()
-            imgui.pop_style_color()
+                wrapped(f"and {len(troubles) - 20} more", theme.WARM)
 
 
 def _sections(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, str]]]]:

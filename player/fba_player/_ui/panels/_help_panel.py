@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from fba_player._ui import theme
-from fba_player._ui.panels.panel import Panel, heading
+from fba_player._ui.panels.panel import Panel, heading, wrapped
 from fba_player.session._keys import keys, mouse
 from fba_player.session._session import Session
 
@@ -23,7 +23,6 @@ class HelpPanel(Panel):
     width, height = 1240.0, 520.0
 
     def draw(self, session: Session) -> None:
-        """Draw the content."""
         groups = _groups(session)
         columns = min(int(imgui.get_content_region_avail().x // MIN_COLUMN_WIDTH), 4)
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
@@ -67,19 +66,9 @@ def _group(name: str, rows: list[tuple[str, str]]) -> None:
     imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY_WIDTH)
     imgui.table_setup_column("does", imgui.TableColumnFlags_.width_stretch)
     for key, does in rows:
-        _line(key, does)
+        imgui.table_next_row()
+        imgui.table_next_column()
+        wrapped(key)
+        imgui.table_next_column()
+        wrapped(does, theme.FAINT)
     imgui.end_table()
-
-
-def _line(key: str, does: str) -> None:
-    imgui.table_next_row()
-    imgui.table_next_column()
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(key)
-    imgui.pop_text_wrap_pos()
-    imgui.table_next_column()
-    imgui.push_style_color(imgui.Col_.text, theme.FAINT)
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(does)
-    imgui.pop_text_wrap_pos()
-    imgui.pop_style_color()

@@ -74,9 +74,8 @@ def groups() -> tuple[Group, ...]:
 def reach(number: int) -> float:
     """Return the amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
     text = (files("fba_player.export") / "contact_sheet.csv").read_text(encoding="utf-8")
-    return next(
-        abs(float(row["value"])) for row in csv.DictReader(text.splitlines()) if int(row["fap"]) == number
-    )
+    rows = csv.DictReader(text.splitlines())
+    return next(abs(float(row["value"])) for row in rows if int(row["fap"]) == number)
 
 
 def _fap_rows(names: list[str]) -> tuple[Row, ...]:
