@@ -159,9 +159,9 @@ def command(request: _Request) -> None:
     _check_options(output, request.drawing)
     outputs = _outputs(request)
     if output is None:
-        from fba_player.window.map_markers import check_window
+        from fba_player.window.pages import check_page
 
-        check_window()
+        check_page("markers")
     motion = _read_capture(capture, request.reading)
     with Progress("reading", None):
         from fba.capture.virtual_markers import read_head
@@ -368,7 +368,7 @@ def _edit(
 
 
 def _show(editing: MarkerEditing, title: str, size: tuple[int, int] | None) -> None:
-    from fba_player.window.map_markers import map_markers
+    from fba_player.window.pages import map_markers
 
     map_markers(editing, title, size=size or (1280, 800))
     if editing.written:

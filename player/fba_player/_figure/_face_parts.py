@@ -49,8 +49,8 @@ COLOUR_WEIGHT = 0.004
 
 def compute_sway(model: FaceModel) -> Float32:
     """Return float32 (V,): share of the head's turn, from 1 above jaw and ears to 0 down the neck."""
-    chin = known_middle(model, ("2.1", "2.10"))
-    lobe = known_middle(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
+    chin = middle_of_points(model, ("2.1", "2.10"))
+    lobe = middle_of_points(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
     if chin is None or lobe is None:
         return np.ones(len(model.vertices), dtype=np.float32)
     reach = NECK_LENGTH * model.fapu.ENS * 1024
@@ -61,11 +61,11 @@ def compute_sway(model: FaceModel) -> Float32:
     return smoothstep(1 - (border - y) / reach).astype(np.float32)
 
 
-def known_middle(model: FaceModel, names: Sequence[str]) -> Float64 | None:
+def middle_of_points(model: FaceModel, names: Sequence[str]) -> Float64 | None:
     """Return (3,): the middle of the first two of the named feature points that the face has, or None."""
     points = np.array([model.points[point_row(name)] for name in names])
-    known = points[np.isfinite(points).all(axis=1)][:2]
-    return np.asarray(known.mean(axis=0)) if len(known) else None
+    first = points[np.isfinite(points).all(axis=1)][:2]
+    return np.asarray(first.mean(axis=0)) if len(first) else None
 
 
 def make_shape(part: Part, sways: Float32) -> FaceShape:

@@ -110,11 +110,11 @@ class BodyLight:
 def build_body_light(body: BodyModel, coarser: Mapping[str, DetailLevels | None]) -> BodyLight:
     """Return the light on a body; coarser as in `BodyLight`."""
     names = body.skeleton.names
-    known = [row for row in CAPSULES if row[0] in names and row[1] in names]
-    ends = np.array([[names.index(a), names.index(b)] for a, b, _ in known], dtype=np.intp)
+    limbs = [row for row in CAPSULES if row[0] in names and row[1] in names]
+    ends = np.array([[names.index(a), names.index(b)] for a, b, _ in limbs], dtype=np.intp)
     tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else ADULT_HEIGHT
     share = 0.92 if "head" in {part.kind for part in body.parts} else 0.85  # up to the crown, or to the neck
-    radii = np.array([row[2] for row in known]) * (tall / share / ADULT_HEIGHT if tall > 0 else 1.0)
+    radii = np.array([row[2] for row in limbs]) * (tall / share / ADULT_HEIGHT if tall > 0 else 1.0)
     return BodyLight(body, coarser, ends, radii)
 
 

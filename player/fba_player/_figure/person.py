@@ -77,11 +77,11 @@ class Person:
     def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
         """Return all parts but the eyeballs for FAPs (68,) and joint matrices as `joints` returns them."""
         positions, normals = np.empty_like(self.body.vertices), np.empty_like(self.body.vertices)
-        own = self.body.own_head if self.head is None else None
-        if own is None:
+        own_head = self.body.own_head if self.head is None else None
+        if own_head is None:
             self.body.skin(joints, positions, normals)
         else:
-            moved = own.move(self.body.vertices, faps)
+            moved = own_head.move(self.body.vertices, faps)
             self.body.skinner.skin_vertices(moved, self.body.normals, joints, positions, normals)
         light = self.light.shade(positions, normals, joints)
         meshes = [

@@ -28,8 +28,7 @@ MAP_POINTS = {
     "8.1": (0.000, -0.997), "8.2": (0.000, -1.299), "8.3": (0.442, -1.121),
     "5.3": (0.690, -0.501), "2.10": (0.000, -1.612), "11.1": (0.000, 1.158),
 }  # fmt: skip
-"""Where feature points lie in the map: to the left of the face's middle and above the pupils, in eye
-separations (ES)."""
+"""Where feature points lie in the map: left of the middle and above the pupils, in eye separations (ES)."""
 MIRRORED = {
     "3.7": "3.12", "3.11": "3.8", "3.9": "3.10", "3.13": "3.14", "4.1": "4.2", "4.3": "4.4", "4.5": "4.6",
     "9.1": "9.2", "8.3": "8.4", "5.3": "5.4",
@@ -77,10 +76,10 @@ def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
     """
     if not model.wrinkles or part.kind != "skin":
         return None
-    known = _known_points(model)
-    if known is None:
+    points = _points_in_map(model)
+    if points is None:
         return None
-    spline = _ThinPlate(*known)
+    spline = _ThinPlate(*points)
     flat = _in_front(model, part.vertices.astype(np.float64))
     places = spline(flat[:, :2])
     behind = flat[:, 2] < -MAX_DEPTH
@@ -94,21 +93,21 @@ def _in_front(model: FaceModel, positions: Float64) -> Float64:
     return np.asarray((positions - middle) / (model.fapu.ES * 1024))
 
 
-def _known_points(model: FaceModel) -> tuple[Float64, Float64] | None:
+def _points_in_map(model: FaceModel) -> tuple[Float64, Float64] | None:
     """Return the points (N, 2) of a face that have places in the map, and these places (N, 2)."""
-    own, shown = [], []
+    positions, places = [], []
     for name, (x, y) in MAP_POINTS.items():
         for side, point in ((1, name), (-1, MIRRORED.get(name))):
             if point is None:
                 continue
             position = model.points[point_row(point)]
             if np.isfinite(position).all():
-                own.append(position)
-                shown.append((side * x, y))
+                positions.append(position)
+                places.append((side * x, y))
             elif name in NEEDED:
                 return None
-    flat = _in_front(model, np.array(own))[:, :2]
-    return (flat, np.array(shown)) if np.isfinite(flat).all() else None  # not without the pupils
+    flat = _in_front(model, np.array(positions))[:, :2]
+    return (flat, np.array(places)) if np.isfinite(flat).all() else None  # not without the pupils
 
 
 class _ThinPlate:

@@ -119,7 +119,7 @@ class Bar:
             return "range"
         marks = {"in": session.transport.mark_in, "out": session.transport.mark_out}
         near = {name: abs(ruler.x(time) - x) for name, time in marks.items() if time is not None}
-        name = min(near, key=lambda one: near[one], default="head")
+        name = min(near, key=lambda mark: near[mark], default="head")
         head = abs(ruler.x(session.transport.time) - x)
         return name if near and near[name] <= min(GRIP_DISTANCE, head) else "head"
 
@@ -139,12 +139,12 @@ class Bar:
 
     def _draw_expressions(self, session: Session, to: imgui.ImDrawList, ruler: Ruler, bottom: float) -> None:
         """Draw the expressions that the face shows, the stronger the less transparent."""
-        for one in session.source.expressions:
-            colour = theme.FEELINGS.get(one.label)
-            if colour is None or not one.shows:
+        for stretch in session.source.expressions:
+            colour = theme.FEELINGS.get(stretch.label)
+            if colour is None or not stretch.shows:
                 continue
-            left, right = ruler.x(one.start), min(ruler.x(one.end), ruler.right)
-            alpha = 0.35 + 0.65 * one.intensity / 100
+            left, right = ruler.x(stretch.start), min(ruler.x(stretch.end), ruler.right)
+            alpha = 0.35 + 0.65 * stretch.intensity / 100
             corners = (left, bottom + STRIP[0]), (max(right, left + 1), bottom + STRIP[1])
             to.add_rect_filled(*corners, theme.packed(colour, alpha), rounding=2.0)
 

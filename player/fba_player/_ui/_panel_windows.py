@@ -40,8 +40,8 @@ class PanelWindows:
         self.sides = (0.0, 0.0)
         if room < 60 or wide < 120:
             return
-        docked = [one for one in panels if one.side != "middle" and one.name not in self._moved]
-        docks = self._docks.arrange([self._request(one) for one in docked], wide, TOP, room)
+        docked = [panel for panel in panels if panel.side != "middle" and panel.name not in self._moved]
+        docks = self._docks.arrange([self._request(panel) for panel in docked], wide, TOP, room)
         self.sides = free_middle(docks.values(), wide)
         for panel in panels:
             if panel in docked:

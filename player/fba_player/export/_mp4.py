@@ -78,7 +78,6 @@ class Mp4:
             undo.pop_all()
 
     def write(self, pixels: UInt8, number: int) -> None:
-        """Add a picture, uint8 (H, W, 4), at number / rate seconds."""
         width, height = self._size
         with self._convert_errors():
             shown = self._framed(pixels[:height, :width], format="rgba")
@@ -89,7 +88,6 @@ class Mp4:
                 self._audio.encode_until(number / self._rate)
 
     def finish(self, count: int) -> Path:
-        """Finish the film, count / rate seconds long; return its path."""
         with self._convert_errors():
             self._container.mux(self._stream.encode(None))
             if self._audio is not None:
@@ -102,12 +100,11 @@ class Mp4:
         return self._path
 
     def abort(self) -> None:
-        """Remove the unfinished file."""
         with contextlib.suppress(Exception):
             if self._container is not None:
                 self._container.close()
-        with contextlib.suppress(_Abandoned), self._cleanup:
-            raise _Abandoned
+        with contextlib.suppress(InterruptedError), self._cleanup:
+            raise InterruptedError  # so that the blocks remove their files
 
     @contextlib.contextmanager
     def _convert_errors(self) -> Any:
@@ -122,10 +119,6 @@ class Mp4:
             ) from error
 
 
-class _Abandoned(Exception):  # noqa: N818 - never seen outside
-    """Leaves the `with` blocks like an error, so that they remove their files."""
-
-
 class _AudioTrack:
     """The AAC track of a film, encoded as far as its pictures."""
 
@@ -138,7 +131,6 @@ class _AudioTrack:
         self._done = 0
 
     def encode_until(self, time: Fraction) -> None:
-        """Encode up to a time in seconds."""
         stop = round(time * self._soundtrack.rate)
         if stop <= self._done:
             return

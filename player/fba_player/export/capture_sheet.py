@@ -97,23 +97,17 @@ def _draw_pair(view: View, sight: Sight) -> list[Image.Image]:
     """Return the pictures of the source and of the result, by the same camera."""
     triangles, colours = _person(view)
     corners = np.concatenate([sight.stick.corners, triangles.reshape(-1, 3)])
-    camera = _camera(corners, triangles, sight)
-    size = (TILE[0] * SUPERSAMPLING, TILE[1] * SUPERSAMPLING)
-    result = []
-    for what in ("source", "result"):
-        picture = Image.new("RGB", size, PAPER)
-        draw = ImageDraw.Draw(picture)
-        _draw_floor(draw, camera, size, corners)
-        if what == "result":
-            _draw_triangles(draw, camera, size, triangles, colours)
-            _draw_lines(draw, camera, size, sight.stick, thin=True)
-        else:
-            _draw_stick(draw, camera, size, sight.stick)
-        result.append(picture.resize(TILE, Image.Resampling.LANCZOS))
-    return result
+    camera = _camera(corners, sight)
+    source, result = _Canvas(camera), _Canvas(camera)
+    source.draw_floor(corners)
+    source.draw_stick(sight.stick)
+    result.draw_floor(corners)
+    result.draw_triangles(triangles, colours)
+    result.draw_lines(sight.stick, thin=True)
+    return [canvas.picture.resize(TILE, Image.Resampling.LANCZOS) for canvas in (source, result)]
 
 
-def _camera(corners: Float64, triangles: Float64, sight: Sight) -> Camera:
+def _camera(corners: Float64, sight: Sight) -> Camera:
     """Return the camera that sees both figures, from ahead of the person and from one side."""
     low, high = np.percentile(corners, [0.5, 99.5], axis=0)
     low[1] = min(low[1], 0.0)
@@ -140,15 +134,6 @@ def _left(stick: Stick) -> Float64:
     return np.array([vector[0], 0.0, vector[2]])
 
 
-def _project(points: Float64, camera: Camera, size: tuple[int, int]) -> tuple[Float64, Float64]:
-    """Return pixels (..., 2) and distances (...) of points (..., 3)."""
-    seen = transform(points, camera.view_matrix())
-    away = np.maximum(-seen[..., 2], 1e-3)
-    scale = size[1] / 2 / np.tan(np.radians(camera.field_of_view) / 2)
-    pixels = seen[..., :2] / away[..., None] * scale * [1.0, -1.0] + np.array(size) / 2
-    return pixels, away
-
-
 def _person(view: View) -> tuple[Float64, Float64]:
     """Return the triangles (N, 3, 3) of a view's person, in the world, and their colours (N, 3), linear."""
     triangles, colours = [], []
@@ -164,59 +149,69 @@ def _person(view: View) -> tuple[Float64, Float64]:
     return np.concatenate(triangles), np.concatenate(colours)
 
 
-def _draw_triangles(
-    draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], triangles: Float64, colours: Float64
-) -> None:
-    """Paint triangles that face the camera, from back to front."""
-    pixels, away = _project(triangles, camera, size)
-    one, other = pixels[:, 1] - pixels[:, 0], pixels[:, 2] - pixels[:, 0]
-    seen = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    axes = camera.view_matrix()[:3, :3]
-    shade = FILL_SHARE + (1 - FILL_SHARE) * np.clip(normals @ axes.T @ LIGHT, 0.0, 1.0)
-    shown = (np.clip(colours * shade[:, None], 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)
-    chosen = np.flatnonzero(seen)
-    for number in chosen[np.argsort(-away[chosen].mean(axis=1))].tolist():
-        draw.polygon(pixels[number].ravel().tolist(), fill=tuple(shown[number].tolist()))
+class _Canvas:
+    """A picture by a camera, painted larger than it will be."""
 
+    def __init__(self, camera: Camera) -> None:
+        self.camera = camera
+        size = (TILE[0] * SUPERSAMPLING, TILE[1] * SUPERSAMPLING)
+        self.picture = Image.new("RGB", size, PAPER)
+        self.draw = ImageDraw.Draw(self.picture)
 
-def _draw_floor(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], corners: Float64) -> None:
-    """Paint the floor at height 0 as lines half a metre apart."""
-    middle = np.round(corners.mean(axis=0)[[0, 2]] * 2) / 2
-    for step in np.arange(-1.5, 1.51, 0.5):
-        for ends in (((step, -1.5), (step, 1.5)), ((-1.5, step), (1.5, step))):
-            points = np.array([[middle[0] + x, 0.0, middle[1] + z] for x, z in ends])
-            pixels, _ = _project(points, camera, size)
-            draw.line(pixels.ravel().tolist(), FLOOR, SUPERSAMPLING)
+    def project(self, points: Float64) -> tuple[Float64, Float64]:
+        """Return pixels (..., 2) and distances (...) of points (..., 3)."""
+        seen = transform(points, self.camera.view_matrix())
+        away = np.maximum(-seen[..., 2], 1e-3)
+        scale = self.picture.height / 2 / np.tan(np.radians(self.camera.field_of_view) / 2)
+        pixels = seen[..., :2] / away[..., None] * scale * [1.0, -1.0] + np.array(self.picture.size) / 2
+        return pixels, away
 
+    def draw_triangles(self, triangles: Float64, colours: Float64) -> None:
+        """Paint triangles that face the camera, from back to front."""
+        pixels, away = self.project(triangles)
+        one, other = pixels[:, 1] - pixels[:, 0], pixels[:, 2] - pixels[:, 0]
+        seen = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        axes = self.camera.view_matrix()[:3, :3]
+        shade = FILL_SHARE + (1 - FILL_SHARE) * np.clip(normals @ axes.T @ LIGHT, 0.0, 1.0)
+        shown = (np.clip(colours * shade[:, None], 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)
+        chosen = np.flatnonzero(seen)
+        for number in chosen[np.argsort(-away[chosen].mean(axis=1))].tolist():
+            self.draw.polygon(pixels[number].ravel().tolist(), fill=tuple(shown[number].tolist()))
 
-def _draw_stick(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick) -> None:
-    """Paint a stick figure: areas of palms and soles, bones from back to front."""
-    for sole in stick.soles:
-        pixels, _ = _project(sole, camera, size)
-        draw.polygon(pixels.ravel().tolist(), fill=SOLE, outline=INK)
-    _draw_lines(draw, camera, size, stick, thin=False)
-    eye = camera.eye
-    for palm in stick.palms:
-        pixels, _ = _project(palm, camera, size)
-        normal = np.cross(palm[1] - palm[0], palm[3] - palm[0])
-        colour = PALM if normal @ (eye - palm.mean(axis=0)) > 0 else BACK_OF_HAND
-        draw.polygon(pixels.ravel().tolist(), fill=colour, outline=INK)
+    def draw_floor(self, corners: Float64) -> None:
+        """Paint the floor at height 0 as lines half a metre apart."""
+        middle = np.round(corners.mean(axis=0)[[0, 2]] * 2) / 2
+        for step in np.arange(-1.5, 1.51, 0.5):
+            for ends in (((step, -1.5), (step, 1.5)), ((-1.5, step), (1.5, step))):
+                points = np.array([[middle[0] + x, 0.0, middle[1] + z] for x, z in ends])
+                pixels, _ = self.project(points)
+                self.draw.line(pixels.ravel().tolist(), FLOOR, SUPERSAMPLING)
 
+    def draw_stick(self, stick: Stick) -> None:
+        """Paint a stick figure: areas of palms and soles, bones from back to front."""
+        for sole in stick.soles:
+            pixels, _ = self.project(sole)
+            self.draw.polygon(pixels.ravel().tolist(), fill=SOLE, outline=INK)
+        self.draw_lines(stick, thin=False)
+        eye = self.camera.eye
+        for palm in stick.palms:
+            pixels, _ = self.project(palm)
+            normal = np.cross(palm[1] - palm[0], palm[3] - palm[0])
+            colour = PALM if normal @ (eye - palm.mean(axis=0)) > 0 else BACK_OF_HAND
+            self.draw.polygon(pixels.ravel().tolist(), fill=colour, outline=INK)
 
-def _draw_lines(
-    draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick, *, thin: bool
-) -> None:
-    pixels, away = _project(stick.lines, camera, size)
-    width = SUPERSAMPLING if thin else 4 * SUPERSAMPLING
-    for number in np.argsort(-away.mean(axis=1)).tolist():
-        colour = COLOURS[stick.sides[number]]
-        draw.line(pixels[number].ravel().tolist(), colour, width, joint="curve")
-        if not thin:
-            x, y = pixels[number, 1].tolist()
-            reach = 2.5 * SUPERSAMPLING
-            draw.ellipse((x - reach, y - reach, x + reach, y + reach), colour)
+    def draw_lines(self, stick: Stick, *, thin: bool) -> None:
+        pixels, away = self.project(stick.lines)
+        width = SUPERSAMPLING if thin else 4 * SUPERSAMPLING
+        for number in np.argsort(-away.mean(axis=1)).tolist():
+            colour = COLOURS[stick.sides[number]]
+            self.draw.line(pixels[number].ravel().tolist(), colour, width, joint="curve")
+            if not thin:
+                x, y = pixels[number, 1].tolist()
+                reach = 2.5 * SUPERSAMPLING
+                self.draw.ellipse((x - reach, y - reach, x + reach, y + reach), colour)
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:

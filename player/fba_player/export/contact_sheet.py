@@ -171,10 +171,10 @@ def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> Any:
     draw = ImageDraw.Draw(sheet)
     font, small = label_font(letters), label_font(letters * 0.9)
     with Offscreen(scene, size, samples=4) as view:
-        for one, (x, y) in zip(shown, layout.corners, strict=True):
-            subject = close_up(one.view, scene)
-            view.camera = Camera(yaw=one.yaw, pitch=one.pitch).fit(subject, width / height)
-            sheet.paste(Image.fromarray(view.still(one.faps)[..., :3]), (x, y))
-            draw.text((x + 2, y + height + 2), shortened(draw, one.label, font, width), font=font, fill=TEXT)
-            draw.text((x + 2, y + height + 2 + line), one.note, font=small, fill=FAINT)
+        for tile, (x, y) in zip(shown, layout.corners, strict=True):
+            subject = close_up(tile.view, scene)
+            view.camera = Camera(yaw=tile.yaw, pitch=tile.pitch).fit(subject, width / height)
+            sheet.paste(Image.fromarray(view.still(tile.faps)[..., :3]), (x, y))
+            draw.text((x + 2, y + height + 2), shortened(draw, tile.label, font, width), font=font, fill=TEXT)
+            draw.text((x + 2, y + height + 2 + line), tile.note, font=small, fill=FAINT)
     return sheet

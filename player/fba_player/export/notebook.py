@@ -142,7 +142,7 @@ class Preview:
 def show_animations(shell: Any) -> None:
     """Make cells that end in an `Animation` show a film. shell: the InteractiveShell of IPython."""
     formatter = shell.display_formatter.formatters["text/html"]
-    formatter.for_type_by_name("fba.animation", "Animation", lambda one: Preview(one)._repr_html_())
+    formatter.for_type_by_name("fba.animation", "Animation", lambda shown: Preview(shown)._repr_html_())
 
 
 def describe(animation: Animation) -> str:

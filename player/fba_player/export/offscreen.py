@@ -105,7 +105,7 @@ class Offscreen:
             if self._multisampled is None:
                 self._multisampled = Target(self._gl, self.size, max(self._samples, TRANSPARENT_SAMPLES))
         views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)]
-        return [self._read(one, camera, self._multisampled).copy() for one in views]
+        return [self._read(other, camera, self._multisampled).copy() for other in views]
 
     def _read(self, view: View, camera: Camera, target: Target) -> UInt8:
         assert self._renderer is not None

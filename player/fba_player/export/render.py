@@ -156,7 +156,7 @@ def record(
         # Opened before the first picture is drawn, so that a missing encoder or folder is reported at once.
         if numbered:
             sink = Sequence(Numbered(path), count, transparent=transparent, replace=replace)
-            recorder = Recorder.into(sink, path, (width, height), film)
+            recorder = Recorder(path, (width, height), rate=film, sink=sink)
         else:
             into = first - shown.timeline.start - Fraction(audio_offset).limit_denominator(10**6)
             recorder = Recorder(path, (width, height), rate=film, audio=audio, audio_start=into)

@@ -115,7 +115,6 @@ class ExtrasRenderer:
         gl.enable_only(gl.DEPTH_TEST)
 
     def close(self) -> None:
-        """Free all OpenGL objects."""
         self._labels.clear()
         self._triangles.clear()
         for part in (*self._buffers.values(), *self._programs.values()):
@@ -223,9 +222,9 @@ class ExtrasRenderer:
         pixel[~inside] = np.nan
         shown, corners = place_names(pixel, boxes[:, 2:], dots.radius * scale, size)
         if len(shown):
-            own = boxes[shown].astype(np.float64)
+            parts = boxes[shown].astype(np.float64)
             texture_size = np.array(texture.size * 2, dtype=np.float64)
-            self._draw_labels(texture, np.concatenate([corners, own[:, 2:], own / texture_size], axis=1))
+            self._draw_labels(texture, np.concatenate([corners, parts[:, 2:], parts / texture_size], axis=1))
 
     def _draw_legend(self, legend: Legend, size: tuple[int, int], scale: float) -> None:
         texture, _ = self._label((legend, scale), lambda: (legend_picture(legend, scale), None))

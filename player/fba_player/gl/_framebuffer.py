@@ -70,7 +70,6 @@ class Target:
         return part
 
     def begin(self) -> None:
-        """Bind it for drawing."""
         self._drawn.use()
 
     def finish(self, into: Any = None, within: Steps | None = None) -> Any:
@@ -108,7 +107,6 @@ class Target:
         self._along.render(vertices=len(data))
 
     def close(self) -> None:
-        """Free all OpenGL objects."""
         for part in reversed(self._parts):
             part.release()
         self._parts.clear()

@@ -26,8 +26,7 @@ from fba_player.view._view import FaceMesh, FaceShape
 CACHED_SHAPES = 64
 """Number of parts whose buffers are cached; the least recently used goes first."""
 CORE_OPACITY = 0.9
-"""Pixels of blended parts with at least this opacity are drawn first, as opaque; then the others are
-blended."""
+"""Pixels of blended parts with at least this opacity are drawn first, as opaque, then the others."""
 MIN_WRINKLE = 0.01
 """Strength from which wrinkles are drawn."""
 MIN_RELIEF = 0.25
@@ -74,7 +73,6 @@ class FaceRenderer:
             gl.enable_only(gl.DEPTH_TEST)
 
     def close(self) -> None:
-        """Free all OpenGL objects."""
         self._shapes.clear()
         for part in (*self._reliefs.values(), *self._wrinkles.values(), *self._programs.values()):
             part.release()
@@ -188,8 +186,9 @@ class FaceRenderer:
         if halvings not in self._wrinkles:
             from PIL import Image
 
-            channels = [Image.fromarray(one).reduce(2**halvings) for one in np.moveaxis(wrinkle_map(), 2, 0)]
-            texture = make_texture(self._gl, np.stack([np.asarray(one) for one in channels], axis=2))
+            channels = map(Image.fromarray, np.moveaxis(wrinkle_map(), 2, 0))
+            smaller = [np.asarray(channel.reduce(2**halvings)) for channel in channels]
+            texture = make_texture(self._gl, np.stack(smaller, axis=2))
             texture.repeat_x = texture.repeat_y = False
             self._wrinkles[halvings] = texture
         return self._wrinkles[halvings]
@@ -235,7 +234,7 @@ def _set_pose(program: Any, mesh: FaceMesh) -> None:
     """Set the uniforms for a mesh's position and turn, unless the program has them already."""
     pose = (mesh.matrix, mesh.turn, mesh.centre)
     before = program.extra.get("pose")
-    if before is not None and all(one is other for one, other in zip(pose, before, strict=True)):
+    if before is not None and all(now is then for now, then in zip(pose, before, strict=True)):
         return
     program.extra["pose"] = pose
     set_uniform(program, "world", matrix_bytes(mesh.matrix))
@@ -244,7 +243,6 @@ def _set_pose(program: Any, mesh: FaceMesh) -> None:
 
 
 def _set_wrinkles(program: Any, mesh: FaceMesh) -> None:
-    """Set the uniforms for a mesh's wrinkles."""
     assert mesh.wrinkles is not None
     left, right = (tuple(float(strength) for strength in side) for side in mesh.wrinkles)
     set_uniform(program, "wrinkles_left", left)

@@ -87,7 +87,6 @@ class RecentlyUsed(Generic[Value]):
         return value
 
     def clear(self) -> None:
-        """Release all values."""
         for value in self._values.values():
             self._release(value)
         self._values.clear()

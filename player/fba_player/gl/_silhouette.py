@@ -34,7 +34,6 @@ class Edges(NamedTuple):
 
 
 def find_edges(triangles: Int32) -> Edges:
-    """Return the edges of triangles (F, 3)."""
     corners = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     owner = np.repeat(np.arange(len(triangles), dtype=np.int32), 3)
     ordered = np.sort(corners, axis=1)
@@ -183,14 +182,8 @@ def _mark(
         near = abs(bx - ax) + abs(by - ay) < 8.0 * (wide + high)
         if outside or not (near and length < 4.0 * (wide + high)):
             continue
-        left, right = (
-            int(max(min(ax, bx) - margin, 0.0)),
-            int(min(max(ax, bx) + margin, wide - 1.0)),
-        )
-        low, top = (
-            int(max(min(ay, by) - margin, 0.0)),
-            int(min(max(ay, by) + margin, high - 1.0)),
-        )
+        left, right = int(max(min(ax, bx) - margin, 0.0)), int(min(max(ax, bx) + margin, wide - 1.0))
+        low, top = int(max(min(ay, by) - margin, 0.0)), int(min(max(ay, by) + margin, high - 1.0))
         if right // TILE - left // TILE <= 1 and top // TILE - low // TILE <= 1:  # short, as most edges are
             for row in range(low // TILE, top // TILE + 1):
                 for column in range(left // TILE, right // TILE + 1):
@@ -199,14 +192,8 @@ def _mark(
         steps = int(length / margin) + 1
         for step in range(steps + 1):
             x, y = ax + (bx - ax) * step / steps, ay + (by - ay) * step / steps
-            left, right = (
-                int(max(x - margin, 0.0)) // TILE,
-                int(min(x + margin, wide - 1.0)) // TILE,
-            )
-            low, top = (
-                int(max(y - margin, 0.0)) // TILE,
-                int(min(y + margin, high - 1.0)) // TILE,
-            )
+            left, right = int(max(x - margin, 0.0)) // TILE, int(min(x + margin, wide - 1.0)) // TILE
+            low, top = int(max(y - margin, 0.0)) // TILE, int(min(y + margin, high - 1.0)) // TILE
             for row in range(low, top + 1):
                 for column in range(left, right + 1):
                     marked[row, column] = 1

@@ -50,7 +50,6 @@ class Pictures:
         return self._sizes[halvings]
 
     def close(self) -> None:
-        """Free everything allocated on the graphics card."""
         for texture in self._sizes.values():
             texture.release()
         self._sizes.clear()

@@ -11,13 +11,14 @@ import threading
 import time as wall
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Int64
 from fba.choices import BapTableOrAuto
 from fba.codec import Block, Decoder, FrameBuffer, StreamInfo, marked_table
 from fba.errors import BitstreamError, FbaError, FbaWarning
+from fba.face.resolve import FaceSettings
 from fba.formats.step_choice import choose_steps
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
 from fba_player.playback.timeline import Timeline
@@ -26,8 +27,7 @@ from fba_player.playback.transport import BUFFER_SECONDS
 CHUNK_BYTES = 1 << 16
 """Bytes read at once, at most."""
 PATIENCE_SECONDS = 0.5
-"""Seconds that `wait` gives a slow stream after its first frame to fill the buffer and to show whether it has
-a face and a body."""
+"""Seconds that `wait` gives a slow stream to fill the buffer and to show whether it has a face and a body."""
 CHECK_BAP_STEPS_AFTER = 4
 """Seconds of a body after which it is checked, once, whether they look right with these BAP steps."""
 CHOOSE_BAP_STEPS_AFTER = 1.25
@@ -304,18 +304,8 @@ class LiveTimeline(Timeline):
     block = 256
     animation: Any
 
-    def __init__(self, animation: LiveAnimation, model: object = None) -> None:
-        super().__init__(animation, model)  # type: ignore[arg-type]
-
-    @property
-    def growing(self) -> bool:  # type: ignore[override]
-        """Whether more may arrive."""
-        return bool(self.animation.growing)
-
-    @property
-    def arrived(self) -> int:  # type: ignore[override]
-        """A counter that changes with every frame, and at the end."""
-        return int(self.animation.arrived)
+    def __init__(self, animation: LiveAnimation, model: FaceSettings | None = None) -> None:
+        super().__init__(cast(Animation, animation), model)
 
 
 def wait_for(live: LiveAnimation, say: Callable[[str], None], after: float = 1.0) -> None:

@@ -67,18 +67,18 @@ def differences(timeline: CompareTimeline, second: int = 1) -> Differences:
     """Return the differences between the first performance and number `second`; ValueError without one."""
     if not 0 < second < len(timeline.timelines):
         raise ValueError(f"there is no performance {second} to compare: {len(timeline.timelines)} are shown")
-    one, other = timeline.timelines[0], timeline.timelines[second]
+    first, other = timeline.timelines[0], timeline.timelines[second]
     bounds = [
         (shown.time_of(0) + later, shown.time_of(shown.frames - 1) + later)
-        for shown, later in ((one, timeline.later[0]), (other, timeline.later[second]))
+        for shown, later in ((first, timeline.later[0]), (other, timeline.later[second]))
     ]
     low, high = (float(v) for v in (max(b[0] for b in bounds), min(b[1] for b in bounds)))
     times = timeline.times()
     times = times[(times >= low - 1e-9) & (times <= high + 1e-9)]
     if len(times) > MAX_FRAMES:
         times = times[np.linspace(0, len(times) - 1, MAX_FRAMES).astype(int)]
-    faces, bodies = one.many(times - float(timeline.later[0]))
+    faces, bodies = first.many(times - float(timeline.later[0]))
     other_faces, other_bodies = other.many(times - float(timeline.later[second]))
-    face = one.animation.face is not None and other.animation.face is not None
-    body = one.animation.body is not None and other.animation.body is not None
+    face = first.animation.face is not None and other.animation.face is not None
+    body = first.animation.body is not None and other.animation.body is not None
     return Differences(times, (other_faces - faces) * face, (other_bodies - bodies) * body)

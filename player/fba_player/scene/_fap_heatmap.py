@@ -87,8 +87,10 @@ class FapHeatmap:
 
     def _part_distances(self, shape: FaceShape, count: int) -> Float32:
         """Return float32 (count,): the movement of a part's vertices; 0 for a part that is not the face's."""
-        own = self.distances[self._figure.rows(shape.name)] if shape.name in self._figure.model.starts else ()
-        return np.asarray(own) if len(own) == count else np.zeros(count, dtype=np.float32)
+        if shape.name not in self._figure.model.starts:
+            return np.zeros(count, dtype=np.float32)
+        distances = self.distances[self._figure.rows(shape.name)]
+        return distances if len(distances) == count else np.zeros(count, dtype=np.float32)
 
     def _ball(self, number: int, vertices: Float32) -> MeshShape:
         """Return an eyeball coloured by the movement of its points."""

@@ -60,9 +60,9 @@ def _join_extras(extras: Sequence[Extras]) -> Extras | None:
         return None
     return replace(
         extras[0],
-        lines=tuple(lines for one in extras for lines in one.lines),
-        dots=tuple(dots for one in extras for dots in one.dots),
-        shells=tuple(shell for one in extras for shell in one.shells),
+        lines=tuple(lines for part in extras for lines in part.lines),
+        dots=tuple(dots for part in extras for dots in part.dots),
+        shells=tuple(shell for part in extras for shell in part.shells),
     )
 
 
@@ -129,8 +129,8 @@ def _move_extras(extras: Extras, offset: Float64) -> Extras:
         grid = replace(grid, height=grid.height + float(offset[1]), centre=centre)
     return replace(
         extras,
-        lines=tuple(replace(one, ends=np.asarray(one.ends + by)) for one in extras.lines),
-        dots=tuple(replace(one, positions=one.positions + by) for one in extras.dots),
+        lines=tuple(replace(lines, ends=np.asarray(lines.ends + by)) for lines in extras.lines),
+        dots=tuple(replace(dots, positions=dots.positions + by) for dots in extras.dots),
         shells=tuple(replace(mesh, matrix=shift @ mesh.matrix) for mesh in extras.shells),
         grid=grid,
     )

@@ -133,11 +133,11 @@ class CompareScene(Timed[CompareTimeline]):
             self._apart = None
         elif preset is None:
             subjects = [scene.gesture_subject or scene.subject for scene in self.scenes]
-            self._apart = max(SHOULDER_HALF_WIDTH * 1.3, max(one.half_width for one in upper) * 0.8)
+            self._apart = max(SHOULDER_HALF_WIDTH * 1.3, max(subject.half_width for subject in upper) * 0.8)
         else:
             subjects = [scene.face_subject for scene in self.scenes]
             self._apart = SHOULDER_HALF_WIDTH
-        self._stands = [np.array(one.centre) for one in subjects]
+        self._stands = [np.array(subject.centre) for subject in subjects]
         return camera.fit(self._all(subjects), aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
@@ -214,13 +214,13 @@ class CompareScene(Timed[CompareTimeline]):
             return self._apart
         if scene.has_body:
             return max(scene.subject.half_width, SHOULDER_HALF_WIDTH)
-        heads = max(one.subject.half_width for one in self.scenes if not one.has_body)
+        heads = max(scene.subject.half_width for scene in self.scenes if not scene.has_body)
         return max(heads, SHOULDER_HALF_WIDTH) if self.has_body else heads
 
     def _height(self, number: int) -> Float64:
         """Return (3,): the shift that brings a head alone to the height of heads on bodies."""
         scene = self.scenes[number]
-        with_body = next((one for one in self.scenes if one.has_body), None)
+        with_body = next((other for other in self.scenes if other.has_body), None)
         if scene.has_body or with_body is None:
             return np.zeros(3)
         return np.subtract(with_body.face_subject.centre, scene.face_subject.centre)
@@ -233,11 +233,11 @@ class CompareScene(Timed[CompareTimeline]):
     def _all(self, subjects: list[Subject]) -> Subject:
         """Return one subject around all subjects in their places."""
         right = self._right()
-        centres = [np.array(one.centre) + self._shift(n) for n, one in enumerate(subjects)]
+        centres = [np.array(subject.centre) + self._shift(n) for n, subject in enumerate(subjects)]
         along = [float(centre @ right) for centre in centres]
         widths = [
-            max(one.half_width, (self._apart or 0.0) * 0.7, SHOULDER_HALF_WIDTH if self.has_body else 0.0)
-            for one in subjects
+            max(subject.half_width, (self._apart or 0.0) * 0.7, SHOULDER_HALF_WIDTH if self.has_body else 0.0)
+            for subject in subjects
         ]
         low = min(a - width for a, width in zip(along, widths, strict=True))
         high = max(a + width for a, width in zip(along, widths, strict=True))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -110,10 +109,10 @@ class MarkersScene(Timed[CaptureTimes]):
         vertices, pose = self._moved(frame, after, share)
         names = list(self.editing.motion.names)
         places = [self._cloud(frame, after, share)] if self.shows_cloud else []
-        found = names if self.shows_cloud else []
+        choices = names if self.shows_cloud else []
         if self.editing.beside:
             centres = {name: one.vertex or 0 for name, one in self.editing.mapping.centres.items()}
-            found = [*found, *centres]
+            choices = [*choices, *centres]
             places.append(self.to_world(transform(vertices[list(centres.values())], pose)))
         pixels = (
             project(np.concatenate(places), camera.clip_matrix(size), size)[0] if places else np.zeros((0, 2))
@@ -121,7 +120,7 @@ class MarkersScene(Timed[CaptureTimes]):
         away = np.linalg.norm(pixels - (x, y), axis=1)
         away[np.isnan(away)] = np.inf
         near = away.min(initial=np.inf) <= MAX_CLICK_DISTANCE * size[1] / 720
-        return found[int(away.argmin())] if near else None
+        return choices[int(away.argmin())] if near else None
 
     def to_world(self, points: Float64) -> Float64:
         """Return the points (..., 3) of the head in the world."""
@@ -145,9 +144,9 @@ class MarkersScene(Timed[CaptureTimes]):
         """Lowest and highest corner, (3,), of the part of the head that markers are on, metres."""
         editing = self.editing
         places = self.to_world(editing.head.vertices[np.unique(editing.head.triangles)])
-        known = editing.head.points[np.isfinite(editing.head.points).all(axis=1)]
-        if len(known) > 1:
-            low, high = self.to_world(known)[:, 1].min(), self.to_world(known)[:, 1].max()
+        points = editing.head.points[np.isfinite(editing.head.points).all(axis=1)]
+        if len(points) > 1:
+            low, high = self.to_world(points)[:, 1].min(), self.to_world(points)[:, 1].max()
             near = (places[:, 1] > low) & (places[:, 1] < high)
             places = places[near] if near.any() else places
         return places.min(axis=0), places.max(axis=0)
@@ -237,7 +236,7 @@ class MarkersScene(Timed[CaptureTimes]):
         on_skin = np.zeros(len(head.skin))
         on_skin[editing.influence.vertices] = editing.influence.shares
         shares = head.followers @ on_skin
-        rows: dict[str, Any] = {part.name: own for part, own in zip(head.parts, head.rows, strict=True)}
+        rows = dict(zip((part.name for part in head.parts), head.rows, strict=True))
         painted = []
         for shape in plain:
             colours = np.full((len(rows[shape.name]), 4), GLOSS, dtype=np.float32)
@@ -281,11 +280,11 @@ class MarkersScene(Timed[CaptureTimes]):
         lines: tuple[Lines, ...] = ()
         if self.editing.beside:
             for colour, fixed in ((FIXED, True), (MOVING, False)):
-                own = [
-                    one.vertex for name, one in editing.mapping.centres.items()
-                    if one.fixed == fixed and name != current
+                vertices_of = [
+                    marker.vertex for name, marker in editing.mapping.centres.items()
+                    if marker.fixed == fixed and name != current
                 ]  # fmt: skip
-                groups.append((world[np.array(own, dtype=np.intp)], colour, CENTRE_RADIUS, ""))
+                groups.append((world[np.array(vertices_of, dtype=np.intp)], colour, CENTRE_RADIUS, ""))
         centre = editing.mapping.centres.get(current)
         if self.shows_cloud and source in at:
             groups.append((at[source][None], CURRENT, CURRENT_RADIUS, source))

@@ -65,7 +65,6 @@ class Viewpoint:
 
     @property
     def gliding(self) -> bool:
-        """Whether it is gliding to another view."""
         return self._clock() < max(self._until, self._shift_until)
 
     @property
@@ -92,7 +91,6 @@ class Viewpoint:
         self._fitted_to = (self.aspect, self._fitted_to[1])
 
     def glide(self, camera: Camera) -> None:
-        """Glide to another view."""
         self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE_SECONDS
 
     def preset(self, name: str) -> None:
@@ -110,7 +108,6 @@ class Viewpoint:
         self._shift_until = self._clock() + GLIDE_SECONDS if smoothly else -math.inf
 
     def reset(self) -> None:
-        """Glide back to the first view."""
         self.follow = True
         self.glide(self.beginning)
         self._preset = self._first_view if not isinstance(self._first_view, Camera) else ""

@@ -19,7 +19,7 @@ from fba_player.export.recorder import Recorder
 from fba_player.gl._framebuffer import Target
 from fba_player.gl.renderer import Renderer
 from fba_player.session._session import Session
-from fba_player.sound._recorded_sound import FilmSound
+from fba_player.sound.soundtrack import FilmSound
 
 RATE = 30
 """Frames per second of a film of the window."""
@@ -44,7 +44,6 @@ class Captures:
 
     @property
     def recording(self) -> bool:
-        """Whether a film is being recorded."""
         return self._recorder is not None
 
     def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
@@ -59,7 +58,6 @@ class Captures:
         return path
 
     def toggle_recording(self) -> None:
-        """Start recording a film, or finish it."""
         if self._recorder is not None:
             self._finish()
             return
@@ -173,9 +171,9 @@ def draw_screenshot(
         view, camera = session.view(time), session.viewpoint.camera_without_panels(time)
         views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)] if transparent else [view]
         pictures = []
-        for one in views:
+        for shown in views:
             target.begin()
-            within = renderer.draw(one, camera, session.size)
+            within = renderer.draw(shown, camera, session.size)
             pictures.append(read_pixels(target.finish(within=within), session.size))
     finally:
         scene.show("background", before)

@@ -71,9 +71,9 @@ class Source:
         """Information about the stream; the same object until something changes."""
         if self._probed is not None:
             return self._probed
-        own, timeline, now = self._scene_info, self._scene.timeline, wall.monotonic()
+        before, timeline, now = self._scene_info, self._scene.timeline, wall.monotonic()
         due = not timeline.growing or now - self._updated >= REFRESH_SECONDS
-        if own is None or (own.frames != timeline.frames and due):
+        if before is None or (before.frames != timeline.frames and due):
             self._scene_info, self._updated = self._info_of_scene(), now
         assert self._scene_info is not None
         return self._scene_info
@@ -89,7 +89,6 @@ class Source:
 
     @property
     def probing(self) -> bool:
-        """Whether `probe` is still running in the background."""
         return self._thread is not None and self._thread.is_alive()
 
     @property

@@ -138,7 +138,7 @@ def read_stretches(animation: Animation, model: FaceSettings | None) -> tuple[St
 
 def stretch_at(stretches: tuple[Stretch, ...], time: float) -> Stretch | None:
     """Return the stretch at a time in seconds; None without one."""
-    return next((one for one in stretches if one.start <= time < one.end), None)
+    return next((stretch for stretch in stretches if stretch.start <= time < stretch.end), None)
 
 
 def _stretches(readings: Readings, begin: float, step: float) -> tuple[Stretch, ...]:

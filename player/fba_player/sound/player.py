@@ -76,7 +76,7 @@ class Audio:
             self._device.start(samples_for_device)
         except Exception as error:
             self.close()
-            raise NoDeviceError(", ".join(str(one) for one in error.args) or type(error).__name__) from error
+            raise NoDeviceError(", ".join(map(str, error.args)) or type(error).__name__) from error
         transport.use_clock(self.clock, self.clock.latency)
 
     @property

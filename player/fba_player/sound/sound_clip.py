@@ -30,8 +30,8 @@ def read_time_of_day(path: PathLike) -> float | None:
     container, stream = open_sound(import_av("sound needs"), Path(path))
     try:
         tags = dict(container.metadata)
-        film = [one for one in container.streams if one.type in ("video", "data")]
-        code = tags.get("timecode") or next((one.metadata.get("timecode") for one in film), None)
+        film = [other for other in container.streams if other.type in ("video", "data")]
+        code = tags.get("timecode") or next((other.metadata.get("timecode") for other in film), None)
         reference = str(tags.get("time_reference", ""))
         if code:
             return parse_time_code(code, _film_rate(film))
@@ -71,5 +71,5 @@ def _samples(block: Any) -> Int16:
 
 def _film_rate(streams: list[Any]) -> Fraction | None:
     """Return the frames in a second of the first stream of pictures; None without one."""
-    rates = (one.average_rate for one in streams if one.type == "video")
+    rates = (stream.average_rate for stream in streams if stream.type == "video")
     return next((Fraction(rate) for rate in rates if rate), None)

@@ -9,12 +9,7 @@ import numpy as np
 
 from fba.arrays import Float64
 
-PRESETS = {
-    "front": (0.0, 0.0),
-    "three-quarter": (35.0, 5.0),
-    "profile": (90.0, 0.0),
-    "body": (25.0, 8.0),
-}
+PRESETS = {"front": (0.0, 0.0), "three-quarter": (35.0, 5.0), "profile": (90.0, 0.0), "body": (25.0, 8.0)}
 """Yaw (to the subject's left) and pitch (from above) of the named views, degrees."""
 PITCH_LIMIT = 89.0
 DISTANCES = (0.05, 100.0)

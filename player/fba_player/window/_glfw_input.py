@@ -93,7 +93,6 @@ class GlfwInput:
         self._on_input()
 
     def on_character(self, window: Any, character: int) -> None:
-        """Pass a typed character to imgui."""
         if self._gui is not None:
             self._gui.io.add_input_character(character)
             self._on_input()
@@ -123,13 +122,11 @@ class GlfwInput:
         self._on_input()
 
     def on_enter(self, window: Any, entered: int) -> None:
-        """Handle the mouse entering or leaving the window."""
         if self._gui is not None and not entered:
             self._gui.io.add_mouse_pos_event(-3.4e38, -3.4e38)
         self._on_input()
 
     def on_scroll(self, window: Any, right: float, up: float) -> None:
-        """Handle a turn of the wheel."""
         self._session.touched()
         if self._gui is not None:
             self._gui.io.add_mouse_wheel_event(right, up)
@@ -138,7 +135,6 @@ class GlfwInput:
         self._on_input()
 
     def on_focus(self, window: Any, focused: int) -> None:
-        """Handle the window getting or losing the keyboard focus."""
         if self._gui is not None:
             self._gui.io.add_focus_event(bool(focused))
 

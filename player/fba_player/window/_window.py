@@ -100,7 +100,6 @@ class Window:
 
     @property
     def transport(self) -> Transport:
-        """The current time, playing, and what else `Transport` has."""
         return self.session.transport
 
     def run(self) -> None:

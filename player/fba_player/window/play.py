@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -75,7 +75,7 @@ def play(
         raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
     scene: Showable
     if isinstance(animation, LiveAnimation):
-        scene = Scene(animation, timeline=LiveTimeline(animation))  # type: ignore[arg-type]
+        scene = Scene(cast(Animation, animation), timeline=LiveTimeline(animation))
     else:
         scene = as_scene(animation)
     source = Source(scene, file, bap_steps=bap_steps, warnings=warnings)

@@ -17,8 +17,8 @@ from fba.face.model import FaceModel, point_row
 from fba.player import Camera, Offscreen, Scene
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player.gl._labels import place_names
+from fba_player.scene._display_options import unique_edges
 from fba_player.scene._fap_heatmap import FapHeatmap
-from fba_player.scene._wireframe import unique_edges
 from fba_player.scene.scene import SWITCHES
 from fba_player.view.switches import Switches, parse_switch
 from player_tracks import body_track, face_track

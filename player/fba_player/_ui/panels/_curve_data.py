@@ -61,17 +61,14 @@ class Courses:
 
     @property
     def has_face(self) -> bool:
-        """Whether the timeline has FAPs."""
         return self._timeline.animation.face is not None
 
     @property
     def has_body(self) -> bool:
-        """Whether the timeline has BAPs."""
         return self._timeline.animation.body is not None
 
     @property
     def resolved_share(self) -> float:
-        """Share of the frames whose FAPs have been resolved."""
         return self._done / max(self._timeline.frames, 1) if self.has_face else 1.0
 
     def advance(self, blocks: int = 1) -> bool:
@@ -127,7 +124,7 @@ class Courses:
             for number in range(1, BAP_COUNT + 1):
                 span_here = max(float(high[number - 1]) - float(low[number - 1]), 0.0)
                 spans.append((span_here / bap_reach(number), "bap", number))
-        spans.sort(key=lambda one: (-one[0], one[1:]))
+        spans.sort(key=lambda span: (-span[0], span[1:]))
         movers: list[tuple[str, int]] = []
         for span_here, kind, number in spans:
             if span_here > 0 and not _is_mate(kind, number, movers):
@@ -237,7 +234,6 @@ class TimeZoom:
 
     @property
     def shows_all(self) -> bool:
-        """Whether the full range is shown."""
         return self.low <= self.first + TIME_TOLERANCE and self.high >= self.last - TIME_TOLERANCE
 
     def bound(self, first: float, last: float) -> None:
@@ -252,7 +248,6 @@ class TimeZoom:
             self._set(self.low, self.high)
 
     def reset(self) -> None:
-        """Show the full range."""
         self.low, self.high = self.first, self.last
 
     def zoom(self, factor: float, about: float) -> None:

@@ -44,7 +44,6 @@ class CurvesPanel(Panel):
         self.chooser = Chooser()
 
     def available(self, session: Session) -> bool:
-        """Return whether the scene has FAPs or BAPs."""
         return _timeline(session) is not None
 
     def draw(self, session: Session) -> None:
@@ -66,7 +65,6 @@ class CurvesPanel(Panel):
         self.lanes.draw(session, self._lanes, self.time_zoom, _now(session, chosen, self.which))
 
     def closed(self, session: Session) -> None:
-        """Stop asking for pictures; computed courses stay."""
         session.rolling.discard(self.name)
 
     def _update_courses(self, session: Session) -> Courses:
@@ -149,9 +147,9 @@ def all_parameters() -> tuple[tuple[str, int, str, str], ...]:
         ("fap", faps()[FIRST_LOW_LEVEL_FAP - 1 :]), ("bap", baps()[:BAP_STANDARD_COUNT]),
     ]  # fmt: skip
     for kind, parameters in listed:
-        for one in parameters:
-            searched = f"{kind} {one.number} {one.name} {one.name.replace('_', ' ')} {one.group_name}"
-            rows.append((kind, one.number, f"{one.number} {one.name}", searched.lower()))
+        for row in parameters:
+            searched = f"{kind} {row.number} {row.name} {row.name.replace('_', ' ')} {row.group_name}"
+            rows.append((kind, row.number, f"{row.number} {row.name}", searched.lower()))
     return tuple(rows)
 
 

@@ -36,7 +36,6 @@ class DifferencesPanel(Panel):
         self._curve: tuple[object, Float64, Float64] | None = None
 
     def available(self, session: Session) -> bool:
-        """Return whether several animations are compared."""
         return isinstance(session.scene, CompareScene) and len(session.scene.scenes) > 1
 
     def draw(self, session: Session) -> None:
@@ -53,10 +52,10 @@ class DifferencesPanel(Panel):
         if not largest:
             imgui.text_colored(theme.FAINT, _why_nothing_differs(scene, self._second, differences))
             return
-        if self._chosen not in [(one.kind, one.number) for one in largest]:
+        if self._chosen not in [(item.kind, item.number) for item in largest]:
             self._chosen = (largest[0].kind, largest[0].number)
         self._table(session, largest)
-        chosen = next(one for one in largest if (one.kind, one.number) == self._chosen)
+        chosen = next(item for item in largest if (item.kind, item.number) == self._chosen)
         self._plot(session, differences, chosen)
 
     def _arrangement(self, session: Session, scene: Any) -> None:
@@ -73,16 +72,16 @@ class DifferencesPanel(Panel):
         for title in ("most", "rms", "unit"):
             imgui.table_setup_column(title)
         imgui.table_headers_row()
-        for one in largest:
+        for item in largest:
             imgui.table_next_row()
             imgui.table_next_column()
-            chosen = (one.kind, one.number) == self._chosen
-            title, whole_row = f"{one.number} {one.name}##{one.kind}", imgui.SelectableFlags_.span_all_columns
-            if imgui.selectable(title, chosen, whole_row)[0]:
-                self._chosen = (one.kind, one.number)
-                session.transport.seek(one.time)
-            tooltip(f"{one.kind.upper()} {one.number}: shows its course, and goes to where it differs most")
-            for text in (f"{one.most:.0f}", f"{one.rms:.1f}", _unit(one.unit, one.most)):
+            chosen = (item.kind, item.number) == self._chosen
+            whole_row = imgui.SelectableFlags_.span_all_columns
+            if imgui.selectable(f"{item.number} {item.name}##{item.kind}", chosen, whole_row)[0]:
+                self._chosen = (item.kind, item.number)
+                session.transport.seek(item.time)
+            tooltip(f"{item.kind.upper()} {item.number}: shows its course, and goes to where it differs most")
+            for text in (f"{item.most:.0f}", f"{item.rms:.1f}", _unit(item.unit, item.most)):
                 imgui.table_next_column()
                 imgui.text_colored(theme.TEXT if chosen else theme.FAINT, text)
         imgui.end_table()
@@ -120,9 +119,9 @@ class DifferencesPanel(Panel):
 
 def _why_nothing_differs(scene: Any, second: int, differences: Differences) -> str:
     """Return the text shown where nothing differs: the reason."""
-    one, other = (scene.scenes[number].animation for number in (0, second))
-    both_faces = one.face is not None and other.face is not None
-    both_bodies = one.body is not None and other.body is not None
+    first, other = (scene.scenes[number].animation for number in (0, second))
+    both_faces = first.face is not None and other.face is not None
+    both_bodies = first.body is not None and other.body is not None
     if not (both_faces or both_bodies):
         return "one is a face, the other a body: nothing to compare"
     return "nothing differs" if len(differences.times) else "they have no time in common"

@@ -33,7 +33,7 @@ class FilePanel(Panel):
             if title:
                 heading(title, exact=title[0].isdigit())
             facts(title or "file", rows)
-        troubles = [*source.warnings, *(str(one.error) for one in info.damage)]
+        troubles = [*source.warnings, *(str(lost.error) for lost in info.damage)]
         if troubles:
             heading("Warnings")
             for text in troubles[:20]:
@@ -105,7 +105,7 @@ def _part(part: PartInfo, name: str, frames: int) -> list[tuple[str, str]]:
     if part.frames != frames:
         rows.append(("frames", f"{part.frames} of {frames}"))
     if part.quants:
-        rows.append(("quantiser", ", ".join(str(one) for one in part.quants)))
+        rows.append(("quantiser", ", ".join(str(quant) for quant in part.quants)))
     if part.mask_types:
         rows.append(("masks", ", ".join(part.mask_types)))
     return rows

@@ -146,7 +146,7 @@ class EmotionTab:
 
     def _add(self, mood: PuppetMood, wide: float) -> None:
         """Draw the list of the expressions that have no slider yet."""
-        others = [one.name for one in expressions() if one.name not in mood.weights]
+        others = [expression.name for expression in expressions() if expression.name not in mood.weights]
         chosen = choose_name("##more", ("more ...", *others), 0, wide)
         if chosen:
             mood.set_weight(others[chosen - 1], 0.0)
@@ -167,7 +167,7 @@ def place_labels(
     points = [(x - clear, y - clear, x + clear, y + clear) for x, y in dots.values()]
     used = [*taken, *points]
     placed: dict[str, Box] = {}
-    for name, (x, y) in sorted(dots.items(), key=lambda one: one[1][1]):
+    for name, (x, y) in sorted(dots.items(), key=lambda dot: dot[1][1]):
         wide, high = sizes[name]
         beside, middle = clear + 1, y - high / 2
         best, least = (x, y, x, y), math.inf

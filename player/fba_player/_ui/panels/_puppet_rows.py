@@ -150,9 +150,9 @@ def _is_flipped(number: int) -> bool:
 
 
 def _other_side(name: str) -> str:
-    for one, other in (("left ", "right "), ("right ", "left "), ("l_", "r_"), ("r_", "l_")):
-        if name.startswith(one):
-            return other + name[len(one) :]
+    for side, other in (("left ", "right "), ("right ", "left "), ("l_", "r_"), ("r_", "l_")):
+        if name.startswith(side):
+            return other + name[len(side) :]
     return ""
 
 

@@ -135,7 +135,6 @@ class RatePanel(Panel):
         """Left, top, right, bottom of the bars in points; for tests."""
 
     def available(self, session: Session) -> bool:
-        """Return whether a single animation is shown."""
         return not isinstance(session.scene, CompareScene)
 
     def draw(self, session: Session) -> None:
@@ -164,7 +163,6 @@ class RatePanel(Panel):
         _table(rates)
 
     def closed(self, session: Session) -> None:
-        """Stop asking for pictures; what was encoded stays."""
         session.rolling.discard(self.name)
 
     def _stream(self, session: Session) -> tuple[StreamInfo | None, str]:

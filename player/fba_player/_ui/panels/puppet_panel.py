@@ -226,16 +226,15 @@ class PuppetPanel(Panel):
         return [(row, 1.0), (group.rows[row.mirror], -1.0 if row.flipped else 1.0)]
 
     def _move(self, performer: Performer, group: Group, row: Row, value: float) -> None:
-        for one, sign in self._both(group, row):
-            _set(performer, one.kind, one.numbers, sign * value / one.scale / len(one.numbers))
+        for moved, sign in self._both(group, row):
+            _set(performer, moved.kind, moved.numbers, sign * value / moved.scale / len(moved.numbers))
 
     def _release(self, performer: Performer, group: Group, row: Row) -> None:
-        for one, _ in self._both(group, row):
-            _release(performer, one.kind, one.numbers)
+        for moved, _ in self._both(group, row):
+            _release(performer, moved.kind, moved.numbers)
 
 
 def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None:
-    """Draw the buttons of a group."""
     if imgui.small_button(f"All to zero##{group.name}"):
         _set(performer, group.kind, group.numbers, 0.0)
     if touched:

@@ -17,10 +17,7 @@ PANELS: tuple[type[Panel], ...] = (
 )  # fmt: skip
 
 
-PAGES: dict[str, tuple[type[Panel], ...]] = {
-    "points": (PointsPanel,),
-    "markers": (MarkersPanel, CameraPanel),
-}
+PAGES: dict[str, tuple[type[Panel], ...]] = {"points": (PointsPanel,), "markers": (MarkersPanel, CameraPanel)}
 """Panels of windows for one task, by the name of the page's own panel."""
 
 
