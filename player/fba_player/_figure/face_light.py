@@ -133,7 +133,7 @@ class FaceLight:
         wide = cached_visibility(moved, normals, triangles, near)
         arrays = [
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
-            for before, after in zip(shut.arrays, wide.arrays, strict=True)
+            for before, after in zip(shut, wide, strict=True)
         ]
         return Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
 
@@ -152,7 +152,7 @@ def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, wi
     """Return what `bake` returns, stored in the disk cache: it takes half a second of every start."""
 
     def make() -> list[Float16]:
-        return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
+        return [array.astype(np.float16) for array in bake(positions, normals, triangles, within)]
 
     count = len(within)
     shapes = ((count, HARMONICS), (count, HARMONICS), (count,))
@@ -221,7 +221,7 @@ def _table(baked: Baked, vertices: Intp) -> Table:
     """Return the visibility of some vertices of a model."""
     near = np.flatnonzero(baked.near[vertices])
     shut, wide = (
-        [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]
+        [np.ascontiguousarray(table[rows].T) for table in visibility]
         for visibility, rows in ((baked.shut, vertices), (baked.wide, vertices[near]))
     )
     return Table(shut[0], shut[1], shut[2], wide[0], wide[1], wide[2], near)

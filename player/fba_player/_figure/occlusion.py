@@ -6,8 +6,8 @@ soft shadows of large lights then cost a few products for each vertex, whichever
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +29,7 @@ CACHE_VERSION = "1"
 """Cache version; increment when `bake` gives other results."""
 
 
-@dataclass(frozen=True, eq=False)
-class Visibility:
+class Visibility(NamedTuple):
     """Light that reaches each vertex.
 
     light: float32 (V, 16), harmonics of the visibility of each direction, 1 if free. through: float32
@@ -41,11 +40,6 @@ class Visibility:
     light: Float32
     through: Float32
     open: Float32
-
-    @property
-    def arrays(self) -> tuple[Float32, Float32, Float32]:
-        """(light, through, open)."""
-        return self.light, self.through, self.open
 
 
 def bake(vertices: Float32, normals: Float32, triangles: Int32, within: Bool | None = None) -> Visibility:
@@ -85,16 +79,13 @@ def weights(directions: Float64) -> Float64:
     return np.asarray(harmonics(directions) * np.repeat(SOFTNESS, [1, 3, 5, 7]))
 
 
-def harmonics(directions: Float64) -> Float64:
-    """Return float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
-    values = np.empty((len(directions), HARMONICS))
-    _harmonics(np.ascontiguousarray(directions, dtype=np.float64), values)
-    return values
-
-
 @compiled
-def _harmonics(directions: Float64, values: Float64) -> None:
-    """Write `harmonics`. Bounds: values are made for directions, with HARMONICS columns."""
+def harmonics(directions: Float64) -> Float64:
+    """Return float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3).
+
+    Bounds: values are made here, with HARMONICS columns.
+    """
+    values = np.empty((len(directions), HARMONICS))
     for i in range(len(directions)):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
         values[i, 0] = 0.282095
@@ -113,6 +104,7 @@ def _harmonics(directions: Float64, values: Float64) -> None:
         values[i, 13] = 0.457046 * x * (5 * z * z - 1)
         values[i, 14] = 1.445306 * z * (x * x - y * y)
         values[i, 15] = 0.590044 * x * (x * x - 3 * y * y)
+    return values
 
 
 @cache

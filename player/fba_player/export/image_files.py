@@ -157,8 +157,7 @@ class Sequence:
 
     def write(self, pixels: UInt8, number: int) -> None:
         """Write a picture, uint8 (H, W, 4), as that of frame `number`."""
-        path = self._names.path(number)
-        write_picture(path, pixels, transparent=self._transparent)
+        write_picture(self._names.path(number), pixels, transparent=self._transparent)
 
     def finish(self, count: int) -> Path:
         """Return the folder of the pictures."""

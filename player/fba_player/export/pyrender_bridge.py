@@ -130,22 +130,16 @@ def _face_primitive(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]
     if shape.picture is not None and shape.texcoords is not None:
         texture = pyrender.Texture(source=shape.picture.pixels, source_channels="RGBA")
         attributes["texcoord_0"] = np.stack([shape.texcoords[:, 0], 1 - shape.texcoords[:, 1]], axis=1)
-    material = pyrender.MetallicRoughnessMaterial(
-        baseColorTexture=texture,
-        metallicFactor=0.0,
-        roughnessFactor=_roughness(shape.colours),
-        alphaMode="BLEND" if shape.see_through else "OPAQUE",
-        doubleSided=not shape.closed,
-    )
-    return attributes, material
+    return attributes, _material(
+        pyrender, _roughness(shape.colours), baseColorTexture=texture,
+        alphaMode="BLEND" if shape.see_through else "OPAQUE", doubleSided=not shape.closed,
+    )  # fmt: skip
 
 
 def _mesh_primitive(pyrender: Any, mesh: Mesh) -> tuple[dict[str, Any], Any]:
     shape = mesh.shape
     attributes = _world_attributes(mesh.positions, mesh.normals, mesh.matrix, shape.triangles, shape.colours)
-    rough = _roughness(shape.colours)
-    material = pyrender.MetallicRoughnessMaterial(metallicFactor=0.0, roughnessFactor=rough, doubleSided=True)
-    return attributes, material
+    return attributes, _material(pyrender, _roughness(shape.colours))
 
 
 def _eye_primitive(pyrender: Any, ball: Eye) -> tuple[dict[str, Any], Any]:
@@ -156,8 +150,12 @@ def _eye_primitive(pyrender: Any, ball: Eye) -> tuple[dict[str, Any], Any]:
     colours[front & (across < ball.iris), :3] = np.array(ball.tint) * IRIS_LIGHT
     colours[front & (across < ball.pupil), :3] = PUPIL
     attributes = _world_attributes(points, points, ball.matrix, triangles, colours)
-    material = pyrender.MetallicRoughnessMaterial(metallicFactor=0.0, roughnessFactor=WET, doubleSided=True)
-    return attributes, material
+    return attributes, _material(pyrender, WET)
+
+
+def _material(pyrender: Any, roughness: float, **more: Any) -> Any:
+    options = {"metallicFactor": 0.0, "roughnessFactor": roughness, "doubleSided": True, **more}
+    return pyrender.MetallicRoughnessMaterial(**options)
 
 
 def _world_attributes(

@@ -60,13 +60,6 @@ def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> floa
     return size[1] / (2 * max(away, 1e-6) * math.tan(math.radians(camera.field_of_view) / 2))
 
 
-def _lift(points: Float64, eye: Float64, lift: float) -> Float64:
-    """Return the points (N, 3) moved by `lift` metres towards the eye."""
-    towards = eye - points
-    length = np.linalg.norm(towards, axis=1, keepdims=True)
-    return np.asarray(points + towards * (lift / np.maximum(length, 1e-6)))
-
-
 class ExtrasRenderer:
     """Draws annotations. OpenGL objects are created on first use; `close` frees them."""
 
@@ -211,9 +204,11 @@ class ExtrasRenderer:
         pixels = max(round(NAME_SIZE * scale), MIN_NAME_SIZE)
         texture, boxes = self._label((dots.names, pixels), lambda: names_picture(dots.names, pixels))
         at = dots.positions.astype(np.float64)
-        facing = np.einsum("ij,ij->i", dots.facing, eye - at) >= 0
         pixel, depth = project(at, matrix, size)
-        nearer = project(_lift(at, eye, dots.lift), matrix, size)[1]
+        towards = eye - at
+        facing = np.einsum("ij,ij->i", dots.facing, towards) >= 0
+        away = np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-6)
+        nearer = project(at + towards * (dots.lift / away), matrix, size)[1]
         inside = facing & np.isfinite(depth) & ((pixel >= 0) & (pixel < size)).all(axis=1)
         if not 0 < inside.sum() <= MAX_NAMES:
             return

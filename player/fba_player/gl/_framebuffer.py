@@ -95,16 +95,14 @@ class Target:
             self._pass.render()
         self._gl.scissor = None
         if within is not None and len(within.bands) and everything not in rectangles:
-            self._smooth_bands(within)
+            data = np.ascontiguousarray(within.bands, dtype="f4")
+            if self._bands is None or self._bands.size < data.nbytes:
+                self._bands = self._own(self._gl.buffer(reserve=2 * data.nbytes, dynamic=True))
+                content = [(self._bands, "2f", "in_corner")]
+                self._along = self._own(self._gl.vertex_array(self._program, content))
+            write_buffer(self._bands, data)
+            self._along.render(vertices=len(data))
         return result
-
-    def _smooth_bands(self, within: Steps) -> None:
-        data = np.ascontiguousarray(within.bands, dtype="f4")
-        if self._bands is None or self._bands.size < data.nbytes:
-            self._bands = self._own(self._gl.buffer(reserve=2 * data.nbytes, dynamic=True))
-            self._along = self._own(self._gl.vertex_array(self._program, [(self._bands, "2f", "in_corner")]))
-        write_buffer(self._bands, data)
-        self._along.render(vertices=len(data))
 
     def close(self) -> None:
         for part in reversed(self._parts):

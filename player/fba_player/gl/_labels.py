@@ -6,6 +6,7 @@ import numpy as np
 
 from fba.arrays import Float64, Int64, Intp, UInt8
 from fba_player.view._font import label_font
+from fba_player.view._geometry import overlap
 from fba_player.view._view import Legend
 
 TEXT = (240, 242, 245, 255)
@@ -87,13 +88,9 @@ def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int
         for left, top in (*above, *beside, *beyond):
             box = (left, top, left + wide, top + high)
             within = left >= 0 and top >= 0 and box[2] <= size[0] and box[3] <= size[1]
-            if within and not any(_meet(box, other) for other in taken):
+            if within and not any(overlap(box, other) > 0 for other in taken):
                 taken.append(box)
                 shown.append(number)
                 corners.append((round(left), round(top)))
                 break
     return np.array(shown, dtype=np.intp), np.array(corners, dtype=np.float64).reshape(-1, 2)
-
-
-def _meet(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

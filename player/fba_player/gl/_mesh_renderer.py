@@ -119,7 +119,11 @@ class FaceRenderer:
         if not len(shape.triangles):  # a part so small that no level of detail is left of it from afar
             return
         parts = self._shapes.get(shape, lambda: self._upload(mesh))
-        _upload_vertices(mesh, parts)
+        write_buffer(parts["positions"], mesh.positions)
+        write_buffer(parts["normals"], mesh.normals)
+        if parts["lit"] is None or not share_memory(parts["lit"], mesh.light):
+            parts["lit"] = mesh.light
+            write_buffer(parts["light"], mesh.light)
         away = distance(mesh, self._camera[0]) if mesh.away is None else mesh.away
         wide = self._camera[2] * away
         picture = parts["pictures"].choose(wide)
@@ -207,15 +211,6 @@ class FaceRenderer:
             smaller = np.asarray(Image.fromarray(self._pixels).reduce(2**halvings))
             self._reliefs[halvings] = make_texture(self._gl, smaller)
         return self._reliefs[halvings]
-
-
-def _upload_vertices(mesh: FaceMesh, parts: dict[str, Any]) -> None:
-    """Write positions and normals into a part's buffers, and its light unless that is there already."""
-    write_buffer(parts["positions"], mesh.positions)
-    write_buffer(parts["normals"], mesh.normals)
-    if parts["lit"] is None or not share_memory(parts["lit"], mesh.light):
-        parts["lit"] = mesh.light
-        write_buffer(parts["light"], mesh.light)
 
 
 def _set_shape(program: Any, shape: FaceShape) -> None:

@@ -92,9 +92,13 @@ class Outliner:
 
     def tiles(self) -> Float32:
         """Return (N, 2) corners of triangles over all tiles with outlines, -1..1 across the picture."""
-        corners = np.empty((6 * _runs(self._marked, self._size, np.empty((0, 2), dtype=np.float32)), 2), "f4")
-        _runs(self._marked, self._size, corners)
-        return corners
+        edges = np.diff(np.pad(self._marked, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+        row, first = np.nonzero(edges > 0)  # the beginnings of runs of marked tiles, row by row
+        after = np.nonzero(edges < 0)[1]
+        left, right = (2.0 * column * TILE / self._size[0] - 1.0 for column in (first, after))
+        low, top = (2.0 * down * TILE / self._size[1] - 1.0 for down in (row, row + 1))
+        corners = (left, low), (right, low), (left, top), (left, top), (right, low), (right, top)
+        return np.array(corners, dtype=np.float32).transpose(2, 0, 1).reshape(-1, 2)
 
 
 @compiled
@@ -197,33 +201,3 @@ def _mark(
             for row in range(low, top + 1):
                 for column in range(left, right + 1):
                     marked[row, column] = 1
-
-
-@compiled
-def _runs(marked: UInt8, size: tuple[int, int], corners: Float32) -> int:
-    """Write two triangles for each run of marked tiles if there is room; return the number of runs.
-
-    Bounds: checked for each run; corners have 6 rows for each.
-    """
-    count = 0
-    for row in range(marked.shape[0]):
-        column = 0
-        while column < marked.shape[1]:
-            if marked[row, column] == 0:
-                column += 1
-                continue
-            first = column
-            while column < marked.shape[1] and marked[row, column] != 0:
-                column += 1
-            if 6 * count + 6 <= len(corners):
-                left, right = 2.0 * first * TILE / size[0] - 1.0, 2.0 * column * TILE / size[0] - 1.0
-                low, top = 2.0 * row * TILE / size[1] - 1.0, 2.0 * (row + 1) * TILE / size[1] - 1.0
-                at = 6 * count
-                corners[at, 0], corners[at, 1] = left, low
-                corners[at + 1, 0], corners[at + 1, 1] = right, low
-                corners[at + 2, 0], corners[at + 2, 1] = left, top
-                corners[at + 3, 0], corners[at + 3, 1] = left, top
-                corners[at + 4, 0], corners[at + 4, 1] = right, low
-                corners[at + 5, 0], corners[at + 5, 1] = right, top
-            count += 1
-    return count

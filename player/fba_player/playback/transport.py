@@ -85,12 +85,8 @@ class Transport:
     @property
     def share(self) -> float:
         """The current time as a share: 0 at the start, 1 at the last frame or after."""
-        return self.share_of(self.time)
-
-    def share_of(self, time: float) -> float:
-        """Return a time as a share: 0 at the start, 1 at the last frame or after."""
         duration = self._last_time() - self.start
-        return min(max((time - self.start) / duration, 0.0), 1.0) if duration > 0 else 0.0
+        return min(max((self.time - self.start) / duration, 0.0), 1.0) if duration > 0 else 0.0
 
     @property
     def motion(self) -> Motion:

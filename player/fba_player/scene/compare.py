@@ -159,7 +159,12 @@ class CompareScene(Timed[CompareTimeline]):
             shift = self._shift(number) + travelled - np.array(scene.travel(own_time))
             view = move_view(scene.view_at(own_time), shift)
             if self.names[number] and len(self.scenes) > 1:
-                view = _add_caption(view, self.names[number], self._caption_position(number) + travelled)
+                head = scene.face_subject
+                x, y, z = head.centre
+                place = np.array([x, y + head.half_height * CAPTION_HEIGHT, z]) + self._shift(number)
+                extras = view.extras or Extras()
+                caption = make_caption(self.names[number], place + travelled)
+                view = replace(view, extras=replace(extras, dots=(*extras.dots, caption)))
             views.append(view)
         return join_views(views)
 
@@ -225,11 +230,6 @@ class CompareScene(Timed[CompareTimeline]):
             return np.zeros(3)
         return np.subtract(with_body.face_subject.centre, scene.face_subject.centre)
 
-    def _caption_position(self, number: int) -> Float64:
-        head = self.scenes[number].face_subject
-        x, y, z = head.centre
-        return np.asarray(np.array([x, y + head.half_height * CAPTION_HEIGHT, z]) + self._shift(number))
-
     def _all(self, subjects: list[Subject]) -> Subject:
         """Return one subject around all subjects in their places."""
         right = self._right()
@@ -248,8 +248,3 @@ class CompareScene(Timed[CompareTimeline]):
         middle = middle + right * ((low + high) / 2 - float(middle @ right))
         centre = (float(middle[0]), (bottom + top) / 2, float(middle[2]))
         return Subject(centre, (top - bottom) / 2, (high - low) / 2)
-
-
-def _add_caption(view: View, text: str, position: Float64) -> View:
-    extras = view.extras or Extras()
-    return replace(view, extras=replace(extras, dots=(*extras.dots, make_caption(text, position))))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,10 +69,6 @@ class Scene(Timed[Timeline]):
         self.timeline = timeline or Timeline(animation, self.model)
         self.switches = Switches()
         self.view = view
-        self._figure: FaceFigure | None = None
-        self._point_view: PointView | None = None
-        self._person: Person | None = None
-        self._options: DisplayOptions | None = None
         self._extent: Extent | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
@@ -100,23 +97,31 @@ class Scene(Timed[Timeline]):
         """The animation's name."""
         return self.animation.name
 
-    @property
+    @cached_property
     def figure(self) -> FaceFigure:
         """The face that is shown; built on first use."""
-        if self._figure is None:
-            from fba_player._figure.face import build_figure
+        from fba_player._figure.face import build_figure
 
-            self._figure = build_figure(self.model)
-        return self._figure
+        return build_figure(self.model)
 
-    @property
+    @cached_property
     def person(self) -> Person:
         """The body that is shown, with the face on it; built on first use; only if there is a body."""
-        if self._person is None:
-            from fba_player._figure.person import build_person
+        from fba_player._figure.person import build_person
 
-            self._person = build_person(self._body, self.figure)
-        return self._person
+        return build_person(self._body, self.figure)
+
+    @cached_property
+    def _point_view(self) -> PointView:
+        from fba_player.scene._feature_points_view import PointView
+
+        return PointView(self.figure)
+
+    @cached_property
+    def _options(self) -> DisplayOptions:
+        from fba_player.scene._display_options import DisplayOptions
+
+        return DisplayOptions(self.figure, self._bones if self.has_body else None)
 
     @property
     def has_body(self) -> bool:
@@ -180,10 +185,8 @@ class Scene(Timed[Timeline]):
         view = self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints)
         if not self.switches.changed:
             return view
-        from fba_player.scene._display_options import DisplayOptions, Posture
+        from fba_player.scene._display_options import Posture
 
-        if self._options is None:
-            self._options = DisplayOptions(self.figure, self._bones if self.has_body else None)
         return self._options.apply(view, self.switches, Posture(faps, self._face_matrix(joints), joints))
 
     def _person_or_head(self, faps: Float32, joints: Float64 | None) -> View:
@@ -201,10 +204,6 @@ class Scene(Timed[Timeline]):
 
     def _points(self, faps: Float32, joints: Float64 | None) -> View:
         """Return the view of feature points and bones."""
-        if self._point_view is None:
-            from fba_player.scene._feature_points_view import PointView
-
-            self._point_view = PointView(self.figure)
         points, matrix = self._point_view, self._face_matrix(joints)
         view = View(
             meshes=points.meshes(faps, matrix),

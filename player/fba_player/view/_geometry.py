@@ -12,6 +12,9 @@ from fba.rotations import quaternions, unit
 from fba_player.view._view import FaceMesh
 from fba_player.view.camera import Camera
 
+Box = tuple[float, float, float, float]
+"""Left, top, right and bottom of an upright rectangle."""
+
 
 def world_positions(mesh: FaceMesh) -> Float32:
     """Return float32 (V, 3): the mesh's positions in the world."""
@@ -88,6 +91,13 @@ def ray_through(camera: Camera, x: float, y: float, size: tuple[int, int]) -> tu
     up = (1 - 2 * y / size[1]) * tall
     direction = np.array([right, up, -1.0]) @ camera.view_matrix()[:3, :3]
     return camera.eye, direction / np.linalg.norm(direction)
+
+
+def overlap(first: Box, second: Box) -> float:
+    """Return the area that two boxes share."""
+    wide = min(first[2], second[2]) - max(first[0], second[0])
+    high = min(first[3], second[3]) - max(first[1], second[1])
+    return max(wide, 0.0) * max(high, 0.0)
 
 
 def first_hit(origin: Float64, direction: Float64, corners: Float64) -> tuple[int, Float64] | None:

@@ -47,7 +47,7 @@ def figure() -> FaceFigure:
 def shown(subject: Animation, view: str = "figure") -> Scene:
     """A scene whose face need not be made anew."""
     scene = Scene(subject, only_figure().model, view=view)
-    scene._figure = only_figure()
+    scene.__dict__["figure"] = only_figure()
     return scene
 
 

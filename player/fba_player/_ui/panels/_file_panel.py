@@ -58,8 +58,8 @@ def _sections(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[
 def _sections_of_several(scene: Any) -> list[tuple[str, list[tuple[str, str]]]]:
     """Return (heading, rows) of each of several animations that are compared."""
     parts = []
-    for number, (name, one) in enumerate(zip(scene.names, scene.scenes, strict=True)):
-        times, animation = one.timeline, one.animation
+    for number, (name, shown) in enumerate(zip(scene.names, scene.scenes, strict=True)):
+        times, animation = shown.timeline, shown.animation
         rows = [("frames", f"{times.frames}"), ("rate", f"{float(times.rate):g} frames/s")]
         rows.append(("duration", clock_text(times.duration)))
         if times.start:

@@ -13,6 +13,12 @@ MIN_COLUMN_WIDTH = 296.0
 """Least width of a column in points."""
 KEY_WIDTH = 104.0
 """Width of the keys in a column, in points."""
+COLUMNS = {
+    2: (("Play", "Save", "Window"), ("View", "Switches", "Mouse")),
+    3: (("Play",), ("View", "Switches", "Save"), ("Window", "Mouse")),
+    4: (("Play",), ("View", "Switches", "Save"), ("Window",), ("Mouse",)),
+}
+"""Groups in each column, by the number of columns."""
 
 
 class HelpPanel(Panel):
@@ -28,7 +34,7 @@ class HelpPanel(Panel):
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
         if columns > 1 and imgui.begin_table("columns", columns):
             imgui.table_next_row()
-            for names in _columns(columns):
+            for names in COLUMNS[columns]:
                 imgui.table_next_column()
                 for name in names:
                     _group(name, groups.get(name, []))
@@ -37,15 +43,6 @@ class HelpPanel(Panel):
             for name, rows in groups.items():
                 _group(name, rows)
         imgui.pop_style_var()
-
-
-def _columns(count: int) -> list[list[str]]:
-    """Return the names of the groups in each of `count` columns, 2 to 4."""
-    if count == 2:
-        return [["Play", "Save", "Window"], ["View", "Switches", "Mouse"]]
-    if count == 3:
-        return [["Play"], ["View", "Switches", "Save"], ["Window", "Mouse"]]
-    return [["Play"], ["View", "Switches", "Save"], ["Window"], ["Mouse"]]
 
 
 def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:

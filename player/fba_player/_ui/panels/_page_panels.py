@@ -9,7 +9,16 @@ from imgui_bundle import imgui
 
 from fba.capture.virtual_markers.mapping import ASSIGNMENTS, OVERLAPS
 from fba_player._ui import theme
-from fba_player._ui.panels.panel import Panel, choose_by_button, facts, heading, shorten, tooltip, wrapped
+from fba_player._ui.panels.panel import (
+    Panel,
+    choose_by_button,
+    facts,
+    heading,
+    shorten,
+    sized,
+    tooltip,
+    wrapped,
+)
 from fba_player.scene._point_placement import MATES, PointPlacement, describe_point
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.session._pages import MARKER_KEYS, MARKING, PLACING, POINT_KEYS, Edited, Page
@@ -71,13 +80,6 @@ class EditingPanel(Panel, Generic[Edited]):
         self._scrolled_to = edited.current
 
 
-def draw_name(name: str) -> None:
-    """Draw the name of the current item, large."""
-    imgui.push_font(None, theme.LARGE)
-    imgui.text_colored(theme.ACCENT, name)
-    imgui.pop_font()
-
-
 def draw_buttons(
     session: Session, page: Page[Edited], edited: Edited, rows: Sequence[Sequence[tuple[str, str, bool]]]
 ) -> None:
@@ -118,7 +120,7 @@ class PointsPanel(EditingPanel[PointPlacement]):
 
 def _draw_point(session: Session, placement: PointPlacement) -> None:
     name = placement.current
-    draw_name(name)
+    sized(name, theme.LARGE, theme.ACCENT)
     wrapped(describe_point(name))
     wrapped(_place_text(placement, name), theme.FAINT)
     rows = (
@@ -183,7 +185,7 @@ class MarkersPanel(EditingPanel[MarkerEditing]):
 
 def _draw_marker(session: Session, editing: MarkerEditing) -> None:
     marker = editing.marker
-    draw_name(editing.current)
+    sized(editing.current, theme.LARGE, theme.ACCENT)
     if marker is None:
         wrapped("not on the head yet: click where it is", theme.WARM)
     elif marker.vertex is None:

@@ -15,6 +15,7 @@ from fba_player._ui.panels.panel import choose_name, heading, shorten, tooltip, 
 from fba_player.session._mood import PuppetMood
 from fba_player.session.performer import Performer
 from fba_player.session.puppet import Expression, Viseme
+from fba_player.view._geometry import Box, overlap
 
 MAX_PLANE_HEIGHT = 240.0
 MIN_PLANE_HEIGHT = 130.0
@@ -33,10 +34,6 @@ AXIS_TEXT = 11.0
 """Size of the names at the ends of the axes, in points."""
 SIDE_SPACE = 10.0
 """Space around the plane for the dots at its edge, in points."""
-
-
-Box = tuple[float, float, float, float]
-"""Left, top, right, bottom, in points."""
 
 
 class EmotionTab:
@@ -177,19 +174,12 @@ def place_labels(
             corners += [(x + side, at) for at in (down, up) for side in (beside, -wide / 2, -beside - wide)]
             for left, top in corners:
                 box = (left, top, left + wide, top + high)
-                covers = sum(_overlap(box, other) for other in used) + wide * high - _overlap(box, within)
+                covers = sum(overlap(box, other) for other in used) + wide * high - overlap(box, within)
                 if covers < least - 0.5:
                     best, least = box, covers
         placed[name] = best
         used.append(best)
     return placed
-
-
-def _overlap(one: Box, other: Box) -> float:
-    """Return the area that two boxes share."""
-    wide = min(one[2], other[2]) - max(one[0], other[0])
-    high = min(one[3], other[3]) - max(one[1], other[1])
-    return max(wide, 0.0) * max(high, 0.0)
 
 
 def _width(text: str, size: float) -> float:

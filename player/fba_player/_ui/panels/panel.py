@@ -82,8 +82,13 @@ def wrapped(text: str, colour: theme.Colour = theme.TEXT) -> None:
 def heading(text: str, *, exact: bool = False) -> None:
     """Draw a heading, in capitals unless `exact`, which is for text with names in it."""
     imgui.dummy((0, 2))
-    imgui.push_font(None, theme.SMALL)
-    imgui.text_colored(theme.ACCENT, text if exact else text.upper())
+    sized(text if exact else text.upper(), theme.SMALL, theme.ACCENT)
+
+
+def sized(text: str, size: float, colour: theme.Colour) -> None:
+    """Draw a text in letters of this size, in points."""
+    imgui.push_font(None, size)
+    imgui.text_colored(colour, text)
     imgui.pop_font()
 
 
