@@ -19,11 +19,11 @@ HEIGHT = 124.0
 """Height of the bar in points."""
 LOW_HEIGHT = 60.0
 """Height in windows that have room for the timeline only."""
-TOP = 24.0
-TRACK = 40.0
-BUTTONS = TOP + TRACK + 13.0
+TRACK_TOP = 24.0
+TRACK_HEIGHT = 40.0
+BUTTONS = TRACK_TOP + TRACK_HEIGHT + 13.0
 """Upper edge and height of the timeline, and the upper edge of the buttons, in points."""
-STRIP = (4.0, 9.0)
+STRIP_EDGES = (4.0, 9.0)
 """Upper and lower edge of the strip of expressions, in points below the timeline."""
 GRIP_DISTANCE = 7.0
 """Distance in points within which the mouse grabs a mark."""
@@ -69,12 +69,12 @@ class Bar:
     def _timeline(self, session: Session, ruler: Ruler, y: float) -> None:
         transport = session.transport
         to = imgui.get_window_draw_list()
-        top, bottom = y + TOP, y + TOP + TRACK
+        top, bottom = y + TRACK_TOP, y + TRACK_TOP + TRACK_HEIGHT
         self.area = (ruler.left, top, ruler.right, bottom)
         if ruler.right - ruler.left < 8:
             return
         imgui.set_cursor_screen_pos((ruler.left - GRIP_DISTANCE, y + 4))
-        size = (ruler.right - ruler.left + 2 * GRIP_DISTANCE, TOP - 4 + TRACK)
+        size = (ruler.right - ruler.left + 2 * GRIP_DISTANCE, TRACK_TOP - 4 + TRACK_HEIGHT)
         imgui.invisible_button("timeline", size, EITHER_BUTTON)
         hovered = imgui.is_item_hovered()
         self._drag(session, ruler)
@@ -128,14 +128,14 @@ class Bar:
         if trace is None:
             return
         scale = session.scale
-        size = (max(round((ruler.right - ruler.left) * scale), 1), max(round((TRACK - 4) * scale), 1))
+        size = (max(round((ruler.right - ruler.left) * scale), 1), max(round((TRACK_HEIGHT - 4) * scale), 1))
         key = (trace, size, ruler.low, ruler.high)
         if self._trace[:-1] != key:
             picture = trace_picture(trace, ruler.low, ruler.high, size)
             self._trace = (*key, self._renderer.set_picture("trace", picture))
         image: Any = self._trace[-1]
         to = imgui.get_window_draw_list()
-        to.add_image(image, (ruler.left, top + 4), (ruler.right, top + TRACK))
+        to.add_image(image, (ruler.left, top + 4), (ruler.right, top + TRACK_HEIGHT))
 
     def _draw_expressions(self, session: Session, to: imgui.ImDrawList, ruler: Ruler, bottom: float) -> None:
         """Draw the expressions that the face shows, the stronger the less transparent."""
@@ -145,7 +145,7 @@ class Bar:
                 continue
             left, right = ruler.x(stretch.start), min(ruler.x(stretch.end), ruler.right)
             alpha = 0.35 + 0.65 * stretch.intensity / 100
-            corners = (left, bottom + STRIP[0]), (max(right, left + 1), bottom + STRIP[1])
+            corners = (left, bottom + STRIP_EDGES[0]), (max(right, left + 1), bottom + STRIP_EDGES[1])
             to.add_rect_filled(*corners, theme.packed(colour, alpha), rounding=2.0)
 
     def _scale(self, to: imgui.ImDrawList, ruler: Ruler, y: float, bottom: float) -> None:
@@ -157,7 +157,7 @@ class Bar:
         for x in small:
             to.add_line((x, bottom - 3), (x, bottom), faint)
         for x, left, text in large:
-            to.add_line((x, y + TOP), (x, bottom), line)
+            to.add_line((x, y + TRACK_TOP), (x, bottom), line)
             to.add_text(font, 12.0, (left, y + 5), colour, text)
 
     def _marks(self, session: Session, to: imgui.ImDrawList, ruler: Ruler, top: float, bottom: float) -> None:

@@ -27,7 +27,7 @@ ASPECT = 4 / 3
 """Width / height of the film."""
 MAX_FILM_SECONDS = Fraction(15)
 """Longest film: longer ones would make the page large, and the reader wait."""
-RATE = Fraction(30)
+MAX_PREVIEW_RATE = Fraction(30)
 """Most frames per second."""
 MAX_FILM_BYTES = 4 << 20
 """Size of a film above which the page gets a still picture instead."""
@@ -98,7 +98,7 @@ class Preview:
         from fba_player.export.render import film_rate, record
 
         rate = film_rate(scene.timeline.rate)
-        rate /= -(-rate // RATE)  # an integer fraction: frames are left out evenly
+        rate /= -(-rate // MAX_PREVIEW_RATE)  # an integer fraction: frames are left out evenly
         begin, end = scene.timeline.start, scene.timeline.end
         begin = begin if self._start is None else max(Fraction(self._start), begin)
         end = end if self._end is None else min(Fraction(self._end), end)

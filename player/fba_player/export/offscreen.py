@@ -17,7 +17,7 @@ from fba_player.gl.renderer import Renderer
 from fba_player.scene.scene import Scene
 from fba_player.view._view import View
 from fba_player.view.camera import Camera
-from fba_player.view.protocols import Showable
+from fba_player.view.protocols import Closing, Showable
 
 SAMPLES = 0
 """Samples per pixel; 0 is one, with edges smoothed afterwards."""
@@ -25,7 +25,7 @@ TRANSPARENT_SAMPLES = 4
 """Least samples per pixel if the background is transparent."""
 
 
-class Offscreen:
+class Offscreen(Closing):
     """Renders a scene into memory; needs no display.
 
     subject: an animation or a scene. size: width and height in pixels, at least 1 each. camera: a `Camera`,
@@ -130,12 +130,6 @@ class Offscreen:
         self._renderer = self._target = self._multisampled = None
         self._gl.release()
         self._gl = None
-
-    def __enter__(self) -> Offscreen:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def cut_out(black: UInt8, white: UInt8) -> UInt8:

@@ -18,7 +18,8 @@ MIN_LEGEND_HEIGHT = 240
 """Pixels: lower pictures have no legend."""
 MAX_NAMES = 45
 """If more points are in view, none is named."""
-GAP = 2.0
+NAME_GAP = 2.0
+"""Pixels between a dot and its name."""
 
 
 def legend_picture(legend: Legend, scale: float) -> UInt8:
@@ -77,7 +78,7 @@ def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int
     inside = np.isfinite(dots).all(axis=1) & ((dots >= 0) & (dots < size)).all(axis=1)
     if inside.sum() > MAX_NAMES:
         return np.zeros(0, dtype=np.intp), np.zeros((0, 2))
-    reach = radius + GAP
+    reach = radius + NAME_GAP
     taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in dots[inside]]
     shown, corners = [], []
     for number in np.flatnonzero(inside):

@@ -26,9 +26,9 @@ MOVING: Colour = (0.95, 0.62, 0.25, 1.0)
 FIXED: Colour = (0.62, 0.70, 0.80, 1.0)
 FREE: Colour = (0.93, 0.94, 0.96, 0.55)
 CURRENT: Colour = (0.25, 0.75, 1.0, 1.0)
-LINE: Colour = (0.25, 0.75, 1.0, 0.55)
+LINE_COLOUR: Colour = (0.25, 0.75, 1.0, 0.55)
 """Moving, fixed and unmapped markers, the current one, and the line from it to its vertex."""
-RADIUS = 4.2
+MARKER_RADIUS = 4.2
 CENTRE_RADIUS = 2.6
 CURRENT_RADIUS = 6.0
 """Radii of dots, pixels in a picture 720 high."""
@@ -275,7 +275,7 @@ class MarkersScene(Timed[CaptureTimes]):
                 (MOVING, [name for name in at if name in markers and not markers[name].fixed]),
             ):
                 places = np.array([at[name] for name in chosen if name != source]).reshape(-1, 3)
-                groups.append((places, colour, RADIUS, ""))
+                groups.append((places, colour, MARKER_RADIUS, ""))
         world = self.to_world(transform(vertices, pose))
         lines: tuple[Lines, ...] = ()
         if self.editing.beside:
@@ -292,7 +292,7 @@ class MarkersScene(Timed[CaptureTimes]):
             groups.append((world[centre.vertex][None], CURRENT, CURRENT_RADIUS - 1, ""))
             if self.shows_cloud and source in at:
                 ends = np.stack([at[source], world[centre.vertex]])[None]
-                lines = (Lines(ends.astype(np.float32), LINE, 1.2, LIFT),)
+                lines = (Lines(ends.astype(np.float32), LINE_COLOUR, 1.2, LIFT),)
         dots = tuple(
             make_dots(points, (name,) * len(points), colour, radius, LIFT)
             for points, colour, radius, name in groups

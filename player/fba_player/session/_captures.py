@@ -21,7 +21,7 @@ from fba_player.gl.renderer import Renderer
 from fba_player.session._session import Session
 from fba_player.sound.soundtrack import FilmSound
 
-RATE = 30
+FILM_RATE = 30
 """Frames per second of a film of the window."""
 SAMPLES = 4
 """Samples per pixel of a screenshot, which need not be fast."""
@@ -64,7 +64,7 @@ class Captures:
         path = self._unused_path("-film", ".mp4")
         sound = self._open_sound()
         try:
-            self._recorder = Recorder(path, self.session.size, rate=RATE, audio=sound)
+            self._recorder = Recorder(path, self.session.size, rate=FILM_RATE, audio=sound)
         except (OSError, FbaError, ValueError) as error:
             if sound is not None:
                 sound.close()

@@ -14,9 +14,10 @@ from fba.arrays import Int16
 from fba.atomic import PathLike
 from fba.errors import FbaWarning, FormatError
 from fba_player.sound._pyav import av_version, import_av
+from fba_player.view.protocols import Closing
 
 CHANNELS = 2
-RATES = (8000, 192_000)
+PLAYABLE_RATES = (8000, 192_000)
 """Samples per second, least and most; other rates are resampled to `USUAL_RATE`."""
 USUAL_RATE = 48_000
 READABLE_RATES = (1000, 1_000_000)
@@ -51,7 +52,7 @@ def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
     return container, stream
 
 
-class SoundFile:
+class SoundFile(Closing):
     """The first audio track of a file, as stereo samples at one rate.
 
     path: WAV, MP3, FLAC, OGG, M4A: anything that FFmpeg reads. rates: samples per second that need no
@@ -111,12 +112,6 @@ class SoundFile:
         if self._container is not None:
             self._container.close()
 
-    def __enter__(self) -> SoundFile:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _open(self) -> None:
         if self._container is not None:
             self._container.close()
@@ -126,7 +121,7 @@ class SoundFile:
         low, high = READABLE_RATES
         if not low <= rate <= high:
             raise FormatError(f"claims {rate} samples a second; {low} to {high} can be read", path=self.path)
-        fits = rate in self._rates if self._rates else RATES[0] <= rate <= RATES[1]
+        fits = rate in self._rates if self._rates else PLAYABLE_RATES[0] <= rate <= PLAYABLE_RATES[1]
         return rate if fits else USUAL_RATE
 
     def _seek(self, start: int) -> int:

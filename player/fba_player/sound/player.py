@@ -25,6 +25,7 @@ from fba_player.sound._mixer import SoundMixer
 from fba_player.sound._read_ahead import SoundBlocks, samples_ahead
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 from fba_player.sound.soundtrack import find_sound_beside
+from fba_player.view.protocols import Closing
 
 __all__ = ["Audio", "find_sound_beside", "open_audio"]
 
@@ -44,7 +45,7 @@ class NoDeviceError(Exception):
     """No sound can be played on this machine; the text says why."""
 
 
-class Audio:
+class Audio(Closing):
     """Plays an audio file in step with a transport; a context manager.
 
     path: anything that FFmpeg reads. transport: follows the device's clock from now on. offset: seconds by
@@ -118,12 +119,6 @@ class Audio:
             self._device = None
             self.transport.use_clock(wall.monotonic)
         self._blocks.close()
-
-    def __enter__(self) -> Audio:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _device_samples(self) -> Generator[bytes, int, None]:
         """Yield the samples for the device as bytes; runs in its thread."""

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, Self, TypeVar
 
 from fba_player.view._view import View
 from fba_player.view.camera import Camera
@@ -92,6 +92,20 @@ class Timed(Generic[Own]):
     def head_travel(self, time: float) -> tuple[float, float, float]:
         """Return the displacement of the head from the start to a time, metres; by default that of all."""
         return self.travel(time)
+
+
+class Closing:
+    """A context manager that calls `close` at the end of its block."""
+
+    def close(self) -> None:
+        """Release its resources; safe to call twice."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 class Showable(Protocol):

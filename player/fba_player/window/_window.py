@@ -28,6 +28,7 @@ from fba_player.session._pages import page_of
 from fba_player.session._session import Session
 from fba_player.session._source import Source
 from fba_player.view.camera import Camera
+from fba_player.view.protocols import Closing
 from fba_player.window._glfw_input import GlfwInput
 from fba_player.window._plain_overlay import Overlay, draw_opening
 from fba_player.window.display import HOW_WITHOUT, FullScreen, start_glfw
@@ -49,7 +50,7 @@ SETTLING_PICTURES = 4
 """Pictures drawn after an input: imgui needs some until the panels have settled."""
 
 
-class Window:
+class Window(Closing):
     """A window that shows a scene; a context manager. See `fba.player.play`.
 
     There can be one at a time, in the main thread. panels: False shows the plain timeline instead of panels,
@@ -165,12 +166,6 @@ class Window:
                 self._glfw.destroy_window(self._window)
                 self._window = None
             self._glfw.terminate()
-
-    def __enter__(self) -> Window:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _open(self, size: tuple[int, int]) -> None:
         glfw = self._glfw

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
@@ -38,7 +39,7 @@ INSTEAD: dict[Subject, str] = {
 def check_page(subject: Subject) -> None:
     """Raise DisplayError, which ends with what to do instead, if the page for a subject cannot be shown."""
     try:
-        import imgui_bundle  # noqa: F401 - pages are made with it
+        import_module("imgui_bundle")  # pages are made with it
     except ImportError as error:
         raise DisplayError(
             f"the page for {subject} needs imgui: {error}. {cure(error, 'mpeg4-fba[player]')}. "

@@ -24,7 +24,7 @@ LABEL_HEIGHT = 19.0
 """Height in points of the name and values above a curve."""
 CURVE_HEIGHT = 36.0
 """Height in points of a curve."""
-GAP = 7.0
+LANE_GAP = 7.0
 """Points between two curves."""
 AXIS = 22.0
 """Height in points of the time labels below the curves."""
@@ -96,9 +96,9 @@ class Lanes:
                 self._lane(session, lane, ruler, time_zoom, y, now.get(lane.key))
             if number == 0:
                 self.area = (left, y + LABEL_HEIGHT, left + wide, y + LABEL_HEIGHT + CURVE_HEIGHT)
-            y += LABEL_HEIGHT + CURVE_HEIGHT + GAP
+            y += LABEL_HEIGHT + CURVE_HEIGHT + LANE_GAP
         imgui.set_cursor_screen_pos((left, top))
-        imgui.dummy((1, max(y - top - GAP, 1)))
+        imgui.dummy((1, max(y - top - LANE_GAP, 1)))
         imgui.end_child()
         imgui.pop_style_var(2)
         bottom = imgui.get_cursor_screen_pos().y
