@@ -110,7 +110,7 @@ def test_many_times_at_once_are_the_same_as_one_by_one(interpolate: bool) -> Non
         timeline.many([0.0, float("nan")])
 
 
-def test_ntsc_frames_are_found_by_their_own_times() -> None:
+def test_ntsc_frames_are_at_their_times() -> None:
     timeline = Timeline(face_animation([{3: t} for t in range(2000)], rate="30000/1001"))
     for frame in (0, 1, 777, 1999):
         assert timeline.position(float(timeline.time_of(frame)))[0] == frame

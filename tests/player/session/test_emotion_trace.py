@@ -38,7 +38,7 @@ def test_stretches_follow_each_other() -> None:
     assert stretch_at(found, 8.5) is None
 
 
-def test_without_a_face_and_for_long_ones_there_are_none(monkeypatch: object) -> None:
+def test_no_expressions_without_a_face_and_for_long_animations(monkeypatch: object) -> None:
     body = BodyTrack(np.zeros((3, 296), dtype=np.int32), np.ones((3, 296), dtype=bool))
     assert read_stretches(Animation(25, np.arange(3), None, body), None) == ()
     face = angry_for_a_while()

@@ -77,7 +77,7 @@ def test_courses_grow_as_frames_arrive() -> None:
     assert course.times[-1] == pytest.approx(99 / 25 + 2.0)
 
 
-def test_those_that_move_most_come_first_and_only_one_of_mates() -> None:
+def test_parameters_that_move_most_come_first_and_one_of_mates() -> None:
     face = face_track([{3: 0, 31: 0, 32: 0, 49: 0}, {3: 400, 31: 240, 32: 240, 49: 4500}])
     body = body_track([{32: 0, 181: 0}, {32: 157080, 181: 30}])  # 90 degrees, and 3 cm
     courses = complete(Courses(Timeline(Animation(25, np.arange(2), face, body))))  # type: ignore[arg-type]
